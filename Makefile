@@ -1,0 +1,53 @@
+# `make demo` and `make test` do all set-up by themselves; `make help` lists the rest.
+SHELL := /bin/bash
+PYTHON ?=
+VENV := .venv
+BIN := $(VENV)/bin
+# One stamp each, so that set-up is done again only when pyproject.toml changes.
+READY := $(VENV)/.ready-demo
+READY_DEV := $(VENV)/.ready-dev
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-all lint format wheel clean clean-kernels
+
+help:  ## what there is
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 24
+
+demo: $(READY)  ## step steer with the three steering systems: table, MCAP files and a plot in demo/
+	$(BIN)/activesteer run step_steer -c none -c ars -c afs --plot -o demo
+
+test: lint  ## lint, types, module borders, and every test that is not slow
+	$(BIN)/python -m pytest -m "not slow"
+
+test-all: lint  ## the same with the slow tests
+	$(BIN)/python -m pytest
+
+lint: $(READY_DEV)  ## ruff, pyright, import-linter
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/lint-imports --no-logo
+
+format: $(READY_DEV)  ## format the code and mend what ruff can mend
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+wheel: $(READY_DEV)  ## build dist/*.whl
+	$(BIN)/python -m build --wheel --no-isolation
+
+clean-kernels:  ## delete the compiled kernels that numba keeps beside the sources
+	find activesteer tests \( -name '*.nbi' -o -name '*.nbc' \) -delete
+
+clean: clean-kernels  ## delete the environment and everything generated
+	rm -rf $(VENV) build dist demo .pytest_cache .ruff_cache .import_linter_cache
+
+$(BIN)/python:
+	tools/make_environment.sh $(VENV) $(PYTHON)
+
+$(READY): pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[plot]'
+	@touch $@
+
+$(READY_DEV): pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $(READY) $@

@@ -1,0 +1,134 @@
+"""What the paper says about the step steer, as checks on three recordings.
+
+The criteria were written down before any parameter of the controllers was chosen.
+
+Source: V. Dorsch, Implementation of active Steering Systems into a Multibody Vehicle Model by Co-Simulation,
+Mecatronics-REM 2012, section on the step steering input.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from activesteer.analysis import step_response
+from activesteer.analysis.source import RecordingLike
+from activesteer.errors import ParameterError
+
+SYSTEMS: Final = ("none", "ars", "afs")
+"""The runs that are compared: no control, active rear steering, active front superposition."""
+
+DELAY_TOLERANCE_S: Final = 0.005
+"""A response time counts as longer when it is longer by more than this [s]: five steps of the controller."""
+
+LEAST_ANGLE_RAD: Final = math.radians(0.01)
+"""A settled angle smaller than this has no sign [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """One statement of the paper, checked.
+
+    Attributes:
+        id: Its number.
+        text: What is claimed.
+        criterion: What must hold for it to pass.
+        passed: Whether it does.
+        values: The numbers it was decided on, named `<system>_<metric>`.
+    """
+
+    id: str
+    text: str
+    criterion: str
+    passed: bool
+    values: dict[str, float]
+
+
+def step_steer_claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
+    """Check claims S1 to S5.
+
+    Args:
+        recordings: Step steers with the same steering input, by system; the three of `SYSTEMS` are needed.
+
+    Returns:
+        Five claims, in order. A value that does not exist (nan) lets its claim fail.
+
+    Raises:
+        ParameterError: one of the three runs is missing.
+        RecordingError: a run is no step steer.
+    """
+    missing = [system for system in SYSTEMS if system not in recordings]
+    if missing:
+        raise ParameterError(
+            f"the claims about the step steer need the runs {', '.join(SYSTEMS)}; missing: {', '.join(missing)}"
+        )
+    runs = {system: step_response.metrics(recordings[system]) for system in SYSTEMS}
+    return [_peak(runs), _delay(runs), _rear_angle(runs), _front_angle(runs), _sideslip(runs)]
+
+
+_Runs = dict[str, dict[str, float]]
+
+
+def _peak(runs: _Runs) -> Claim:
+    values = _pick(runs, "yaw_rate_peak_radps")
+    none, ars, afs = (abs(value) for value in values.values())
+    return Claim(
+        "S1",
+        "Both systems lower the peak of the yaw rate.",
+        "The peak yaw rate of ars and of afs is below that of none.",
+        ars < none and afs < none,
+        values,
+    )
+
+
+def _delay(runs: _Runs) -> Claim:
+    values = _pick(runs, "yaw_rate_response_time_s")
+    none, ars, afs = values.values()
+    return Claim(
+        "S2",
+        "Neither system makes the car answer later.",
+        "The yaw rate of ars and of afs reaches 90 % of its steady-state value, counted from half the steering angle, "
+        f"at most {1000.0 * DELAY_TOLERANCE_S:.0f} ms after that of none.",
+        ars <= none + DELAY_TOLERANCE_S and afs <= none + DELAY_TOLERANCE_S,
+        values,
+    )
+
+
+def _rear_angle(runs: _Runs) -> Claim:
+    rear_rad, front_rad = runs["ars"]["rear_steer_steady_state_rad"], runs["ars"]["front_steer_steady_state_rad"]
+    return Claim(
+        "S3",
+        "The rear wheels settle turned against the front wheels.",
+        "In ars, the steady-state rear angle has the sign opposite to that of the front wheels.",
+        rear_rad * front_rad < 0.0 and abs(rear_rad) > LEAST_ANGLE_RAD,
+        {"ars_rear_steer_steady_state_rad": rear_rad, "ars_front_steer_steady_state_rad": front_rad},
+    )
+
+
+def _front_angle(runs: _Runs) -> Claim:
+    added_rad = runs["afs"]["superposition_steady_state_rad"]
+    wheel_rad = runs["afs"]["steering_wheel_steady_state_rad"]
+    return Claim(
+        "S4",
+        "The superposed angle adds to the driver's.",
+        "In afs, the steady-state superposition angle has the sign of the steering wheel angle.",
+        added_rad * wheel_rad > 0.0 and abs(added_rad) > LEAST_ANGLE_RAD,
+        {"afs_superposition_steady_state_rad": added_rad, "afs_steering_wheel_steady_state_rad": wheel_rad},
+    )
+
+
+def _sideslip(runs: _Runs) -> Claim:
+    values = _pick(runs, "sideslip_steady_state_rad")
+    return Claim(
+        "S5",
+        "Rear steering makes the sideslip angle larger.",
+        "The magnitude of the steady-state sideslip angle of ars is above that of none.",
+        abs(values["ars_sideslip_steady_state_rad"]) > abs(values["none_sideslip_steady_state_rad"]),
+        values,
+    )
+
+
+def _pick(runs: _Runs, metric: str) -> dict[str, float]:
+    return {f"{system}_{metric}": runs[system][metric] for system in SYSTEMS}

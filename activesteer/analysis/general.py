@@ -1,0 +1,46 @@
+"""Metrics that make sense for every manoeuvre: peaks, root mean squares, and the friction that the tyres used."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import CORNERS
+
+SIGNALS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("roll", "rad"))
+"""Channels that are evaluated: name and unit suffix."""
+
+LEAST_LOAD_N: Final = 100.0
+"""Vertical load below which a tyre carries nothing that matters and its force ratio is not looked at [N]."""
+
+
+def metrics(recording: RecordingLike) -> dict[str, float]:
+    """Peaks and root mean squares of a run.
+
+    Returns:
+        `<name>_peak_abs_<unit>` and `<name>_rms_<unit>` of yaw rate, lateral acceleration, sideslip and roll, the
+        largest steering wheel angle, `friction_used_max` (largest ratio of horizontal to vertical tyre force, of all
+        corners) and `speed_end_mps`.
+
+    Raises:
+        RecordingError: a channel is missing.
+    """
+    values: dict[str, float] = {}
+    for name, unit in SIGNALS:
+        channel = np.asarray(recording[f"{name}_{unit}"], dtype=np.float64)
+        values[f"{name}_peak_abs_{unit}"] = float(np.abs(channel).max())
+        values[f"{name}_rms_{unit}"] = float(np.sqrt(np.mean(channel**2)))
+    values["steering_wheel_peak_abs_rad"] = float(np.abs(recording["steering_wheel_rad"]).max())
+    values["friction_used_max"] = max(_friction_used(recording, corner) for corner in CORNERS)
+    values["speed_end_mps"] = float(recording["speed_mps"][-1])
+    return values
+
+
+def _friction_used(recording: RecordingLike, corner: str) -> float:
+    fx_N, fy_N, fz_N = (np.asarray(recording[f"{corner}_tyre_f{axis}_N"], dtype=np.float64) for axis in "xyz")
+    loaded = fz_N > LEAST_LOAD_N
+    if not loaded.any():
+        return 0.0
+    return float((np.hypot(fx_N, fy_N)[loaded] / fz_N[loaded]).max())

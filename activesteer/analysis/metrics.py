@@ -1,0 +1,29 @@
+"""The metrics that belong to a recording, chosen by the kind of its manoeuvre."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from activesteer.analysis import general, step_response
+from activesteer.analysis.source import RecordingLike, maneuver_kind
+
+BY_KIND: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
+    "step_steer": step_response.metrics,
+}
+"""Kinds of manoeuvre with metrics of their own; every other kind gets those of `general`."""
+
+
+def metrics(recording: RecordingLike) -> dict[str, float]:
+    """Metrics of a run.
+
+    Args:
+        recording: The run; `metadata["maneuver"]["kind"]` says what was driven.
+
+    Returns:
+        Metric name, ending in its unit, to value; nan where the run does not define one.
+
+    Raises:
+        RecordingError: the metadata name no kind, a channel is missing, or the run is not what its kind promises.
+    """
+    return BY_KIND.get(maneuver_kind(recording), general.metrics)(recording)

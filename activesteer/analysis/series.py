@@ -1,0 +1,159 @@
+"""Sampled signals: smoothing, crossings, and the response to a step. Plain functions on arrays."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import RecordingError
+
+Array = NDArray[np.floating]
+
+SMOOTHING_S: Final = 0.04
+"""Width of the smoothing window [s]. A cubic fit over it leaves a 3 Hz oscillation unchanged to 1e-4 of its amplitude
+and takes white noise at 1 kHz down to a quarter."""
+
+RATE_SPAN_S: Final = 0.01
+"""Time over which a rate of change is taken [s]."""
+
+PEAK_MARGIN: Final = 0.005
+"""A maximum less than this share above the steady-state value is no peak."""
+
+
+class StepResponse(NamedTuple):
+    """How a signal follows a step. Times count from the step; nan where a value does not exist.
+
+    Attributes:
+        steady_state: Value at the end.
+        response_time_s: Time to 90 % of the steady-state value [s].
+        peak: Largest value in the direction of the steady-state value.
+        peak_time_s: Time of the peak [s].
+        overshoot: (peak - steady state)/steady state.
+        notes: Why a value is nan, one sentence each.
+    """
+
+    steady_state: float
+    response_time_s: float
+    peak: float
+    peak_time_s: float
+    overshoot: float
+    notes: tuple[str, ...]
+
+
+def smooth(values: Array, timestep_s: float) -> Array:
+    """Smoothing without delay: a cubic fitted around every sample (Savitzky and Golay, 1964).
+
+    Args:
+        values: Samples at equal distances, shape (n,).
+        timestep_s: Distance of the samples [s].
+
+    Returns:
+        Smoothed samples, shape (n,); the samples themselves where the window holds fewer than five.
+    """
+    half = round(SMOOTHING_S / timestep_s / 2.0)
+    window = 2 * half + 1
+    if window < 5 or window > len(values):
+        return values
+    # Row i of the projection gives the fitted value at place i of a window, from the samples of the window: the middle
+    # row slides over the signal, the others serve its two ends. (scipy.signal takes half a second to import.)
+    powers = np.vander(np.arange(-half, half + 1) / half, 4)
+    fit = powers @ np.linalg.pinv(powers)
+    inside = np.convolve(values, fit[half][::-1], mode="valid")
+    return np.concatenate((fit[:half] @ values[:window], inside, fit[half + 1 :] @ values[-window:]))
+
+
+def crossing_time(time_s: Array, values: Array, level: float) -> float:
+    """First time at which a signal rises through a level, interpolated between samples.
+
+    Args:
+        time_s: Time of the samples [s], ascending, shape (n,).
+        values: Samples, shape (n,).
+        level: Level, in the unit of `values`.
+
+    Returns:
+        Time [s]; nan if the signal never rises through the level.
+    """
+    rising = np.flatnonzero((values[:-1] < level) & (values[1:] >= level))
+    if rising.size == 0:
+        return math.nan
+    i = int(rising[0])
+    share = (level - values[i]) / (values[i + 1] - values[i])
+    return float(time_s[i] + share * (time_s[i + 1] - time_s[i]))
+
+
+def largest_rate(values: Array, timestep_s: float) -> float:
+    """Largest rate of change, taken over `RATE_SPAN_S`: unlike the slope of a smoothed signal it does not overshoot.
+
+    Args:
+        values: Samples at equal distances, shape (n,).
+        timestep_s: Distance of the samples [s].
+
+    Returns:
+        Magnitude of the rate, in the unit of `values` per second; nan if the signal is shorter than the span.
+    """
+    span = max(1, round(RATE_SPAN_S / timestep_s))
+    if len(values) <= span:
+        return math.nan
+    return float(np.abs(values[span:] - values[:-span]).max() / (span * timestep_s))
+
+
+def timestep(time_s: Array) -> float:
+    """Distance of equidistant samples [s].
+
+    Raises:
+        RecordingError: fewer than two samples, or they are not equidistant within 1 % of a step.
+    """
+    if len(time_s) < 2:
+        raise RecordingError(f"{len(time_s)} samples are too few to analyse, at least 2 are needed")
+    steps = np.diff(time_s)
+    mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
+    if mean_s <= 0.0 or float(np.abs(steps - mean_s).max()) > 0.01 * mean_s:
+        raise RecordingError(
+            f"the samples are not equidistant: steps between {steps.min():.6g} s and {steps.max():.6g} s; "
+            "metrics need a recording of every step"
+        )
+    return mean_s
+
+
+def step_response(time_s: Array, values: Array, step_time_s: float, window_s: float, least: float) -> StepResponse:
+    """Evaluate the response of one signal to a step.
+
+    The signal is at zero before the step; it may move either way. Noise is reduced by `smooth` before crossings and
+    maxima are looked for; the steady-state value is the mean of the samples themselves.
+
+    Args:
+        time_s: Time [s], equidistant, shape (n,).
+        values: Signal, shape (n,).
+        step_time_s: Time of the step [s].
+        window_s: Length of the window at the end whose mean is the steady-state value [s].
+        least: Smallest steady-state value to which times and overshoot are referred, in the unit of the signal.
+
+    Returns:
+        The response. Its response time is nan if 90 % is never passed, its peak time if the largest value lies in the
+        window at the end or exceeds the steady-state value by less than `PEAK_MARGIN`: such a response only settles.
+
+    Source: ISO 7401, step input: response time, peak response time, overshoot.
+    """
+    steady_state = float(np.mean(values[time_s >= time_s[-1] - window_s]))
+    direction = math.copysign(1.0, steady_state)
+    after = time_s >= step_time_s
+    moving_s, moving = time_s[after], direction * smooth(values, timestep(time_s))[after]
+    top = int(np.argmax(moving))
+    peak = direction * float(moving[top])
+    if abs(steady_state) < least:
+        note = f"the steady-state value {steady_state:.3g} is too small to refer to (below {least:.3g})"
+        return StepResponse(steady_state, math.nan, peak, math.nan, math.nan, (note,))
+
+    notes: list[str] = []
+    response_time_s = crossing_time(moving_s, moving, 0.9 * abs(steady_state)) - step_time_s
+    if math.isnan(response_time_s):
+        notes.append("90 % of the steady-state value is not passed after the step")
+    overshoot = (peak - steady_state) / steady_state
+    peak_time_s = float(moving_s[top]) - step_time_s
+    if overshoot < PEAK_MARGIN or moving_s[top] >= time_s[-1] - window_s:
+        peak_time_s = math.nan
+        notes.append(f"no peak stands out: the largest value is {100.0 * overshoot:.2g} % above the steady-state value")
+    return StepResponse(steady_state, response_time_s, peak, peak_time_s, overshoot, tuple(notes))

@@ -1,0 +1,136 @@
+"""Metrics of a step steer by ISO 7401.
+
+The car runs straight ahead before the step, so every value is counted from zero. t = 0 is where the steering wheel
+passes half of its final angle, interpolated between samples. A steady-state value is the mean over the last second.
+
+Source: ISO 7401, Road vehicles - Lateral transient response test methods, step input.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from activesteer.analysis.series import crossing_time, largest_rate, step_response, timestep
+from activesteer.analysis.source import RecordingLike
+from activesteer.errors import RecordingError
+
+STEADY_WINDOW_S: Final = 1.0
+"""Length of the window at the end of the run whose mean is the steady-state value [s]."""
+
+LEAST_STEP_RAD: Final = math.radians(0.5)
+"""Smallest final steering wheel angle that counts as a step [rad]."""
+
+
+class Signal(NamedTuple):
+    """A signal that is evaluated.
+
+    Attributes:
+        name: First part of the names of its metrics.
+        unit: Unit suffix.
+        least: Smallest steady-state value to which times and overshoot are referred; below it the run says nothing
+            about them.
+    """
+
+    name: str
+    unit: str
+    least: float
+
+
+SIGNALS: Final = (
+    Signal("yaw_rate", "radps", 1e-3),
+    Signal("ay", "mps2", 1e-2),
+    Signal("roll", "rad", 1e-4),
+    Signal("sideslip", "rad", 1e-4),
+)
+
+STEADY_CHANNELS: Final = (
+    ("steering_wheel", "rad"),
+    ("front_steer", "rad"),
+    ("rear_steer", "rad"),
+    ("superposition", "rad"),
+)
+"""Channels of which only the steady-state value is given: channel name and unit suffix."""
+
+
+class StepSteer(NamedTuple):
+    """Metrics of one step steer.
+
+    Attributes:
+        values: Metric name, ending in its unit, to value.
+        notes: Name of the signal to the reasons why some of its values are nan.
+    """
+
+    values: dict[str, float]
+    notes: dict[str, tuple[str, ...]]
+
+
+def evaluate(recording: RecordingLike) -> StepSteer:
+    """Metrics of a step steer, with the reasons for what could not be evaluated.
+
+    For each of yaw rate, lateral acceleration (`ay`), roll and sideslip: `<name>_steady_state_<unit>`,
+    `<name>_response_time_s` (90 %), `<name>_peak_<unit>`, `<name>_peak_time_s`, `<name>_overshoot`. Peaks are taken in
+    the direction of the steady-state value. `tb_srad` is the peak response time of the yaw rate times the magnitude of
+    the steady-state sideslip. Then the steering: `step_time_s`, its largest rate, settled angles; `speed_end_mps`.
+
+    Args:
+        recording: A run with one step of the steering wheel, to either side, and at least two seconds after it.
+
+    Returns:
+        Values and notes. Times are from t = 0 [s], except `step_time_s`, which is from the beginning of the run.
+
+    Raises:
+        RecordingError: there is no step, it has no beginning, the run ends too early after it, or a channel is missing.
+    """
+    time_s = np.asarray(recording.time_s, dtype=np.float64)
+    steering_rad = np.asarray(recording["steering_wheel_rad"], dtype=np.float64)
+    step_time_s = _step_time(time_s, steering_rad)
+
+    values: dict[str, float] = {"step_time_s": step_time_s}
+    notes: dict[str, tuple[str, ...]] = {}
+    for signal in SIGNALS:
+        channel = np.asarray(recording[f"{signal.name}_{signal.unit}"], dtype=np.float64)
+        response = step_response(time_s, channel, step_time_s, STEADY_WINDOW_S, signal.least)
+        values[f"{signal.name}_steady_state_{signal.unit}"] = response.steady_state
+        values[f"{signal.name}_response_time_s"] = response.response_time_s
+        values[f"{signal.name}_peak_{signal.unit}"] = response.peak
+        values[f"{signal.name}_peak_time_s"] = response.peak_time_s
+        values[f"{signal.name}_overshoot"] = response.overshoot
+        if response.notes:
+            notes[signal.name] = response.notes
+    values["tb_srad"] = values["yaw_rate_peak_time_s"] * abs(values["sideslip_steady_state_rad"])
+
+    settled = time_s >= time_s[-1] - STEADY_WINDOW_S
+    values["steering_wheel_max_rate_radps"] = largest_rate(steering_rad, timestep(time_s))
+    for name, unit in STEADY_CHANNELS:
+        values[f"{name}_steady_state_{unit}"] = float(np.mean(recording[f"{name}_{unit}"][settled]))
+    values["speed_end_mps"] = float(recording["speed_mps"][-1])
+    return StepSteer(values, notes)
+
+
+def metrics(recording: RecordingLike) -> dict[str, float]:
+    """The values of `evaluate` alone."""
+    return evaluate(recording).values
+
+
+def _step_time(time_s: np.ndarray, steering_rad: np.ndarray) -> float:
+    final_rad = float(np.mean(steering_rad[time_s >= time_s[-1] - STEADY_WINDOW_S]))
+    if not abs(final_rad) >= LEAST_STEP_RAD:
+        raise RecordingError(
+            f"the recording holds no step steer: the steering wheel ends at {math.degrees(final_rad):.3g} deg, "
+            f"at least {math.degrees(LEAST_STEP_RAD):.3g} deg to either side are needed"
+        )
+    step_time_s = crossing_time(time_s, math.copysign(1.0, final_rad) * steering_rad, 0.5 * abs(final_rad))
+    if math.isnan(step_time_s):
+        raise RecordingError(
+            f"the step steer has no beginning: the steering wheel stands at {math.degrees(steering_rad[0]):.3g} deg "
+            f"from the first sample on and ends at {math.degrees(final_rad):.3g} deg"
+        )
+    if time_s[-1] - step_time_s < 2.0 * STEADY_WINDOW_S:
+        raise RecordingError(
+            f"the run ends {time_s[-1] - step_time_s:.3g} s after the step at {step_time_s:.3g} s; "
+            f"steady-state values need at least {2.0 * STEADY_WINDOW_S:.3g} s"
+        )
+    return step_time_s

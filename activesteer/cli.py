@@ -1,0 +1,267 @@
+"""The command line: `activesteer run | list | info | bench`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.version import __version__
+
+_DEFAULT_FOLDER: Final = Path("runs")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of the console script.
+
+    Args:
+        arguments: Words after the program's name; those of the process where not given.
+
+    Returns:
+        Exit status: 0, 1 for an error that was explained, 130 after Ctrl-C.
+    """
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    try:
+        return options.action(options)
+    except ActiveSteerError as error:
+        lines = [f"activesteer: {error}", *getattr(error, "__notes__", [])]
+        print("\n".join(lines), file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("activesteer: stopped; what was recorded until then is saved", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="activesteer", description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--version", action="version", version=f"activesteer {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="drive a manoeuvre and record it")
+    run.add_argument("maneuver", metavar="MANEUVER", help="a name from `activesteer list`, or a TOML file")
+    run.add_argument(
+        "-c", "--controller", action="append", metavar="CONTROLLER",
+        help="none, ars, afs, or my_file.py:MyController; one run for each (default: none)",
+    )  # fmt: skip
+    run.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
+    run.add_argument(
+        "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
+        help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
+    )  # fmt: skip
+    run.add_argument(
+        "-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="FILE_OR_DIR",
+        help="a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap (default: runs)",
+    )  # fmt: skip
+    run.add_argument("--plot", action="store_true", help="also draw the runs (step steer)")
+    run.add_argument("--json", action="store_true", help="print metrics as JSON and nothing else")
+    run.set_defaults(action=_run)
+
+    listing = commands.add_parser("list", help="manoeuvres, controllers and vehicles that there are")
+    listing.set_defaults(action=_list)
+
+    info = commands.add_parser("info", help="what a recording holds")
+    info.add_argument("file", type=Path, metavar="FILE.mcap")
+    info.set_defaults(action=_info)
+
+    bench = commands.add_parser("bench", help="where the time of a step goes")
+    bench.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    bench.set_defaults(action=_bench)
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    from activesteer.analysis.tables import comparison
+    from activesteer.runner import prepared, run_scenario
+    from activesteer.scenario import resolve
+
+    controllers = options.controller or ["none"]
+    scenario = resolve(options.maneuver, options.vehicle, dict(_override(text) for text in options.overrides))
+    paths = _output_paths(options.output, scenario.maneuver.name, controllers)
+    scenario = prepared(scenario)
+    recordings = {}
+    for controller, path in zip(controllers, paths, strict=True):
+        label = _label(controller)
+        progress = _Progress(f"{scenario.maneuver.name} {label}", quiet=options.json)
+        recordings[label] = run_scenario(scenario, controller, path=path, progress=progress)
+        progress.end(str(path))
+    claims = _claims(recordings)
+    if options.json:
+        runs = [
+            {"controller": controller, "file": str(path), "metrics": recording.metrics}
+            for controller, path, recording in zip(controllers, paths, recordings.values(), strict=True)
+        ]
+        _print_json({"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs, "claims": claims})
+    else:
+        print(comparison({label: recording.metrics for label, recording in recordings.items()}))
+        for claim in claims:
+            print(f"{claim['id']} {'passed' if claim['passed'] else 'FAILED'}: {claim['text']}")
+    if options.plot:
+        _plot(recordings, paths[0].parent / f"{scenario.maneuver.name}.png", quiet=options.json)
+    return 0
+
+
+def _label(controller: str) -> str:
+    """How a controller is called in files and tables: the class of a user's own."""
+    return controller.rpartition(":")[2]
+
+
+def _output_paths(output: Path, maneuver: str, controllers: Sequence[str]) -> list[Path]:
+    labels = [_label(controller) for controller in controllers]
+    if len(set(labels)) != len(labels):
+        msg = f"-c: {', '.join(controllers)}: every controller can be given once"
+        raise ParameterError(msg)
+    if output.suffix == ".mcap":
+        if len(controllers) > 1:
+            msg = f"-o {output}: {len(controllers)} controllers make as many files; give a folder"
+            raise ParameterError(msg)
+        folder, paths = output.parent, [output]
+    else:
+        folder, paths = output, [output / f"{maneuver}-{label}.mcap" for label in labels]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        msg = f"-o {output}: cannot make the folder {folder}: {reason.strerror}"
+        raise ParameterError(msg) from reason
+    return paths
+
+
+def _override(text: str) -> tuple[str, Any]:
+    """`key=value`, the value as in TOML; what is no TOML value is a text."""
+    key, sign, value = text.partition("=")
+    if not sign or not key:
+        msg = f"--set {text}: KEY=VALUE is needed, as in --set road.mu=0.4"
+        raise ParameterError(msg)
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value
+
+
+def _claims(recordings: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The paper's claims, where the runs are those that they speak of."""
+    from activesteer.analysis.claims import SYSTEMS, step_steer_claims
+
+    first = next(iter(recordings.values()))
+    if first.metadata["maneuver"]["kind"] != "step_steer" or not set(SYSTEMS) <= set(recordings):
+        return []
+    return [
+        {
+            "id": claim.id,
+            "text": claim.text,
+            "passed": claim.passed,
+            "values": claim.values,
+            "criterion": claim.criterion,
+        }
+        for claim in step_steer_claims(recordings)
+    ]
+
+
+def _plot(recordings: Mapping[str, Any], path: Path, *, quiet: bool) -> None:
+    from activesteer.analysis.plots import step_steer_figure
+
+    kind = next(iter(recordings.values())).metadata["maneuver"]["kind"]
+    if kind != "step_steer":
+        msg = f"--plot: there is a figure for step_steer, none yet for {kind}"
+        raise ParameterError(msg)
+    step_steer_figure(recordings, path)
+    if not quiet:
+        print(f"figure: {path}")
+
+
+class _Progress:
+    """A bar on the terminal; silent where standard error is none."""
+
+    def __init__(self, label: str, *, quiet: bool) -> None:
+        self._label = label
+        self._shown = not quiet and sys.stderr.isatty()
+        self._quiet = quiet
+
+    def __call__(self, share: float) -> None:
+        if self._shown:
+            filled = round(30 * share)
+            print(f"\r{self._label} [{'#' * filled}{' ' * (30 - filled)}] {share:4.0%}", end="", file=sys.stderr)
+
+    def end(self, result: str) -> None:
+        """Replaces the bar by what came out."""
+        if self._shown:
+            print("\r" + " " * (len(self._label) + 40) + "\r", end="", file=sys.stderr)
+        if not self._quiet:
+            print(f"{self._label}: {result}", file=sys.stderr)
+
+
+def _list(_options: argparse.Namespace) -> int:
+    from activesteer.config import read_toml
+    from activesteer.controllers import BUILT_IN
+    from activesteer.resources import find_maneuver, list_maneuvers, list_vehicles
+
+    print("manoeuvres:")
+    for name in list_maneuvers():
+        title = read_toml(find_maneuver(name))[0].get("title", "")
+        print(f"  {name:24} {title}")
+    print("controllers:")
+    for name, made_from in BUILT_IN.items():
+        print(f"  {name:24} {(made_from.__doc__ or '').splitlines()[0]}")
+    print("  my_file.py:MyController  a class of your own with step(self, command, measurement)")
+    print("vehicles:")
+    for name in list_vehicles():
+        print(f"  {name}")
+    return 0
+
+
+def _info(options: argparse.Namespace) -> int:
+    from activesteer.analysis.tables import comparison
+    from activesteer.recording import Recording
+
+    recording = Recording.open(options.file, recover=True)
+    metadata = recording.metadata
+    time_s = recording.time_s
+    span = f"{time_s[0]:.3f} to {time_s[-1]:.3f} s, {len(time_s)} steps" if len(time_s) else "no steps"
+    print(f"{options.file}: {span}")
+    for key in ("maneuver", "vehicle"):
+        table = metadata.get(key, {})
+        print(f"{key}: {table.get('name', '?')} {table.get('title', '')}".rstrip())
+    print(f"controller: {metadata.get('controller', '?')}")
+    for key in ("overrides", "versions"):
+        if metadata.get(key):
+            print(f"{key}: " + ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
+    if not metadata.get("complete", True):
+        print(f"INCOMPLETE: {metadata.get('error', 'the run did not end properly')}")
+    if recording.metrics:
+        print(comparison({"metrics": recording.metrics}))
+    print("channels:")
+    for channel in recording.channels:
+        print(f"  {channel.name:32} {channel.unit or '-':6} {channel.meaning}")
+    print("attachments: " + ", ".join(recording.attachments))
+    return 0
+
+
+def _bench(options: argparse.Namespace) -> int:
+    from activesteer.bench import bench
+
+    results = bench()
+    if options.json:
+        _print_json(results)
+        return 0
+    for name, value in results.items():
+        print(f"{name:28} {value:8.2f}")
+    return 0
+
+
+def _print_json(value: Any) -> None:
+    print(json.dumps(_finite(value), indent=2))
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no nan: a value that is not defined becomes null."""
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

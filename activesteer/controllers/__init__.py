@@ -1,0 +1,21 @@
+"""Active steering controllers: DriverCommand, Measurement -> SteerCommand."""
+
+from activesteer.controllers.front_superposition import FrontSuperposition
+from activesteer.controllers.loading import BUILT_IN, Controller, load_controller
+from activesteer.controllers.no_control import NoControl
+from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
+from activesteer.controllers.rear_steer import RearSteer
+from activesteer.controllers.single_track import SingleTrack, SingleTrackParameters
+
+__all__ = [
+    "BUILT_IN",
+    "Controller",
+    "ControllerParameters",
+    "ControllerSetup",
+    "FrontSuperposition",
+    "NoControl",
+    "RearSteer",
+    "SingleTrack",
+    "SingleTrackParameters",
+    "load_controller",
+]

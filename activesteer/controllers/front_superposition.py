@@ -1,0 +1,54 @@
+"""Active front steering: an angle added to the driver's by the yaw rate error (Dorsch 2012, section V.B)."""
+
+from __future__ import annotations
+
+from activesteer.controllers.corrector import Corrector, decide
+from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
+from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
+from activesteer.controllers.single_track import SingleTrack
+from activesteer.signals import DriverCommand, Measurement, SteerCommand
+
+
+class FrontSuperposition:
+    """Active front steering (AFS): the corrector of the rear system with the opposite sign, and no prediction."""
+
+    def __init__(self, desired: DesiredYawRate, parameters: FrontSuperpositionParameters, timestep_s: float) -> None:
+        """Takes its parts.
+
+        Args:
+            desired: Desired yaw rate, from the driver's own angle.
+            parameters: Gains and limit.
+            timestep_s: Time between two steps [s].
+        """
+        self._desired = desired
+        self._corrector = Corrector(parameters.corrector, timestep_s)
+        self._limit_rad = parameters.limit_rad
+        self._saturated = False
+
+    @classmethod
+    def from_vehicle(cls, setup: ControllerSetup) -> FrontSuperposition:
+        """Makes the controller for a car."""
+        desired = DesiredYawRate(
+            SingleTrack(setup.single_track), setup.gains.desired_yaw_rate, setup.mu, setup.timestep_s
+        )
+        return cls(desired, setup.gains.afs, setup.timestep_s)
+
+    def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:
+        """Angle to add now.
+
+        Args:
+            command: What the driver does.
+            measurement: What the car's sensors say.
+
+        Returns:
+            The angle to add at the front wheels.
+        """
+        desired = self._desired.step(command.front_steer_rad, measurement.speed_mps)
+        if measurement.speed_mps < MIN_SPEED_MPS:
+            return SteerCommand(yaw_rate_desired_radps=desired)
+        error = desired - measurement.yaw_rate_radps
+        feedback = self._corrector.step(error, hold_integral=self._saturated)
+        angle = decide(measurement.yaw_rate_radps, feedback).front * abs(feedback)
+        limited = min(max(angle, -self._limit_rad), self._limit_rad)
+        self._saturated = limited != angle
+        return SteerCommand(0.0, limited, desired, 0.0, angle, self._saturated)

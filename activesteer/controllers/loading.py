@@ -1,0 +1,125 @@
+"""Controllers by name, or from a user's own file."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from activesteer.controllers.front_superposition import FrontSuperposition
+from activesteer.controllers.no_control import NoControl
+from activesteer.controllers.parameters import ControllerSetup
+from activesteer.controllers.rear_steer import RearSteer
+from activesteer.errors import ControllerError, nearest_names
+from activesteer.signals import DriverCommand, Measurement, SteerCommand
+
+
+class Controller(Protocol):
+    """What a controller must have: one method."""
+
+    def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:
+        """Steer command for the next step."""
+        ...
+
+
+BUILT_IN: Final = {"none": NoControl, "ars": RearSteer, "afs": FrontSuperposition}
+"""Name -> class."""
+
+_MOST_RAD: Final = 1.0
+"""No road wheel is steered further by a controller; more is taken for a mistake, such as degrees [rad]."""
+
+
+def load_controller(name: str, setup: ControllerSetup) -> Controller:
+    """Makes a controller.
+
+    Args:
+        name: `none`, `ars`, `afs`, or a user's own as `path/to/file.py:ClassName`. A class with a classmethod
+            `from_vehicle(setup)` is made by it, another one by calling it without arguments.
+        setup: What the controller may know of the car.
+
+    Returns:
+        The controller.
+
+    Raises:
+        ControllerError: there is no such controller, or it cannot be made.
+    """
+    made_from = BUILT_IN[name] if name in BUILT_IN else _user_class(name)
+    try:
+        controller = made_from.from_vehicle(setup) if hasattr(made_from, "from_vehicle") else made_from()
+    except Exception as reason:
+        if name in BUILT_IN:
+            raise
+        msg = f"controller {name}: {made_from.__name__} cannot be made: {type(reason).__name__}: {reason}"
+        raise ControllerError(msg) from reason
+    if not callable(getattr(controller, "step", None)):
+        msg = f"controller {name}: {made_from.__name__} has no method step(command, measurement)"
+        raise ControllerError(msg)
+    return controller
+
+
+def user_file(name: str) -> dict[str, bytes]:
+    """The file of a user's own controller, to be kept with the recording; empty for a built-in one."""
+    path_text, _, _ = name.rpartition(":")
+    path = Path(path_text)
+    return {path.name: path.read_bytes()} if name not in BUILT_IN and path.is_file() else {}
+
+
+def _user_class(name: str) -> Any:
+    path_text, _, class_name = name.rpartition(":")
+    if not path_text or not class_name:
+        msg = f"there is no controller {name!r}; {nearest_names(name, BUILT_IN)} A file is given as my_file.py:MyController"
+        raise ControllerError(msg)
+    path = Path(path_text)
+    if not path.is_file():
+        msg = f"controller {name}: there is no file {path}"
+        raise ControllerError(msg)
+    spec = importlib.util.spec_from_file_location(f"activesteer_user_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        msg = f"controller {name}: {path} is no Python file"
+        raise ControllerError(msg)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as reason:
+        msg = f"controller {name}: {path} cannot be run: {type(reason).__name__}: {reason}"
+        raise ControllerError(msg) from reason
+    found = getattr(module, class_name, None)
+    if not isinstance(found, type):
+        classes = [key for key, value in vars(module).items() if isinstance(value, type)]
+        msg = f"controller {name}: {path} has no class {class_name!r}; {nearest_names(class_name, classes)}"
+        raise ControllerError(msg)
+    return found
+
+
+def is_sane(steer: SteerCommand) -> bool:
+    """Whether both angles are finite and within reason; quick, because it is asked every step."""
+    return -_MOST_RAD <= steer.rear_steer_rad <= _MOST_RAD and -_MOST_RAD <= steer.superposition_rad <= _MOST_RAD
+
+
+def check_command(steer: object, name: str) -> None:
+    """Says what is wrong with what a controller returned.
+
+    Args:
+        steer: What it returned.
+        name: The controller, for the message.
+
+    Raises:
+        ControllerError: it is no steering command, or an angle is not finite or beyond 1 rad.
+    """
+    if not isinstance(steer, SteerCommand):
+        msg = f"controller {name}: step returned {steer!r}; a SteerCommand is needed (from activesteer import SteerCommand)"
+        raise ControllerError(msg)
+    for key in ("rear_steer_rad", "superposition_rad"):
+        value = getattr(steer, key)
+        try:
+            good = -_MOST_RAD <= value <= _MOST_RAD
+        except TypeError:
+            good = False
+        if not good:
+            msg = (
+                f"controller {name}: step returned {key} = {value!r}; a finite angle of at most {_MOST_RAD:g} rad to either "
+                "side is needed (radians, not degrees)"
+            )
+            raise ControllerError(msg)

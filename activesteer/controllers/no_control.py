@@ -1,0 +1,27 @@
+"""The car without active steering; it only works out the desired yaw rate, to compare with."""
+
+from __future__ import annotations
+
+from activesteer.controllers.desired_yaw_rate import DesiredYawRate
+from activesteer.controllers.parameters import ControllerSetup
+from activesteer.controllers.single_track import SingleTrack
+from activesteer.signals import DriverCommand, Measurement, SteerCommand
+
+
+class NoControl:
+    """No additional steer angles."""
+
+    def __init__(self, desired: DesiredYawRate) -> None:
+        """Takes the reference model."""
+        self._desired = desired
+
+    @classmethod
+    def from_vehicle(cls, setup: ControllerSetup) -> NoControl:
+        """Makes the controller for a car."""
+        single_track = SingleTrack(setup.single_track)
+        return cls(DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.mu, setup.timestep_s))
+
+    def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:
+        """No angles; the desired yaw rate for the recording."""
+        desired = self._desired.step(command.front_steer_rad, measurement.speed_mps)
+        return SteerCommand(yaw_rate_desired_radps=desired)

@@ -1,0 +1,93 @@
+"""Gains and limits of the controllers; keys of the table [controllers] in a vehicle file."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from activesteer.config import Range
+from activesteer.controllers.single_track import SingleTrackParameters
+
+_NotNegative = Annotated[float, Range(0.0)]
+
+
+@dataclass(frozen=True)
+class DesiredYawRateParameters:
+    """How the driver's demand becomes a desired yaw rate (eqs. 3 and 6)."""
+
+    max_lateral_acceleration_mps2: Annotated[float, Range(0.1, 20.0)] = 8.0
+    """a_y_max: the desired yaw rate stays below a_y_max / v [m/s2]."""
+    delay_s: Annotated[float, Range(0.001, 1.0)] = 0.06
+    """Time constant of the delay element: a car cannot follow a sudden change [s]."""
+
+
+@dataclass(frozen=True)
+class CorrectorParameters:
+    """Tolerance band and PID corrector on the yaw rate error; the paper uses the P part alone."""
+
+    off_radps: _NotNegative = math.radians(0.5)
+    """c_off: below this error there is no action [rad/s]."""
+    full_radps: _NotNegative = math.radians(2.0)
+    """c_in: above this error the action is full [rad/s]."""
+    proportional_gain_s: _NotNegative = 0.25
+    """Steer angle per yaw rate error [rad/(rad/s)]."""
+    integral_gain: _NotNegative = 0.0
+    """Steer angle per integrated yaw rate error [rad/rad]."""
+    derivative_gain_s2: _NotNegative = 0.0
+    """Steer angle per change of the yaw rate error [rad/(rad/s2)]."""
+    derivative_filter_s: Annotated[float, Range(0.001, 1.0)] = 0.02
+    """Time constant of the filter of the D part [s]."""
+
+
+@dataclass(frozen=True)
+class RearSteerParameters:
+    """Active rear steering (ARS)."""
+
+    corrector: CorrectorParameters = CorrectorParameters()
+    """Feedback."""
+    prediction_gain: Annotated[float, Range(0.0, 1.0)] = 1.0
+    """Share of the predicted rear angle that is used; 1 is the zero-sideslip feed-forward of eq. 5 [-]."""
+    limit_rad: Annotated[float, Range(0.0, math.radians(10.0))] = math.radians(3.0)
+    """Most rear angle demanded [rad]."""
+
+
+@dataclass(frozen=True)
+class FrontSuperpositionParameters:
+    """Active front steering by superposition (AFS)."""
+
+    corrector: CorrectorParameters = CorrectorParameters()
+    """Feedback."""
+    limit_rad: Annotated[float, Range(0.0, math.radians(10.0))] = math.radians(3.0)
+    """Most angle added at the road wheels [rad]."""
+
+
+@dataclass(frozen=True)
+class ControllerParameters:
+    """All of them."""
+
+    desired_yaw_rate: DesiredYawRateParameters = DesiredYawRateParameters()
+    """What both systems steer for."""
+    ars: RearSteerParameters = RearSteerParameters()
+    """Active rear steering."""
+    afs: FrontSuperpositionParameters = FrontSuperpositionParameters()
+    """Active front steering."""
+
+
+@dataclass(frozen=True)
+class ControllerSetup:
+    """What a controller gets when it is made.
+
+    Attributes:
+        single_track: The car as a single-track model sees it.
+        gains: Gains and limits from the vehicle file.
+        steering_ratio: Steering wheel angle over road-wheel angle [-].
+        mu: Friction of the road relative to a dry one; a real car would estimate it [-].
+        timestep_s: Time between two calls [s].
+    """
+
+    single_track: SingleTrackParameters
+    gains: ControllerParameters
+    steering_ratio: float
+    mu: float
+    timestep_s: float

@@ -1,0 +1,108 @@
+"""Active rear steering: predicted angle for zero sideslip, corrected by the yaw rate error (Dorsch 2012, Fig. 8)."""
+
+from __future__ import annotations
+
+import math
+
+from activesteer.controllers.corrector import Corrector, decide
+from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
+from activesteer.controllers.parameters import ControllerSetup, RearSteerParameters
+from activesteer.controllers.single_track import SingleTrack
+from activesteer.signals import DriverCommand, Measurement, SteerCommand
+
+
+class RearPrediction:
+    """The transfer function G(s) of eq. 5 in the time domain, its coefficients those of the present speed.
+
+    State form: T_1 dx/dt = delta_V - x, delta_H = K_H x + K_H T_z dx/dt; exact for an input held between steps.
+    """
+
+    def __init__(self, single_track: SingleTrack, timestep_s: float) -> None:
+        """Takes the model.
+
+        Args:
+            single_track: The model that gives the coefficients.
+            timestep_s: Time between two steps [s].
+        """
+        self._coefficients = single_track.rear_prediction
+        self._timestep_s = timestep_s
+        self._state_rad = 0.0
+
+    def step(self, front_steer_rad: float, speed_mps: float) -> float:
+        """Predicted rear angle now.
+
+        Args:
+            front_steer_rad: The driver's demand at the road wheel [rad].
+            speed_mps: Speed > 0 [m/s].
+
+        Returns:
+            Rear angle [rad], left positive.
+        """
+        gain, lead_s, lag_s = self._coefficients(speed_mps)
+        difference = front_steer_rad - self._state_rad
+        angle = gain * self._state_rad + lead_s * difference / lag_s
+        self._state_rad += (1.0 - math.exp(-self._timestep_s / lag_s)) * difference
+        return angle
+
+
+class RearSteer:
+    """Active rear steering (ARS): prediction less correction, limited.
+
+    The lag and the rate limit that follow are the actuator's, in the vehicle.
+    """
+
+    def __init__(
+        self,
+        desired: DesiredYawRate,
+        prediction: RearPrediction,
+        parameters: RearSteerParameters,
+        timestep_s: float,
+    ) -> None:
+        """Takes its parts.
+
+        Args:
+            desired: Desired yaw rate.
+            prediction: Feed-forward.
+            parameters: Gains and limit.
+            timestep_s: Time between two steps [s].
+        """
+        self._desired = desired
+        self._prediction = prediction
+        self._corrector = Corrector(parameters.corrector, timestep_s)
+        self._prediction_gain = parameters.prediction_gain
+        self._limit_rad = parameters.limit_rad
+        self._saturated = False
+
+    @classmethod
+    def from_vehicle(cls, setup: ControllerSetup) -> RearSteer:
+        """Makes the controller for a car."""
+        single_track = SingleTrack(setup.single_track)
+        return cls(
+            DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.mu, setup.timestep_s),
+            RearPrediction(single_track, setup.timestep_s),
+            setup.gains.ars,
+            setup.timestep_s,
+        )
+
+    def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:
+        """Rear angle now.
+
+        Args:
+            command: What the driver does.
+            measurement: What the car's sensors say.
+
+        Returns:
+            The rear angle demanded, with its parts.
+        """
+        speed = measurement.speed_mps
+        desired = self._desired.step(command.front_steer_rad, speed)
+        if speed < MIN_SPEED_MPS:
+            return SteerCommand(yaw_rate_desired_radps=desired)
+        error = desired - measurement.yaw_rate_radps
+        prediction = self._prediction_gain * self._prediction.step(command.front_steer_rad, speed)
+        feedback = self._corrector.step(error, hold_integral=self._saturated)
+        correction = decide(measurement.yaw_rate_radps, feedback).rear * abs(feedback)
+        angle = prediction + correction
+        limited = min(max(angle, -self._limit_rad), self._limit_rad)
+        self._saturated = limited != angle
+        return SteerCommand(limited, 0.0, desired, prediction, correction, self._saturated)

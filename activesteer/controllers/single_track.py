@@ -1,0 +1,154 @@
+"""The linear single-track model: its equations, its steady state, and the rear angle that it predicts.
+
+Symbols of the source: V front axle, H rear axle; C cornering stiffness of an axle, l_V and l_H distance of the centre of
+gravity to the axles, l their sum, m mass, J_z yaw inertia, v speed, beta sideslip angle, psi_dot yaw rate, delta
+steer angle at the road wheel. Source: Dorsch, Implementation of active Steering Systems into a Multibody Vehicle Model by
+Co-Simulation, Mecatronics-REM 2012, eqs. 1 to 5.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from activesteer.config import Range
+from activesteer.errors import ParameterError
+
+if TYPE_CHECKING:
+    import control
+
+_Positive = Annotated[float, Range(1e-9)]
+
+
+@dataclass(frozen=True)
+class SingleTrackParameters:
+    """What the single-track model knows of a car; keys of the table [single_track] in a vehicle file."""
+
+    mass_kg: _Positive
+    """Mass m [kg]."""
+    yaw_inertia_kgm2: _Positive
+    """Yaw inertia J_z [kg m2]."""
+    cg_to_front_m: _Positive
+    """Distance of the centre of gravity to the front axle, l_V [m]."""
+    cg_to_rear_m: _Positive
+    """Distance of the centre of gravity to the rear axle, l_H [m]."""
+    front_stiffness_Nprad: _Positive
+    """Cornering stiffness of the front axle with its suspension and steering, C_V [N/rad]."""
+    rear_stiffness_Nprad: _Positive
+    """Cornering stiffness of the rear axle with its suspension, C_H [N/rad]."""
+    characteristic_speed_mps: _Positive | None = None
+    """Characteristic speed v_ch from a test of the car [m/s]; eq. 4 where not given."""
+
+
+class SingleTrack:
+    """The linear single-track model of a car.
+
+    Attributes:
+        parameters: What it knows of the car.
+        wheelbase_m: l [m].
+        characteristic_speed_mps: v_ch [m/s].
+    """
+
+    def __init__(self, parameters: SingleTrackParameters) -> None:
+        """Computes what does not depend on speed.
+
+        Args:
+            parameters: What it knows of the car.
+
+        Raises:
+            ParameterError: the car oversteers, so that it has no characteristic speed, and none is given.
+        """
+        p = self.parameters = parameters
+        self.wheelbase_m = p.cg_to_front_m + p.cg_to_rear_m
+        moment = p.rear_stiffness_Nprad * p.cg_to_rear_m - p.front_stiffness_Nprad * p.cg_to_front_m
+        if p.characteristic_speed_mps is not None:
+            self.characteristic_speed_mps = p.characteristic_speed_mps
+        elif moment > 0.0:
+            product = p.front_stiffness_Nprad * p.rear_stiffness_Nprad * self.wheelbase_m**2
+            self.characteristic_speed_mps = math.sqrt(product / (p.mass_kg * moment))
+        else:
+            msg = (
+                f"single_track: C_H l_H - C_V l_V is {moment:.4g} N m/rad; it must be above 0 (an understeering car) for "
+                "eq. 4 to give a characteristic speed, or characteristic_speed_kmh must be given"
+            )
+            raise ParameterError(msg)
+
+    def yaw_rate_gain(self, speed_mps: float) -> float:
+        """Steady-state yaw rate per front steer angle, eq. 3 [1/s].
+
+        Args:
+            speed_mps: Speed v [m/s].
+        """
+        ratio = speed_mps / self.characteristic_speed_mps
+        return speed_mps / self.wheelbase_m / (1.0 + ratio * ratio)
+
+    def rear_prediction(self, speed_mps: float) -> tuple[float, float, float]:
+        """Coefficients of the rear angle that keeps the sideslip angle at zero, eq. 5.
+
+            G(s) = delta_H(s)/delta_V(s) = (K_H + K_H T_z s) / (1 + T_1 s)
+
+        Re-derived from eqs. 1 and 2 with beta = beta_dot = 0. K_H is negative (against the front wheels) at low speed
+        and positive at high speed. K_H T_z is returned in place of T_z, which is infinite where K_H is zero.
+
+        Args:
+            speed_mps: Speed v > 0 [m/s].
+
+        Returns:
+            K_H [-], K_H T_z [s], T_1 [s].
+        """
+        p = self.parameters
+        cv, ch, lv, lh = p.front_stiffness_Nprad, p.rear_stiffness_Nprad, p.cg_to_front_m, p.cg_to_rear_m
+        inertia_force = p.mass_kg * speed_mps * speed_mps
+        denominator = inertia_force * lh + cv * lv * self.wheelbase_m
+        ratio = cv / ch
+        gain = ratio * (inertia_force * lv - ch * lh * self.wheelbase_m) / denominator
+        lead = -ratio * p.yaw_inertia_kgm2 * speed_mps / denominator
+        lag = p.yaw_inertia_kgm2 * speed_mps / denominator
+        return gain, lead, lag
+
+    def state_space(self, speed_mps: float) -> control.StateSpace:
+        """The model at a speed, eqs. 1 and 2.
+
+        Args:
+            speed_mps: Speed v > 0 [m/s].
+
+        Returns:
+            States and outputs yaw rate [rad/s], sideslip angle [rad]; inputs front and rear steer angle [rad].
+
+        Raises:
+            ParameterError: the speed is not above zero.
+        """
+        import control  # noqa: PLC0415 - takes longer to import than a run takes to start
+
+        if speed_mps <= 0.0:
+            msg = f"speed_mps is {speed_mps:g} m/s; the single-track model needs a speed above 0"
+            raise ParameterError(msg)
+        a, b = self.matrices(speed_mps)
+        return control.StateSpace(
+            a,
+            b,
+            np.eye(2),
+            np.zeros((2, 2)),
+            inputs=["front_steer_rad", "rear_steer_rad"],
+            outputs=["yaw_rate_radps", "sideslip_rad"],
+            states=["yaw_rate_radps", "sideslip_rad"],
+            name="single_track",
+        )
+
+    def matrices(self, speed_mps: float) -> tuple[np.ndarray, np.ndarray]:
+        """System and input matrix of eqs. 1 and 2, shape (2, 2) each; states yaw rate and sideslip angle."""
+        p, v = self.parameters, speed_mps
+        cv, ch, lv, lh = p.front_stiffness_Nprad, p.rear_stiffness_Nprad, p.cg_to_front_m, p.cg_to_rear_m
+        m, jz = p.mass_kg, p.yaw_inertia_kgm2
+        difference = ch * lh - cv * lv
+        a = np.array(
+            [
+                [-(cv * lv**2 + ch * lh**2) / (jz * v), difference / jz],
+                [difference / (m * v**2) - 1.0, -(cv + ch) / (m * v)],
+            ]
+        )
+        b = np.array([[cv * lv / jz, -ch * lh / jz], [cv / (m * v), ch / (m * v)]])
+        return a, b

@@ -1,0 +1,24 @@
+"""The one table of axes, signs and orders. SI units and radians everywhere inside the package.
+
+Axes follow ISO 8855: x forward, y left, z up; a left turn, a left steer and a left yaw are positive.
+Roll is positive to the right (rotation about +x), pitch is positive nose down (rotation about +y).
+
+The vehicle axis system of the models has its origin on the road below the middle of the front axle in the
+design position; the rear axle lies at x = -wheelbase. Results are given for the centre of gravity (the site `cg`).
+
+Tyre quantities are those of the ISO-W wheel axis system at the contact point: x along the wheel's heading, y to its
+left, z normal to the road. A slip angle > 0 gives a lateral force < 0; a slip ratio > 0 drives.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+CORNERS: Final = ("fl", "fr", "rl", "rr")
+"""Corner names in the order of every per-corner array: front left, front right, rear left, rear right."""
+
+GRAVITY_MPS2: Final = 9.81
+"""Gravitational acceleration [m/s2]."""
+
+DEFAULT_TIMESTEP_S: Final = 0.001
+"""Step of the engine and of the control loop [s]."""

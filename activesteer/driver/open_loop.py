@@ -1,0 +1,48 @@
+"""The open-loop driver: turns the steering wheel as asked, holds speed, presses the brake."""
+
+from __future__ import annotations
+
+from activesteer.driver.speed_hold import SpeedHold
+from activesteer.signals import DriverCommand, Measurement, Reference
+
+
+class OpenLoopDriver:
+    """A steering robot and a cruise control.
+
+    Attributes:
+        speed_hold: The cruise control.
+    """
+
+    def __init__(self, speed_hold: SpeedHold, steering_ratio: float, steering_wheel_limit_rad: float) -> None:
+        """Takes its parts.
+
+        Args:
+            speed_hold: The cruise control.
+            steering_ratio: Steering wheel angle over road-wheel angle [-].
+            steering_wheel_limit_rad: Lock angle [rad]; more cannot be turned.
+        """
+        self.speed_hold = speed_hold
+        self._ratio = steering_ratio
+        self._limit_rad = steering_wheel_limit_rad
+
+    def step(self, reference: Reference, measurement: Measurement) -> DriverCommand:
+        """What the driver does now.
+
+        Args:
+            reference: What is asked.
+            measurement: What the car's sensors say.
+
+        Returns:
+            The command.
+        """
+        angle = reference.steering_wheel_rad
+        if angle > self._limit_rad:
+            angle = self._limit_rad
+        elif angle < -self._limit_rad:
+            angle = -self._limit_rad
+        if reference.hold_speed:
+            torque = self.speed_hold.step(reference.speed_mps, measurement.speed_mps)
+        else:
+            self.speed_hold.reset()
+            torque = 0.0
+        return DriverCommand(angle, angle / self._ratio, torque, reference.brake)

@@ -1,0 +1,57 @@
+"""What every manoeuvre has: speed, road, duration, and a reference for the driver at any time."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Annotated
+
+from activesteer.config import Range
+from activesteer.signals import Reference
+
+Speed = Annotated[float, Range(-20.0, 100.0)]
+
+
+@dataclass(frozen=True)
+class RoadTable:
+    """The road as a manoeuvre file describes it."""
+
+    mu: Annotated[float, Range(0.01, 2.0)] = 1.0
+    """Friction relative to the one of the tyre files [-]."""
+    grade: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    """Rise over run in the direction of travel [-]; positive is uphill."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Maneuver(ABC):
+    """Base of all kinds. The fields are the keys of the TOML file."""
+
+    kind: str
+    """Which kind of manoeuvre this is."""
+    name: str = ""
+    """Short name, for files and tables; the file's name where not given."""
+    title: str = ""
+    """One line for lists and plots."""
+    speed_mps: Speed
+    """Speed at the start [m/s]."""
+    duration_s: Annotated[float, Range(0.01, 3600.0)]
+    """Length of the recording [s]."""
+    settle_s: Annotated[float, Range(0.0, 60.0)] = 2.0
+    """Time before the recording in which the car rolls straight ahead and its speed settles [s]."""
+    road: RoadTable = RoadTable()
+    """What the wheels roll on."""
+
+    @abstractmethod
+    def reference(self, time_s: float) -> Reference:
+        """What is asked of the driver.
+
+        Args:
+            time_s: Time since the start of the recording [s].
+
+        Returns:
+            The reference at that time.
+        """
+
+    def settling_reference(self) -> Reference:
+        """What is asked of the driver while the car settles before the recording."""
+        return self.reference(0.0)

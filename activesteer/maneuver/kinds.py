@@ -1,0 +1,51 @@
+"""Which kinds of manoeuvre there are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from activesteer.config import Source, build
+from activesteer.errors import nearest_names
+from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.open_loop import OpenLoop
+from activesteer.maneuver.step_steer import StepSteer
+
+KINDS: Final[dict[str, type[Maneuver]]] = {"step_steer": StepSteer, "open_loop": OpenLoop}
+"""Value of `kind` in a file -> class."""
+
+
+def maneuver_class(table: Mapping[str, Any], source: Source) -> type[Maneuver]:
+    """The class of a manoeuvre table.
+
+    Args:
+        table: The table.
+        source: For error messages; its error class is raised.
+
+    Returns:
+        The class.
+
+    Raises:
+        ManeuverError: `kind` is missing or unknown.
+    """
+    kind = table.get("kind")
+    if kind not in KINDS:
+        problem = "is missing" if kind is None else f"there is no kind {kind!r}"
+        raise source.fail(("kind",), f"{problem}; {nearest_names(str(kind), KINDS)}")
+    return KINDS[kind]
+
+
+def build_maneuver(table: Mapping[str, Any], source: Source) -> Maneuver:
+    """A manoeuvre from its table.
+
+    Args:
+        table: Keys and values of the file.
+        source: For error messages.
+
+    Returns:
+        The manoeuvre.
+
+    Raises:
+        ManeuverError: a key is unknown or missing, or a value is wrong.
+    """
+    return build(maneuver_class(table, source), table, source)

@@ -1,0 +1,67 @@
+"""Step steer (ISO 7401): the steering wheel is turned at once and then held, speed kept by the drive."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from activesteer.config import Range
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.base import Maneuver
+from activesteer.signals import Reference
+
+
+@dataclass(frozen=True)
+class StepInput:
+    """The step at the steering wheel."""
+
+    start_s: Annotated[float, Range(0.0)] = 0.5
+    """When the steering wheel begins to turn [s]."""
+    rate_radps: Annotated[float, Range(0.1, 50.0)] = math.radians(400.0)
+    """How fast it turns [rad/s]; ISO 7401 asks for at least 200 deg/s."""
+    steering_wheel_rad: Annotated[float, Range(-15.0, 15.0)] | None = None
+    """Amplitude, left positive [rad]; found by a search where not given."""
+    lateral_acceleration_mps2: Annotated[float, Range(-12.0, 12.0)] | None = None
+    """Steady-state lateral acceleration of the control-free car that the search aims at, left positive [m/s2]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepSteer(Maneuver):
+    """A step of the steering wheel angle, ramped at a limited rate."""
+
+    steer: StepInput
+    """The step."""
+
+    def __post_init__(self) -> None:
+        """Exactly one of amplitude and aim must be known.
+
+        Raises:
+            ManeuverError: neither or both of them are given, or the step starts after the end.
+        """
+        step = self.steer
+        if step.steering_wheel_rad is None and step.lateral_acceleration_mps2 is None:
+            msg = (
+                f"{self.name or self.kind}: steer needs steering_wheel_deg (the amplitude) or "
+                "lateral_acceleration_g (what the control-free car shall reach)"
+            )
+            raise ManeuverError(msg)
+        if step.start_s >= self.duration_s:
+            msg = f"{self.name or self.kind}: steer.start_s is {step.start_s:g} s, but the run ends at {self.duration_s:g} s"
+            raise ManeuverError(msg)
+
+    def reference(self, time_s: float) -> Reference:
+        """Steering wheel angle of the ramp; see the base class."""
+        step = self.steer
+        amplitude = step.steering_wheel_rad or 0.0
+        turned = min(max(time_s - step.start_s, 0.0) * step.rate_radps, abs(amplitude))
+        return Reference(math.copysign(turned, amplitude), self.speed_mps, 0.0, hold_speed=True)
+
+    def settling_reference(self) -> Reference:
+        """Straight ahead at the speed of the manoeuvre."""
+        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
+
+    def with_amplitude(self, steering_wheel_rad: float) -> StepSteer:
+        """The same step with its amplitude known [rad]; the aim that led to it stays on record."""
+        return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))

@@ -1,0 +1,120 @@
+"""Collects what a run does, step by step, and turns it into channels block by block."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.recording import McapWriter, Poses
+from activesteer.signals import Channel, DriverCommand, SteerCommand
+from activesteer.vehicle import Vehicle
+
+BLOCK_ROWS: Final = 1000
+"""Rows that are turned into channels and written at once: a second of a run, which is what a crash may cost."""
+POSE_INTERVAL_S: Final = 0.01
+"""Time between two recorded poses of all bodies [s]."""
+
+CONTROL_CHANNELS: Final = (
+    Channel("front_steer_demand_rad", "rad", "the driver's demand at the road wheel", "control"),
+    Channel("drive_torque_demand_Nm", "Nm", "drive torque demanded, all wheels together", "control"),
+    Channel("brake_pedal", "", "brake pedal position, 0 to 1", "control"),
+    Channel("rear_steer_demand_rad", "rad", "rear angle that the controller demands", "control"),
+    Channel("superposition_demand_rad", "rad", "angle that the controller adds at the front wheels", "control"),
+    Channel("yaw_rate_desired_radps", "rad/s", "yaw rate that the controller steers for", "control"),
+    Channel("prediction_rad", "rad", "feed-forward part of the controller's angle", "control"),
+    Channel("correction_rad", "rad", "feedback part of the controller's angle", "control"),
+    Channel("controller_saturated", "", "1 where a limit of the controller is active", "control"),
+)
+
+
+class Recorder:
+    """Rows of one run, in memory and, where a writer is given, in a file as the run goes on.
+
+    Attributes:
+        channels: The table of channels.
+    """
+
+    def __init__(self, vehicle: Vehicle, steps: int, writer: McapWriter | None = None) -> None:
+        """Allocates everything.
+
+        Args:
+            vehicle: What is recorded.
+            steps: Most steps that will come.
+            writer: File to write to.
+        """
+        self.channels = channels_of(vehicle)
+        self._vehicle = vehicle
+        self._writer = writer
+        self._timestep_s = vehicle.timestep_s
+        self._values = np.empty((steps, len(self.channels)))
+        self._time_s = np.asarray(np.arange(steps) * vehicle.timestep_s, dtype=np.float64)
+        self._raw = vehicle.raw_rows(min(BLOCK_ROWS, steps))
+        self._control = np.empty((len(self._raw.sensordata), len(CONTROL_CHANNELS)))
+        self._copies = tuple(zip(self._raw, vehicle.live_arrays(), strict=True))
+        self._pose_every = max(1, round(POSE_INTERVAL_S / vehicle.timestep_s))
+        data, bodies = vehicle.data, len(vehicle.body_names)
+        poses = -(-steps // self._pose_every)
+        self._positions = np.empty((poses, bodies, 3))
+        self._quaternions = np.empty((poses, bodies, 4))
+        # Without the world, which is the engine's body 0.
+        self._xpos, self._xquat = data.xpos[1:], data.xquat[1:]
+        self._rows = 0
+        self._flushed = 0
+
+    def record(self, command: DriverCommand, steer: SteerCommand) -> None:
+        """Takes the row of the step that was just made; its values are those of the instant at which it began.
+
+        Args:
+            command: What the driver did.
+            steer: What the controller asked for.
+        """
+        count = self._rows
+        row = count - self._flushed
+        for rows, live in self._copies:
+            rows[row] = live
+        self._control[row] = (
+            command.front_steer_rad, command.drive_torque_Nm, command.brake, steer.rear_steer_rad,
+            steer.superposition_rad, steer.yaw_rate_desired_radps, steer.prediction_rad, steer.correction_rad,
+            steer.saturated,
+        )  # fmt: skip
+        if count % self._pose_every == 0:
+            pose = count // self._pose_every
+            self._positions[pose] = self._xpos
+            self._quaternions[pose] = self._xquat
+        self._rows = count + 1
+        if row + 1 == BLOCK_ROWS:
+            self.flush()
+
+    def flush(self) -> None:
+        """Turns the rows since the last flush into channels, and writes them."""
+        first, last = self._flushed, self._rows
+        count = last - first
+        if count == 0:
+            return
+        values = self._values[first:last]
+        split = len(self.channels) - len(CONTROL_CHANNELS)
+        self._vehicle.channels.evaluate(type(self._raw)(*(rows[:count] for rows in self._raw)), values[:, :split])
+        values[:, split:] = self._control[:count]
+        self._flushed = last
+        if self._writer is not None:
+            poses = self._poses_between(first, last)
+            self._writer.write(self._time_s[first:last], values, poses.time_s, poses.positions_m, poses.quaternions)
+
+    def result(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Poses]:
+        """Times, values and poses of all rows so far."""
+        self.flush()
+        rows = self._rows
+        return self._time_s[:rows], self._values[:rows], self._poses_between(0, rows)
+
+    def _poses_between(self, first: int, last: int) -> Poses:
+        every = self._pose_every
+        begin, end = -(-first // every), -(-last // every)
+        times = np.asarray(np.arange(begin, end) * (every * self._timestep_s), dtype=np.float64)
+        return Poses(times, self._vehicle.body_names, self._positions[begin:end], self._quaternions[begin:end])
+
+
+def channels_of(vehicle: Vehicle) -> tuple[Channel, ...]:
+    """All channels that a run with this vehicle records."""
+    return (*vehicle.channels.channels, *CONTROL_CHANNELS)

@@ -1,0 +1,9 @@
+"""Recordings: the channel table, the MCAP writer and reader, and `Recording`, the arrays of a run by channel name."""
+
+from activesteer.recording.channels import ChannelTable
+from activesteer.recording.reader import Poses
+from activesteer.recording.recording import Recording
+from activesteer.recording.scene import Primitive
+from activesteer.recording.writer import McapWriter
+
+__all__ = ["ChannelTable", "McapWriter", "Poses", "Primitive", "Recording"]

@@ -1,0 +1,55 @@
+"""Checks of the arrays that enter a recording."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from activesteer.errors import RecordingError
+
+
+def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.uint64]:
+    """Times in whole nanoseconds.
+
+    Args:
+        time_s: Times [s], shape (n,).
+        what: Name of the argument, for the error message.
+        after_ns: What the first time must exceed [ns].
+
+    Raises:
+        RecordingError: a time is not finite, negative, above 2**35 s, or not later than the one before it.
+    """
+    times = np.asarray(time_s, np.float64)
+    if times.ndim != 1:
+        message = f"{what} has shape {times.shape} in place of (n,)"
+        raise RecordingError(message)
+    usable = (times >= 0.0) & (times < 2.0**35)
+    if not usable.all():
+        message = f"{what} is {times[~usable][0]} s: it must be finite and not negative"
+        raise RecordingError(message)
+    result = np.rint(times * 1e9).astype(np.int64)
+    steps = np.diff(result, prepend=after_ns)
+    if (steps <= 0).any():
+        row = int(np.argmax(steps <= 0))
+        message = f"{what} must increase: row {row} is at {times[row]} s, the one before it at "
+        raise RecordingError(message + f"{(result[row] - steps[row]) * 1e-9} s")
+    return result.astype(np.uint64)
+
+
+def shaped(array: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return a float array of that shape; an empty one of any shape where nothing is expected.
+
+    Raises:
+        RecordingError: the shape is another, or the values are no numbers.
+    """
+    try:
+        numbers = np.asarray(array, np.float64)
+    except (TypeError, ValueError) as error:
+        message = f"{what}: {error}"
+        raise RecordingError(message) from None
+    if numbers.size == 0 and 0 in shape:
+        return numbers.reshape(shape)
+    if numbers.shape != shape:
+        message = f"{what} has shape {numbers.shape} in place of {shape}"
+        raise RecordingError(message)
+    return numbers

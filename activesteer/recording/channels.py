@@ -1,0 +1,97 @@
+"""The ordered table of recorded channels: the one place where a channel name becomes a column index."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+
+from activesteer.errors import RecordingError, nearest_names
+from activesteer.signals import Channel
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_GROUP = re.compile(r"[a-z][a-z0-9_]*")
+
+
+class ChannelTable:
+    """Channels in the order of their columns.
+
+    Iterating gives `Channel` objects in column order, `table["yaw_rate_radps"]` gives one of them, and
+    `"yaw_rate_radps" in table` asks whether it exists.
+    """
+
+    def __init__(self, channels: Iterable[Channel]) -> None:
+        """Take the channels in column order.
+
+        Args:
+            channels: The channels.
+
+        Raises:
+            RecordingError: a name occurs twice, or a name or group cannot be a field or message name in a file.
+        """
+        self._channels = tuple(channels)
+        self._index = {channel.name: column for column, channel in enumerate(self._channels)}
+        for column, channel in enumerate(self._channels):
+            if not _NAME.fullmatch(channel.name):
+                message = f"channel name {channel.name!r}: allowed are letters, digits and '_', a letter first"
+                raise RecordingError(message)
+            if not _GROUP.fullmatch(channel.group):
+                message = (
+                    f"group {channel.group!r} of channel {channel.name!r}: allowed are a to z, 0 to 9 and '_', "
+                    "a letter first"
+                )
+                raise RecordingError(message)
+            if self._index[channel.name] != column:
+                message = f"channel name {channel.name!r} occurs twice, in columns {column} and "
+                raise RecordingError(message + str(self._index[channel.name]))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Channel names in column order."""
+        return tuple(self._index)
+
+    def index(self, name: str) -> int:
+        """Column of a channel.
+
+        Raises:
+            RecordingError: there is no such channel; the message names the nearest ones.
+        """
+        try:
+            return self._index[name]
+        except (KeyError, TypeError):
+            message = f"no channel {name!r} in this recording: {nearest_names(str(name), self._index)}"
+            raise RecordingError(message) from None
+
+    def groups(self) -> dict[str, list[int]]:
+        """Columns of each group, groups in the order of their first channel."""
+        columns: dict[str, list[int]] = {}
+        for column, channel in enumerate(self._channels):
+            columns.setdefault(channel.group, []).append(column)
+        return columns
+
+    def __getitem__(self, name: str) -> Channel:
+        """Return the channel of that name; `RecordingError` where there is none."""
+        return self._channels[self.index(name)]
+
+    def __iter__(self) -> Iterator[Channel]:
+        """Iterate over the channels in column order."""
+        return iter(self._channels)
+
+    def __len__(self) -> int:
+        """Return how many channels there are."""
+        return len(self._channels)
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether a channel of that name exists."""
+        return name in self._index
+
+    def __eq__(self, other: object) -> bool:
+        """Compare by channels and their order."""
+        return isinstance(other, ChannelTable) and self._channels == other._channels
+
+    def __hash__(self) -> int:
+        """Hash by channels and their order."""
+        return hash(self._channels)
+
+    def __repr__(self) -> str:
+        """Show the names."""
+        return f"ChannelTable({', '.join(self._index)})"

@@ -1,0 +1,174 @@
+"""Rows of channel values and poses into the bytes of an MCAP chunk, a block at a time."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from mcap.opcode import Opcode
+from numpy.typing import NDArray
+
+from activesteer.recording.channels import ChannelTable
+from activesteer.recording.container import ChunkData
+from activesteer.recording.protobuf import FixedMessage, timestamps
+from activesteer.recording.schemas import state_layout, transforms_layout
+
+_MESSAGE_HEAD = 22  # Bytes of a message record between its length and its data: channel, sequence, two times.
+_INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
+
+
+def message_record(channel_id: int, message: FixedMessage) -> FixedMessage:
+    """Frame a message as an MCAP record; its first runs are the sequence number and the two times [ns]."""
+    record = FixedMessage()
+    record.constant(struct.pack("<BQH", Opcode.MESSAGE, _MESSAGE_HEAD + len(message), channel_id))
+    return record.block("<u4", 1).block("<u8", 2).append(message)
+
+
+def _index_record(channel_id: int, time_ns: NDArray[np.uint64], offsets: NDArray[np.int64]) -> tuple[int, bytes]:
+    entries = np.empty(len(time_ns), _INDEX_ENTRY)
+    entries["time"] = time_ns
+    entries["offset"] = offsets
+    head = struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + entries.nbytes, channel_id, entries.nbytes)
+    return len(entries), head + entries.tobytes()
+
+
+def one_message(channel_id: int, data: bytes) -> ChunkData:
+    """Return a chunk that holds a single message, at time zero."""
+    record = message_record(channel_id, FixedMessage().constant(data))
+    index = _index_record(channel_id, np.zeros(1, np.uint64), np.zeros(1, np.int64))
+    return ChunkData(0, 0, bytes(record.template), {channel_id: index})
+
+
+class _Rows:
+    """A block of rows whose constant bytes stay while the numbers change from block to block."""
+
+    def __init__(self, layout: FixedMessage) -> None:
+        self.layout = layout
+        self.block = layout.allocate(0)
+        self.views: list[NDArray] = []
+
+    def at_least(self, rows: int) -> None:
+        """Make room for a number of rows."""
+        if rows > len(self.block) or not self.views:
+            self.block = self.layout.allocate(max(rows, 1))
+            self.views = self.layout.views(self.block)
+
+
+class BlockEncoder:
+    """Encodes blocks of rows for one file: in each row one message for every group, poses between the rows."""
+
+    def __init__(
+        self,
+        channels: ChannelTable,
+        body_names: Sequence[str],
+        group_ids: Mapping[str, int],
+        transforms_id: int,
+    ) -> None:
+        """Lay out the messages.
+
+        Args:
+            channels: The channels, in the order of the columns of `values`.
+            body_names: Names of the bodies, in the order of the second axis of the poses.
+            group_ids: MCAP channel id of each group.
+            transforms_id: MCAP channel id of the poses.
+        """
+        layout = FixedMessage()
+        table = list(channels)
+        self._group_offsets: list[tuple[int, int]] = []
+        self._columns: list[list[int]] = []  # For each group, the columns of `values` in the order of its fields.
+        for group, columns in channels.groups().items():
+            self._group_offsets.append((group_ids[group], len(layout)))
+            self._columns.append(columns)
+            layout.append(message_record(group_ids[group], state_layout(table[column] for column in columns)))
+        self._rows = _Rows(layout)
+        self._transforms_id = transforms_id
+        self._poses = _Rows(message_record(transforms_id, transforms_layout(body_names)))
+        self._sources = self._column_slices(layout)
+        self._row_count = 0
+        self._pose_count = 0
+
+    def _column_slices(self, layout: FixedMessage) -> list[slice | list[int]]:
+        """For each run of channel values, the columns that it takes; a slice where they are neighbours."""
+        sources: list[slice | list[int]] = []
+        runs = iter(layout.runs)
+        for group in self._columns:
+            _sequence, _times = next(runs), next(runs)
+            used = 0
+            while used < len(group):
+                columns = group[used : used + next(runs).count]
+                used += len(columns)
+                adjacent = columns == list(range(columns[0], columns[0] + len(columns)))
+                sources.append(slice(columns[0], columns[0] + len(columns)) if adjacent else columns)
+        return sources
+
+    def encode(
+        self,
+        row_ns: NDArray[np.uint64],
+        values: NDArray[np.float64],
+        pose_ns: NDArray[np.uint64],
+        positions_m: NDArray[np.float64],
+        quaternions: NDArray[np.float64],
+    ) -> ChunkData:
+        """Encode a block; the arguments are as in `McapWriter.write`, with times in nanoseconds."""
+        rows, poses = len(row_ns), len(pose_ns)
+        self._encode_rows(row_ns, values)
+        self._encode_poses(pose_ns, positions_m, quaternions)
+        row_length, pose_length = len(self._rows.layout), len(self._poses.layout)
+
+        # In the order of time: a pose follows the row of the same instant.
+        rows_before = np.searchsorted(row_ns, pose_ns, side="right")
+        row_bytes = self._rows.block.reshape(-1).data
+        pose_bytes = self._poses.block.reshape(-1).data
+        pieces: list[memoryview] = []
+        done = 0
+        for pose, row in enumerate(rows_before.tolist()):
+            pieces.append(row_bytes[done * row_length : row * row_length])
+            pieces.append(pose_bytes[pose * pose_length : (pose + 1) * pose_length])
+            done = row
+        pieces.append(row_bytes[done * row_length : rows * row_length])
+
+        indexes: dict[int, tuple[int, bytes]] = {}
+        if rows:
+            starts = np.arange(rows) * row_length + np.searchsorted(pose_ns, row_ns, side="left") * pose_length
+            for number, offset in self._group_offsets:
+                indexes[number] = _index_record(number, row_ns, starts + offset)
+        if poses:
+            starts = np.arange(poses) * pose_length + rows_before * row_length
+            indexes[self._transforms_id] = _index_record(self._transforms_id, pose_ns, starts)
+        ends = [int(time_ns[which]) for time_ns in (row_ns, pose_ns) if len(time_ns) for which in (0, -1)]
+        return ChunkData(min(ends), max(ends), b"".join(pieces), indexes)
+
+    def _encode_rows(self, row_ns: NDArray[np.uint64], values: NDArray[np.float64]) -> None:
+        rows = len(row_ns)
+        self._rows.at_least(rows)
+        views = iter(self._rows.views)
+        sources = iter(self._sources)
+        sequence = np.arange(self._row_count, self._row_count + rows, dtype=np.uint32)
+        self._row_count += rows
+        with np.errstate(over="ignore"):  # A diverging run may exceed what 32 bit hold: infinity is what it is then.
+            for columns in self._columns:
+                next(views)[:rows, 0] = sequence
+                next(views)[:rows] = row_ns[:, None]
+                used = 0
+                while used < len(columns):
+                    view = next(views)
+                    view[:rows] = values[:, next(sources)]
+                    used += view.shape[1]
+
+    def _encode_poses(
+        self, pose_ns: NDArray[np.uint64], positions_m: NDArray[np.float64], quaternions: NDArray[np.float64]
+    ) -> None:
+        poses = len(pose_ns)
+        self._poses.at_least(poses)
+        sequence, times, *bodies = self._poses.views
+        sequence[:poses, 0] = np.arange(self._pose_count, self._pose_count + poses, dtype=np.uint32)
+        self._pose_count += poses
+        times[:poses] = pose_ns[:, None]
+        stamps = timestamps(pose_ns)
+        for body in range(len(bodies) // 3):
+            stamp, position, rotation = bodies[3 * body : 3 * body + 3]
+            stamp[:poses] = stamps
+            position[:poses] = positions_m[:, body]
+            rotation[:poses, :3] = quaternions[:, body, 1:]  # Foxglove's order is x y z w.
+            rotation[:poses, 3] = quaternions[:, body, 0]

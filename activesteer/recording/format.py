@@ -1,0 +1,67 @@
+"""Names of the topics and metadata records of a file, and metadata as text.
+
+In the order of the file: schemas and topics, attachments, the record of the run, the format record, chunks of about a
+second, the record of the result, metrics. Values of metadata are JSON text, metrics are numbers in text.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+import numpy as np
+
+from activesteer.errors import RecordingError
+
+FORMAT_VERSION = 1
+"""Raised when a reader of the version before could misread a file."""
+
+STATE_TOPIC, TRANSFORMS_TOPIC, SCENE_TOPIC = "/state/", "/tf", "/scene"
+RUN_RECORD, RESULT_RECORD, METRICS_RECORD = "activesteer.run", "activesteer.result", "activesteer.metrics"
+"""Names of the metadata records: what is known before the run, after it, and its metrics."""
+
+FORMAT_RECORD = "activesteer.format"
+"""Name of the metadata record that marks a file as ours."""
+
+
+def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict[str, str]]:
+    """Metadata as the texts that an MCAP file holds.
+
+    Args:
+        metadata: Values that JSON can represent; numpy numbers and arrays become numbers and lists.
+
+    Returns:
+        The values as JSON text, without the key `metrics`; and the metrics, as numbers in text.
+
+    Raises:
+        RecordingError: a value cannot be represented, or a metric is no number.
+    """
+    texts: dict[str, str] = {}
+    metrics: dict[str, str] = {}
+    for key, value in metadata.items():
+        if key == "metrics":
+            if not isinstance(value, Mapping):
+                message = f"metadata 'metrics' is {value!r} in place of numbers by name"
+                raise RecordingError(message)
+            for name, number in value.items():
+                try:
+                    metrics[str(name)] = repr(float(number))
+                except (TypeError, ValueError):
+                    message = f"metric {name!r} is {number!r}, which is no number"
+                    raise RecordingError(message) from None
+            continue
+        try:
+            texts[str(key)] = json.dumps(value, default=_plain, ensure_ascii=False)
+        except (TypeError, ValueError) as error:
+            message = f"metadata {key!r} cannot be kept as JSON: {error}"
+            raise RecordingError(message) from None
+    return texts, metrics
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return dict(value)
+    message = f"a {type(value).__name__} ({value!r})"
+    raise TypeError(message)

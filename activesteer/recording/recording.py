@@ -1,0 +1,179 @@
+"""A recorded run: arrays by channel name, poses, metadata, metrics, and the files that it was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from activesteer.errors import RecordingError
+from activesteer.recording.arrays import nanoseconds, shaped
+from activesteer.recording.channels import ChannelTable
+from activesteer.recording.reader import Poses, read_mcap
+from activesteer.recording.scene import Primitive
+from activesteer.recording.writer import McapWriter
+from activesteer.signals import Channel
+
+
+class Recording:
+    """A run, in memory or read from an MCAP file.
+
+    `recording["yaw_rate_radps"]` is the channel as a read-only array over `recording.time_s`.
+
+    Attributes:
+        metadata: What is needed to run it again, and how it ended; JSON values. `complete` is false where the file
+            was not ended properly, as after a killed process.
+        metrics: Metrics by name, in the unit that ends their names.
+        attachments: Files kept with the run, by name.
+        poses: Poses of all bodies.
+        scene: What the bodies look like.
+    """
+
+    def __init__(
+        self,
+        channels: Iterable[Channel],
+        time_s: ArrayLike,
+        values: ArrayLike,
+        *,
+        poses: Poses | None = None,
+        metadata: Mapping[str, Any] | None = None,
+        metrics: Mapping[str, float] | None = None,
+        attachments: Mapping[str, bytes] | None = None,
+        scene: Iterable[Primitive] = (),
+    ) -> None:
+        """Take the arrays of a run. They are not copied where they are already floats, and must not change any more.
+
+        Args:
+            channels: The channels, in the order of the columns of `values`.
+            time_s: Time of each row [s], increasing, >= 0, shape (n,). Kept in whole nanoseconds, as in a file.
+            values: Channel values, shape (n, number of channels).
+            poses: Poses of the bodies; none where omitted.
+            metadata: Metadata; a key `metrics` in it is taken as the metrics.
+            metrics: Metrics by name.
+            attachments: Files to keep, by name.
+            scene: What the bodies look like.
+
+        Raises:
+            RecordingError: a shape or a time is wrong, or a channel occurs twice.
+        """
+        self._channels = channels if isinstance(channels, ChannelTable) else ChannelTable(channels)
+        self._time_s = _frozen(nanoseconds(time_s, "time_s") / 1e9)
+        self._values = _frozen(shaped(values, "values", (len(self._time_s), len(self._channels))))
+        self.metadata: dict[str, Any] = {"complete": True, **(metadata or {})}
+        found = self.metadata.pop("metrics", {})
+        if not isinstance(found, Mapping):
+            message = f"metadata 'metrics' is {found!r} in place of numbers by name"
+            raise RecordingError(message)
+        self.metrics: dict[str, float] = {**found, **(metrics or {})}
+        self.attachments: dict[str, bytes] = dict(attachments or {})
+        self.scene: tuple[Primitive, ...] = tuple(scene)
+        given = Poses(np.empty(0), (), np.empty((0, 0, 3)), np.empty((0, 0, 4))) if poses is None else poses
+        count, bodies = len(np.asarray(given.time_s)), len(given.names)
+        self.poses = Poses(
+            _frozen(nanoseconds(given.time_s, "poses.time_s") / 1e9),
+            tuple(given.names),
+            _frozen(shaped(given.positions_m, "poses.positions_m", (count, bodies, 3))),
+            _frozen(shaped(given.quaternions, "poses.quaternions", (count, bodies, 4))),
+        )
+
+    @classmethod
+    def open(cls, path: str | Path, *, recover: bool = False) -> Self:
+        """Read a recording from an MCAP file.
+
+        A file that ends too early, as that of a killed process does, opens with all its whole blocks and
+        `metadata["complete"]` false.
+
+        Args:
+            path: The file.
+            recover: Whether to return, from a damaged file, what comes before the damage.
+
+        Raises:
+            RecordingError: the file cannot be opened, is no recording, or is damaged; the message says how much of it
+                can be read.
+        """
+        contents = read_mcap(Path(path))
+        if contents.damage and not recover:
+            rows = len(contents.time_s)
+            message = f"{path} is damaged: {contents.damage}. "
+            if rows:
+                message += f"The {rows} rows up to {contents.time_s[-1]:.3f} s can be read"
+            else:
+                message += "Metadata and attachments can be read, but no rows"
+            raise RecordingError(message + ", with Recording.open(path, recover=True)")
+        try:
+            return cls(
+                contents.channels,
+                contents.time_s,
+                contents.values,
+                poses=contents.poses,
+                metadata=contents.metadata,
+                metrics=contents.metrics,
+                attachments=contents.attachments,
+                scene=contents.scene,
+            )
+        except RecordingError as error:
+            message = f"{path}: {error}"
+            raise RecordingError(message) from None
+
+    def save(self, path: str | Path, *, overwrite: bool = True) -> None:
+        """Write the recording to an MCAP file; channels with `single` are kept to 32 bit, all others exactly.
+
+        Args:
+            path: The file.
+            overwrite: Whether a file that exists may be replaced.
+
+        Raises:
+            RecordingError: the file cannot be written, or a metadata value cannot be kept as JSON.
+        """
+        with McapWriter(
+            path,
+            self._channels,
+            self.poses.names,
+            {**self.metadata, "metrics": self.metrics},
+            self.attachments,
+            self.scene,
+            overwrite=overwrite,
+        ) as writer:
+            writer.write(self._time_s, self._values, self.poses.time_s, self.poses.positions_m, self.poses.quaternions)
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """Time of each row [s], shape (n,), read-only."""
+        return self._time_s
+
+    @property
+    def channels(self) -> ChannelTable:
+        """The channels in column order: name, unit, meaning."""
+        return self._channels
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """All channel values, shape (n, number of channels), read-only."""
+        return self._values
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """Return a channel over time, shape (n,), read-only; `RecordingError` where there is none of that name."""
+        return self._values[:, self._channels.index(name)]
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether a channel of that name exists."""
+        return name in self._channels
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self._time_s)
+
+    def __repr__(self) -> str:
+        """Show size and duration."""
+        span = f"{self._time_s[0]:.3f} to {self._time_s[-1]:.3f} s" if len(self._time_s) else "no rows"
+        return f"<Recording: {len(self._channels)} channels, {len(self._time_s)} rows, {span}>"
+
+
+def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a view that cannot be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view

@@ -1,0 +1,182 @@
+"""What the messages of a recording look like: one message of our own for each group, poses and scene by Foxglove.
+
+Each topic carries its schema as a protobuf `FileDescriptorSet`, so that other tools decode it without this package.
+
+Source of the `foxglove` messages: foxglove-sdk, schemas/proto (names and field numbers).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from functools import cache
+
+from google.protobuf import duration_pb2, timestamp_pb2
+from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
+
+from activesteer.errors import RecordingError
+from activesteer.recording.protobuf import STAMP_LENGTH, FixedMessage
+from activesteer.signals import Channel
+
+TRANSFORMS_SCHEMA = "foxglove.FrameTransforms"
+SCENE_SCHEMA = "foxglove.SceneUpdate"
+WORLD = "world"
+"""Name of the frame that all poses refer to."""
+
+_SCALARS = {
+    "double": FieldDescriptorProto.TYPE_DOUBLE,
+    "float": FieldDescriptorProto.TYPE_FLOAT,
+    "bool": FieldDescriptorProto.TYPE_BOOL,
+    "string": FieldDescriptorProto.TYPE_STRING,
+    "bytes": FieldDescriptorProto.TYPE_BYTES,
+    "fixed32": FieldDescriptorProto.TYPE_FIXED32,
+}
+_FIELD = re.compile(r"(repeated )?([\w.]+) (\w+) = (\d+)")
+
+_FOXGLOVE = {
+    "Vector3": "double x = 1, double y = 2, double z = 3",
+    "Point3": "double x = 1, double y = 2, double z = 3",
+    "Quaternion": "double x = 1, double y = 2, double z = 3, double w = 4",
+    "Color": "double r = 1, double g = 2, double b = 3, double a = 4",
+    "Pose": "foxglove.Vector3 position = 1, foxglove.Quaternion orientation = 2",
+    "KeyValuePair": "string key = 1, string value = 2",
+    "FrameTransform": "google.protobuf.Timestamp timestamp = 1, string parent_frame_id = 2, "
+    "string child_frame_id = 3, foxglove.Vector3 translation = 4, foxglove.Quaternion rotation = 5",
+    "FrameTransforms": "repeated foxglove.FrameTransform transforms = 1",
+    "ArrowPrimitive": "foxglove.Pose pose = 1, double shaft_length = 2, double shaft_diameter = 3, "
+    "double head_length = 4, double head_diameter = 5, foxglove.Color color = 6",
+    "CubePrimitive": "foxglove.Pose pose = 1, foxglove.Vector3 size = 2, foxglove.Color color = 3",
+    "SpherePrimitive": "foxglove.Pose pose = 1, foxglove.Vector3 size = 2, foxglove.Color color = 3",
+    "CylinderPrimitive": "foxglove.Pose pose = 1, foxglove.Vector3 size = 2, double bottom_scale = 3, "
+    "double top_scale = 4, foxglove.Color color = 5",
+    "LinePrimitive": "Type type = 1, foxglove.Pose pose = 2, double thickness = 3, bool scale_invariant = 4, "
+    "repeated foxglove.Point3 points = 5, foxglove.Color color = 6, repeated foxglove.Color colors = 7, "
+    "repeated fixed32 indices = 8",
+    "TriangleListPrimitive": "foxglove.Pose pose = 1, repeated foxglove.Point3 points = 2, foxglove.Color color = 3, "
+    "repeated foxglove.Color colors = 4, repeated fixed32 indices = 5",
+    "TextPrimitive": "foxglove.Pose pose = 1, bool billboard = 2, double font_size = 3, bool scale_invariant = 4, "
+    "foxglove.Color color = 5, string text = 6",
+    "ModelPrimitive": "foxglove.Pose pose = 1, foxglove.Vector3 scale = 2, foxglove.Color color = 3, "
+    "bool override_color = 4, string url = 5, string media_type = 6, bytes data = 7",
+    "SceneEntityDeletion": "google.protobuf.Timestamp timestamp = 1, Type type = 2, string id = 3",
+    "SceneEntity": "google.protobuf.Timestamp timestamp = 1, string frame_id = 2, string id = 3, "
+    "google.protobuf.Duration lifetime = 4, bool frame_locked = 5, repeated foxglove.KeyValuePair metadata = 6, "
+    "repeated foxglove.ArrowPrimitive arrows = 7, repeated foxglove.CubePrimitive cubes = 8, "
+    "repeated foxglove.SpherePrimitive spheres = 9, repeated foxglove.CylinderPrimitive cylinders = 10, "
+    "repeated foxglove.LinePrimitive lines = 11, repeated foxglove.TriangleListPrimitive triangles = 12, "
+    "repeated foxglove.TextPrimitive texts = 13, repeated foxglove.ModelPrimitive models = 14",
+    "SceneUpdate": "repeated foxglove.SceneEntityDeletion deletions = 1, repeated foxglove.SceneEntity entities = 2",
+}
+_FOXGLOVE_ENUMS = {
+    "LinePrimitive": ("LINE_STRIP", "LINE_LOOP", "LINE_LIST"),
+    "SceneEntityDeletion": ("MATCHING_ID", "ALL"),
+}
+
+
+def _define(package: str, name: str, fields: str, enum: Sequence[str] = ()) -> DescriptorProto:
+    """Return the descriptor of a message; `fields` in the notation of a .proto file, `enum` its nested `Type`."""
+    message = DescriptorProto(name=name)
+    for repeated, kind, field_name, number in _FIELD.findall(fields):
+        # A JSON name of its own keeps two names that differ in case only (`a_n`, `a_N`) apart.
+        field = message.field.add(name=field_name, number=int(number), json_name=field_name)
+        field.label = FieldDescriptorProto.LABEL_REPEATED if repeated else FieldDescriptorProto.LABEL_OPTIONAL
+        if kind in _SCALARS:
+            field.type = _SCALARS[kind]
+        elif kind == "Type":
+            field.type, field.type_name = FieldDescriptorProto.TYPE_ENUM, f".{package}.{name}.Type"
+        else:
+            field.type, field.type_name = FieldDescriptorProto.TYPE_MESSAGE, f".{kind}"
+    if enum:
+        kinds = message.enum_type.add(name="Type")
+        for number, value in enumerate(enum):
+            kinds.value.add(name=value, number=number)
+    return message
+
+
+@cache
+def foxglove_schema() -> bytes:
+    """Serialised `FileDescriptorSet` with the Foxglove messages for poses and scene."""
+    files = FileDescriptorSet()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(files.file.add())
+    duration_pb2.DESCRIPTOR.CopyToProto(files.file.add())
+    foxglove = FileDescriptorProto(name="foxglove.proto", package="foxglove", syntax="proto3")
+    foxglove.dependency.extend(entry.name for entry in files.file)
+    for name, fields in _FOXGLOVE.items():
+        foxglove.message_type.append(_define("foxglove", name, fields, _FOXGLOVE_ENUMS.get(name, ())))
+    files.file.append(foxglove)
+    return files.SerializeToString()
+
+
+def state_schema_name(group: str) -> str:
+    """Full name of the message that carries the channels of a group."""
+    return f"activesteer.{group.capitalize()}"
+
+
+def state_schema(group: str, channels: Iterable[Channel]) -> bytes:
+    """Serialised `FileDescriptorSet` of a group: one field for each channel, numbered from 1 in their order."""
+    fields = ", ".join(
+        f"{'float' if channel.single else 'double'} {channel.name} = {number}"
+        for number, channel in enumerate(channels, start=1)
+    )
+    file = FileDescriptorProto(name=f"activesteer/{group}.proto", package="activesteer", syntax="proto3")
+    file.message_type.append(_define("activesteer", group.capitalize(), fields))
+    return FileDescriptorSet(file=[file]).SerializeToString()
+
+
+def state_fields(schema: bytes, schema_name: str) -> tuple[list[str], FixedMessage]:
+    """Read what `state_schema` wrote.
+
+    Args:
+        schema: Serialised `FileDescriptorSet`.
+        schema_name: Full name of the message in it.
+
+    Returns:
+        Field names in their order, and the layout of the messages.
+
+    Raises:
+        RecordingError: the schema is not one of a group of channels.
+        google.protobuf.message.DecodeError: it is no schema at all.
+    """
+    for file in FileDescriptorSet.FromString(schema).file:
+        for message in file.message_type:
+            if f"{file.package}.{message.name}" == schema_name:
+                return [field.name for field in message.field], _layout(message)
+    problem = f"the schema of {schema_name} does not define it"
+    raise RecordingError(problem)
+
+
+def _layout(message: DescriptorProto) -> FixedMessage:
+    layout = FixedMessage()
+    kinds = {FieldDescriptorProto.TYPE_FLOAT: "<f4", FieldDescriptorProto.TYPE_DOUBLE: "<f8"}
+    for field in message.field:
+        if field.type not in kinds or field.label == FieldDescriptorProto.LABEL_REPEATED:
+            problem = f"field {field.name} of {message.name} is neither float nor double"
+            raise RecordingError(problem)
+        layout.number(field.number, kinds[field.type])
+    return layout
+
+
+def state_layout(channels: Iterable[Channel]) -> FixedMessage:
+    """Layout of the message of a group, see `state_schema`."""
+    layout = FixedMessage()
+    for number, channel in enumerate(channels, start=1):
+        layout.number(number, "<f4" if channel.single else "<f8")
+    return layout
+
+
+def transforms_layout(body_names: Iterable[str]) -> FixedMessage:
+    """Layout of `foxglove.FrameTransforms`: every body a child of `world`.
+
+    Its runs are, for each body in order: the timestamp (bytes), the position x y z, the quaternion x y z w.
+    """
+    layout = FixedMessage()
+    for name in body_names:
+        transform = FixedMessage().nested(1, FixedMessage().block("u1", STAMP_LENGTH))
+        transform.text(2, WORLD).text(3, name)
+        for field, numbers in ((4, 3), (5, 4)):
+            vector = FixedMessage()
+            for number in range(1, numbers + 1):
+                vector.number(number, "<f8")
+            transform.nested(field, vector)
+        layout.nested(1, transform)
+    return layout

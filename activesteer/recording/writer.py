@@ -1,0 +1,265 @@
+"""Writes a recording to an MCAP file while the run goes on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from activesteer.errors import RecordingError
+from activesteer.recording.arrays import nanoseconds, shaped
+from activesteer.recording.channels import ChannelTable
+from activesteer.recording.container import McapFile
+from activesteer.recording.encoder import BlockEncoder, one_message
+from activesteer.recording.format import (
+    FORMAT_RECORD,
+    FORMAT_VERSION,
+    METRICS_RECORD,
+    RESULT_RECORD,
+    RUN_RECORD,
+    SCENE_TOPIC,
+    STATE_TOPIC,
+    TRANSFORMS_TOPIC,
+    metadata_texts,
+)
+from activesteer.recording.scene import Primitive, encode_scene
+from activesteer.recording.schemas import (
+    SCENE_SCHEMA,
+    TRANSFORMS_SCHEMA,
+    WORLD,
+    foxglove_schema,
+    state_schema,
+    state_schema_name,
+)
+from activesteer.signals import Channel
+from activesteer.version import __version__
+
+_ROWS_PER_CHUNK = 1000
+_BLOCKS_IN_FLIGHT = 2  # Bounds the memory when the disk is slower than the simulation.
+
+
+class McapWriter:
+    """Streams channel values and poses into an MCAP file, readable up to the last block at any moment.
+
+    `write` encodes on the calling thread; compressing and writing run in one thread of their own, because zstd and
+    file output release the interpreter lock and the simulation need not wait. An error of that thread is raised by the
+    next `write` or `close`.
+
+    As a context manager it closes the file in every case; after an exception the file is marked with
+    `complete = false` and the error.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        channels: Iterable[Channel],
+        body_names: Sequence[str] = (),
+        metadata: Mapping[str, object] | None = None,
+        attachments: Mapping[str, bytes] | None = None,
+        scene: Iterable[Primitive] = (),
+        *,
+        overwrite: bool = True,
+    ) -> None:
+        """Open the file and write everything that is known before the run.
+
+        Args:
+            path: File to write.
+            channels: What is recorded, in the order of the columns of `values`. Those of one group share a topic.
+            body_names: Names of the bodies whose poses are recorded.
+            metadata: What is needed to run it again; values must be representable in JSON.
+            attachments: Files to keep with the recording, by name.
+            scene: What the bodies look like.
+            overwrite: Whether a file that exists may be replaced.
+
+        Raises:
+            RecordingError: the file cannot be written, or a channel, body, metadata value or primitive is not usable.
+        """
+        self.path = Path(path)
+        self.channels = ChannelTable(channels)
+        self.body_names = tuple(body_names)
+        if len({WORLD, *self.body_names}) != len(self.body_names) + 1:
+            message = f"body names must differ from each other and from {WORLD!r}: {', '.join(self.body_names)}"
+            raise RecordingError(message)
+        texts, metrics = metadata_texts(metadata or {})
+        scene_data = encode_scene(scene)
+        self._last_row_ns = self._last_pose_ns = -1
+        self._saved_ns = -1
+        self._pending: list[tuple[int, Future[None]]] = []
+        self._stream = _open(self.path, overwrite=overwrite)
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="mcap-writer")
+        self._closed = False
+        try:
+            self._file = McapFile(self._stream, f"activesteer {__version__}")
+            self._begin(texts, metrics, attachments or {}, scene_data)
+        except BaseException as error:
+            self._abandon()
+            if isinstance(error, OSError):
+                raise self._failure(error) from error
+            raise
+
+    def _begin(
+        self, texts: Mapping[str, str], metrics: Mapping[str, str], attachments: Mapping[str, bytes], scene: bytes
+    ) -> None:
+        table = list(self.channels)
+        group_ids: dict[str, int] = {}
+        for group, columns in self.channels.groups().items():
+            members = [table[column] for column in columns]
+            described = {
+                table[column].name: json.dumps(
+                    {"unit": table[column].unit, "meaning": table[column].meaning, "column": column},
+                    ensure_ascii=False,
+                )
+                for column in columns
+            }
+            group_ids[group] = self._file.add_topic(
+                STATE_TOPIC + group, state_schema_name(group), state_schema(group, members), described
+            )
+        bodies = {"bodies": json.dumps(self.body_names)}
+        transforms_id = self._file.add_topic(TRANSFORMS_TOPIC, TRANSFORMS_SCHEMA, foxglove_schema(), bodies)
+        scene_id = self._file.add_topic(SCENE_TOPIC, SCENE_SCHEMA, foxglove_schema(), {}) if scene else None
+        for name, data in attachments.items():
+            self._file.add_attachment(name, bytes(data))
+        self._file.add_metadata(RUN_RECORD, texts)
+        if metrics:
+            self._file.add_metadata(METRICS_RECORD, metrics)
+        # Last, so that its presence tells the reader that all that comes before it is there too.
+        self._file.add_metadata(FORMAT_RECORD, {"version": str(FORMAT_VERSION)})
+        self._encoder = BlockEncoder(self.channels, self.body_names, group_ids, transforms_id)
+        if scene_id is not None:
+            self._file.add_chunk(one_message(scene_id, scene))
+        self._stream.flush()
+
+    def write(
+        self,
+        time_s: ArrayLike,
+        values: ArrayLike,
+        pose_time_s: ArrayLike = (),
+        positions_m: ArrayLike = (),
+        quaternions: ArrayLike = (),
+    ) -> None:
+        """Write one block, best about one simulated second. The arrays may be reused as soon as it returns.
+
+        Args:
+            time_s: Time of each row [s], >= 0, increasing from row to row and from block to block, shape (n,).
+            values: Channel values, shape (n, number of channels).
+            pose_time_s: Time of each set of poses [s], increasing, shape (k,).
+            positions_m: Positions of the body frames in the world [m], shape (k, number of bodies, 3).
+            quaternions: Their orientations, w x y z, shape (k, number of bodies, 4).
+
+        Raises:
+            RecordingError: a shape or a time is wrong, the file is closed, or this or an earlier block could not be
+                written.
+        """
+        if self._closed:
+            message = f"{self.path} is closed"
+            raise RecordingError(message)
+        row_ns = nanoseconds(time_s, "time_s", self._last_row_ns)
+        pose_ns = nanoseconds(pose_time_s, "pose_time_s", self._last_pose_ns)
+        rows, poses, bodies = len(row_ns), len(pose_ns), len(self.body_names)
+        values = shaped(values, "values", (rows, len(self.channels)))
+        positions = shaped(positions_m, "positions_m", (poses, bodies, 3))
+        turns = shaped(quaternions, "quaternions", (poses, bodies, 4))
+        pose_done = 0
+        for start in range(0, max(rows, min(poses, 1)), _ROWS_PER_CHUNK):
+            stop = start + _ROWS_PER_CHUNK
+            # Poses up to the last row of the piece go with it; the last piece takes all that remain.
+            pose_stop = poses if stop >= rows else int(np.searchsorted(pose_ns, row_ns[stop - 1], side="right"))
+            piece, pose_piece = slice(start, stop), slice(pose_done, pose_stop)
+            pose_done = pose_stop
+            chunk = self._encoder.encode(
+                row_ns[piece], values[piece], pose_ns[pose_piece], positions[pose_piece], turns[pose_piece]
+            )
+            self._await(_BLOCKS_IN_FLIGHT - 1)
+            self._pending.append((chunk.end_ns, self._thread.submit(self._file.add_chunk, chunk)))
+        if rows:
+            self._last_row_ns = int(row_ns[-1])
+        if poses:
+            self._last_pose_ns = int(pose_ns[-1])
+
+    def close(self, metadata: Mapping[str, object] | None = None) -> None:
+        """Write what is known after the run, and end the file. Closing twice does nothing.
+
+        Args:
+            metadata: More metadata, such as how the run ended; its key `metrics` holds the metrics by name.
+
+        Raises:
+            RecordingError: a metadata value cannot be kept, and the file is still open; or something could not be
+                written, and what was written before is in the file.
+        """
+        if self._closed:
+            return
+        texts, metrics = metadata_texts(metadata or {})
+        try:
+            self._await(0)
+            try:
+                if texts:
+                    self._file.add_metadata(RESULT_RECORD, texts)
+                if metrics:
+                    self._file.add_metadata(METRICS_RECORD, metrics)
+                self._file.finish()
+                self._stream.close()
+            except OSError as error:
+                raise self._failure(error) from error
+        finally:
+            self._abandon()
+
+    def __enter__(self) -> Self:
+        """Return the writer."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Close the file; after an exception, mark it as incomplete."""
+        if error is None:
+            self.close()
+            return
+        try:
+            self.close({"complete": False, "error": f"{type(error).__name__}: {error}"})
+        except RecordingError as second:
+            error.add_note(f"The recording could not be ended properly either: {second}")
+
+    def _await(self, most: int) -> None:
+        """Wait until at most that many blocks are still being written; raise what went wrong with them."""
+        while len(self._pending) > most:
+            end_ns, future = self._pending[0]
+            try:
+                future.result()
+            except OSError as error:
+                failure = self._failure(error)
+                self._abandon()
+                raise failure from error
+            self._saved_ns = end_ns
+            del self._pending[0]
+
+    def _failure(self, error: OSError) -> RecordingError:
+        saved = f"; saved up to {self._saved_ns * 1e-9:.3f} s" if self._saved_ns >= 0 else ""
+        return RecordingError(f"cannot write {self.path}: {error.strerror or error}{saved}")
+
+    def _abandon(self) -> None:
+        """Give up thread and file without ending the file properly."""
+        self._closed = True
+        self._thread.shutdown(wait=True, cancel_futures=True)
+        with suppress(OSError):  # Whoever called has the first error in hand.
+            self._stream.close()
+
+
+def _open(path: Path, *, overwrite: bool) -> BinaryIO:
+    if not path.parent.is_dir():
+        message = f"cannot write {path}: folder {path.parent} does not exist"
+        raise RecordingError(message)
+    try:
+        return path.open("wb" if overwrite else "xb")
+    except FileExistsError:
+        message = f"cannot write {path}: it exists already"
+        raise RecordingError(message) from None
+    except OSError as error:
+        message = f"cannot write {path}: {error.strerror}"
+        raise RecordingError(message) from None

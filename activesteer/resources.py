@@ -1,0 +1,107 @@
+"""Finds the models and manoeuvres, in a checkout, in an editable install and in an installed wheel.
+
+In a wheel they travel inside the package, in `_data/`; in a checkout they lie beside the package, at the top.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError, nearest_names
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def _data_dir(name: str, error: type[ActiveSteerError]) -> Path:
+    inside, beside = _PACKAGE / "_data" / name, _PACKAGE.parent / name
+    for candidate in (inside, beside):
+        if candidate.is_dir():
+            return candidate
+    raise error(f"the {name} that belong to activesteer are missing: neither {inside} nor {beside} is a directory")
+
+
+def models_dir() -> Path:
+    """The directory with `mjcf/`, `vehicles/` and `tyres/`.
+
+    Returns:
+        Absolute path of an existing directory.
+
+    Raises:
+        ModelError: the installation is incomplete.
+    """
+    return _data_dir("models", ModelError)
+
+
+def maneuvers_dir() -> Path:
+    """The directory with the manoeuvre files.
+
+    Returns:
+        Absolute path of an existing directory.
+
+    Raises:
+        ManeuverError: the installation is incomplete.
+    """
+    return _data_dir("maneuvers", ManeuverError)
+
+
+def list_maneuvers() -> list[str]:
+    """Names of the manoeuvres that come with the package, sorted."""
+    return _names(maneuvers_dir())
+
+
+def list_vehicles() -> list[str]:
+    """Names of the vehicles that come with the package, sorted."""
+    return _names(models_dir() / "vehicles")
+
+
+def find_maneuver(name_or_path: str | os.PathLike[str]) -> Path:
+    """The file of a manoeuvre.
+
+    Args:
+        name_or_path: A name from `list_maneuvers`, or the path of a .toml file. A string is a path if it contains a
+            separator or ends in `.toml`.
+
+    Returns:
+        Path of an existing file.
+
+    Raises:
+        ManeuverError: there is no such manoeuvre or file; the message names the nearest ones.
+    """
+    return _find(name_or_path, maneuvers_dir(), "manoeuvre", ManeuverError)
+
+
+def find_vehicle(name_or_path: str | os.PathLike[str]) -> Path:
+    """The parameter file of a vehicle.
+
+    Args:
+        name_or_path: A name from `list_vehicles`, or the path of a .toml file. A string is a path if it contains a
+            separator or ends in `.toml`.
+
+    Returns:
+        Path of an existing file.
+
+    Raises:
+        ParameterError: there is no such vehicle or file; the message names the nearest ones.
+    """
+    return _find(name_or_path, models_dir() / "vehicles", "vehicle", ParameterError)
+
+
+def _names(directory: Path) -> list[str]:
+    return sorted(file.stem for file in directory.glob("*.toml"))
+
+
+def _find(name_or_path: str | os.PathLike[str], directory: Path, kind: str, error: type[ActiveSteerError]) -> Path:
+    text = os.fspath(name_or_path)
+    separators = [separator for separator in (os.sep, os.altsep) if separator]
+    is_path = not isinstance(name_or_path, str) or text.endswith(".toml") or any(s in text for s in separators)
+    if is_path:
+        path = Path(text).expanduser()
+        if path.is_file():
+            return path
+        siblings = _names(path.parent) if path.parent.is_dir() else []
+        raise error(f"{kind} file {path} does not exist; in {path.parent}: {nearest_names(path.stem, siblings)}")
+    file = directory / f"{text}.toml"
+    if file.is_file():
+        return file
+    raise error(f"no {kind} is named {text!r}; {nearest_names(text, _names(directory))}")

@@ -1,0 +1,104 @@
+"""The messages that the blocks hand to each other, once every step. Immutable; SI units; signs of `conventions`.
+
+They are named tuples because they are made every millisecond: a frozen dataclass costs several times as much to build.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Channel(NamedTuple):
+    """What a recorded signal is called and means.
+
+    Attributes:
+        name: Channel name, ending in its unit (`yaw_rate_radps`).
+        unit: Unit as printed in tables and plots (`rad/s`), empty for a pure number.
+        meaning: One line, with the sign convention where it matters.
+        group: Name of the topic that carries it in a file (`vehicle`, `control`, `fl` ...).
+        single: True where 32 bit are enough in a file.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    group: str
+    single: bool = True
+
+
+class Reference(NamedTuple):
+    """What the manoeuvre asks of the driver at one instant.
+
+    Attributes:
+        steering_wheel_rad: Steering wheel angle asked for [rad], left positive.
+        speed_mps: Speed to hold [m/s].
+        brake: Brake pedal position, 0 to 1.
+        hold_speed: Whether the drive holds `speed_mps`; where False the car coasts.
+    """
+
+    steering_wheel_rad: float
+    speed_mps: float
+    brake: float
+    hold_speed: bool
+
+
+class DriverCommand(NamedTuple):
+    """What the driver does.
+
+    Attributes:
+        steering_wheel_rad: Steering wheel angle demanded [rad], left positive.
+        front_steer_rad: The same at the road wheel: divided by the overall steering ratio [rad].
+        drive_torque_Nm: Torque at the driven wheels together [Nm]; negative is engine braking.
+        brake: Brake pedal position, 0 to 1.
+    """
+
+    steering_wheel_rad: float
+    front_steer_rad: float
+    drive_torque_Nm: float
+    brake: float
+
+
+class Measurement(NamedTuple):
+    """What the sensors of a real car deliver, and nothing else.
+
+    Attributes:
+        time_s: Time of the measurement [s].
+        speed_mps: Longitudinal speed [m/s].
+        yaw_rate_radps: Yaw rate [rad/s], left positive.
+        ay_mps2: Lateral acceleration [m/s2], left positive.
+        ax_mps2: Longitudinal acceleration [m/s2].
+        steering_wheel_rad: Steering wheel angle [rad], left positive.
+        rear_steer_rad: Angle of the rear steering actuators, mean of both [rad], left positive.
+        superposition_rad: Angle added by the front superposition, at the road wheel [rad].
+        wheel_speed_radps: Rotational speeds of the four wheels [rad/s], order of `CORNERS`.
+    """
+
+    time_s: float
+    speed_mps: float
+    yaw_rate_radps: float
+    ay_mps2: float
+    ax_mps2: float
+    steering_wheel_rad: float
+    rear_steer_rad: float
+    superposition_rad: float
+    wheel_speed_radps: tuple[float, float, float, float]
+
+
+class SteerCommand(NamedTuple):
+    """What a controller asks of the steering actuators, with its intermediate results for the recording.
+
+    Attributes:
+        rear_steer_rad: Rear wheel angle demanded [rad], left positive.
+        superposition_rad: Angle to add at the front road wheels [rad], left positive.
+        yaw_rate_desired_radps: Yaw rate that the controller steers for [rad/s].
+        prediction_rad: Feed-forward part [rad].
+        correction_rad: Feedback part [rad].
+        saturated: Whether a limit of the controller is active.
+    """
+
+    rear_steer_rad: float = 0.0
+    superposition_rad: float = 0.0
+    yaw_rate_desired_radps: float = 0.0
+    prediction_rad: float = 0.0
+    correction_rad: float = 0.0
+    saturated: bool = False

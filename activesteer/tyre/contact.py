@@ -1,0 +1,194 @@
+"""One wheel on the road: contact kinematics, slip with relaxation, standstill, and the Magic Formula.
+
+Pure functions of the state. The two relaxation states of a tyre are the deflections of its contact patch against the
+rim [m], `deflection_x_m` along and `deflection_y_m` across the wheel's heading (Pacejka, Tire and Vehicle Dynamics,
+3rd ed. 2012, section 8.6, the restricted fully non-linear model):
+
+    d(u)/dt = -V_sx - |V_x| u / sigma_kappa        kappa' = u / sigma_kappa
+    d(v)/dt =  V_sy - |V_x| v / sigma_alpha        tan(alpha') = v / sigma_alpha      (ISO-W sign of alpha)
+
+Three additions make them usable from standstill to any speed:
+
+* The rates are those of an implicit Euler step, (f(u) h)/(1 + |V_x| h / sigma), and the forces belong to the end of the
+  step. Nothing gets stiff when sigma becomes small, and at rest the tyre is a spring, not an amplifier.
+* At low speed the deflection stops growing where the contact patch slides as a whole (the "wind-up" of Pacejka, eq.
+  8.125 ff.): |V_x| is replaced by max(|V_x|, |V_s| / slip_limit). Above `low_speed_mps` the slip limit is that of the
+  tyre file, so that the formula's steady state is reached exactly within its range of validity.
+* At low speed a viscous term acts beside the spring (Pacejka, eq. 8.129: k_Vlow), faded out by a cosine. It enters as a
+  slip, so that the friction limit bounds it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from numba import njit
+
+from activesteer.tyre import parameters as prm
+from activesteer.tyre.magic_formula import (
+    effective_rolling_radius,
+    magic_formula,
+    relaxation_lengths,
+    slip_stiffnesses,
+    vertical_force,
+)
+
+_MIN_RELAXATION_LENGTH_M: Final = 0.02
+"""About a tread block: keeps the slip defined when the load vanishes."""
+_LIFTED_DECAY_PER_S: Final = 20.0
+"""How fast the deflection of a lifted tyre decays [1/s]: a carcass rings down within some tenths of a second."""
+_SLIDING_TO_LINEAR: Final = 3.0
+"""Slip of full sliding over slip at which the linear force would reach the friction limit: 3 for a brush model."""
+
+
+class WheelForces(NamedTuple):
+    """Forces of one tyre and what they came from, ISO-W frame at the contact point."""
+
+    fx_N: float
+    fy_N: float
+    fz_N: float
+    mx_Nm: float
+    my_Nm: float
+    mz_Nm: float
+    slip_ratio: float
+    slip_angle_rad: float
+    inclination_rad: float
+    deflection_x_rate_mps: float
+    deflection_y_rate_mps: float
+    loaded_radius_m: float
+    heading_x: float
+    heading_y: float
+    arm_x_m: float
+    arm_y_m: float
+    arm_z_m: float
+    limited: float
+
+
+@njit(cache=True)
+def _low_speed_slip_limit(file_limit, sliding_slip, share):
+    """Slip at which the deflection stops growing: where the tyre slides at rest, the file's limit when rolling."""
+    return file_limit + (min(sliding_slip, file_limit) - file_limit) * share
+
+
+@njit(cache=True)
+def tyre_on_road(  # noqa: PLR0915 - one evaluation, compiled as one function
+    p,
+    mu,
+    pressure_Pa,
+    low_speed_mps,
+    low_speed_damping_Nspm,
+    timestep_s,
+    centre_height_m,
+    axis_x,
+    axis_y,
+    axis_z,
+    velocity_x_mps,
+    velocity_y_mps,
+    velocity_z_mps,
+    spin_x_radps,
+    spin_y_radps,
+    spin_z_radps,
+    deflection_x_m,
+    deflection_y_m,
+):
+    """Forces of a tyre on the plane road z = 0 and the rates of its relaxation states.
+
+    Args:
+        p: Tyre parameters, shape (PARAMETER_COUNT,); it knows the side that the tyre is mounted on.
+        mu: Friction of the road relative to the one of the tyre file [-].
+        pressure_Pa: Inflation pressure [Pa].
+        low_speed_mps: Speed below which the standstill terms fade in [m/s].
+        low_speed_damping_Nspm: Viscous coefficient of the contact patch at rest [N s/m].
+        timestep_s: Step of the integrator [s].
+        centre_height_m: Height of the wheel centre above the road [m].
+        axis_x: Unit vector of the spin axis, pointing to the left side of the car, world frame.
+        axis_y: Its y component.
+        axis_z: Its z component.
+        velocity_x_mps: Velocity of the wheel centre, world frame [m/s].
+        velocity_y_mps: Its y component.
+        velocity_z_mps: Its z component.
+        spin_x_radps: Angular velocity of the wheel, its spin included, world frame [rad/s].
+        spin_y_radps: Its y component.
+        spin_z_radps: Its z component.
+        deflection_x_m: Relaxation state along the heading [m].
+        deflection_y_m: Relaxation state across the heading [m].
+
+    Returns:
+        The members of `WheelForces` in their order. `heading_x`, `heading_y` is the unit vector of the wheel's heading
+        in the road plane; `arm_..._m` leads from the wheel centre to the contact point, world frame;
+        `limited` is 1.0 where a limit of validity of the tyre file is exceeded.
+    """
+    horizontal = math.sqrt(axis_x * axis_x + axis_y * axis_y)
+    heading_x = axis_y / horizontal
+    heading_y = -axis_x / horizontal
+    gamma = math.atan2(axis_z, horizontal)
+    loaded_radius = centre_height_m / horizontal
+    # From the centre straight down in the wheel plane: -(n - (n.s) s) / |n - (n.s) s| times the loaded radius.
+    arm_x = loaded_radius * axis_z * axis_x / horizontal
+    arm_y = loaded_radius * axis_z * axis_y / horizontal
+    arm_z = -centre_height_m
+
+    spin = spin_x_radps * axis_x + spin_y_radps * axis_y + spin_z_radps * axis_z
+    # What turns the wheel plane, without the spin itself; it moves the contact point across the heading.
+    turn_x = spin_x_radps - spin * axis_x
+    turn_y = spin_y_radps - spin * axis_y
+    turn_z = spin_z_radps - spin * axis_z
+    contact_x = velocity_x_mps + turn_y * arm_z - turn_z * arm_y
+    contact_y = velocity_y_mps + turn_z * arm_x - turn_x * arm_z
+    vx = velocity_x_mps * heading_x + velocity_y_mps * heading_y
+    vsy = contact_y * heading_x - contact_x * heading_y
+
+    deflection = p[prm.UNLOADED_RADIUS] - loaded_radius
+    fz = 0.0
+    if deflection > 0.0:
+        axis_z_rate = turn_x * axis_y - turn_y * axis_x
+        closing = -(velocity_z_mps / horizontal + centre_height_m * axis_z * axis_z_rate / horizontal**3)
+        fz = vertical_force(p, deflection, spin, pressure_Pa) + p[prm.VERTICAL_DAMPING] * closing
+    if fz <= 0.0:
+        decay = -_LIFTED_DECAY_PER_S
+        return (
+            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gamma, decay * deflection_x_m, decay * deflection_y_m,
+            loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, 0.0,
+        )  # fmt: skip
+
+    vsx = vx - spin * effective_rolling_radius(p, fz, spin, pressure_Pa)
+    sigma_x, sigma_y = relaxation_lengths(p, fz, gamma, pressure_Pa)
+    sigma_x = max(sigma_x, _MIN_RELAXATION_LENGTH_M)
+    sigma_y = max(sigma_y, _MIN_RELAXATION_LENGTH_M)
+    limit_x = p[prm.KPUMAX]
+    limit_y = math.tan(min(p[prm.ALPMAX], 1.5))
+    speed = abs(vx)
+    damping_slip_x = 0.0
+    damping_slip_y = 0.0
+    if speed < low_speed_mps:
+        share = 0.5 * (1.0 + math.cos(math.pi * speed / low_speed_mps))
+        stiffness_x, stiffness_y = slip_stiffnesses(p, fz, gamma, pressure_Pa, mu)
+        stiffness_x = abs(stiffness_x)
+        stiffness_y = abs(stiffness_y)
+        sliding = _SLIDING_TO_LINEAR * mu * fz
+        limit_x = _low_speed_slip_limit(limit_x, sliding / stiffness_x, share)
+        limit_y = _low_speed_slip_limit(limit_y, sliding / stiffness_y, share)
+        damping_slip_x = -low_speed_damping_Nspm * share * vsx / stiffness_x
+        damping_slip_y = low_speed_damping_Nspm * share * vsy / stiffness_y
+
+    carry_x = max(speed, abs(vsx) / limit_x)
+    carry_y = max(speed, abs(vsy) / limit_y)
+    rate_x = (-vsx - carry_x * deflection_x_m / sigma_x) / (1.0 + timestep_s * carry_x / sigma_x)
+    rate_y = (vsy - carry_y * deflection_y_m / sigma_y) / (1.0 + timestep_s * carry_y / sigma_y)
+    kappa = (deflection_x_m + timestep_s * rate_x) / sigma_x + damping_slip_x
+    alpha = math.atan((deflection_y_m + timestep_s * rate_y) / sigma_y + damping_slip_y)
+
+    limited = 0.0
+    if (
+        not p[prm.FZMIN] <= fz <= p[prm.FZMAX]
+        or not p[prm.KPUMIN] <= kappa <= p[prm.KPUMAX]
+        or not p[prm.ALPMIN] <= alpha <= p[prm.ALPMAX]
+        or not p[prm.CAMMIN] <= gamma <= p[prm.CAMMAX]
+    ):
+        limited = 1.0
+    fx, fy, mx, my, mz = magic_formula(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu)
+    return (
+        fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y,
+        loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, limited,
+    )  # fmt: skip

@@ -1,0 +1,217 @@
+"""`MagicFormula`: a tyre to be asked for its forces, one operating point or arrays of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from activesteer.errors import ParameterError
+from activesteer.tyre.limits import Limit
+from activesteer.tyre.rows import FORCE_COLUMNS, INPUT_COLUMNS, ROLLING_COLUMNS, evaluate_rows, rolling_rows
+from activesteer.tyre.tyre_parameters import TyreParameters
+
+Values = NDArray[np.float64]
+_MF52 = 52
+
+
+@dataclass(frozen=True)
+class TyreForces:
+    """Forces and moments in ISO-W axes at the contact point, and what they came from.
+
+    Every quantity has the shape that the inputs broadcast to. Relaxation lengths, radii and contact patch are
+    worked out when they are first asked for.
+    """
+
+    _array: Values = field(repr=False)
+    _inputs: Values = field(repr=False)
+    _forces: Values = field(repr=False)
+    _flags: NDArray[np.int64] = field(repr=False)
+    shape: tuple[int, ...]
+
+    def _force(self, name: str) -> Values:
+        """One column of the forces, in the shape of the inputs."""
+        return self._forces[:, FORCE_COLUMNS.index(name)].reshape(self.shape)
+
+    def _roll(self, name: str) -> Values:
+        """One column of the rolling quantities, in the shape of the inputs."""
+        return self._rolling[:, ROLLING_COLUMNS.index(name)].reshape(self.shape)
+
+    @cached_property
+    def _rolling(self) -> Values:
+        """Columns of ROLLING_COLUMNS."""
+        rolling = np.empty((len(self._inputs), len(ROLLING_COLUMNS)))
+        rolling_rows(self._array, self._inputs, self._forces, rolling)
+        return rolling
+
+    @property
+    def fx_N(self) -> Values:
+        """Longitudinal force [N], positive drives."""
+        return self._force("fx_N")
+
+    @property
+    def fy_N(self) -> Values:
+        """Lateral force [N], negative for a positive slip angle."""
+        return self._force("fy_N")
+
+    @property
+    def mx_Nm(self) -> Values:
+        """Overturning moment [Nm]."""
+        return self._force("mx_Nm")
+
+    @property
+    def my_Nm(self) -> Values:
+        """Rolling resistance moment [Nm], negative rolling forward."""
+        return self._force("my_Nm")
+
+    @property
+    def mz_Nm(self) -> Values:
+        """Aligning moment [Nm]."""
+        return self._force("mz_Nm")
+
+    @property
+    def friction_x(self) -> Values:
+        """Peak longitudinal friction mu_x."""
+        return self._force("friction_x")
+
+    @property
+    def friction_y(self) -> Values:
+        """Peak lateral friction mu_y."""
+        return self._force("friction_y")
+
+    @property
+    def trail_m(self) -> Values:
+        """Pneumatic trail [m]."""
+        return self._force("trail_m")
+
+    @property
+    def residual_moment_Nm(self) -> Values:
+        """Residual part of the aligning moment [Nm]."""
+        return self._force("residual_moment_Nm")
+
+    @property
+    def slip_stiffness_N(self) -> Values:
+        """Slope of the longitudinal force over slip at zero slip [N]."""
+        return self._force("slip_stiffness_N")
+
+    @property
+    def cornering_stiffness_Nprad(self) -> Values:
+        """Slope of the lateral force over slip angle at zero slip [N/rad], negative."""
+        return self._force("cornering_stiffness_Nprad")
+
+    @property
+    def relaxation_length_x_m(self) -> Values:
+        """Relaxation length of longitudinal slip [m]."""
+        return self._roll("relaxation_length_x_m")
+
+    @property
+    def relaxation_length_y_m(self) -> Values:
+        """Relaxation length of lateral slip [m]."""
+        return self._roll("relaxation_length_y_m")
+
+    @property
+    def effective_radius_m(self) -> Values:
+        """Effective rolling radius [m]."""
+        return self._roll("effective_radius_m")
+
+    @property
+    def loaded_radius_m(self) -> Values:
+        """Distance from wheel centre to road [m]."""
+        return self._roll("loaded_radius_m")
+
+    @property
+    def deflection_m(self) -> Values:
+        """Vertical deflection [m]."""
+        return self._roll("deflection_m")
+
+    @property
+    def spin_radps(self) -> Values:
+        """Rotational speed of the wheel that belongs to the slip [rad/s]."""
+        return self._roll("spin_radps")
+
+    @property
+    def contact_length_m(self) -> Values:
+        """Length of the contact patch [m]."""
+        return self._roll("contact_length_m")
+
+    @property
+    def contact_width_m(self) -> Values:
+        """Width of the contact patch [m]."""
+        return self._roll("contact_width_m")
+
+    @property
+    def limits(self) -> NDArray[np.int64]:
+        """Which inputs were evaluated at their limit: sums of `Limit` values."""
+        return self._flags.reshape(self.shape)
+
+    def saturated(self, limit: Limit) -> NDArray[np.bool_]:
+        """Where an input was evaluated at its limit."""
+        return (self.limits & int(limit)) != 0
+
+
+class MagicFormula:
+    """A tyre in steady state.
+
+    Attributes:
+        parameters: Its coefficients.
+    """
+
+    def __init__(self, parameters: TyreParameters) -> None:
+        self.parameters = parameters
+        self._array = parameters.array
+
+    def evaluate(
+        self,
+        fz_N: ArrayLike,
+        kappa: ArrayLike,
+        alpha_rad: ArrayLike,
+        gamma_rad: ArrayLike = 0.0,
+        pressure_Pa: ArrayLike | None = None,
+        vx_mps: ArrayLike | None = None,
+        *,
+        road_friction: ArrayLike = 1.0,
+        turn_slip_1pm: ArrayLike = 0.0,
+    ) -> TyreForces:
+        """Forces and moments at one operating point or at arrays of them, which broadcast.
+
+        Args:
+            fz_N: Load [N]; zero or less gives no forces.
+            kappa: Longitudinal slip, positive drives, -1 is a locked wheel.
+            alpha_rad: Slip angle [rad], ISO-W: positive gives a negative lateral force.
+            gamma_rad: Camber [rad], positive about +x.
+            pressure_Pa: Inflation pressure [Pa]; None is that of the file.
+            vx_mps: Speed along the heading [m/s]; None is the speed of the measurement.
+            road_friction: Friction of the road relative to that of the file.
+            turn_slip_1pm: Yaw rate over speed [1/m], positive to the left; MF 6.x only.
+
+        Returns:
+            Forces, moments and intermediate quantities in the common shape of the inputs.
+
+        Raises:
+            ParameterError: an input is not finite, shapes do not broadcast, or turn slip is asked of an MF 5.2 tyre.
+
+        Validity: the ranges of the file; beyond them the value at the limit, and `limits` says so.
+        Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 4.3.2.
+        """
+        pressure = self.parameters["INFLPRES"] if pressure_Pa is None else pressure_Pa
+        speed = self.parameters["LONGVL"] if vx_mps is None else vx_mps
+        given = (fz_N, kappa, alpha_rad, gamma_rad, pressure, speed, road_friction, turn_slip_1pm)
+        try:
+            columns = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in given))
+        except ValueError as error:
+            shapes = ", ".join(f"{name} {np.shape(value)}" for name, value in zip(INPUT_COLUMNS, given, strict=True))
+            raise ParameterError(f"the inputs do not broadcast: {shapes}") from error
+        shape = columns[0].shape
+        inputs = np.empty((columns[0].size, len(INPUT_COLUMNS)))
+        for place, (name, column) in enumerate(zip(INPUT_COLUMNS, columns, strict=True)):
+            inputs[:, place] = column.ravel()
+            if not np.isfinite(inputs[:, place]).all():
+                raise ParameterError(f"{name} must be finite, {np.count_nonzero(~np.isfinite(column))} values are not")
+        if self.parameters.version == _MF52 and inputs[:, -1].any():
+            raise ParameterError("turn_slip_1pm is not zero, but MF 5.2 knows no turn slip; use a 6.x tyre")
+        forces = np.empty((len(inputs), len(FORCE_COLUMNS)))
+        flags = np.empty(len(inputs), dtype=np.int64)
+        evaluate_rows(self._array, inputs, forces, flags)
+        return TyreForces(self._array, inputs, forces, flags, shape)

@@ -1,0 +1,135 @@
+"""The syntax of .tir files: sections, keys, values, table rows and comments. Knows nothing about tyres."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from activesteer.errors import TyreFileError
+
+MOST_BYTES = 4_000_000
+"""Longest file that is read; real ones have some tens of kilobytes."""
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d{1,4})?\Z")
+_KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]*\Z")
+_SECTION = re.compile(r"\[\s*([^\[\]]{1,80}?)\s*\]")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One `KEY = value` of a file.
+
+    Attributes:
+        section: Section in upper case, empty before the first one.
+        key: Key in upper case.
+        value: A number, or the text between the quotes.
+        line: Line number, from 1.
+    """
+
+    section: str
+    key: str
+    value: float | str
+    line: int
+
+
+@dataclass(frozen=True)
+class Syntax:
+    """What stands in a .tir file, in its order.
+
+    Attributes:
+        entries: Keys and values.
+        tables: Rows of numbers, by section in upper case (`[SHAPE]`, deflection curves).
+    """
+
+    entries: tuple[Entry, ...]
+    tables: dict[str, tuple[tuple[float, ...], ...]]
+
+
+def read_text(path: Path) -> str:
+    """Read a file of limited size as Latin-1, in which every byte is a character.
+
+    Raises:
+        TyreFileError: the file cannot be read, or is no text of the size of a tyre file.
+    """
+    try:
+        with path.open("rb") as file:
+            raw = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise TyreFileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
+        raise TyreFileError(f"{path!s}: cannot be read: {error}") from error
+    if len(raw) > MOST_BYTES:
+        raise TyreFileError(f"{path}: is longer than {MOST_BYTES} bytes, no tyre file is")
+    return raw.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
+
+
+def number(text: str) -> float | None:
+    """The finite number that a text stands for (Fortran's D exponent included), None where it is none."""
+    if not _NUMBER.match(text):
+        return None
+    value = float(text.replace("d", "e").replace("D", "e"))
+    return value if math.isfinite(value) else None
+
+
+def _without_comment(line: str) -> str:
+    """Cut a line at the first `$` or `!` outside quotes."""
+    quoted = ""
+    for place, character in enumerate(line):
+        if quoted:
+            quoted = "" if character == quoted else quoted
+        elif character in "'\"":
+            quoted = character
+        elif character in "$!":
+            return line[:place].strip()
+    return line.strip()
+
+
+def _value(text: str) -> float | str:
+    """A number where it reads as one, else the text without its quotes."""
+    found = number(text)
+    if found is not None:
+        return found
+    if len(text) > 1 and text[0] in "'\"" and text[-1] == text[0]:
+        return text[1:-1].strip()
+    return text
+
+
+def parse(text: str, source: str) -> Syntax:
+    """Split a .tir file into its entries and tables.
+
+    Args:
+        text: The file's content.
+        source: Name of the file, for messages.
+
+    Raises:
+        TyreFileError: a line is neither a section, `KEY = value`, a row of numbers, a `{heading}` nor a comment.
+    """
+    section = ""
+    entries: list[Entry] = []
+    tables: dict[str, list[tuple[float, ...]]] = {}
+    for count, raw in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
+        line = _without_comment(raw)
+        if not line or line[0] in "{('\"" or line[0] in "#*":
+            continue
+        if line[0] == "[":
+            match = _SECTION.match(line)
+            if not match:
+                raise TyreFileError(f"{source}, line {count}: {line[:60]!r} is no section, expected [NAME]")
+            section = match.group(1).upper()
+            continue
+        key, equals, rest = (part.strip() for part in line.partition("="))
+        if equals:
+            if not _KEY.match(key):
+                raise TyreFileError(f"{source}, line {count}: {key[:60]!r} is no key, expected KEY = value")
+            entries.append(Entry(section, key.upper(), _value(rest), count))
+            continue
+        row = [number(word) for word in line.replace(",", " ").split()]
+        if any(value is None for value in row):
+            raise TyreFileError(
+                f"{source}, line {count}: {line[:60]!r} is neither KEY = value, [SECTION], {{heading}} "
+                "nor a row of numbers"
+            )
+        tables.setdefault(section, []).append(tuple(value for value in row if value is not None))
+    return Syntax(tuple(entries), {name: tuple(rows) for name, rows in tables.items()})

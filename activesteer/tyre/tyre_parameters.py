@@ -1,0 +1,187 @@
+"""`TyreParameters`: the coefficients of one tyre, and how it is mounted and evaluated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from activesteer.errors import ParameterError, nearest_names
+from activesteer.tyre import parameters as index
+from activesteer.tyre.coefficients import BY_NAME, COEFFICIENTS
+
+DEFAULT_PRESSURE_PA = 220_000.0
+DEFAULT_LONGITUDINAL_STIFFNESS_NPM = 300_000.0
+DEFAULT_LATERAL_STIFFNESS_NPM = 100_000.0
+
+Side = Literal["LEFT", "RIGHT"]
+
+_MF_VERSIONS = {5: 52, 6: 52, 21: 52, 52: 52, 60: 60, 61: 61, 62: 62}
+_POSITIVE = (
+    "UNLOADED_RADIUS", "FNOMIN", "LONGVL", "NOMPRES", "INFLPRES", "PRESMIN", "WIDTH", "VERTICAL_STIFFNESS", "PCX1",
+    "PCY1", "PKY2", "LFZO", "LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS", "RIM_RADIUS", "FZMAX", "PTY2", "LCZ",
+)  # fmt: skip
+_RANGES = (("PRESMIN", "PRESMAX"), ("FZMIN", "FZMAX"), ("KPUMIN", "KPUMAX"), ("ALPMIN", "ALPMAX"), ("CAMMIN", "CAMMAX"))
+
+
+@dataclass(frozen=True)
+class TyreParameters(Mapping[str, float]):
+    """Coefficients of one tyre, in SI and radians; a read-only mapping from key to value, defaults included.
+
+    Attributes:
+        given: What the file states, by key in upper case, in SI.
+        source: The file, None where there is none.
+        side: Side of the vehicle that the coefficients belong to.
+        mounted: Side of the vehicle that the tyre is mounted on; on the other side everything is mirrored.
+        slip_tangent: Whether alpha* = tan(alpha) and gamma* = sin(gamma); else the angles themselves.
+        texts: Values of the file that are words, by (section, key).
+        unused: Numbers of the file that no formula of the package uses, by (section, key).
+        tables: Rows of numbers, by section.
+    """
+
+    given: Mapping[str, float]
+    source: Path | None = None
+    side: Side = "LEFT"
+    mounted: Side = "LEFT"
+    slip_tangent: bool = False
+    texts: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    unused: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    tables: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check the values and work out what the file leaves open.
+
+        Raises:
+            ParameterError: a key is missing, unknown, or outside its range.
+        """
+        values = _resolve(self.given, str(self.source or "tyre"))
+        object.__setattr__(self, "_values", MappingProxyType(values))
+
+    @property
+    def version(self) -> int:
+        """Version of the formula: 52, 60, 61 or 62."""
+        return _MF_VERSIONS[int(self["FITTYP"])]
+
+    @property
+    def array(self) -> np.ndarray:
+        """The parameter array of the kernels, float64, shape (PARAMETER_COUNT,); a new one at every call."""
+        array = np.empty(index.PARAMETER_COUNT)
+        array[: len(COEFFICIENTS)] = [self[coefficient.name] for coefficient in COEFFICIENTS]
+        array[index.MF_VERSION] = self.version
+        array[index.SLIP_TANGENT] = self.slip_tangent
+        array[index.SIDE] = 1.0 if self.mounted == self.side else -1.0
+        array[index.PTX_GIVEN] = self.version == 52 and "PTX1" in self.given
+        array[index.PTY_GIVEN] = self.version == 52 and "PTY1" in self.given
+        array[index.Q_RA_GIVEN] = "Q_RA1" in self.given or "Q_RA2" in self.given
+        array[index.Q_RB_GIVEN] = "Q_RB1" in self.given or "Q_RB2" in self.given
+        for name in ("VERTICAL_STIFFNESS", "Q_FZ1", "Q_FZ2", "Q_FZ3"):
+            array[getattr(index, name)] *= self["LCZ"]
+        return array
+
+    def mounted_on(self, side: Side) -> TyreParameters:
+        """The same tyre on a side of the vehicle: mirrored where its coefficients belong to the other one."""
+        if side not in ("LEFT", "RIGHT"):
+            raise ParameterError(f"tyre side is {side!r}, allowed are 'LEFT' and 'RIGHT'")
+        return replace(self, mounted=side)
+
+    def with_values(self, **changes: float) -> TyreParameters:
+        """A copy with other values of some keys, in SI.
+
+        Raises:
+            ParameterError: a key does not exist, or a value is not allowed.
+        """
+        return replace(self, given={**self.given, **changes})
+
+    def __getitem__(self, key: str) -> float:
+        """Value of a key in SI, the default where the file does not give it."""
+        values: Mapping[str, float] = self.__dict__["_values"]
+        try:
+            return values[key]
+        except KeyError:
+            raise ParameterError(f"there is no tyre coefficient {key!r}: {nearest_names(key, values)}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        """Every key, in the order of the parameter array."""
+        return iter(BY_NAME)
+
+    def __len__(self) -> int:
+        """Number of keys."""
+        return len(BY_NAME)
+
+    def __contains__(self, key: object) -> bool:
+        """Whether a key exists, given in the file or not."""
+        return key in BY_NAME
+
+
+def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
+    """Every coefficient: the given value, else the default, else what stands in for it."""
+    for key, value in given.items():
+        if key not in BY_NAME:
+            raise ParameterError(f"{source}: there is no tyre coefficient {key!r}: {nearest_names(key, BY_NAME)}")
+        if not math.isfinite(value):
+            raise ParameterError(f"{source}: {key} = {value}, must be finite")
+    missing = [
+        coefficient.name for coefficient in COEFFICIENTS if coefficient.required and coefficient.name not in given
+    ]
+    if missing:
+        raise ParameterError(
+            f"{source}: {', '.join(missing)} missing, a tyre needs {'it' if len(missing) == 1 else 'them'}"
+        )
+    values = {
+        coefficient.name: float(given.get(coefficient.name, coefficient.default or 0.0)) for coefficient in COEFFICIENTS
+    }
+    if values["FITTYP"] not in _MF_VERSIONS:
+        allowed = ", ".join(str(version) for version in _MF_VERSIONS)
+        raise ParameterError(f"{source}: FITTYP = {values['FITTYP']:g}, allowed are {allowed}")
+    _fill(values, given, source)
+    for key in _POSITIVE:
+        if not values[key] > 0.0:
+            raise ParameterError(f"{source}: {key} = {values[key]:g}, must be greater than 0")
+    for low, high in _RANGES:
+        if not values[low] < values[high]:
+            raise ParameterError(f"{source}: {low} = {values[low]:g} must be less than {high} = {values[high]:g}")
+    for key in ("VXLOW", "FZMIN"):
+        if values[key] < 0.0:
+            raise ParameterError(f"{source}: {key} = {values[key]:g}, must not be negative")
+    return values
+
+
+def _fill(values: dict[str, float], given: Mapping[str, float], source: str) -> None:
+    """Work out the coefficients that have no fixed default."""
+    pressure = given.get("NOMPRES", given.get("INFLPRES", DEFAULT_PRESSURE_PA))
+    stand_ins = {
+        "NOMPRES": pressure,
+        "INFLPRES": pressure,
+        "FZMAX": 2.5 * values["FNOMIN"],
+        "RIM_RADIUS": 0.6 * values["UNLOADED_RADIUS"],
+        "LONGITUDINAL_STIFFNESS": DEFAULT_LONGITUDINAL_STIFFNESS_NPM,
+        "LATERAL_STIFFNESS": DEFAULT_LATERAL_STIFFNESS_NPM,
+    }
+    for key, value in stand_ins.items():
+        if key not in given:
+            values[key] = value
+    # Stiffness at the nominal load and the coefficients of the force over deflection say the same (Besselink 2010, 4).
+    r0, fz0 = values["UNLOADED_RADIUS"], values["FNOMIN"]
+    if not (r0 > 0.0 and fz0 > 0.0):
+        return
+    if "Q_FZ1" not in given or values["Q_FZ1"] == 0.0:
+        if "VERTICAL_STIFFNESS" not in given:
+            raise ParameterError(f"{source}: VERTICAL_STIFFNESS and Q_FZ1 missing, a tyre needs one of them")
+        relative = values["VERTICAL_STIFFNESS"] * r0 / fz0
+        square = relative * relative - 4.0 * values["Q_FZ2"]
+        if not square > 0.0:
+            raise ParameterError(
+                f"{source}: Q_FZ2 = {values['Q_FZ2']:g} is too great for VERTICAL_STIFFNESS = "
+                f"{values['VERTICAL_STIFFNESS']:g} N/m, must be below {relative * relative / 4.0:g}"
+            )
+        values["Q_FZ1"] = math.sqrt(square)
+    elif "VERTICAL_STIFFNESS" not in given:
+        square = values["Q_FZ1"] * values["Q_FZ1"] + 4.0 * values["Q_FZ2"]
+        values["VERTICAL_STIFFNESS"] = fz0 / r0 * math.sqrt(max(square, 0.0))
+    if not (math.isfinite(values["Q_FZ1"]) and math.isfinite(values["VERTICAL_STIFFNESS"])):
+        raise ParameterError(f"{source}: the vertical stiffness is not finite, check VERTICAL_STIFFNESS, Q_FZ1, Q_FZ2")

@@ -1,0 +1,261 @@
+"""The car in the engine: commands in, one step, measurements out. Binds MuJoCo's arrays once, by name."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
+from activesteer.errors import ModelError, SimulationDiverged
+from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle.channels import ChannelMap, RawRows
+from activesteer.vehicle.equilibrium import static_ride
+from activesteer.vehicle.loading import find, load_model
+from activesteer.vehicle.native_forces import install_native_forces
+from activesteer.vehicle.parameters import Road, VehicleParameters
+
+_STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+_FASTEST_MPS: Final = 200.0
+"""No car of ours goes faster; a speed beyond it, or none at all, is a run that has diverged [m/s]."""
+
+
+class Vehicle:
+    """A car with its tyres on a road.
+
+    Attributes:
+        model: The engine's model.
+        data: The engine's state.
+        parameters: What the vehicle file says.
+        channels: Map from raw rows to recorded channels.
+    """
+
+    def __init__(
+        self,
+        mjcf: Path,
+        parameters: VehicleParameters,
+        tyres: tuple[TyreParameters, TyreParameters],
+        road: Road,
+        timestep_s: float = DEFAULT_TIMESTEP_S,
+    ) -> None:
+        """Compiles the car, puts it at rest in static equilibrium and installs the native forces.
+
+        Args:
+            mjcf: The model file.
+            parameters: What the vehicle file says.
+            tyres: Tyres of the front and of the rear axle.
+            road: Friction and grade.
+            timestep_s: Step of the engine [s].
+
+        Raises:
+            ModelError: the MJCF does not compile, lacks a part, or has no static equilibrium.
+        """
+        install_native_forces()
+        self.parameters = parameters
+        self.model = model = load_model(mjcf, parameters, tyres, road, timestep_s)
+        self.data = mujoco.MjData(model)
+        self.timestep_s = timestep_s
+        self.channels = ChannelMap(model, parameters)
+        self._bind()
+        self._place()
+
+    def _bind(self) -> None:
+        """Looks up addresses once; the step uses nothing but integers and views."""
+        model, data = self.model, self.data
+
+        def actuator(name: str) -> int:
+            return find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+
+        def sensor(name: str) -> int:
+            return int(model.sensor_adr[find(model, mujoco.mjtObj.mjOBJ_SENSOR, name)])
+
+        self._ctrl = data.ctrl
+        self._steering_wheel = actuator("steering_wheel")
+        self._superposition = actuator("superposition")
+        self._rear = actuator("rl_steer"), actuator("rr_steer")
+        self._drives = tuple(actuator(f"{corner}_drive") for corner in CORNERS)
+        self._brakes = tuple(actuator(f"{corner}_brake") for corner in CORNERS)
+        self._accelerometer, self._gyro = sensor("cg_accelerometer"), sensor("cg_gyro")
+        self._velocimeter = sensor("cg_velocimeter")
+        self._angles = tuple(
+            sensor(name) for name in ("steering_wheel_angle", "superposition_angle", "rl_steer_angle", "rr_steer_angle")
+        )
+        self._wheel_speed = sensor("fl_wheel_speed")
+        last = max(self._wheel_speed + 3, *self._angles, self._velocimeter, self._gyro + 2, self._accelerometer + 1)
+        self._sensed = data.sensordata[: last + 1]
+        self._root = int(model.jnt_qposadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
+        self._root_dof = int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
+        self._spins = [
+            int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_spin")]) for corner in CORNERS
+        ]
+        if self._root or self._root_dof:
+            msg = "the free joint 'root' of the chassis must be the first joint of the model"
+            raise ModelError(msg)
+        powertrain, brakes = self.parameters.powertrain, self.parameters.brakes
+        front, rear = 0.5 * powertrain.front_share, 0.5 * (1.0 - powertrain.front_share)
+        self._drive_shares = (front, front, rear, rear)
+        self._brake_torques = (
+            brakes.front_torque_Nm, brakes.front_torque_Nm, brakes.rear_torque_Nm, brakes.rear_torque_Nm,
+        )  # fmt: skip
+        self._ratio = self.parameters.steering.ratio
+        self._drive_torque_Nm = 0.0
+        self._brake = 0.0
+
+    def _place(self) -> None:
+        """Static equilibrium at the origin of the world, heading along x."""
+        mujoco.mj_resetData(self.model, self.data)
+        held = [self._root_dof, self._root_dof + 1, self._root_dof + 5, *self._spins]
+        static_ride(self.model, self.data, np.asarray(held))
+
+    def start(self, speed_mps: float) -> Measurement:
+        """Sets the car rolling straight ahead at a speed, from static ride.
+
+        Args:
+            speed_mps: Speed along world x [m/s].
+
+        Returns:
+            The first measurement.
+        """
+        data = self.data
+        self._place()
+        data.qvel[self._root_dof] = speed_mps
+        for index, dof in enumerate(self._spins):
+            data.qvel[dof] = speed_mps / self._rolling_radius(index)
+        data.time = 0.0
+        mujoco.mj_forward(self.model, data)
+        return self.measure()
+
+    def _rolling_radius(self, corner: int) -> float:
+        """Height of a wheel centre [m]: the settling before a manoeuvre corrects the rest."""
+        return float(self.data.xpos[self.model.body(f"{CORNERS[corner]}_wheel").id, 2])
+
+    def rebase(self) -> None:
+        """Makes where the car is the origin of road and time, its heading along x; its motion goes on unchanged."""
+        data, root = self.data, self._root
+        # The step leaves positions of its beginning beside the state of its end.
+        mujoco.mj_kinematics(self.model, data)
+        w, z = data.qpos[root + 3], data.qpos[root + 6]
+        half = math.atan2(z, w)
+        cos, sin = math.cos(2 * half), math.sin(2 * half)
+        x, y, height = data.qpos[root : root + 3]
+        cg_x, cg_y = self._cg_offset()
+        data.qpos[root] = cos * (x - cg_x) + sin * (y - cg_y)
+        data.qpos[root + 1] = -sin * (x - cg_x) + cos * (y - cg_y)
+        data.qpos[root + 2] = height
+        turn = np.array([math.cos(half), 0.0, 0.0, -math.sin(half)])
+        turned = np.empty(4)
+        mujoco.mju_mulQuat(turned, turn, data.qpos[root + 3 : root + 7])
+        data.qpos[root + 3 : root + 7] = turned
+        vx, vy = data.qvel[self._root_dof : self._root_dof + 2]
+        data.qvel[self._root_dof] = cos * vx + sin * vy
+        data.qvel[self._root_dof + 1] = -sin * vx + cos * vy
+        data.time = 0.0
+        mujoco.mj_forward(self.model, data)
+
+    def _cg_offset(self) -> tuple[float, float]:
+        site = self.data.site_xpos[self.model.site("cg").id]
+        return float(site[0]), float(site[1])
+
+    def step(self, command: DriverCommand, steer: SteerCommand) -> None:
+        """Applies the commands and advances the engine by one step.
+
+        Args:
+            command: What the driver does.
+            steer: What the controller adds.
+        """
+        ctrl = self._ctrl
+        ctrl[self._steering_wheel] = command.steering_wheel_rad
+        ctrl[self._superposition] = steer.superposition_rad * self._ratio
+        left, right = self._rear
+        ctrl[left] = ctrl[right] = steer.rear_steer_rad
+        if command.drive_torque_Nm != self._drive_torque_Nm:
+            self._drive_torque_Nm = torque = command.drive_torque_Nm
+            for index, share in zip(self._drives, self._drive_shares, strict=True):
+                ctrl[index] = share * torque
+        if command.brake != self._brake:
+            self._brake = command.brake
+            for index, torque in zip(self._brakes, self._brake_torques, strict=True):
+                ctrl[index] = command.brake * torque
+        mujoco.mj_step(self.model, self.data)
+
+    def measure(self) -> Measurement:
+        """What the car's sensors say of the instant at which the last step began.
+
+        Raises:
+            SimulationDiverged: the speed is not finite or beyond all reason.
+        """
+        values = self._sensed.tolist()
+        speed = values[self._velocimeter]
+        if not -_FASTEST_MPS < speed < _FASTEST_MPS:
+            msg = f"the speed is {speed:g} m/s at {self.data.time:.3f} s"
+            raise SimulationDiverged(msg)
+        wheel, added, left, right = self._angles
+        spin = self._wheel_speed
+        return Measurement(
+            self.data.time,
+            speed,
+            values[self._gyro + 2],
+            values[self._accelerometer + 1],
+            values[self._accelerometer],
+            values[wheel],
+            0.5 * (values[left] + values[right]),
+            values[added] / self._ratio,
+            (values[spin], values[spin + 1], values[spin + 2], values[spin + 3]),
+        )
+
+    def check(self) -> None:
+        """Looks for warnings of the engine and for a state that is not finite.
+
+        Raises:
+            SimulationDiverged: there is one.
+        """
+        data = self.data
+        for kind, warning in enumerate(data.warning):
+            if warning.number:
+                text = mujoco.mju_warningText(kind, warning.lastinfo)
+                msg = f"MuJoCo warns at {data.time:.3f} s: {text}"
+                raise SimulationDiverged(msg)
+        if not np.isfinite(data.qpos).all() or not np.isfinite(data.qvel).all():
+            bad = np.flatnonzero(~np.isfinite(data.qvel))
+            joints = sorted({self.model.joint(int(self.model.dof_jntid[dof])).name for dof in bad})
+            msg = f"the state is not finite at {data.time:.3f} s; joints: {', '.join(joints)}"
+            raise SimulationDiverged(msg)
+
+    def raw_rows(self, count: int) -> RawRows:
+        """Empty rows for `count` steps, to be filled by `copy_row`."""
+        data = self.data
+        sizes = (
+            data.sensordata.size, data.userdata.size, data.ten_length.size, data.ten_velocity.size, data.act.size,
+            data.actuator_force.size, data.ctrl.size,
+        )  # fmt: skip
+        return RawRows(*(np.empty((count, size)) for size in sizes))
+
+    def live_arrays(self) -> tuple[NDArray[np.float64], ...]:
+        """The engine's arrays in the order of `RawRows`."""
+        data = self.data
+        return (
+            data.sensordata, data.userdata, data.ten_length, data.ten_velocity, data.act, data.actuator_force,
+            data.ctrl,
+        )  # fmt: skip
+
+    def save_state(self) -> NDArray[np.float64]:
+        """The engine's state, complete: what continues from it is bit-identical."""
+        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, self.data, state, _STATE)
+        return state
+
+    def restore_state(self, state: NDArray[np.float64]) -> None:
+        """Puts a saved state back."""
+        mujoco.mj_setState(self.model, self.data, state, _STATE)
+        # The step writes drive and brake only where they change; these values never occur, so it writes them now.
+        self._drive_torque_Nm = self._brake = math.nan
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """All bodies but the world, in the engine's order."""
+        return tuple(self.model.body(index).name for index in range(1, self.model.nbody))

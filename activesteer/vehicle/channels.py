@@ -1,0 +1,326 @@
+"""From the engine's raw rows to the recorded channels: units, axes, signs. The only place that says what each is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import CORNERS
+from activesteer.errors import ModelError, nearest_names
+from activesteer.signals import Channel
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.parameters import VehicleParameters
+
+Array = NDArray[np.float64]
+
+_STANDSTILL_MPS: Final = 0.2
+"""Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""
+
+_CORNER_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+
+
+class RawRows(NamedTuple):
+    """Copies of the engine's arrays, one row a step, all of the same instant."""
+
+    sensordata: Array
+    userdata: Array
+    ten_length: Array
+    ten_velocity: Array
+    act: Array
+    actuator_force: Array
+    ctrl: Array
+
+
+class Signal(NamedTuple):
+    """A channel and how to get it from raw rows."""
+
+    channel: Channel
+    values: Callable[[RawRows], Array]
+
+
+class ChannelMap:
+    """All channels of a vehicle, evaluated block by block.
+
+    Attributes:
+        channels: Their table, in the order of the columns.
+    """
+
+    def __init__(self, model: mujoco.MjModel, parameters: VehicleParameters) -> None:
+        """Looks up everything by name, once.
+
+        Args:
+            model: The car.
+            parameters: Its parameters.
+
+        Raises:
+            ModelError: a sensor, tendon or actuator is missing.
+        """
+        self._model = model
+        self._parameters = parameters
+        self._last_yaw_rad = 0.0
+        self._sensors = {model.sensor(index).name: index for index in range(model.nsensor)}
+        signals = [*self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators()]
+        self.channels = tuple(signal.channel for signal in signals)
+        self._values = tuple(signal.values for signal in signals)
+
+    def evaluate(self, rows: RawRows, out: Array) -> None:
+        """Values of all channels. Blocks must come in the order of time, so that the yaw angle stays unwrapped.
+
+        Args:
+            rows: Raw rows of n steps, n > 0.
+            out: Where the values go, shape (n, len(channels)).
+        """
+        self._frame = _Frame(rows, self._sensor, self._model.opt.gravity, self._last_yaw_rad)
+        self._last_yaw_rad = float(self._frame.yaw_rad[-1])
+        for column, values in enumerate(self._values):
+            out[:, column] = values(rows)
+
+    def _sensor(self, name: str) -> slice:
+        index = self._sensors.get(name)
+        if index is None:
+            msg = f"the model has no sensor {name!r}; {nearest_names(name, self._sensors)}"
+            raise ModelError(msg)
+        start = int(self._model.sensor_adr[index])
+        return slice(start, start + int(self._model.sensor_dim[index]))
+
+    def _motion(self) -> list[Signal]:
+        def of(name: str, unit: str, meaning: str, *, exact: bool = False) -> Signal:
+            return Signal(Channel(name, unit, meaning, "vehicle", not exact), lambda _: getattr(self._frame, name))
+
+        return [
+            of("x_m", "m", "position of the centre of gravity, world x", exact=True),
+            of("y_m", "m", "position of the centre of gravity, world y (left)", exact=True),
+            of("z_m", "m", "height of the centre of gravity above the road"),
+            of("yaw_rad", "rad", "yaw angle, left positive, unwrapped", exact=True),
+            of("roll_rad", "rad", "roll angle, positive to the right"),
+            of("pitch_rad", "rad", "pitch angle, positive nose down"),
+            of("vx_mps", "m/s", "longitudinal velocity of the centre of gravity, in the road plane"),
+            of("vy_mps", "m/s", "lateral velocity of the centre of gravity, in the road plane, left positive"),
+            of("vz_mps", "m/s", "vertical velocity of the centre of gravity"),
+            of("speed_mps", "m/s", "speed of the centre of gravity over the road"),
+            of("yaw_rate_radps", "rad/s", "yaw rate, left positive"),
+            of("roll_rate_radps", "rad/s", "roll rate, body-fixed"),
+            of("pitch_rate_radps", "rad/s", "pitch rate, body-fixed"),
+            of("ax_mps2", "m/s2", "longitudinal acceleration, in the road plane"),
+            of("ay_mps2", "m/s2", "lateral acceleration, in the road plane, left positive"),
+            of("az_mps2", "m/s2", "vertical acceleration"),
+            of("sideslip_rad", "rad", "sideslip angle at the centre of gravity, atan(vy/vx)"),
+            of("front_axle_x_m", "m", "position of the middle of the front axle, world x", exact=True),
+            of("front_axle_y_m", "m", "position of the middle of the front axle, world y", exact=True),
+        ]
+
+    def _steering(self) -> list[Signal]:
+        ratio = self._parameters.steering.ratio
+        wheel, added = self._sensor("steering_wheel_angle").start, self._sensor("superposition_angle").start
+        rack = self._sensor("rack_travel").start
+        rear = [self._sensor(f"{corner}_steer_angle").start for corner in ("rl", "rr")]
+        front = [self._sensor(f"{corner}_wheel_axis") for corner in ("fl", "fr")]
+        demand = self._model.actuator("steering_wheel").id
+
+        def channel(name: str, unit: str, meaning: str) -> Channel:
+            return Channel(name, unit, meaning, "vehicle")
+
+        return [
+            Signal(
+                channel("steering_wheel_rad", "rad", "steering wheel angle, left positive, not wrapped"),
+                lambda rows: rows.sensordata[:, wheel],
+            ),
+            Signal(
+                channel("steering_wheel_demand_rad", "rad", "steering wheel angle that the driver demands"),
+                lambda rows: rows.ctrl[:, demand],
+            ),
+            Signal(
+                channel("front_steer_rad", "rad", "mean steer angle of the front wheels against the chassis"),
+                lambda rows: 0.5 * (_toe(rows.sensordata[:, front[0]]) + _toe(rows.sensordata[:, front[1]])),
+            ),
+            Signal(
+                channel("superposition_rad", "rad", "angle added by the front superposition, at the road wheel"),
+                lambda rows: rows.sensordata[:, added] / ratio,
+            ),
+            Signal(
+                channel("rear_steer_rad", "rad", "mean angle of the rear steering hinges"),
+                lambda rows: 0.5 * (rows.sensordata[:, rear[0]] + rows.sensordata[:, rear[1]]),
+            ),
+            Signal(channel("rack_m", "m", "rack travel, positive steers left"), lambda rows: rows.sensordata[:, rack]),
+        ]
+
+    def _corners(self) -> list[Signal]:
+        signals: list[Signal] = []
+        for index, corner in enumerate(CORNERS):
+            first = index * fb.USERDATA_PER_WHEEL
+            words = _CORNER_WORDS[corner]
+
+            def user(
+                slot: int, name: str, unit: str, meaning: str, *, first: int = first, corner: str = corner,
+                words: str = words,
+            ) -> Signal:  # fmt: skip
+                column = first + slot
+                return Signal(
+                    Channel(f"{corner}_{name}", unit, f"{meaning}, {words}", "corners"),
+                    lambda rows: rows.userdata[:, column],
+                )
+
+            signals += [
+                user(fb.U_FX, "tyre_fx_N", "N", "longitudinal tyre force at the contact point, ISO-W"),
+                user(fb.U_FY, "tyre_fy_N", "N", "lateral tyre force at the contact point, ISO-W, left positive"),
+                user(fb.U_FZ, "tyre_fz_N", "N", "vertical tyre force"),
+                user(fb.U_MX, "tyre_mx_Nm", "Nm", "overturning moment"),
+                user(fb.U_MY, "tyre_my_Nm", "Nm", "rolling resistance moment, negative rolling forward"),
+                user(fb.U_MZ, "tyre_mz_Nm", "Nm", "aligning moment"),
+                user(fb.U_SLIP_RATIO, "slip_ratio", "", "transient longitudinal slip, positive drives"),
+                user(fb.U_SLIP_ANGLE, "slip_angle_rad", "rad", "transient slip angle, positive gives negative force"),
+                user(fb.U_INCLINATION, "inclination_rad", "rad", "inclination of the wheel against the road about +x"),
+                user(fb.U_LOADED_RADIUS, "loaded_radius_m", "m", "distance of wheel centre and contact point"),
+                user(fb.U_LIMITED, "tyre_limited", "", "1 where the tyre is outside its file's range of validity"),
+            ]
+            signals += self._wheel(corner, words, index)
+        return signals
+
+    def _wheel(self, corner: str, words: str, index: int) -> list[Signal]:
+        height = self._sensor(f"{corner}_wheel_position").start + 2
+        axis = self._sensor(f"{corner}_wheel_axis")
+        spin = self._sensor(f"{corner}_wheel_speed").start
+        design_m = self._design_height(corner)
+        damper = len(CORNERS) * fb.USERDATA_PER_WHEEL + index
+
+        def channel(name: str, unit: str, meaning: str) -> Channel:
+            return Channel(f"{corner}_{name}", unit, f"{meaning}, {words}", "corners")
+
+        return [
+            Signal(channel("wheel_speed_radps", "rad/s", "rotational speed"), lambda rows: rows.sensordata[:, spin]),
+            Signal(
+                channel("travel_m", "m", "wheel travel from the design position, bump positive"),
+                lambda rows: rows.sensordata[:, height] - design_m,
+            ),
+            Signal(
+                channel("steer_rad", "rad", "steer angle of the wheel against the chassis, left positive"),
+                lambda rows: _toe(rows.sensordata[:, axis]),
+            ),
+            Signal(
+                channel("camber_rad", "rad", "inclination of the wheel against the chassis about +x"),
+                lambda rows: np.arcsin(rows.sensordata[:, axis.start + 2]),
+            ),
+            Signal(
+                channel("damper_force_N", "N", "damper force, positive resists compression"),
+                lambda rows: rows.userdata[:, damper],
+            ),
+        ]
+
+    def _design_height(self, corner: str) -> float:
+        """Height of a wheel centre in vehicle axes in the design position [m]."""
+        data = mujoco.MjData(self._model)
+        mujoco.mj_kinematics(self._model, data)
+        chassis = self._model.body("chassis").id
+        offset = data.xpos[self._model.body(f"{corner}_wheel").id] - data.xpos[chassis]
+        return float((data.xmat[chassis].reshape(3, 3).T @ offset)[2])
+
+    def _links(self) -> list[Signal]:
+        """Axial forces of everything that is a tendon with a stiffness of its own; tension positive."""
+        model = self._model
+        signals = []
+        for index in range(model.ntendon):
+            if model.tendon_stiffness[index] == 0.0 and not model.tendon_stiffnesspoly[index].any():
+                continue
+            # What a damper's tendon has of a spring are the stops at both ends of its travel.
+            name = model.tendon(index).name.replace("_damper", "_stop")
+            coefficients = (model.tendon_stiffness[index], *model.tendon_stiffnesspoly[index])
+            damping = float(model.tendon_damping[index])
+            low, high = (float(length) for length in model.tendon_lengthspring[index])
+
+            def force(
+                rows: RawRows, index: int = index, k: tuple[float, ...] = coefficients, damping: float = damping,
+                low: float = low, high: float = high,
+            ) -> Array:  # fmt: skip
+                length = rows.ten_length[:, index]
+                x = length - np.clip(length, low, high)
+                spring = x * (k[0] + x * (k[1] + x * k[2]))
+                return spring + damping * rows.ten_velocity[:, index] if damping else spring
+
+            signals.append(
+                Signal(Channel(f"{name}_force_N", "N", f"axial force of {name}, tension positive", "links"), force)
+            )
+        return signals
+
+    def _actuators(self) -> list[Signal]:
+        """Torques of drive and brakes, and flags that say where an actuator is at a limit."""
+        model = self._model
+        signals: list[Signal] = []
+        for index in range(model.nu):
+            name = model.actuator(index).name
+            if name.endswith(("_drive", "_brake")):
+                signals.append(
+                    Signal(
+                        Channel(f"{name}_torque_Nm", "Nm", f"torque of {name} on the wheel", "vehicle"),
+                        lambda rows, index=index: rows.actuator_force[:, index],
+                    )
+                )
+            elif model.actuator_actadr[index] >= 0 and model.actuator_gainprm[index, 0] > 0.0:
+                signals.append(
+                    Signal(
+                        Channel(
+                            f"{name}_saturated",
+                            "",
+                            f"1 where {name} is at its angle, rate or torque limit",
+                            "vehicle",
+                        ),
+                        lambda rows, index=index: self._saturated(rows, index),
+                    )
+                )
+        return signals
+
+    def _saturated(self, rows: RawRows, index: int) -> Array:
+        model = self._model
+        lag, rate = model.actuator_dynprm[index, :2]
+        low, high = model.actuator_ctrlrange[index]
+        command = rows.ctrl[:, index]
+        wanted = (np.clip(command, low, high) - rows.act[:, model.actuator_actadr[index]]) / lag
+        force = rows.actuator_force[:, index]
+        weakest, strongest = model.actuator_forcerange[index]
+        limited = (np.abs(wanted) >= rate) | (command < low) | (command > high)
+        if model.actuator_forcelimited[index]:
+            limited |= (force <= weakest) | (force >= strongest)
+        return limited.astype(float)
+
+
+class _Frame:
+    """Motion of the centre of gravity in the axes of ISO 8855, from sensors in world and body axes."""
+
+    def __init__(self, rows: RawRows, sensor: Callable[[str], slice], gravity: Array, last_yaw_rad: float) -> None:
+        def columns(name: str) -> list[Array]:
+            part = sensor(name)
+            return [rows.sensordata[:, column] for column in range(part.start, part.stop)]
+
+        self.x_m, self.y_m, self.z_m = columns("cg_position")
+        self.front_axle_x_m, self.front_axle_y_m, _ = columns("front_axle_position")
+        w, x, y, z = columns("chassis_orientation")
+        # Body axes in the world: yaw, pitch, roll in this order (ISO 8855).
+        yaw = np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+        self.yaw_rad = np.unwrap(np.concatenate(([last_yaw_rad], yaw)))[1:]
+        self.pitch_rad = np.arcsin(np.clip(2 * (w * y - x * z), -1.0, 1.0))
+        self.roll_rad = np.arctan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+        cos, sin = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        vx, vy, self.vz_mps = columns("cg_velocity")
+        self.vx_mps = vx * cos + vy * sin
+        self.vy_mps = vy * cos - vx * sin
+        self.speed_mps = np.hypot(vx, vy)
+        self.sideslip_rad = np.where(self.speed_mps > _STANDSTILL_MPS, np.arctan2(self.vy_mps, self.vx_mps), 0.0)
+        ax, ay, az = columns("cg_accelerometer")
+        cp, sp = np.cos(self.pitch_rad), np.sin(self.pitch_rad)
+        cr, sr = np.cos(self.roll_rad), np.sin(self.roll_rad)
+        # An accelerometer measures the specific force: turned into the road plane, gravity (which has a part there on a
+        # grade) is added to get the acceleration.
+        self.ax_mps2 = cp * ax + sp * (sr * ay + cr * az) + gravity[0] * cos
+        self.ay_mps2 = cr * ay - sr * az - gravity[0] * sin
+        self.az_mps2 = -sp * ax + cp * (sr * ay + cr * az) + gravity[2]
+        self.roll_rate_radps, self.pitch_rate_radps, body_yaw = columns("cg_gyro")
+        # Euler angle rate about the road's normal, not the body's z axis.
+        self.yaw_rate_radps = (sr * self.pitch_rate_radps + cr * body_yaw) / cp
+
+
+def _toe(axis: Array) -> Array:
+    """Steer angle of a wheel from its spin axis in chassis axes, shape (n, 3)."""
+    return np.arctan2(-axis[:, 0], axis[:, 1])

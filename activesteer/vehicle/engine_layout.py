@@ -1,0 +1,121 @@
+"""Where MuJoCo keeps its arrays: byte offsets inside mjModel and mjData, found at run time.
+
+A native callback receives bare pointers to both structs. Their layout is no part of MuJoCo's Python interface and
+changes between versions, so it is measured: the words of a struct are compared with the addresses that the bindings'
+numpy views report, and with distinctive values planted in a small model. A second model confirms every finding.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Final, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import ModelError
+
+_WORD_BYTES: Final = 8
+_MODEL_BYTES: Final = 8192
+"""How far to look into mjModel: all its members are sizes, options and pointers, a few kilobytes."""
+_DATA_BYTES: Final = 262_144
+"""How far to look into mjData: solver statistics lie before the pointers (160 KB in MuJoCo 4.0)."""
+
+_DATA_ARRAYS: Final = (
+    "qvel",
+    "act",
+    "ctrl",
+    "userdata",
+    "xpos",
+    "xmat",
+    "subtree_com",
+    "cdof",
+    "ten_J",
+    "ten_velocity",
+    "cvel",
+    "qfrc_passive",
+)
+
+
+class EngineLayout(NamedTuple):
+    """Byte offsets inside mjModel (`m_`) and mjData (`d_`); all name the pointer to an array but the first two."""
+
+    m_nnumericdata: int
+    m_timestep: int
+    m_numeric_data: int
+    d_qvel: int
+    d_act: int
+    d_ctrl: int
+    d_userdata: int
+    d_xpos: int
+    d_xmat: int
+    d_subtree_com: int
+    d_cdof: int
+    d_ten_J: int
+    d_ten_velocity: int
+    d_cvel: int
+    d_qfrc_passive: int
+
+
+def _probe(numbers: int, timestep_s: float) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """A small model that has every array we look for, a known count of custom numbers and a known time step."""
+    xml = f"""
+    <mujoco>
+      <option timestep="{timestep_s!r}"/>
+      <size nuserdata="3"/>
+      <custom><numeric name="probe" size="{numbers}" data="1"/></custom>
+      <worldbody>
+        <site name="a"/>
+        <body pos="0 0 1"><joint name="j" type="slide" axis="0 0 1"/><geom size="0.1"/><site name="b"/></body>
+      </worldbody>
+      <tendon><spatial><site site="a"/><site site="b"/></spatial></tendon>
+      <actuator><general joint="j" dyntype="user"/></actuator>
+    </mujoco>"""
+    model = mujoco.MjModel.from_xml_string(xml)
+    return model, mujoco.MjData(model)
+
+
+def _words(address: int, size_bytes: int) -> NDArray[np.uint64]:
+    # A view, not a copy: nothing is touched before _find looks at it, block by block, and stops at the match.
+    return np.ctypeslib.as_array((ctypes.c_uint64 * (size_bytes // _WORD_BYTES)).from_address(address))
+
+
+def _find(address: int, wanted: int, limit_bytes: int, what: str) -> int:
+    """Byte offset of the only word that equals `wanted`, scanning forward and stopping at the first match."""
+    words = _words(address, limit_bytes)
+    block = 256
+    for start in range(0, len(words), block):
+        hits = np.flatnonzero(words[start : start + block] == np.uint64(wanted))
+        if hits.size:
+            return (start + int(hits[0])) * _WORD_BYTES
+    msg = f"MuJoCo {mujoco.__version__}: cannot locate {what} in its structures; this version is not supported"
+    raise ModelError(msg)
+
+
+def _measure(model: mujoco.MjModel, data: mujoco.MjData, numbers: int) -> EngineLayout:
+    m, d = model._address, data._address
+    step_bits = int(np.float64(model.opt.timestep).view(np.uint64))
+    return EngineLayout(
+        _find(m, numbers, _MODEL_BYTES, "mjModel.nnumericdata"),
+        _find(m, step_bits, _MODEL_BYTES, "mjModel.opt.timestep"),
+        _find(m, model.numeric_data.ctypes.data, _MODEL_BYTES, "mjModel.numeric_data"),
+        *(_find(d, getattr(data, name).ctypes.data, _DATA_BYTES, f"mjData.{name}") for name in _DATA_ARRAYS),
+    )
+
+
+def measure_engine_layout() -> EngineLayout:
+    """Finds the offsets and confirms them on a second, different model.
+
+    Returns:
+        The offsets for the MuJoCo that is installed.
+
+    Raises:
+        ModelError: the structures do not look as expected in this MuJoCo version.
+    """
+    first = _measure(*_probe(7919, 0.00123456789), 7919)
+    second = _measure(*_probe(6421, 0.00098765432), 6421)
+    if first != second:
+        msg = f"MuJoCo {mujoco.__version__}: two models give different struct layouts ({first}, {second})"
+        raise ModelError(msg)
+    return first

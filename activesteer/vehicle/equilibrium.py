@@ -1,0 +1,75 @@
+"""Static ride: the position in which the standing car is in equilibrium."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import ModelError
+
+_ITERATIONS: Final = 40
+_DIFFERENCE: Final = 1e-7
+"""Step of the finite differences [m, rad]: links of 1e7 N/m change their force by 1 N."""
+_LARGEST_STEP: Final = 0.02
+"""Most that a coordinate may move in one iteration [m, rad], so that stops are met from outside."""
+_TOLERANCE_N: Final = 1e-7
+"""Residual force at which the search ends [N, N m]; weight is 1.4e4."""
+
+
+def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.intp]) -> None:
+    """Moves the car into static equilibrium, by Newton's method on the forces at rest.
+
+    The car must stand near the position that is sought. Velocities and activations are set to zero: the tyres carry
+    their load and no side force but the one of their own asymmetry.
+
+    Args:
+        model: The model.
+        data: Its state; `qpos` is the first guess and becomes the result.
+        held: Degrees of freedom to leave alone: position and heading on the road, rotation of the wheels.
+
+    Raises:
+        ModelError: no equilibrium was found.
+    """
+    free = np.setdiff1d(np.arange(model.nv), held)
+    data.qvel[:] = 0.0
+    if model.na:
+        data.act[:] = 0.0
+    residual = _residual(model, data, free)
+    for _ in range(_ITERATIONS):
+        if np.abs(residual).max() < _TOLERANCE_N:
+            return
+        start = data.qpos.copy()
+        stiffness = np.empty((free.size, free.size))
+        move = np.zeros(model.nv)
+        for column, dof in enumerate(free):
+            move[:] = 0.0
+            move[dof] = _DIFFERENCE
+            mujoco.mj_integratePos(model, data.qpos, move, 1.0)
+            stiffness[:, column] = (_residual(model, data, free) - residual) / _DIFFERENCE
+            data.qpos[:] = start
+        step = np.linalg.lstsq(stiffness, -residual, rcond=None)[0]
+        step *= min(1.0, _LARGEST_STEP / np.abs(step).max())
+        move[:] = 0.0
+        move[free] = step
+        mujoco.mj_integratePos(model, data.qpos, move, 1.0)
+        smaller = _residual(model, data, free)
+        if np.abs(step).max() < 1e-12 or (np.abs(smaller).max() >= np.abs(residual).max() < 1e-4):
+            # The last digits: rounding decides, no step gets closer.
+            return
+        residual = smaller
+    worst = int(free[np.abs(residual).argmax()])
+    joint = model.joint(int(model.dof_jntid[worst])).name
+    msg = (
+        f"no static equilibrium found in {_ITERATIONS} iterations: {np.abs(residual).max():.3g} N (or N m) remain at "
+        f"joint {joint!r}; are the springs' free lengths right for the car's weight?"
+    )
+    raise ModelError(msg)
+
+
+def _residual(model: mujoco.MjModel, data: mujoco.MjData, free: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Generalised force that is not balanced, at rest, shape (free.size,)."""
+    mujoco.mj_forward(model, data)
+    return data.qfrc_smooth[free].copy()

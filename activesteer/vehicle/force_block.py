@@ -1,0 +1,150 @@
+"""The parameters of the native forces, as they lie in a model's custom numeric data.
+
+One block of numbers per model holds everything the callbacks need: sizes, indices, tyres, dampers, drag and the
+dynamics of the actuators. So the compiled code is the same for every car and can be cached on disk, and models of one
+process may differ. The block is the last custom numeric of the model and ends with its own start and a marker, by
+which the callbacks recognise a model of ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+BLOCK_NAME: Final = "activesteer"
+MARKER: Final = 20121121.0
+"""Last number of the block; the date of the conference of the paper that this project starts from."""
+TRAILER_SIZE: Final = 2
+
+# Header.
+(
+    N_WHEELS, N_DAMPERS, N_DOFS, N_BODIES, N_USERDATA, N_ACTIVATIONS, N_CONTROLS, N_TENDONS, N_TENDON_JACOBIAN,
+    CHASSIS_BODY, CHASSIS_ROOT, CHASSIS_N_DOFS, DRAG_Ns2pm2, AERO_X_m, AERO_Y_m, AERO_Z_m,
+    WHEELS_START, DAMPERS_START, ACTUATORS_START, CHASSIS_DOFS, HEADER_SIZE,
+) = range(21)  # fmt: skip
+
+MAX_CHAIN: Final = 32
+"""Most degrees of freedom between the world and a wheel."""
+
+# One record per wheel; the chain of degrees of freedom follows.
+(
+    W_BODY, W_ROOT, W_ACT_X, W_ACT_Y, W_MU, W_PRESSURE_Pa, W_LOW_SPEED_mps, W_LOW_SPEED_DAMPING_Nspm,
+    W_TYRE_START, W_CHAIN_LENGTH, W_CHAIN,
+) = range(11)  # fmt: skip
+WHEEL_SIZE: Final = W_CHAIN + MAX_CHAIN
+
+# One record per damper: a tendon, its place in the sparse tendon Jacobian, and a piecewise linear curve.
+D_TENDON, D_ROW, D_LENGTH, D_POINTS, D_CHAIN = range(5)
+MAX_CURVE_POINTS: Final = 12
+D_VELOCITY: Final = D_CHAIN + MAX_CHAIN
+D_FORCE: Final = D_VELOCITY + MAX_CURVE_POINTS
+DAMPER_SIZE: Final = D_FORCE + MAX_CURVE_POINTS
+
+# One record per actuator with user dynamics (all actuators have one; KIND_NONE where the engine does the dynamics).
+A_KIND, A_ACT, A_FIRST, A_SECOND, A_LOW, A_HIGH = range(6)
+ACTUATOR_SIZE: Final = 6
+KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE = 0.0, 1.0, 2.0, 3.0
+
+# What the callback writes into mjData.userdata: one record per wheel, then the force of each damper.
+(
+    U_FX, U_FY, U_FZ, U_MX, U_MY, U_MZ, U_SLIP_RATIO, U_SLIP_ANGLE, U_INCLINATION, U_RATE_X, U_RATE_Y,
+    U_LOADED_RADIUS, U_LIMITED,
+) = range(13)  # fmt: skip
+USERDATA_PER_WHEEL: Final = 13
+
+
+@dataclass
+class WheelEntry:
+    """One wheel for the block; see the `W_` indices."""
+
+    body: int
+    root: int
+    act_x: int
+    act_y: int
+    mu: float
+    pressure_Pa: float
+    low_speed_mps: float
+    low_speed_damping_Nspm: float
+    chain: list[int]
+    tyre: NDArray[np.float64]
+
+
+@dataclass
+class DamperEntry:
+    """One damper for the block; velocities positive in compression, forces positive where they push apart."""
+
+    tendon: int
+    row: int
+    chain: list[int]
+    velocity_mps: list[float]
+    force_N: list[float]
+
+
+@dataclass
+class ForceBlock:
+    """Everything the native forces need, before it becomes an array."""
+
+    n_dofs: int
+    n_bodies: int
+    n_userdata: int
+    n_activations: int
+    n_controls: int
+    n_tendons: int
+    n_tendon_jacobian: int
+    chassis_body: int
+    chassis_root: int
+    chassis_chain: list[int]
+    drag_Ns2pm2: float
+    aero_point_m: tuple[float, float, float]
+    wheels: list[WheelEntry] = field(default_factory=list)
+    dampers: list[DamperEntry] = field(default_factory=list)
+    actuators: list[tuple[float, float, float, float, float, float]] = field(default_factory=list)
+
+    def wheel_start(self, index: int) -> int:
+        """Where the record of a wheel begins, counted from the start of the block."""
+        return HEADER_SIZE + MAX_CHAIN + index * WHEEL_SIZE
+
+    def to_array(self) -> NDArray[np.float64]:
+        """The block without its trailer."""
+        wheels_start = self.wheel_start(0)
+        dampers_start = self.wheel_start(len(self.wheels))
+        actuators_start = dampers_start + len(self.dampers) * DAMPER_SIZE
+        tyres_start = actuators_start + len(self.actuators) * ACTUATOR_SIZE
+        tyres = [wheel.tyre for wheel in self.wheels]
+        block = np.zeros(tyres_start + sum(tyre.size for tyre in tyres))
+        block[:CHASSIS_DOFS] = (
+            len(self.wheels), len(self.dampers), self.n_dofs, self.n_bodies, self.n_userdata, self.n_activations,
+            self.n_controls, self.n_tendons, self.n_tendon_jacobian, self.chassis_body, self.chassis_root,
+            len(self.chassis_chain), self.drag_Ns2pm2, *self.aero_point_m, wheels_start, dampers_start, actuators_start,
+        )  # fmt: skip
+        block[CHASSIS_DOFS] = HEADER_SIZE
+        block[HEADER_SIZE : HEADER_SIZE + len(self.chassis_chain)] = self.chassis_chain
+        tyre_start = tyres_start
+        for index, wheel in enumerate(self.wheels):
+            record = block[self.wheel_start(index) : self.wheel_start(index + 1)]
+            record[:W_CHAIN] = (
+                wheel.body, wheel.root, wheel.act_x, wheel.act_y, wheel.mu, wheel.pressure_Pa,
+                wheel.low_speed_mps, wheel.low_speed_damping_Nspm, tyre_start, len(wheel.chain),
+            )  # fmt: skip
+            record[W_CHAIN : W_CHAIN + len(wheel.chain)] = wheel.chain
+            block[tyre_start : tyre_start + wheel.tyre.size] = wheel.tyre
+            tyre_start += wheel.tyre.size
+        for index, damper in enumerate(self.dampers):
+            start = dampers_start + index * DAMPER_SIZE
+            record = block[start : start + DAMPER_SIZE]
+            points = len(damper.velocity_mps)
+            record[:D_CHAIN] = (damper.tendon, damper.row, len(damper.chain), points)
+            record[D_CHAIN : D_CHAIN + len(damper.chain)] = damper.chain
+            record[D_VELOCITY : D_VELOCITY + points] = damper.velocity_mps
+            record[D_FORCE : D_FORCE + points] = damper.force_N
+        if self.actuators:
+            block[actuators_start:tyres_start] = np.asarray(self.actuators, float).ravel()
+        return block
+
+
+def with_trailer(block: NDArray[np.float64], start: int) -> NDArray[np.float64]:
+    """The block as it goes into the model, given the index at which it will start in `numeric_data`."""
+    return np.concatenate([block, (float(start), MARKER)])

@@ -1,0 +1,227 @@
+"""MJCF and vehicle parameters -> a compiled MuJoCo model that carries its tyres, dampers and actuators."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.errors import ModelError, nearest_names
+from activesteer.tyre import parameters as tyre_index
+from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.parameters import DamperCurve, Road, VehicleParameters
+
+_USER_DYNAMICS: Final = int(mujoco.mjtDyn.mjDYN_USER)
+
+
+def load_model(
+    mjcf: Path,
+    parameters: VehicleParameters,
+    tyres: tuple[TyreParameters, TyreParameters],
+    road: Road,
+    timestep_s: float,
+) -> mujoco.MjModel:
+    """Compiles a car.
+
+    Args:
+        mjcf: The model file.
+        parameters: What MJCF cannot say.
+        tyres: Tyres of the front and of the rear axle.
+        road: Friction and grade.
+        timestep_s: Step of the engine [s].
+
+    Returns:
+        The model, ready for the native forces.
+
+    Raises:
+        ModelError: the MJCF does not compile, or lacks something that a car must have.
+    """
+    try:
+        spec = mujoco.MjSpec.from_file(str(mjcf))
+        spec.option.timestep = timestep_s
+        angle = math.atan(road.grade)
+        spec.option.gravity = [-GRAVITY_MPS2 * math.sin(angle), 0.0, -GRAVITY_MPS2 * math.cos(angle)]
+        spec.nuserdata = len(CORNERS) * (fb.USERDATA_PER_WHEEL + 1)
+        _fit_brakes(spec, parameters)
+        _load_chassis(spec, parameters)
+        block = _force_block(spec.compile(), parameters, tyres, road).to_array()
+        start = sum(len(numeric.data) for numeric in spec.numerics)
+        spec.add_numeric(name=fb.BLOCK_NAME, size=block.size + fb.TRAILER_SIZE, data=fb.with_trailer(block, start))
+        return spec.compile()
+    except (ValueError, KeyError) as reason:
+        msg = f"{mjcf}: {reason}"
+        raise ModelError(msg) from reason
+
+
+def _fit_brakes(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
+    """Gives the brakes the stiffness of the vehicle file; their force follows the wind-up that a step reaches."""
+    for actuator in spec.actuators:
+        if actuator.name.endswith("_brake"):
+            actuator.gainprm[0] = -parameters.brakes.stiffness_Nmprad
+            actuator.actearly = True
+
+
+def _load_chassis(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
+    chassis = spec.body("chassis")
+    if chassis is None:
+        msg = "there is no body 'chassis'"
+        raise KeyError(msg)
+    factor = parameters.load.mass_factor
+    chassis.mass *= factor
+    chassis.inertia = np.asarray(chassis.inertia) * factor
+    chassis.fullinertia = np.asarray(chassis.fullinertia) * factor
+    chassis.ipos = np.add(chassis.ipos, (0.0, 0.0, parameters.load.cg_height_change_m))
+
+
+def chain_to(model: mujoco.MjModel, body: int) -> list[int]:
+    """Degrees of freedom between the world and a body, nearest to the body first."""
+    while model.body_dofnum[body] == 0:
+        body = int(model.body_parentid[body])
+        if body == 0:
+            return []
+    dof = int(model.body_dofadr[body] + model.body_dofnum[body] - 1)
+    chain = []
+    while dof >= 0:
+        chain.append(dof)
+        dof = int(model.dof_parentid[dof])
+    return chain
+
+
+def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    """Index of a named thing.
+
+    Raises:
+        ModelError: there is none of this name.
+    """
+    index = mujoco.mj_name2id(model, kind, name)
+    if index < 0:
+        word = kind.name.removeprefix("mjOBJ_").lower()
+        count = {
+            mujoco.mjtObj.mjOBJ_BODY: model.nbody,
+            mujoco.mjtObj.mjOBJ_JOINT: model.njnt,
+            mujoco.mjtObj.mjOBJ_SENSOR: model.nsensor,
+            mujoco.mjtObj.mjOBJ_TENDON: model.ntendon,
+            mujoco.mjtObj.mjOBJ_ACTUATOR: model.nu,
+        }[kind]
+        names = [mujoco.mj_id2name(model, kind, number) or "" for number in range(count)]
+        msg = f"the model has no {word} {name!r}; {nearest_names(name, names)}"
+        raise ModelError(msg)
+    return index
+
+
+def _force_block(
+    model: mujoco.MjModel,
+    parameters: VehicleParameters,
+    tyres: tuple[TyreParameters, TyreParameters],
+    road: Road,
+) -> fb.ForceBlock:
+    chassis = find(model, mujoco.mjtObj.mjOBJ_BODY, "chassis")
+    aero = parameters.aerodynamics
+    block = fb.ForceBlock(
+        n_dofs=model.nv,
+        n_bodies=model.nbody,
+        n_userdata=model.nuserdata,
+        n_activations=model.na,
+        n_controls=model.nu,
+        n_tendons=model.ntendon,
+        n_tendon_jacobian=model.nJten,
+        chassis_body=chassis,
+        chassis_root=int(model.body_rootid[chassis]),
+        chassis_chain=chain_to(model, chassis),
+        drag_Ns2pm2=0.5 * aero.air_density_kgpm3 * aero.drag_area_m2,
+        aero_point_m=_triple(aero.pressure_point_m),
+    )
+    for corner in CORNERS:
+        front = corner.startswith("f")
+        block.wheels.append(_wheel(model, corner, parameters, tyres[0 if front else 1], road))
+        block.dampers.append(_damper(model, corner, parameters.dampers.front if front else parameters.dampers.rear))
+    block.actuators.extend(_actuator(model, index, parameters) for index in range(model.nu))
+    return block
+
+
+def _triple(values: tuple[float, ...]) -> tuple[float, float, float]:
+    if len(values) != 3:
+        msg = f"aerodynamics.pressure_point_m: {len(values)} numbers given; 3 are needed"
+        raise ModelError(msg)
+    return values[0], values[1], values[2]
+
+
+def _wheel(
+    model: mujoco.MjModel, corner: str, parameters: VehicleParameters, tyre: TyreParameters, road: Road
+) -> fb.WheelEntry:
+    body = find(model, mujoco.mjtObj.mjOBJ_BODY, f"{corner}_wheel")
+    chain = chain_to(model, body)
+    if len(chain) > fb.MAX_CHAIN:
+        msg = f"{corner}_wheel: {len(chain)} degrees of freedom above the wheel; at most {fb.MAX_CHAIN} are supported"
+        raise ModelError(msg)
+    fitment = parameters.tyres
+    pressure = fitment.front_pressure_Pa if corner.startswith("f") else fitment.rear_pressure_Pa
+    return fb.WheelEntry(
+        body=body,
+        root=int(model.body_rootid[body]),
+        act_x=_activation(model, f"{corner}_slip_x"),
+        act_y=_activation(model, f"{corner}_slip_y"),
+        mu=road.mu,
+        pressure_Pa=pressure if pressure is not None else float(tyre.array[tyre_index.INFLPRES]),
+        low_speed_mps=fitment.low_speed_mps,
+        low_speed_damping_Nspm=fitment.low_speed_damping_Nspm,
+        chain=chain,
+        tyre=tyre.mounted_on("LEFT" if corner.endswith("l") else "RIGHT").array,
+    )
+
+
+def _activation(model: mujoco.MjModel, actuator: str) -> int:
+    index = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
+    address = int(model.actuator_actadr[index])
+    if address < 0:
+        msg = f'actuator {actuator!r} has no activation; it needs dyntype="user"'
+        raise ModelError(msg)
+    return address
+
+
+def _damper(model: mujoco.MjModel, corner: str, curve: DamperCurve) -> fb.DamperEntry:
+    name = f"{corner}_damper"
+    count = len(curve.velocity_mps)
+    if not 2 <= count <= fb.MAX_CURVE_POINTS or len(curve.force_N) != count:
+        msg = (
+            f"dampers: {count} velocities and {len(curve.force_N)} forces given; 2 to {fb.MAX_CURVE_POINTS} points are "
+            "needed, as many velocities as forces"
+        )
+        raise ModelError(msg)
+    if any(right <= left for left, right in zip(curve.velocity_mps, curve.velocity_mps[1:], strict=False)):
+        msg = f"dampers: the velocities {list(curve.velocity_mps)} do not increase"
+        raise ModelError(msg)
+    tendon = find(model, mujoco.mjtObj.mjOBJ_TENDON, name)
+    row, length = int(model.ten_J_rowadr[tendon]), int(model.ten_J_rownnz[tendon])
+    chain = [int(dof) for dof in model.ten_J_colind[row : row + length]]
+    return fb.DamperEntry(tendon, row, chain, list(curve.velocity_mps), list(curve.force_N))
+
+
+def _actuator(
+    model: mujoco.MjModel, index: int, parameters: VehicleParameters
+) -> tuple[float, float, float, float, float, float]:
+    """The record of one actuator for the callback that gives its rate."""
+    if int(model.actuator_dyntype[index]) != _USER_DYNAMICS:
+        return (fb.KIND_NONE, 0.0, 0.0, 0.0, 0.0, 0.0)
+    name = model.actuator(index).name
+    address = float(model.actuator_actadr[index])
+    if name.endswith(("_slip_x", "_slip_y")):
+        wheel = CORNERS.index(name[:2])
+        slot = wheel * fb.USERDATA_PER_WHEEL + (fb.U_RATE_X if name.endswith("x") else fb.U_RATE_Y)
+        return (fb.KIND_SLIP, address, float(slot), 0.0, 0.0, 0.0)
+    if name.endswith("_brake"):
+        brakes = parameters.brakes
+        most = brakes.front_torque_Nm if name.startswith("f") else brakes.rear_torque_Nm
+        spin = float(model.jnt_dofadr[int(model.actuator_trnid[index, 0])])
+        return (fb.KIND_BRAKE, address, brakes.stiffness_Nmprad, spin, brakes.drag_torque_Nm, most)
+    lag, rate = (float(value) for value in model.actuator_dynprm[index, :2])
+    if lag <= 0.0 or rate <= 0.0:
+        msg = f"actuator {name!r}: dynprm is {lag:g} {rate:g}; a lag [s] and a rate limit [rad/s] above 0 are needed"
+        raise ModelError(msg)
+    low, high = (float(value) for value in model.actuator_ctrlrange[index])
+    return (fb.KIND_SERVO, address, lag, rate, low, high)

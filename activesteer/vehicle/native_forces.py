@@ -1,0 +1,271 @@
+"""The native callbacks: tyres, dampers and drag as passive forces, and the dynamics of our actuators.
+
+Compiled once by numba, cached on disk, called by the engine without any Python. They are pure functions of the state:
+what they leave in `userdata` is scratch for the recorder, written anew at every evaluation. Models without our block
+are left alone.
+
+Forces reach the joints by the transposed Jacobian: for every degree of freedom between the world and the body, the
+scalar product of its motion axis (`cdof`, about the centre of mass of the tree) with the wrench about the same point.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any, Final
+
+import mujoco
+import numba
+from numba import carray, cfunc, njit, types
+
+import activesteer.tyre
+from activesteer.errors import ModelError
+from activesteer.tyre.contact import tyre_on_road
+from activesteer.tyre.parameters import PARAMETER_COUNT as TYRE_PARAMETERS
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.engine_layout import EngineLayout, measure_engine_layout
+from activesteer.vehicle.native_memory import array_at, f64_pointer, word
+
+_MARKER: Final = fb.MARKER
+
+
+@njit(inline="always")
+def _our_block(model, m_count, m_numbers):
+    """The block of a model of ours, or an empty array."""
+    count = word(model + m_count)
+    numbers = carray(f64_pointer(word(model + m_numbers)), (count,))
+    if count < fb.TRAILER_SIZE or numbers[count - 1] != _MARKER:
+        return numbers[:0]
+    return numbers[int(numbers[count - 2]) :]
+
+
+@njit(inline="always")
+def _apply(qfrc, cdof, chain, fx, fy, fz, tx, ty, tz):
+    """Adds J^T w for a wrench about the tree's centre of mass."""
+    for index in range(chain.size):
+        dof = int(chain[index])
+        axis = 6 * dof
+        qfrc[dof] += (
+            cdof[axis] * tx + cdof[axis + 1] * ty + cdof[axis + 2] * tz
+            + cdof[axis + 3] * fx + cdof[axis + 4] * fy + cdof[axis + 5] * fz
+        )  # fmt: skip
+
+
+@njit(inline="always")
+def _interpolate(x, xs, ys, count):
+    """Piecewise linear curve, continued with the slope of its ends."""
+    index = 1
+    while index < count - 1 and x > xs[index]:
+        index += 1
+    return ys[index - 1] + (x - xs[index - 1]) * (ys[index] - ys[index - 1]) / (xs[index] - xs[index - 1])
+
+
+@njit(inline="always")
+def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc):
+    for index in range(int(block[fb.N_WHEELS])):
+        wheel = block[int(block[fb.WHEELS_START]) + index * fb.WHEEL_SIZE :]
+        body = int(wheel[fb.W_BODY])
+        root = int(wheel[fb.W_ROOT])
+        to_x = xpos[3 * body] - com[3 * root]
+        to_y = xpos[3 * body + 1] - com[3 * root + 1]
+        to_z = xpos[3 * body + 2] - com[3 * root + 2]
+        wx, wy, wz = cvel[6 * body], cvel[6 * body + 1], cvel[6 * body + 2]
+        tyre_start = int(wheel[fb.W_TYRE_START])
+        (
+            fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, radius, hx, hy, arm_x, arm_y, arm_z, limited,
+        ) = tyre_on_road(
+            block[tyre_start : tyre_start + TYRE_PARAMETERS],
+            wheel[fb.W_MU],
+            wheel[fb.W_PRESSURE_Pa],
+            wheel[fb.W_LOW_SPEED_mps],
+            wheel[fb.W_LOW_SPEED_DAMPING_Nspm],
+            timestep_s,
+            xpos[3 * body + 2],
+            xmat[9 * body + 1],
+            xmat[9 * body + 4],
+            xmat[9 * body + 7],
+            cvel[6 * body + 3] + wy * to_z - wz * to_y,
+            cvel[6 * body + 4] + wz * to_x - wx * to_z,
+            cvel[6 * body + 5] + wx * to_y - wy * to_x,
+            wx,
+            wy,
+            wz,
+            act[int(wheel[fb.W_ACT_X])],
+            act[int(wheel[fb.W_ACT_Y])],
+        )  # fmt: skip
+        out = userdata[index * fb.USERDATA_PER_WHEEL :]
+        out[fb.U_FX] = fx
+        out[fb.U_FY] = fy
+        out[fb.U_FZ] = fz
+        out[fb.U_MX] = mx
+        out[fb.U_MY] = my
+        out[fb.U_MZ] = mz
+        out[fb.U_SLIP_RATIO] = kappa
+        out[fb.U_SLIP_ANGLE] = alpha
+        out[fb.U_INCLINATION] = gamma
+        out[fb.U_RATE_X] = rate_x
+        out[fb.U_RATE_Y] = rate_y
+        out[fb.U_LOADED_RADIUS] = radius
+        out[fb.U_LIMITED] = limited
+        gx = fx * hx - fy * hy
+        gy = fx * hy + fy * hx
+        px, py, pz = to_x + arm_x, to_y + arm_y, to_z + arm_z
+        chain = wheel[fb.W_CHAIN : fb.W_CHAIN + int(wheel[fb.W_CHAIN_LENGTH])]
+        _apply(
+            qfrc,
+            cdof,
+            chain,
+            gx,
+            gy,
+            fz,
+            py * fz - pz * gy + mx * hx - my * hy,
+            pz * gx - px * fz + mx * hy + my * hx,
+            px * gy - py * gx + mz,
+        )
+
+
+@njit(inline="always")
+def _dampers(block, ten_velocity, jacobian, userdata, qfrc):
+    first_slot = int(block[fb.N_WHEELS]) * fb.USERDATA_PER_WHEEL
+    for index in range(int(block[fb.N_DAMPERS])):
+        damper = block[int(block[fb.DAMPERS_START]) + index * fb.DAMPER_SIZE :]
+        force = _interpolate(
+            -ten_velocity[int(damper[fb.D_TENDON])],
+            damper[fb.D_VELOCITY :],
+            damper[fb.D_FORCE :],
+            int(damper[fb.D_POINTS]),
+        )
+        userdata[first_slot + index] = force
+        row = int(damper[fb.D_ROW])
+        for entry in range(int(damper[fb.D_LENGTH])):
+            qfrc[int(damper[fb.D_CHAIN + entry])] += jacobian[row + entry] * force
+
+
+@njit(inline="always")
+def _drag(block, xpos, xmat, com, cvel, cdof, qfrc):
+    """Aerodynamic drag: against the velocity of the pressure point, in the plane of the road."""
+    body = int(block[fb.CHASSIS_BODY])
+    root = int(block[fb.CHASSIS_ROOT])
+    ax, ay, az = block[fb.AERO_X_m], block[fb.AERO_Y_m], block[fb.AERO_Z_m]
+    rot = xmat[9 * body : 9 * body + 9]
+    px = xpos[3 * body] + rot[0] * ax + rot[1] * ay + rot[2] * az - com[3 * root]
+    py = xpos[3 * body + 1] + rot[3] * ax + rot[4] * ay + rot[5] * az - com[3 * root + 1]
+    pz = xpos[3 * body + 2] + rot[6] * ax + rot[7] * ay + rot[8] * az - com[3 * root + 2]
+    wx, wy, wz = cvel[6 * body], cvel[6 * body + 1], cvel[6 * body + 2]
+    vx = cvel[6 * body + 3] + wy * pz - wz * py
+    vy = cvel[6 * body + 4] + wz * px - wx * pz
+    factor = -block[fb.DRAG_Ns2pm2] * (vx * vx + vy * vy) ** 0.5
+    fx, fy = factor * vx, factor * vy
+    start = int(block[fb.CHASSIS_DOFS])
+    chain = block[start : start + int(block[fb.CHASSIS_N_DOFS])]
+    _apply(qfrc, cdof, chain, fx, fy, 0.0, -pz * fy, pz * fx, px * fy - py * fx)
+
+
+def _make_callbacks(layout: EngineLayout, fingerprint: str) -> tuple[Any, Any]:
+    """Compiles the two callbacks, or loads them from numba's cache.
+
+    The offsets and the fingerprint are closure variables on purpose: numba makes those part of the cache key, so that
+    another MuJoCo version or a change in the functions called here cannot run stale machine code.
+    """
+    (
+        m_count, m_timestep, m_numbers, d_qvel, d_act, d_ctrl, d_userdata, d_xpos, d_xmat, d_com, d_cdof, d_ten_j,
+        d_ten_velocity, d_cvel, d_qfrc,
+    ) = layout  # fmt: skip
+    key = int(fingerprint[:12], 16)
+
+    @cfunc(types.void(types.intp, types.intp), cache=True)
+    def passive(model, data):
+        block = _our_block(model, m_count, m_numbers)
+        if block.size == 0 or key == 0:
+            return
+        bodies = int(block[fb.N_BODIES])
+        dofs = int(block[fb.N_DOFS])
+        timestep_s = carray(f64_pointer(model + m_timestep), (1,))[0]
+        xpos = array_at(data, d_xpos, 3 * bodies)
+        xmat = array_at(data, d_xmat, 9 * bodies)
+        com = array_at(data, d_com, 3 * bodies)
+        cvel = array_at(data, d_cvel, 6 * bodies)
+        cdof = array_at(data, d_cdof, 6 * dofs)
+        act = array_at(data, d_act, int(block[fb.N_ACTIVATIONS]))
+        userdata = array_at(data, d_userdata, int(block[fb.N_USERDATA]))
+        qfrc = array_at(data, d_qfrc, dofs)
+        _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
+        ten_velocity = array_at(data, d_ten_velocity, int(block[fb.N_TENDONS]))
+        jacobian = array_at(data, d_ten_j, int(block[fb.N_TENDON_JACOBIAN]))
+        _dampers(block, ten_velocity, jacobian, userdata, qfrc)
+        _drag(block, xpos, xmat, com, cvel, cdof, qfrc)
+
+    @cfunc(types.double(types.intp, types.intp, types.intc), cache=True)
+    def actuator_rate(model, data, actuator):
+        block = _our_block(model, m_count, m_numbers)
+        if block.size == 0 or key == 0:
+            return 0.0
+        entry = block[int(block[fb.ACTUATORS_START]) + actuator * fb.ACTUATOR_SIZE :]
+        kind = entry[fb.A_KIND]
+        if kind == fb.KIND_SLIP:
+            return array_at(data, d_userdata, int(block[fb.N_USERDATA]))[int(entry[fb.A_FIRST])]
+        state = array_at(data, d_act, int(block[fb.N_ACTIVATIONS]))[int(entry[fb.A_ACT])]
+        command = array_at(data, d_ctrl, int(block[fb.N_CONTROLS]))[actuator]
+        if kind == fb.KIND_SERVO:
+            # First-order lag behind the limited command, its rate limited.
+            command = min(max(command, entry[fb.A_LOW]), entry[fb.A_HIGH])
+            rate = (command - state) / entry[fb.A_FIRST]
+            return min(max(rate, -entry[fb.A_SECOND]), entry[fb.A_SECOND])
+        if kind == fb.KIND_BRAKE:
+            # Elasto-plastic friction: the pads wind up with the wheel and slip where the torque reaches the demand.
+            timestep_s = carray(f64_pointer(model + m_timestep), (1,))[0]
+            speed = array_at(data, d_qvel, int(block[fb.N_DOFS]))[int(entry[fb.A_SECOND])]
+            # The drag of pads, bearings and seals is always there; it is also what keeps a car from creeping at rest.
+            limit = min(max(command, entry[fb.A_LOW]), entry[fb.A_HIGH]) / entry[fb.A_FIRST]
+            wound = min(max(state + timestep_s * speed, -limit), limit)
+            return (wound - state) / timestep_s
+        return 0.0
+
+    return passive, actuator_rate
+
+
+def _source_fingerprint() -> str:
+    """Changes with any source that is compiled into the callbacks, and with numba's and MuJoCo's version."""
+    digest = hashlib.sha256(f"{numba.__version__} {mujoco.__version__}".encode())
+    here = Path(__file__).parent
+    sources = [here / "force_block.py", here / "native_memory.py", *Path(activesteer.tyre.__file__).parent.glob("*.py")]
+    for source in sorted(sources):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()
+
+
+_installed: list[Any] = []
+"""The callbacks as the engine sees them; kept for the life of the process, since the engine holds bare pointers."""
+
+
+def install_native_forces() -> None:
+    """Installs the callbacks in this process; does nothing where they are installed already.
+
+    Raises:
+        ModelError: another part of the program has put a callback of its own in their place.
+    """
+    slots = (
+        ("mjcb_passive", mujoco.get_mjcb_passive(), mujoco.set_mjcb_passive),
+        ("mjcb_act_dyn", mujoco.get_mjcb_act_dyn(), mujoco.set_mjcb_act_dyn),
+    )
+    for name, present, _ in slots:
+        if present is not None and not any(present is ours for ours in _installed):
+            msg = (
+                f"MuJoCo's {name} is already taken by {present!r}; there is one per process and the tyre forces need "
+                f"it: call mujoco.set_{name}(None) before using activesteer"
+            )
+            raise ModelError(msg)
+    if not _installed:
+        compiled = _make_callbacks(measure_engine_layout(), _source_fingerprint())
+        _installed.extend(callback.ctypes for callback in compiled)
+    for (_, present, install), ours in zip(slots, _installed, strict=True):
+        if present is None:
+            install(ours)
+
+
+def remove_native_forces() -> None:
+    """Takes our callbacks out of this process, as for a measurement of the bare engine; others' are left."""
+    if any(mujoco.get_mjcb_passive() is ours for ours in _installed):
+        mujoco.set_mjcb_passive(None)
+    if any(mujoco.get_mjcb_act_dyn() is ours for ours in _installed):
+        mujoco.set_mjcb_act_dyn(None)

@@ -1,0 +1,40 @@
+"""Reading and writing the engine's memory from compiled code: addresses become numba pointers and arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import carray, njit, types
+from numba.extending import intrinsic
+
+
+def _pointer_to(numba_type: types.Type) -> Any:
+    @intrinsic
+    def cast(_typing_context, _address):
+        signature = types.CPointer(numba_type)(types.intp)
+
+        def generate(context, builder: ir.IRBuilder, sig, args):
+            return builder.inttoptr(args[0], context.get_value_type(sig.return_type))
+
+        return signature, generate
+
+    return cast
+
+
+f64_pointer = _pointer_to(types.float64)
+"""Address (intp) -> pointer to float64."""
+word_pointer = _pointer_to(types.intp)
+"""Address (intp) -> pointer to a machine word."""
+
+
+@njit(inline="always")
+def word(address):
+    """The machine word at an address."""
+    return word_pointer(address)[0]
+
+
+@njit(inline="always")
+def array_at(struct, offset, size):
+    """The float64 array whose pointer stands `offset` bytes into a struct, as a 1-D view of `size` elements."""
+    return carray(f64_pointer(word(struct + offset)), (size,))

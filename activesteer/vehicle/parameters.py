@@ -1,0 +1,130 @@
+"""What a vehicle file says beside its MJCF: tyres, dampers, brakes, powertrain, steering ratio, drag."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from activesteer.config import Range
+
+Positive = Annotated[float, Range(1e-12)]
+NotNegative = Annotated[float, Range(0.0)]
+Share = Annotated[float, Range(0.0, 1.0)]
+
+
+@dataclass(frozen=True)
+class TyreFitment:
+    """Which tyres the car wears and how they behave near standstill."""
+
+    front: str
+    """Tyre file of the front wheels, a name in models/tyres or a path."""
+    rear: str
+    """Tyre file of the rear wheels."""
+    front_pressure_Pa: Positive | None = None
+    """Inflation pressure; the one in the tyre file where not given [Pa]."""
+    rear_pressure_Pa: Positive | None = None
+    """Inflation pressure; the one in the tyre file where not given [Pa]."""
+    low_speed_mps: Annotated[float, Range(0.1, 5.0)] = 2.0
+    """Speed below which the standstill behaviour fades in [m/s]."""
+    low_speed_damping_Nspm: NotNegative = 1500.0
+    """Viscous coefficient of the contact patch at rest [N s/m]."""
+
+
+@dataclass(frozen=True)
+class DamperCurve:
+    """Force of a damper over its velocity, piecewise linear, compression positive."""
+
+    velocity_mps: tuple[float, ...]
+    """Compression velocities, increasing [m/s]."""
+    force_N: tuple[float, ...]
+    """Forces that resist them [N]."""
+
+
+@dataclass(frozen=True)
+class Dampers:
+    """One curve per axle, along the damper."""
+
+    front: DamperCurve
+    rear: DamperCurve
+
+
+@dataclass(frozen=True)
+class Brakes:
+    """Friction brakes: torque per wheel at full pedal, and the stiffness of pads and caliper in their holder."""
+
+    front_torque_Nm: NotNegative
+    rear_torque_Nm: NotNegative
+    drag_torque_Nm: NotNegative = 0.0
+    """Dry friction of released pads, bearings and seals, per wheel [N m]."""
+    stiffness_Nmprad: Positive = 1e5
+    """Torque per angle of wind-up while the brake holds [N m/rad]."""
+
+
+@dataclass(frozen=True)
+class Powertrain:
+    """Torque at the driven wheels and where it goes."""
+
+    front_share: Share
+    """Share of the drive torque at the front axle; each axle's part is split evenly [-]."""
+    max_torque_Nm: NotNegative
+    """Most drive torque at all wheels together [N m]."""
+    engine_brake_torque_Nm: NotNegative
+    """Most braking torque of the engine at all wheels together [N m]."""
+
+
+@dataclass(frozen=True)
+class Steering:
+    """The overall steering ratio, by which driver and controllers relate both ends of the steering."""
+
+    ratio: Positive
+    """Steering wheel angle over mean road-wheel angle around straight ahead [-]."""
+    steering_wheel_limit_rad: Positive
+    """Lock angle of the steering wheel to either side [rad]."""
+
+
+@dataclass(frozen=True)
+class Aerodynamics:
+    """Drag; lift is left out."""
+
+    drag_area_m2: NotNegative
+    """Drag coefficient times frontal area [m2]."""
+    air_density_kgpm3: NotNegative = 1.2
+    """At 20 deg C and sea level [kg/m3]."""
+    pressure_point_m: tuple[float, ...] = (0.0, 0.0, 0.0)
+    """Where drag acts, vehicle axes [m]."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """A change of the chassis as modelled: more or less mass, a higher or lower centre of gravity."""
+
+    mass_factor: Annotated[float, Range(0.5, 2.0)] = 1.0
+    """Mass and inertia of the chassis body times this [-]."""
+    cg_height_change_m: Annotated[float, Range(-0.3, 0.3)] = 0.0
+    """The chassis body's centre of gravity is moved up by this [m]."""
+
+
+@dataclass(frozen=True)
+class VehicleParameters:
+    """A vehicle file without what belongs to controllers and driver."""
+
+    name: str
+    mjcf: str
+    """The model, relative to models/mjcf or a path."""
+    tyres: TyreFitment
+    dampers: Dampers
+    brakes: Brakes
+    powertrain: Powertrain
+    steering: Steering
+    aerodynamics: Aerodynamics
+    load: Load = Load()
+
+
+@dataclass(frozen=True)
+class Road:
+    """What the wheels roll on."""
+
+    mu: Annotated[float, Range(0.01, 2.0)] = 1.0
+    """Friction relative to the one of the tyre files [-]."""
+    grade: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    """Rise over run in the direction of travel [-]; positive is uphill."""

@@ -1,0 +1,67 @@
+"""The metrics are those of the manoeuvre's kind."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from activesteer.analysis import general, step_response
+from activesteer.analysis.metrics import metrics
+from activesteer.conventions import CORNERS
+from activesteer.errors import RecordingError
+from tests.unit.analysis.made_up import MadeUp, step_steer
+
+TIME_S = np.arange(2001) * 0.001
+
+
+def wave(kind: str = "straight") -> MadeUp:
+    channels = {
+        "yaw_rate_radps": 0.3 * np.sin(2.0 * np.pi * TIME_S),
+        "ay_mps2": -5.0 * np.sin(2.0 * np.pi * TIME_S),
+        "sideslip_rad": np.zeros_like(TIME_S),
+        "roll_rad": np.full_like(TIME_S, -0.02),
+        "steering_wheel_rad": -0.7 * np.sin(2.0 * np.pi * TIME_S),
+        "speed_mps": np.linspace(20.0, 19.0, TIME_S.size),
+    }
+    for corner in CORNERS:
+        channels |= {f"{corner}_tyre_f{axis}_N": np.zeros_like(TIME_S) for axis in "xy"}
+        channels[f"{corner}_tyre_fz_N"] = np.full_like(TIME_S, 4000.0)
+    return MadeUp(TIME_S, channels, kind)
+
+
+def test_step_steer_gets_the_metrics_of_iso_7401():
+    run = step_steer()
+    assert metrics(run) == pytest.approx(step_response.metrics(run), nan_ok=True)
+
+
+@pytest.mark.parametrize("kind", ["straight", "something_new"])
+def test_other_kinds_get_the_general_ones(kind):
+    assert metrics(wave(kind)) == general.metrics(wave(kind))
+
+
+def test_peaks_and_root_mean_squares_of_a_sine():
+    values = metrics(wave())
+    assert values["yaw_rate_peak_abs_radps"] == pytest.approx(0.3, rel=1e-6)
+    assert values["yaw_rate_rms_radps"] == pytest.approx(0.3 / math.sqrt(2.0), rel=1e-3)
+    assert values["ay_peak_abs_mps2"] == pytest.approx(5.0, rel=1e-6)
+    assert values["roll_peak_abs_rad"] == pytest.approx(0.02)
+    assert values["steering_wheel_peak_abs_rad"] == pytest.approx(0.7, rel=1e-6)
+    assert values["speed_end_mps"] == pytest.approx(19.0)
+
+
+def test_friction_used_is_the_largest_force_ratio_of_a_loaded_tyre():
+    run = wave()
+    run.channels["rl_tyre_fx_N"] = np.where(TIME_S > 1.0, 1200.0, 0.0)
+    run.channels["rl_tyre_fy_N"] = np.where(TIME_S > 1.0, -1600.0, 0.0)
+    run.channels["fr_tyre_fz_N"] = np.where(TIME_S > 1.0, 0.0, 4000.0)
+    run.channels["fr_tyre_fy_N"] = np.where(TIME_S > 1.0, 1.0, 0.0)
+    assert metrics(run)["friction_used_max"] == pytest.approx(0.5)
+
+
+def test_a_recording_without_kind_is_refused():
+    run = wave()
+    run.metadata["maneuver"] = "step_steer"
+    with pytest.raises(RecordingError, match="key 'kind'"):
+        metrics(run)

@@ -1,0 +1,111 @@
+"""The figure of the step steer."""
+
+from __future__ import annotations
+
+import builtins
+import sys
+
+import numpy as np
+import pytest
+
+from activesteer.analysis.plots import step_steer_figure
+from activesteer.errors import ParameterError, RecordingError
+from tests.unit.analysis.made_up import step_steer
+
+
+def three():
+    return {
+        "afs": step_steer(superposition_rad=0.01),
+        "none": step_steer(),
+        "ars": step_steer(rear_rad=-0.01),
+    }
+
+
+@pytest.fixture
+def saved(monkeypatch, tmp_path):
+    """The Figure that was saved, for looking at its curves."""
+    figure_module = pytest.importorskip("matplotlib.figure")
+    figures = []
+    save = figure_module.Figure.savefig
+
+    def keep(self, *args, **words):
+        figures.append(self)
+        return save(self, *args, **words)
+
+    monkeypatch.setattr(figure_module.Figure, "savefig", keep)
+    step_steer_figure(three(), tmp_path / "figure.png")
+    return figures[0]
+
+
+def test_figure_is_a_png_of_readable_size(tmp_path):
+    image = pytest.importorskip("matplotlib.image")
+    path = step_steer_figure(three(), tmp_path / "figure.png")
+    pixels = image.imread(path)
+    assert pixels.shape[0] > 1000
+    assert pixels.shape[1] > 800
+    assert pixels[..., :3].min() < 0.5 < pixels[..., :3].max()
+
+
+def test_five_panels_share_the_time_axis(saved):
+    axes = saved.get_axes()
+    assert len(axes) == 5
+    assert {axis.get_xlim() for axis in axes} == {(0.0, 7.0)}
+
+
+def test_curves_are_named_and_ordered_as_in_the_paper(saved):
+    legend = [text.get_text() for text in saved.legends[0].get_texts()]
+    assert legend == ["1 no control", "2 active rear steering", "3 active front steering"]
+
+
+def test_angles_are_in_degrees_and_only_those_that_exist(saved):
+    lines = [line for line in saved.get_axes()[1].get_lines() if len(line.get_xdata())]
+    ends = sorted(round(float(line.get_ydata()[-1]), 3) for line in lines)
+    front = round(float(np.degrees(1.0 / 16.0)), 3)
+    assert ends == [pytest.approx(np.degrees(-0.01), abs=1e-3), pytest.approx(np.degrees(0.01), abs=1e-3)] + [front] * 3
+
+
+def test_the_same_run_keeps_its_colour_when_others_are_left_out(tmp_path, monkeypatch):
+    figure_module = pytest.importorskip("matplotlib.figure")
+    figures = []
+    monkeypatch.setattr(figure_module.Figure, "savefig", lambda self, *_, **__: figures.append(self))
+    step_steer_figure(three(), tmp_path / "a.png")
+    step_steer_figure({"ars": three()["ars"]}, tmp_path / "b.png")
+    assert figures[0].get_axes()[2].get_lines()[1].get_color() == figures[1].get_axes()[2].get_lines()[0].get_color()
+
+
+def test_a_users_controller_is_drawn_under_its_own_name(tmp_path, monkeypatch):
+    figure_module = pytest.importorskip("matplotlib.figure")
+    figures = []
+    monkeypatch.setattr(figure_module.Figure, "savefig", lambda self, *_, **__: figures.append(self))
+    step_steer_figure({"my_controller.py:Mine": step_steer(rear_rad=-0.02)}, tmp_path / "a.png")
+    assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["my_controller.py:Mine"]
+
+
+def test_pyplot_is_left_alone(tmp_path):
+    before = "matplotlib.pyplot" in sys.modules
+    step_steer_figure(three(), tmp_path / "figure.png")
+    assert ("matplotlib.pyplot" in sys.modules) == before
+
+
+def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
+    imported = builtins.__import__
+
+    def without(name, *args, **words):
+        if name.startswith("matplotlib"):
+            raise ImportError(name)
+        return imported(name, *args, **words)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(ParameterError, match=r"pip install 'activesteer\[plot\]'"):
+        step_steer_figure(three(), tmp_path / "figure.png")
+
+
+def test_nothing_to_draw_is_an_error(tmp_path):
+    with pytest.raises(ParameterError, match="no recording"):
+        step_steer_figure({}, tmp_path / "figure.png")
+
+
+@pytest.mark.parametrize("name", ["missing/figure.png", "figure.unknown"])
+def test_a_file_that_cannot_be_written_is_named(tmp_path, name):
+    with pytest.raises(RecordingError, match=name):
+        step_steer_figure(three(), tmp_path / name)

@@ -1,0 +1,130 @@
+"""Smoothing, crossings and step responses against signals whose answer is known in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import savgol_filter
+
+from activesteer.analysis.series import crossing_time, largest_rate, smooth, step_response, timestep
+from activesteer.errors import RecordingError
+from tests.unit.analysis.made_up import first_order, second_order
+
+TIME_S = np.arange(6001) * 0.001
+
+
+def test_smoothing_keeps_a_3_hz_oscillation():
+    wave = np.sin(2.0 * np.pi * 3.0 * TIME_S)
+    inside = slice(50, -50)
+    np.testing.assert_allclose(smooth(wave, 0.001)[inside], wave[inside], atol=1e-4)
+
+
+def test_smoothing_is_the_filter_of_savitzky_and_golay(rng):
+    values = rng.standard_normal(200)
+    expected = np.asarray(savgol_filter(values, 41, polyorder=3))
+    np.testing.assert_allclose(smooth(values, 0.001), expected, atol=1e-12)
+
+
+def test_smoothing_takes_white_noise_to_a_quarter(rng):
+    noise = rng.standard_normal(TIME_S.size)
+    assert smooth(noise, 0.001).std() < 0.25 * noise.std()
+
+
+def test_smoothing_leaves_coarse_samples_alone():
+    values = np.array([0.0, 1.0, 0.0, 1.0, 0.0, 1.0])
+    np.testing.assert_array_equal(smooth(values, 0.05), values)
+
+
+def test_crossing_is_interpolated_between_samples():
+    assert crossing_time(np.array([0.0, 1.0, 2.0]), np.array([0.0, 0.0, 4.0]), 1.0) == pytest.approx(1.25)
+
+
+def test_crossing_is_nan_for_a_signal_that_starts_above_the_level():
+    assert math.isnan(crossing_time(np.array([0.0, 1.0]), np.array([3.0, 2.0]), 1.0))
+
+
+def test_first_order_lag_takes_ln_10_time_constants_to_90_percent():
+    response = step_response(TIME_S, 0.3 * first_order(TIME_S - 1.0, 0.2), 1.0, 1.0, 1e-3)
+    assert response.steady_state == pytest.approx(0.3, rel=1e-8)
+    assert response.response_time_s == pytest.approx(0.2 * math.log(10.0), abs=1e-5)
+
+
+def test_first_order_lag_has_no_peak_and_says_so():
+    response = step_response(TIME_S, 0.3 * first_order(TIME_S - 1.0, 0.2), 1.0, 1.0, 1e-3)
+    assert math.isnan(response.peak_time_s)
+    assert response.overshoot == pytest.approx(0.0, abs=1e-6)
+    assert any("no peak" in note for note in response.notes)
+
+
+@pytest.mark.parametrize("damping", [0.3, 0.5, 0.7])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_second_order_lag_peaks_where_the_closed_form_says(damping, side):
+    natural_radps = 9.0
+    response = step_response(
+        TIME_S, side * 0.2 * second_order(TIME_S - 1.0, natural_radps, damping), 1.0, 1.0, least=1e-3
+    )
+    root = math.sqrt(1.0 - damping**2)
+    # Half a millisecond: peaks are taken from samples. 2e-4: what is left of the oscillation in the last second.
+    assert response.peak_time_s == pytest.approx(math.pi / (natural_radps * root), abs=6e-4)
+    assert response.overshoot == pytest.approx(math.exp(-math.pi * damping / root), abs=2e-4)
+    assert response.peak == pytest.approx(side * 0.2 * (1.0 + math.exp(-math.pi * damping / root)), rel=1e-4)
+    assert not response.notes
+
+
+def test_response_time_of_a_second_order_lag_solves_its_equation():
+    response = step_response(TIME_S, second_order(TIME_S - 1.0, 9.0, 0.7), 1.0, 1.0, 1e-3)
+    at_crossing = second_order(np.array([response.response_time_s]), 9.0, 0.7)[0]
+    assert at_crossing == pytest.approx(0.9, abs=1e-4)
+
+
+def test_noise_of_one_percent_moves_the_results_little(rng):
+    clean = second_order(TIME_S - 1.0, 9.0, 0.5)
+    noisy = clean + 0.01 * rng.standard_normal(TIME_S.size)
+    wanted, got = (step_response(TIME_S, values, 1.0, 1.0, 1e-3) for values in (clean, noisy))
+    assert got.steady_state == pytest.approx(wanted.steady_state, abs=1e-3)
+    assert got.response_time_s == pytest.approx(wanted.response_time_s, abs=2e-3)
+    assert got.overshoot == pytest.approx(wanted.overshoot, abs=8e-3)
+    assert got.peak_time_s == pytest.approx(wanted.peak_time_s, abs=30e-3)
+
+
+def test_response_that_first_moves_the_other_way_is_timed_by_its_final_direction():
+    since_s = TIME_S - 1.0
+    values = -0.02 * first_order(since_s, 0.3) + 0.015 * np.where(since_s > 0.0, np.exp(-since_s / 0.1), 0.0)
+    response = step_response(TIME_S, values, 1.0, 1.0, 1e-4)
+    assert response.steady_state < 0.0
+    crossing_s = np.interp(response.response_time_s + 1.0, TIME_S, values)
+    assert crossing_s == pytest.approx(0.9 * response.steady_state, rel=1e-4)
+
+
+def test_response_that_is_there_before_the_step_has_no_response_time():
+    response = step_response(TIME_S, np.full_like(TIME_S, 0.2), 1.0, 1.0, 1e-3)
+    assert math.isnan(response.response_time_s)
+    assert any("90 %" in note for note in response.notes)
+
+
+def test_steady_state_near_zero_gives_no_times():
+    response = step_response(TIME_S, 1e-6 * first_order(TIME_S - 1.0), 1.0, 1.0, 1e-3)
+    assert math.isnan(response.response_time_s)
+    assert math.isnan(response.overshoot)
+    assert "too small" in response.notes[0]
+
+
+def test_unequal_steps_are_refused():
+    with pytest.raises(RecordingError, match="not equidistant"):
+        timestep(np.array([0.0, 0.001, 0.003]))
+
+
+def test_one_sample_is_refused():
+    with pytest.raises(RecordingError, match="1 samples are too few"):
+        timestep(np.array([0.0]))
+
+
+def test_largest_rate_of_a_ramp_is_its_slope():
+    ramp = np.clip(TIME_S - 1.0, 0.0, 0.5)
+    assert largest_rate(-4.0 * ramp, 0.001) == pytest.approx(4.0, rel=1e-9)
+
+
+def test_largest_rate_is_that_of_a_step_between_coarse_samples():
+    assert largest_rate(np.array([0.0, 0.0, 3.0, 3.0]), 0.5) == pytest.approx(6.0)

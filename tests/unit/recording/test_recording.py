@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+from pathlib import Path, PurePath
+
+import numpy as np
+import pytest
+
+from activesteer.errors import RecordingError
+from activesteer.recording import McapWriter, Poses, Primitive, Recording
+from activesteer.signals import Channel
+from tests.unit.recording.conftest import assert_same
+
+
+def test_saved_and_opened_it_is_the_same(recording: Recording, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recording.save(path)
+    opened = Recording.open(path)
+    assert_same(recording, opened)
+    assert opened.metadata["complete"] is True
+
+
+def test_written_in_blocks_it_is_the_same(recording: Recording, mcap_file: Path) -> None:
+    assert_same(recording, Recording.open(mcap_file))
+
+
+def test_saved_again_nothing_is_lost(mcap_file: Path, tmp_path: Path) -> None:
+    once = Recording.open(mcap_file)
+    again = tmp_path / "again.mcap"
+    once.save(again)
+    assert_same(once, Recording.open(again))
+
+
+def test_more_rows_than_a_chunk_holds_come_back_in_order(tmp_path: Path, rng: np.random.Generator) -> None:
+    table = [Channel(f"signal_{column}", "m", "", "vehicle", single=False) for column in range(40)]
+    time_s = np.arange(2345) * 1e-3
+    pose_s = np.sort(rng.uniform(0.0, 3.0, 333))  # between the rows and after the last
+    poses = Poses(pose_s, ("chassis",), rng.normal(size=(333, 1, 3)), rng.normal(size=(333, 1, 4)))
+    recording = Recording(table, time_s, rng.normal(size=(2345, 40)), poses=poses)
+    recording.save(tmp_path / "long.mcap")
+    assert_same(recording, Recording.open(tmp_path / "long.mcap"))
+
+
+def test_time_has_the_resolution_of_the_file(recording: Recording) -> None:
+    summed = np.cumsum(np.full(200, 0.01)) - 0.01
+    assert not np.array_equal(summed, np.arange(200) / 100)
+    assert np.array_equal(recording.time_s, np.arange(200) / 100)
+
+
+def test_without_poses_scene_and_rows(channels: list[Channel], tmp_path: Path) -> None:
+    path = tmp_path / "empty.mcap"
+    empty = Recording(channels, [], np.empty((0, len(channels))))
+    empty.save(path)
+    opened = Recording.open(path)
+    assert_same(empty, opened)
+    assert len(opened) == 0
+    assert opened["yaw_rate_radps"].shape == (0,)
+
+
+def test_values_that_are_not_finite_or_exceed_32_bit_are_kept_as_such(tmp_path: Path) -> None:
+    """The last rows of a run that diverged."""
+    table = [Channel("single_m", "m", "", "vehicle"), Channel("double_m", "m", "", "vehicle", single=False)]
+    path = tmp_path / "diverged.mcap"
+    Recording(table, [0.0, 0.1, 0.2], [[1e200, 1e200], [np.nan, np.nan], [-np.inf, -np.inf]]).save(path)
+    opened = Recording.open(path)
+    assert np.array_equal(opened["single_m"], [np.inf, np.nan, -np.inf], equal_nan=True)
+    assert np.array_equal(opened["double_m"], [1e200, np.nan, -np.inf], equal_nan=True)
+
+
+def test_a_channel_is_a_read_only_float64_array(mcap_file: Path) -> None:
+    opened = Recording.open(mcap_file)
+    channel = opened["fl_tyre_fx_N"]
+    assert channel.dtype == np.float64
+    assert channel.shape == opened.time_s.shape
+    with pytest.raises(ValueError, match="read-only"):
+        channel[0] = 1.0
+    assert "fl_tyre_fx_N" in opened
+    assert "fl_tyre" not in opened
+
+
+def test_an_unknown_channel_names_the_nearest(recording: Recording) -> None:
+    with pytest.raises(RecordingError, match=r"no channel 'yaw_rate'.*'yaw_rate_radps'"):
+        recording["yaw_rate"]
+
+
+def test_metrics_are_taken_from_metadata(channels: list[Channel]) -> None:
+    made = Recording(channels, [], [], metadata={"metrics": {"a_s": 1.0, "b_s": 2.0}}, metrics={"b_s": 3.0})
+    assert made.metrics == {"a_s": 1.0, "b_s": 3.0}
+    assert made.metadata == {"complete": True}
+
+
+def test_numpy_values_in_metadata_become_plain_ones(channels: list[Channel], tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    metadata = {"mass_kg": np.float32(1400), "gains": np.arange(3), "nested": {"steps": np.int64(5)}}
+    Recording(channels, [], [], metadata=metadata).save(path)
+    opened = Recording.open(path).metadata
+    assert opened == {"mass_kg": 1400.0, "gains": [0, 1, 2], "nested": {"steps": 5}, "complete": True}
+
+
+def test_metadata_that_json_cannot_hold_is_refused_before_the_file_is_touched(
+    recording: Recording, tmp_path: Path
+) -> None:
+    recording.metadata["file"] = {"vehicle": PurePath("compact.toml")}
+    with pytest.raises(RecordingError, match=r"metadata 'file' cannot be kept as JSON: a PurePosixPath"):
+        recording.save(tmp_path / "run.mcap")
+    assert not (tmp_path / "run.mcap").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"time_s": [0.0, 0.1]}, r"values has shape \(3, 1\) in place of \(2, 1\)"),
+        ({"time_s": [0.0, 0.2, 0.2]}, r"time_s must increase: row 2 is at 0\.2 s"),
+        ({"time_s": [-0.1, 0.2, 0.3]}, r"time_s is -0\.1 s: it must be finite and not negative"),
+        ({"time_s": [0.0, np.nan, 0.3]}, r"time_s is nan s"),
+        ({"time_s": [[0.0, 0.1, 0.3]]}, r"time_s has shape \(1, 3\)"),
+        ({"values": [["a"], ["b"], ["c"]]}, "values: could not convert"),
+        ({"metadata": {"metrics": 3}}, "metadata 'metrics' is 3"),
+        (
+            {"poses": Poses(np.zeros(1), ("chassis",), np.zeros((1, 1, 2)), np.zeros((1, 1, 4)))},
+            r"poses.positions_m has shape \(1, 1, 2\) in place of \(1, 1, 3\)",
+        ),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(change: dict, words: str) -> None:
+    arguments = {"time_s": [0.0, 0.1, 0.2], "values": [[1.0], [2.0], [3.0]], **change}
+    with pytest.raises(RecordingError, match=words):
+        Recording([Channel("v_mps", "m/s", "Speed", "vehicle")], **arguments)
+
+
+def test_unusable_primitives_and_bodies_are_refused(channels: list[Channel], tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with pytest.raises(RecordingError, match="kind 'cone', known are: box, cylinder, sphere"):
+        McapWriter(path, channels, scene=[Primitive("chassis", "cone", (1.0, 1.0, 1.0))])
+    with pytest.raises(RecordingError, match="a number of the box is missing"):
+        McapWriter(path, channels, scene=[Primitive("chassis", "box", (1.0, 1.0))])  # type: ignore[arg-type]
+    for names in (("chassis", "chassis"), ("world", "chassis")):
+        with pytest.raises(RecordingError, match="body names must differ"):
+            McapWriter(path, channels, names)
+    assert not path.exists()

@@ -1,0 +1,197 @@
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from activesteer.errors import RecordingError
+from activesteer.recording import McapWriter, Recording
+from activesteer.signals import Channel
+
+SPEED = [Channel("v_mps", "m/s", "Speed", "vehicle", single=False)]
+
+CHILD = """
+import sys, time
+import numpy as np
+from activesteer.recording import McapWriter
+from activesteer.signals import Channel
+writer = McapWriter(sys.argv[1], [Channel("v_mps", "m/s", "Speed", "vehicle", single=False)], ["chassis"], {"run": 1})
+for second in range(1000):
+    time_s = (1000 * second + np.arange(1000)) / 1000
+    writer.write(time_s, time_s[:, None], time_s[::10], np.zeros((100, 1, 3)), np.ones((100, 1, 4)))
+    time.sleep(0.05)
+    print(second + 1, flush=True)
+"""
+
+
+def test_a_killed_process_leaves_everything_up_to_its_last_block(tmp_path: Path) -> None:
+    path = tmp_path / "killed.mcap"
+    with subprocess.Popen([sys.executable, "-c", CHILD, str(path)], stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        for line in child.stdout:
+            if int(line) == 5:
+                os.kill(child.pid, signal.SIGKILL)
+                break
+    opened = Recording.open(path)
+    assert len(opened) >= 5000
+    assert np.array_equal(opened["v_mps"], opened.time_s)
+    assert opened.metadata == {"run": 1, "complete": False}
+    assert len(opened.poses.time_s) == len(opened) // 10
+
+
+def test_each_block_is_on_disk_soon_after_it_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with McapWriter(path, SPEED) as writer:
+        for second in range(3):
+            writer.write(second + np.arange(10) * 0.1, np.full((10, 1), second))
+            deadline = time.monotonic() + 10.0
+            while len(Recording.open(path)) < 10 * (second + 1):
+                assert time.monotonic() < deadline
+                time.sleep(0.01)
+        assert Recording.open(path).metadata["complete"] is False
+    assert Recording.open(path).metadata["complete"] is True
+
+
+def test_the_arrays_may_be_reused_after_write_returns(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    values = np.empty((1000, 1))
+    with McapWriter(path, SPEED) as writer:
+        for second in range(5):
+            time_s = (1000 * second + np.arange(1000)) / 1000
+            values[:, 0] = time_s
+            writer.write(time_s, values)
+            values[:] = np.nan
+    opened = Recording.open(path)
+    assert np.array_equal(opened["v_mps"], opened.time_s)
+
+
+def test_an_exception_in_the_run_keeps_what_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+
+    def run() -> None:
+        with McapWriter(path, SPEED, metadata={"maneuver": "step_steer"}) as writer:
+            writer.write([0.0, 0.1], [[1.0], [2.0]])
+            message = "no more road"
+            raise ArithmeticError(message)
+
+    with pytest.raises(ArithmeticError, match="no more road"):
+        run()
+    opened = Recording.open(path)
+    assert opened["v_mps"].tolist() == [1.0, 2.0]
+    assert opened.metadata == {
+        "maneuver": "step_steer",
+        "complete": False,
+        "error": "ArithmeticError: no more road",
+    }
+
+
+def test_a_wrong_result_leaves_the_file_open_for_another_try(tmp_path: Path) -> None:
+    writer = McapWriter(tmp_path / "run.mcap", SPEED)
+    writer.write([0.0], [[1.0]])
+    with pytest.raises(RecordingError, match="metric 'a_s' is 'soon'"):
+        writer.close({"metrics": {"a_s": "soon"}})
+    writer.close({"metrics": {"a_s": 1}, "status": "done"})
+    opened = Recording.open(tmp_path / "run.mcap")
+    assert opened.metrics == {"a_s": 1.0}
+    assert opened.metadata == {"status": "done", "complete": True}
+
+
+def test_times_must_increase_across_blocks(tmp_path: Path) -> None:
+    with McapWriter(tmp_path / "run.mcap", SPEED, ["chassis"]) as writer:
+        writer.write([0.0, 1.0], [[1.0], [2.0]])
+        with pytest.raises(RecordingError, match=r"time_s must increase: row 0 is at 1\.0 s, the one before it at 1"):
+            writer.write([1.0], [[1.0]])
+        with pytest.raises(RecordingError, match=r"quaternions has shape \(1, 1, 3\) in place of \(1, 1, 4\)"):
+            writer.write([2.0], [[1.0]], [2.0], np.zeros((1, 1, 3)), np.zeros((1, 1, 3)))
+        writer.write([2.0], [[3.0]])
+    assert Recording.open(tmp_path / "run.mcap")["v_mps"].tolist() == [1.0, 2.0, 3.0]
+
+
+def test_a_closed_file_takes_nothing_more(tmp_path: Path) -> None:
+    writer = McapWriter(tmp_path / "run.mcap", SPEED)
+    writer.close()
+    writer.close()
+    with pytest.raises(RecordingError, match="is closed"):
+        writer.write([0.0], [[1.0]])
+
+
+def test_a_path_that_cannot_be_written_says_why(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"cannot write .*no/run\.mcap: folder .*no does not exist"):
+        McapWriter(tmp_path / "no" / "run.mcap", SPEED)
+    with pytest.raises(RecordingError, match=r"cannot write .*: Is a directory"):
+        McapWriter(tmp_path, SPEED)
+
+
+def test_an_existing_file_is_kept_unless_told_otherwise(recording: Recording, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"precious")
+    with pytest.raises(RecordingError, match="it exists already"):
+        recording.save(path, overwrite=False)
+    assert path.read_bytes() == b"precious"
+    recording.save(path)
+    assert len(Recording.open(path)) == len(recording)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a device that is always full")
+def test_a_full_disk_is_an_error_before_the_run_starts() -> None:
+    with pytest.raises(RecordingError, match=r"cannot write /dev/full: No space left on device"):
+        McapWriter("/dev/full", SPEED)
+
+
+def test_a_disk_that_fills_up_ends_the_recording_with_what_was_saved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator
+) -> None:
+    """The file size is limited for this process, so that the third block or so no longer fits."""
+    resource = pytest.importorskip("resource")
+    path = tmp_path / "run.mcap"
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, hard))
+    try:
+        writer = McapWriter(path, SPEED)
+
+        def run() -> None:
+            for second in range(20):
+                writer.write(second + np.arange(1000) * 1e-3, rng.normal(size=(1000, 1)))
+
+        with pytest.raises(RecordingError, match=r"run\.mcap: File too large; saved up to \d\.999 s"):
+            run()
+        with pytest.raises(RecordingError, match="is closed"):
+            writer.write([100.0], [[0.0]])
+        writer.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, ignored)
+    opened = Recording.open(path)
+    assert len(opened) >= 1000
+    assert len(opened) % 1000 == 0
+    assert opened.metadata["complete"] is False
+
+
+@pytest.mark.slow
+def test_twenty_seconds_are_written_and_read_fast(tmp_path: Path, rng: np.random.Generator) -> None:
+    """At most 15 us a row on the calling thread and 1 s to open; best of three, for other load on the machine."""
+    table = [Channel(f"signal_{column}", "m", "", "vehicle", single=column >= 20) for column in range(170)]
+    values = rng.normal(size=(1000, 170))
+    names = [f"body_{body}" for body in range(17)]
+    positions, turns = rng.normal(size=(100, 17, 3)), rng.normal(size=(100, 17, 4))
+    write_s, open_s = [], []
+    for attempt in range(3):
+        path = tmp_path / f"{attempt}.mcap"
+        start = time.perf_counter()
+        with McapWriter(path, table, names) as writer:
+            for second in range(20):
+                time_s = (1000 * second + np.arange(1000)) / 1000
+                writer.write(time_s, values, time_s[::10], positions, turns)
+        write_s.append(time.perf_counter() - start)
+        start = time.perf_counter()
+        assert len(Recording.open(path)) == 20_000
+        open_s.append(time.perf_counter() - start)
+    assert min(write_s) < 20_000 * 15e-6
+    assert min(open_s) < 1.0

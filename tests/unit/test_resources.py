@@ -1,0 +1,79 @@
+"""Models and manoeuvres are found by name and by path, in a checkout and in an installed package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from activesteer import resources
+from activesteer.errors import ManeuverError, ModelError, ParameterError
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch) -> Path:
+    """A made-up checkout with two manoeuvres and one vehicle."""
+    for file in ("maneuvers/step_steer.toml", "maneuvers/slalom.toml", "models/vehicles/compact.toml"):
+        path = tmp_path / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    monkeypatch.setattr(resources, "_PACKAGE", tmp_path / "activesteer")
+    return tmp_path
+
+
+def test_the_real_ones_are_there():
+    assert "step_steer" in resources.list_maneuvers()
+    assert "compact" in resources.list_vehicles()
+    assert (resources.models_dir() / "mjcf" / "compact" / "compact.xml").is_file()
+
+
+def test_names_are_found_beside_the_package(checkout):
+    assert resources.list_maneuvers() == ["slalom", "step_steer"]
+    assert resources.find_maneuver("slalom") == checkout / "maneuvers" / "slalom.toml"
+    assert resources.find_vehicle("compact") == checkout / "models" / "vehicles" / "compact.toml"
+
+
+def test_what_travels_inside_the_package_comes_first(checkout):
+    inside = checkout / "activesteer" / "_data" / "maneuvers"
+    inside.mkdir(parents=True)
+    (inside / "step_steer.toml").write_text("")
+    assert resources.list_maneuvers() == ["step_steer"]
+    assert resources.find_maneuver("step_steer") == inside / "step_steer.toml"
+
+
+def test_a_path_is_taken_as_it_is(checkout):
+    path = checkout / "mine.toml"
+    path.write_text("")
+    assert resources.find_maneuver(path) == path
+    assert resources.find_vehicle(str(path)) == path
+
+
+def test_a_path_without_the_usual_ending_is_a_path(checkout):
+    path = checkout / "mine.txt"
+    path.write_text("")
+    assert resources.find_maneuver(f"{checkout}/mine.txt") == path
+
+
+def test_a_misspelt_name_is_answered_with_the_nearest(checkout):
+    with pytest.raises(ManeuverError, match=r"no manoeuvre is named 'step_ster'; did you mean 'step_steer'\?"):
+        resources.find_maneuver("step_ster")
+    with pytest.raises(ParameterError, match=r"no vehicle is named 'truck'; known are: compact"):
+        resources.find_vehicle("truck")
+
+
+def test_a_missing_file_is_answered_with_its_neighbours(checkout):
+    with pytest.raises(ManeuverError, match=r"slalon\.toml does not exist; .*did you mean 'slalom'\?"):
+        resources.find_maneuver(checkout / "maneuvers" / "slalon.toml")
+
+
+def test_a_file_in_a_missing_folder_is_an_error(checkout):
+    with pytest.raises(ParameterError, match=r"nowhere/mine\.toml does not exist"):
+        resources.find_vehicle("nowhere/mine.toml")
+
+
+def test_an_incomplete_installation_says_where_it_looked(tmp_path, monkeypatch):
+    monkeypatch.setattr(resources, "_PACKAGE", tmp_path / "activesteer")
+    with pytest.raises(ModelError, match=r"neither .*_data.*models nor .*models is a directory"):
+        resources.models_dir()
+    with pytest.raises(ManeuverError, match="maneuvers"):
+        resources.maneuvers_dir()
