@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import sys
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -33,6 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ActiveSteerError as error:
         lines = [f"activesteer: {error}", *getattr(error, "__notes__", [])]
         print("\n".join(lines), file=sys.stderr)
+        return 1
+    except BrokenPipeError:  # whoever reads the output, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:
         print("activesteer: stopped; what was recorded until then is saved", file=sys.stderr)
@@ -72,25 +76,37 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = commands.add_parser("bench", help="where the time of a step goes")
     bench.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    bench.add_argument("--rounds", type=int, default=5, metavar="N", help="the best of N counts (default: 5)")
     bench.set_defaults(action=_bench)
     return parser
 
 
 def _run(options: argparse.Namespace) -> int:
     from activesteer.analysis.tables import comparison
+    from activesteer.controllers import load_controller
+    from activesteer.conventions import DEFAULT_TIMESTEP_S
     from activesteer.runner import prepared, run_scenario
     from activesteer.scenario import resolve
 
     controllers = options.controller or ["none"]
     scenario = resolve(options.maneuver, options.vehicle, dict(_override(text) for text in options.overrides))
+    # What is wrong with the last controller or the plot is said before the first run, not after it.
+    for controller in controllers:
+        load_controller(controller, scenario.controller_setup(DEFAULT_TIMESTEP_S))
+    if options.plot and scenario.maneuver.kind != "step_steer":
+        msg = f"--plot: there is a figure for step_steer, none yet for {scenario.maneuver.kind}"
+        raise ParameterError(msg)
     paths = _output_paths(options.output, scenario.maneuver.name, controllers)
     scenario = prepared(scenario)
     recordings = {}
     for controller, path in zip(controllers, paths, strict=True):
         label = _label(controller)
-        progress = _Progress(f"{scenario.maneuver.name} {label}", quiet=options.json)
-        recordings[label] = run_scenario(scenario, controller, path=path, progress=progress)
-        progress.end(str(path))
+        with _Progress(f"{scenario.maneuver.name} {label}", quiet=options.json) as progress:
+            recordings[label] = run_scenario(scenario, controller, path=path, progress=progress)
+        if not options.json:
+            print(f"{scenario.maneuver.name} {label}: {path}", file=sys.stderr)
+        if problem := recordings[label].metadata.get("metrics_error"):
+            print(f"{scenario.maneuver.name} {label}: no metrics: {problem}", file=sys.stderr)
     claims = _claims(recordings)
     if options.json:
         runs = [
@@ -98,7 +114,7 @@ def _run(options: argparse.Namespace) -> int:
             for controller, path, recording in zip(controllers, paths, recordings.values(), strict=True)
         ]
         _print_json({"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs, "claims": claims})
-    else:
+    elif any(recording.metrics for recording in recordings.values()):
         print(comparison({label: recording.metrics for label, recording in recordings.items()}))
         for claim in claims:
             print(f"{claim['id']} {'passed' if claim['passed'] else 'FAILED'}: {claim['text']}")
@@ -115,7 +131,7 @@ def _label(controller: str) -> str:
 def _output_paths(output: Path, maneuver: str, controllers: Sequence[str]) -> list[Path]:
     labels = [_label(controller) for controller in controllers]
     if len(set(labels)) != len(labels):
-        msg = f"-c: {', '.join(controllers)}: every controller can be given once"
+        msg = f"-c {' -c '.join(controllers)}: two of them have the same name, which tells runs and files apart"
         raise ParameterError(msg)
     if output.suffix == ".mcap":
         if len(controllers) > 1:
@@ -151,6 +167,8 @@ def _claims(recordings: Mapping[str, Any]) -> list[dict[str, Any]]:
     first = next(iter(recordings.values()))
     if first.metadata["maneuver"]["kind"] != "step_steer" or not set(SYSTEMS) <= set(recordings):
         return []
+    if not all(recordings[system].metrics for system in SYSTEMS):
+        return []
     return [
         {
             "id": claim.id,
@@ -166,34 +184,29 @@ def _claims(recordings: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _plot(recordings: Mapping[str, Any], path: Path, *, quiet: bool) -> None:
     from activesteer.analysis.plots import step_steer_figure
 
-    kind = next(iter(recordings.values())).metadata["maneuver"]["kind"]
-    if kind != "step_steer":
-        msg = f"--plot: there is a figure for step_steer, none yet for {kind}"
-        raise ParameterError(msg)
     step_steer_figure(recordings, path)
     if not quiet:
         print(f"figure: {path}")
 
 
 class _Progress:
-    """A bar on the terminal; silent where standard error is none."""
+    """A bar on the terminal, gone when the run ends; silent where standard error is none."""
 
     def __init__(self, label: str, *, quiet: bool) -> None:
         self._label = label
         self._shown = not quiet and sys.stderr.isatty()
-        self._quiet = quiet
+
+    def __enter__(self) -> _Progress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._shown:
+            print("\r" + " " * (len(self._label) + 40) + "\r", end="", file=sys.stderr)
 
     def __call__(self, share: float) -> None:
         if self._shown:
             filled = round(30 * share)
             print(f"\r{self._label} [{'#' * filled}{' ' * (30 - filled)}] {share:4.0%}", end="", file=sys.stderr)
-
-    def end(self, result: str) -> None:
-        """Replaces the bar by what came out."""
-        if self._shown:
-            print("\r" + " " * (len(self._label) + 40) + "\r", end="", file=sys.stderr)
-        if not self._quiet:
-            print(f"{self._label}: {result}", file=sys.stderr)
 
 
 def _list(_options: argparse.Namespace) -> int:
@@ -245,7 +258,10 @@ def _info(options: argparse.Namespace) -> int:
 def _bench(options: argparse.Namespace) -> int:
     from activesteer.bench import bench
 
-    results = bench()
+    if options.rounds < 1:
+        msg = f"--rounds {options.rounds}: at least 1 is needed"
+        raise ParameterError(msg)
+    results = bench(options.rounds)
     if options.json:
         _print_json(results)
         return 0
@@ -262,6 +278,6 @@ def _finite(value: Any) -> Any:
     """JSON has no nan: a value that is not defined becomes null."""
     if isinstance(value, Mapping):
         return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, (list, tuple)):
         return [_finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,8 +1,9 @@
 """TOML tables into frozen dataclasses: every key known, every value of the right type and within its range.
 
-A field's type is its check: `float`, `int`, `bool`, `str`, a tuple of floats, a nested dataclass, a dict of nested
-dataclasses, or one of these `| None`. A range is written `Annotated[float, Range(low, high)]`. Inside, everything is SI and radians; in a
-file a key may carry an edge unit instead: `speed_kmh` fills `speed_mps`, `angle_deg` fills `angle_rad`.
+A field's type is its check: `float`, `int`, `bool`, `str`, tuples of floats, a nested dataclass, a dict of nested
+dataclasses, or one of these `| None`. A range is written `Annotated[float, Range(low, high)]`. Inside, everything is SI
+and radians; in a file a key may carry an edge unit instead: `speed_kmh` fills `speed_mps`, `angle_deg` fills
+`angle_rad`.
 """
 
 from __future__ import annotations
@@ -53,32 +54,35 @@ class Source:
         name: File name, or what to call a table that has no file.
         text: The file's text, to find lines in.
         error: Class of the errors to raise.
+        overridden: Dotted keys whose values came from overrides, not from here.
     """
 
     name: str
     text: str = ""
     error: type[ActiveSteerError] = ParameterError
+    overridden: frozenset[str] = frozenset()
 
     def fail(self, path: Sequence[str], problem: str) -> ActiveSteerError:
         """An error that says where and what."""
         key = ".".join(path)
+        if any(key == other or key.startswith(other + ".") for other in self.overridden):
+            return self.error(f"override {key}: {problem}")
         line = self._line_of(path)
         where = f"{self.name}, line {line}" if line else self.name
         return self.error(f"{where}: {key}: {problem}" if key else f"{where}: {problem}")
 
     def _line_of(self, path: Sequence[str]) -> int | None:
         """Line of a key, found in the text: tomllib does not keep it."""
-        if not path:
-            return None
-        table = ".".join(path[:-1])
-        current = ""
-        for number, line in enumerate(self.text.splitlines(), 1):
-            header = re.match(r"\s*\[([^\]]+)\]", line)
-            if header:
-                current = header.group(1).strip()
-                if current == ".".join(path):
-                    return number
-            elif current == table and re.match(rf"\s*{re.escape(path[-1])}\s*=", line):
+        wanted = ".".join(path)
+        table = ""
+        for number, line in enumerate(self.text.splitlines() if path else (), 1):
+            if header := re.fullmatch(r"\s*\[([^\[\]]+)\]\s*(#.*)?", line):
+                found = table = header.group(1).strip()
+            elif pair := re.match(r"\s*([\w.-]+)\s*=", line):
+                found = f"{table}.{pair.group(1)}" if table else pair.group(1)
+            else:
+                continue
+            if found == wanted:
                 return number
         return None
 
@@ -132,7 +136,8 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
         if name is None:
             raise source.fail(where, f"there is no such key; {nearest_names(key, _names_in_file(fields))}")
         if name in values:
-            raise source.fail(where, f"is given twice, in two units; one of them is {name}")
+            first = next(other for other in table if _field_of(other, fields)[0] == name)
+            raise source.fail(where, f"{first} and {key} are the same in two units; give one of them")
         values[name] = _convert(hints[name], raw, factor, source, where)
     for name, field in fields.items():
         if name in values or field.default is not dataclasses.MISSING:
@@ -140,7 +145,10 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
         if field.default_factory is not dataclasses.MISSING:
             continue
         raise source.fail(path, f"the key {' or '.join(_spellings(name))} is missing")
-    return cls(**values)
+    try:
+        return cls(**values)
+    except ActiveSteerError as reason:  # from the class's own checks, which know no file
+        raise source.fail(path, str(reason)) from reason
 
 
 def merged(cls: type, table: Mapping[str, Any], path: Sequence[str], value: object, source: Source) -> dict[str, Any]:
@@ -278,7 +286,10 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range | None, source: So
         raise source.fail(path, f"{raw!r} is not {wanted}")
     if hint in (bool, str):
         return raw
-    value = raw * factor if factor != 1.0 else hint(raw)
+    try:
+        value = raw * factor if factor != 1.0 else hint(raw)
+    except OverflowError:  # a whole number too large for a float
+        value = math.inf
     if not math.isfinite(value):
         raise source.fail(path, f"{raw!r} is not finite")
     if limits is not None and not limits.low <= value <= limits.high:

@@ -48,7 +48,8 @@ class Recorder:
         self._vehicle = vehicle
         self._writer = writer
         self._timestep_s = vehicle.timestep_s
-        self._values = np.empty((steps, len(self.channels)))
+        # By column, because that is how it is filled and read.
+        self._values = np.empty((steps, len(self.channels)), order="F")
         self._time_s = np.asarray(np.arange(steps) * vehicle.timestep_s, dtype=np.float64)
         self._raw = vehicle.raw_rows(min(BLOCK_ROWS, steps))
         self._control = np.empty((len(self._raw.sensordata), len(CONTROL_CHANNELS)))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
 import platform
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -15,7 +17,7 @@ import numpy as np
 from activesteer.analysis.metrics import metrics
 from activesteer.controllers.loading import user_file
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.errors import ActiveSteerError, ManeuverError
+from activesteer.errors import ActiveSteerError, ManeuverError, RecordingError
 from activesteer.maneuver import StepSteer
 from activesteer.recorder import Recorder, channels_of
 from activesteer.recording import McapWriter, Primitive, Recording
@@ -28,8 +30,10 @@ from activesteer.version import __version__
 _SEARCH_TOLERANCE: Final = 5e-4
 """Relative error of the lateral acceleration at which the search for the step's amplitude ends."""
 _SEARCH_RUNS: Final = 8
+_SEARCH_S: Final = 4.5
+"""Time after the beginning of the step that a run of the search takes, however long the manoeuvre is [s]."""
 _STEADY_S: Final = 0.5
-"""Length of the end of the run over which the steady state is taken [s]."""
+"""Length of the end of such a run over which the steady state is taken [s]."""
 
 
 def simulate(
@@ -74,14 +78,15 @@ def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scen
     maneuver = scenario.maneuver
     if not isinstance(maneuver, StepSteer) or maneuver.steer.steering_wheel_rad is not None:
         return scenario
-    key = json.dumps([describe(scenario), timestep_s, str(scenario.mjcf)], sort_keys=True, default=str)
+    described = json.dumps([describe(scenario), timestep_s], sort_keys=True, default=str)
+    key = (described, scenario.mjcf, *sorted(scenario.files.items()))
     amplitude = _amplitudes.get(key)
     if amplitude is None:
         amplitude = _amplitudes[key] = _search_amplitude(scenario, maneuver, timestep_s)
     return _replace_maneuver(scenario, maneuver.with_amplitude(amplitude))
 
 
-_amplitudes: dict[str, float] = {}
+_amplitudes: dict[tuple[object, ...], float] = {}
 """Results of searches of this process, by everything that they depend on."""
 
 
@@ -95,6 +100,7 @@ def _search_amplitude(scenario: Scenario, maneuver: StepSteer, timestep_s: float
     assert wanted is not None  # StepSteer has checked it
     if wanted == 0.0:
         return 0.0
+    maneuver = dataclasses.replace(maneuver, duration_s=maneuver.steer.start_s + _SEARCH_S)
     simulation = Simulation(scenario, "none", timestep_s)
     start = simulation.save_state()
     car, speed = scenario.car.single_track, max(maneuver.speed_mps, 1.0)
@@ -151,47 +157,58 @@ def run_scenario(
         progress: Called about every simulated second with the share that is done, 0 to 1.
 
     Returns:
-        The recording, with metrics.
+        The recording, with metrics; where the run cannot be evaluated, as when it is too short, there are none and
+        the metadata's `metrics_error` says why.
 
     Raises:
         ActiveSteerError: the run failed. What was recorded until then is in the file, and in the error's `recording`.
     """
     simulation = Simulation(scenario, controller, timestep_s)
     context = RunContext.of(scenario, controller, simulation)
-    writer = context.writer(path) if path is not None else None
-    recorder = Recorder(simulation.vehicle, simulation.steps, writer)
     outcome: dict[str, Any] = {"complete": True}
     failure: ActiveSteerError | None = None
-    try:
-        _drive(simulation, recorder, progress)
-    except ActiveSteerError as error:
-        failure = error
-        outcome = {"complete": False, "error": f"{type(error).__name__}: {error}"}
-    except BaseException as error:
-        if writer is not None:
+    # Whatever else goes wrong, the writer ends its file, marked as incomplete.
+    with context.writer(path) if path is not None else nullcontext() as writer:
+        recorder = Recorder(simulation.vehicle, simulation.steps, writer)
+        try:
+            _drive(simulation, recorder, progress)
+        except ActiveSteerError as error:
+            failure = error
+            outcome = {"complete": False, "error": f"{type(error).__name__}: {error}"}
+        except BaseException:
             recorder.flush()
-            writer.close({"complete": False, "error": f"{type(error).__name__}: {error}"})
-        raise
-    time_s, values, poses = recorder.result()
-    recording = Recording(
-        recorder.channels,
-        time_s,
-        values,
-        poses=poses,
-        metadata=context.metadata | outcome,
-        attachments=context.files,
-        scene=context.scene,
-    )
-    if failure is None:
-        recording.metrics.update(metrics(recording))
-    if writer is not None:
-        writer.close(outcome | {"metrics": recording.metrics})
+            raise
+        time_s, values, poses = recorder.result()
+        recording = Recording(
+            recorder.channels,
+            time_s,
+            values,
+            poses=poses,
+            metadata=context.metadata | outcome,
+            attachments=context.files,
+            scene=context.scene,
+        )
+        if failure is None:
+            outcome |= _evaluate(recording)
+        if writer is not None:
+            writer.close(outcome | {"metrics": recording.metrics})
     if failure is not None:
         failure.recording = recording
         saved = f"; what was recorded until then is in {path}" if path is not None else ""
         failure.add_note(f"controller {controller}: {len(recording)} steps were made{saved}")
         raise failure
     return recording
+
+
+def _evaluate(recording: Recording) -> dict[str, str]:
+    """Puts the metrics into a recording; returns what there is to say where that cannot be done."""
+    try:
+        recording.metrics.update(metrics(recording))
+    except RecordingError as error:
+        problem = {"metrics_error": str(error)}
+        recording.metadata.update(problem)
+        return problem
+    return {}
 
 
 class RunContext(NamedTuple):

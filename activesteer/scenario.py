@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
+
+import numpy as np
 
 from activesteer.config import Source, build, key_paths, merged, read_toml, to_table
 from activesteer.controllers import ControllerParameters, ControllerSetup, SingleTrackParameters
@@ -92,13 +94,18 @@ def resolve(
     car_table, car_source, car_files = _read(vehicle, "vehicle", ParameterError)
     files |= car_files
     kind = maneuver_class(maneuver_table, maneuver_source)
-    for key, value in (overrides or {}).items():
+    changes = {key: _plain(value) for key, value in (overrides or {}).items()}
+    changed: dict[str, set[str]] = {part: set() for part in _PARTS}
+    for key, value in changes.items():
         part, path = _which_part(key, kind)
         source = Source(f"override {key}", error=ParameterError)
         if part == "maneuver":
             maneuver_table = merged(kind, maneuver_table, path, value, source)
         else:
             car_table = merged(CarFile, car_table, path, value, source)
+        changed[part].add(".".join(path))
+    maneuver_source = replace(maneuver_source, overridden=frozenset(changed["maneuver"]))
+    car_source = replace(car_source, overridden=frozenset(changed["vehicle"]))
     built = build_maneuver(maneuver_table, maneuver_source)
     car = build(CarFile, car_table, car_source)
     mjcf = _find_file(car.mjcf, models_dir() / "mjcf", car_source, ("mjcf",), ModelError)
@@ -110,7 +117,12 @@ def resolve(
     files |= {f"mjcf/{mjcf.parent.name}/{path.name}": path.read_bytes() for path in sorted(mjcf.parent.glob("*.xml"))}
     front_tyre = load_tir(front)
     tyres = (front_tyre, front_tyre if rear == front else load_tir(rear))
-    return Scenario(built, car, mjcf, tyres, dict(overrides or {}), files)
+    return Scenario(built, car, mjcf, tyres, changes, files)
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's numbers and arrays as Python's: sweeps are made of them, JSON is not."""
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
 def _read(
@@ -149,7 +161,7 @@ def _find_file(
         if candidate.is_file():
             return candidate
     present = [str(path.relative_to(folder)) for path in folder.rglob(f"*{Path(name).suffix or '.*'}")]
-    raise Source(source.name, source.text, error).fail(
+    raise replace(source, error=error).fail(
         key, f"there is no file {name!r} in {folder.parent.name}/{folder.name}; {nearest_names(name, present)}"
     )
 

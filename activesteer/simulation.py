@@ -16,7 +16,7 @@ from activesteer.maneuver import Maneuver
 from activesteer.recorder import Recorder
 from activesteer.scenario import Scenario
 from activesteer.signals import Measurement, Reference, SteerCommand
-from activesteer.vehicle import Vehicle
+from activesteer.vehicle import Vehicle, engine_warnings_held
 
 _CHECK_EVERY_STEPS = 100
 """How often the engine is asked for warnings; the speed is looked at in every step."""
@@ -94,19 +94,20 @@ class Simulation:
     def _advance(self, maneuver: Maneuver | _Settling, steps: int, recorder: Recorder | None) -> None:
         driver, controller, vehicle = self.driver, self.controller, self.vehicle
         timestep_s, measurement = vehicle.timestep_s, self._measurement
-        for step in range(self._step, self._step + steps):
-            reference = maneuver.reference(step * timestep_s)
-            command = driver.step(reference, measurement)
-            steer = controller.step(command, measurement)
-            if steer.__class__ is not SteerCommand or not is_sane(steer):
-                check_command(steer, self._controller_name)
-            vehicle.step(command, steer)
-            if recorder is not None:
-                recorder.record(command, steer)
-            measurement = vehicle.measure()
-            if step % _CHECK_EVERY_STEPS == 0:
-                vehicle.check()
-            self._step, self._measurement = step + 1, measurement
+        with engine_warnings_held():
+            for step in range(self._step, self._step + steps):
+                reference = maneuver.reference(step * timestep_s)
+                command = driver.step(reference, measurement)
+                steer = controller.step(command, measurement)
+                if steer.__class__ is not SteerCommand or not is_sane(steer):
+                    check_command(steer, self._controller_name)
+                vehicle.step(command, steer)
+                if recorder is not None:
+                    recorder.record(command, steer)
+                measurement = vehicle.measure()
+                if step % _CHECK_EVERY_STEPS == 0:
+                    vehicle.check()
+        self._step, self._measurement = self._step + steps, measurement
         vehicle.check()
 
     def save_state(self) -> SavedState:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import Enum
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from activesteer.controllers.parameters import CorrectorParameters
 
@@ -47,11 +47,19 @@ class Decision(NamedTuple):
     front: int
 
 
+_NEUTRAL: Final = Decision(Situation.NEUTRAL, rear=0, front=0)
+# Table I: oversteer turns the rear wheels the way the car turns and the front ones against it, understeer the reverse.
+_LEFT_OVERSTEER: Final = Decision(Situation.OVERSTEER, rear=1, front=-1)
+_LEFT_UNDERSTEER: Final = Decision(Situation.UNDERSTEER, rear=-1, front=1)
+_RIGHT_OVERSTEER: Final = Decision(Situation.OVERSTEER, rear=-1, front=1)
+_RIGHT_UNDERSTEER: Final = Decision(Situation.UNDERSTEER, rear=1, front=-1)
+
+
 def decide(yaw_rate_radps: float, error_radps: float) -> Decision:
     """Orientation of the additional steer angles.
 
-    Oversteer turns the rear wheels the way the car turns and the front wheels against it; understeer the reverse. With the
-    error defined as desired minus actual this comes out as: rear against the error, front with it, whichever way the car turns.
+    With the error defined as desired minus actual it comes out as: rear against the error, front with it, whichever way
+    the car turns.
 
     Args:
         yaw_rate_radps: Yaw rate, left positive [rad/s].
@@ -63,18 +71,17 @@ def decide(yaw_rate_radps: float, error_radps: float) -> Decision:
     Source: Dorsch 2012, Table I and Fig. 10.
     """
     if error_radps == 0.0:
-        return Decision(Situation.NEUTRAL, 0, 0)
-    turn = 1 if yaw_rate_radps >= 0.0 else -1
-    if error_radps * turn < 0.0:
-        return Decision(Situation.OVERSTEER, turn, -turn)
-    return Decision(Situation.UNDERSTEER, -turn, turn)
+        return _NEUTRAL
+    if yaw_rate_radps >= 0.0:
+        return _LEFT_OVERSTEER if error_radps < 0.0 else _LEFT_UNDERSTEER
+    return _RIGHT_OVERSTEER if error_radps > 0.0 else _RIGHT_UNDERSTEER
 
 
 class Corrector:
     """PID on the yaw rate error behind the tolerance function; the size of the angle, without its orientation.
 
-    With all gains but the proportional one at zero it is the paper's P corrector. The integral stands still while the
-    angle is at its limit, and it fades with the tolerance function.
+    With all gains but the proportional one at zero it is the paper's P corrector. The integral grows no further into a
+    limit that is active, and it fades with the tolerance function.
     """
 
     def __init__(self, parameters: CorrectorParameters, timestep_s: float) -> None:
@@ -84,31 +91,39 @@ class Corrector:
             parameters: Gains and tolerance band.
             timestep_s: Time between two steps [s].
         """
-        self._p = parameters
-        self._timestep_s = timestep_s
-        self._filter_share = 1.0 - math.exp(-timestep_s / parameters.derivative_filter_s)
+        p = parameters
+        self._off_radps, self._full_radps = p.off_radps, p.full_radps
+        self._proportional_gain_s = p.proportional_gain_s
+        self._integral_share = p.integral_gain * timestep_s
+        self._derivative_share_s = p.derivative_gain_s2 / timestep_s
+        self._filter_share = 1.0 - math.exp(-timestep_s / p.derivative_filter_s)
         self._integral_rad = 0.0
         self._filtered_radps: float | None = None
 
-    def step(self, error_radps: float, *, hold_integral: bool = False) -> float:
-        """Signed angle of the corrector, with the sign of the error.
+    def step(self, error_radps: float, limited: int = 0) -> float:
+        """Signed angle of the corrector; of the sign of the error where P acts alone.
 
         Args:
             error_radps: Desired less actual yaw rate [rad/s].
-            hold_integral: Whether the integral must not grow, because a limit is active.
+            limited: Whether a limit is active: 1 where a larger angle would be cut off, -1 where a smaller one would
+                be, 0 elsewhere. The integral then moves the other way only.
 
         Returns:
             Angle [rad].
         """
-        p = self._p
-        activity = tolerance(error_radps, p.off_radps, p.full_radps)
-        angle = p.proportional_gain_s * error_radps
-        if p.integral_gain:
-            if not hold_integral:
-                self._integral_rad += p.integral_gain * error_radps * activity * self._timestep_s
+        activity = tolerance(error_radps, self._off_radps, self._full_radps)
+        angle = self._proportional_gain_s * error_radps
+        if self._integral_share:
+            if limited * error_radps <= 0.0:
+                self._integral_rad += self._integral_share * error_radps * activity
             angle += self._integral_rad
-        if p.derivative_gain_s2:
+        if self._derivative_share_s:
             before = error_radps if self._filtered_radps is None else self._filtered_radps
             self._filtered_radps = before + self._filter_share * (error_radps - before)
-            angle += p.derivative_gain_s2 * (self._filtered_radps - before) / self._timestep_s
+            angle += self._derivative_share_s * (self._filtered_radps - before)
         return activity * angle
+
+    def reset(self) -> None:
+        """Forgets integral and derivative, as where active steering rests."""
+        self._integral_rad = 0.0
+        self._filtered_radps = None

@@ -9,7 +9,7 @@ from activesteer.controllers.parameters import DesiredYawRateParameters
 from activesteer.controllers.single_track import SingleTrack
 
 MIN_SPEED_MPS: Final = 3.0
-"""Below this speed the steady-state model has no meaning and active steering rests [m/s]."""
+"""Below this speed active steering rests, and the friction limit of the desired yaw rate rises no further [m/s]."""
 
 
 class DesiredYawRate:
@@ -39,17 +39,18 @@ class DesiredYawRate:
 
         Args:
             front_steer_rad: The driver's demand at the road wheel [rad].
-            speed_mps: Speed [m/s].
+            speed_mps: Speed [m/s]; negative backwards.
 
         Returns:
             Desired yaw rate [rad/s], left positive.
         """
-        speed = speed_mps if speed_mps > MIN_SPEED_MPS else MIN_SPEED_MPS
-        wanted = self._gain(speed) * front_steer_rad
-        limit = self._limit_mps2 / speed
+        wanted = self._gain(speed_mps) * front_steer_rad
+        limit = self._limit_mps2 / (speed_mps if speed_mps > MIN_SPEED_MPS else MIN_SPEED_MPS)
         if wanted > limit:
             wanted = limit
         elif wanted < -limit:
             wanted = -limit
-        self._state_radps += self._share * (wanted - self._state_radps)
-        return self._state_radps
+        # The lag answers to what was held until now: its value at this instant, before the new demand works on it.
+        desired = self._state_radps
+        self._state_radps += self._share * (wanted - desired)
+        return desired

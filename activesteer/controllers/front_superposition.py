@@ -23,7 +23,7 @@ class FrontSuperposition:
         self._desired = desired
         self._corrector = Corrector(parameters.corrector, timestep_s)
         self._limit_rad = parameters.limit_rad
-        self._saturated = False
+        self._limited = 0
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> FrontSuperposition:
@@ -45,10 +45,15 @@ class FrontSuperposition:
         """
         desired = self._desired.step(command.front_steer_rad, measurement.speed_mps)
         if measurement.speed_mps < MIN_SPEED_MPS:
+            self._corrector.reset()
+            self._limited = 0
             return SteerCommand(yaw_rate_desired_radps=desired)
-        error = desired - measurement.yaw_rate_radps
-        feedback = self._corrector.step(error, hold_integral=self._saturated)
-        angle = decide(measurement.yaw_rate_radps, feedback).front * abs(feedback)
-        limited = min(max(angle, -self._limit_rad), self._limit_rad)
-        self._saturated = limited != angle
-        return SteerCommand(0.0, limited, desired, 0.0, angle, self._saturated)
+        yaw_rate = measurement.yaw_rate_radps
+        feedback = self._corrector.step(desired - yaw_rate, self._limited)
+        angle = correction = decide(yaw_rate, feedback).front * abs(feedback)
+        self._limited = 0
+        if angle > self._limit_rad:
+            angle, self._limited = self._limit_rad, 1
+        elif angle < -self._limit_rad:
+            angle, self._limited = -self._limit_rad, -1
+        return SteerCommand(0.0, angle, desired, 0.0, correction, self._limited != 0)

@@ -40,7 +40,7 @@ class RearPrediction:
         """
         gain, lead_s, lag_s = self._coefficients(speed_mps)
         difference = front_steer_rad - self._state_rad
-        angle = gain * self._state_rad + lead_s * difference / lag_s
+        angle = gain * self._state_rad + lead_s / lag_s * difference
         self._state_rad += (1.0 - math.exp(-self._timestep_s / lag_s)) * difference
         return angle
 
@@ -71,7 +71,7 @@ class RearSteer:
         self._corrector = Corrector(parameters.corrector, timestep_s)
         self._prediction_gain = parameters.prediction_gain
         self._limit_rad = parameters.limit_rad
-        self._saturated = False
+        self._limited = 0
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> RearSteer:
@@ -97,12 +97,18 @@ class RearSteer:
         speed = measurement.speed_mps
         desired = self._desired.step(command.front_steer_rad, speed)
         if speed < MIN_SPEED_MPS:
+            self._corrector.reset()
+            self._limited = 0
             return SteerCommand(yaw_rate_desired_radps=desired)
-        error = desired - measurement.yaw_rate_radps
+        yaw_rate = measurement.yaw_rate_radps
         prediction = self._prediction_gain * self._prediction.step(command.front_steer_rad, speed)
-        feedback = self._corrector.step(error, hold_integral=self._saturated)
-        correction = decide(measurement.yaw_rate_radps, feedback).rear * abs(feedback)
+        # The rear wheels turn against the corrector's angle, and so does their limit.
+        feedback = self._corrector.step(desired - yaw_rate, -self._limited)
+        correction = decide(yaw_rate, feedback).rear * abs(feedback)
         angle = prediction + correction
-        limited = min(max(angle, -self._limit_rad), self._limit_rad)
-        self._saturated = limited != angle
-        return SteerCommand(limited, 0.0, desired, prediction, correction, self._saturated)
+        self._limited = 0
+        if angle > self._limit_rad:
+            angle, self._limited = self._limit_rad, 1
+        elif angle < -self._limit_rad:
+            angle, self._limited = -self._limit_rad, -1
+        return SteerCommand(angle, 0.0, desired, prediction, correction, self._limited != 0)

@@ -1,9 +1,9 @@
 """The linear single-track model: its equations, its steady state, and the rear angle that it predicts.
 
-Symbols of the source: V front axle, H rear axle; C cornering stiffness of an axle, l_V and l_H distance of the centre of
-gravity to the axles, l their sum, m mass, J_z yaw inertia, v speed, beta sideslip angle, psi_dot yaw rate, delta
-steer angle at the road wheel. Source: Dorsch, Implementation of active Steering Systems into a Multibody Vehicle Model by
-Co-Simulation, Mecatronics-REM 2012, eqs. 1 to 5.
+Symbols of the source: V front axle, H rear axle; C cornering stiffness of an axle, l_V and l_H distance of the centre
+of gravity to the axles, l their sum, m mass, J_z yaw inertia, v speed, beta sideslip angle, psi_dot yaw rate, delta
+steer angle at the road wheel. Source: Dorsch, Implementation of active Steering Systems into a Multibody Vehicle Model
+by Co-Simulation, Mecatronics-REM 2012, eqs. 1 to 5.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class SingleTrack:
     Attributes:
         parameters: What it knows of the car.
         wheelbase_m: l [m].
-        characteristic_speed_mps: v_ch [m/s].
+        characteristic_speed_mps: v_ch [m/s]; infinite for a neutral car.
     """
 
     def __init__(self, parameters: SingleTrackParameters) -> None:
@@ -62,19 +62,24 @@ class SingleTrack:
             ParameterError: the car oversteers, so that it has no characteristic speed, and none is given.
         """
         p = self.parameters = parameters
-        self.wheelbase_m = p.cg_to_front_m + p.cg_to_rear_m
-        moment = p.rear_stiffness_Nprad * p.cg_to_rear_m - p.front_stiffness_Nprad * p.cg_to_front_m
+        cv, ch, lv, lh = p.front_stiffness_Nprad, p.rear_stiffness_Nprad, p.cg_to_front_m, p.cg_to_rear_m
+        wheelbase = self.wheelbase_m = lv + lh
+        moment = ch * lh - cv * lv
         if p.characteristic_speed_mps is not None:
             self.characteristic_speed_mps = p.characteristic_speed_mps
-        elif moment > 0.0:
-            product = p.front_stiffness_Nprad * p.rear_stiffness_Nprad * self.wheelbase_m**2
-            self.characteristic_speed_mps = math.sqrt(product / (p.mass_kg * moment))
+        elif moment >= 0.0:
+            square = cv * ch * wheelbase**2 / (p.mass_kg * moment) if moment else math.inf
+            self.characteristic_speed_mps = math.sqrt(square)
         else:
             msg = (
-                f"single_track: C_H l_H - C_V l_V is {moment:.4g} N m/rad; it must be above 0 (an understeering car) for "
-                "eq. 4 to give a characteristic speed, or characteristic_speed_kmh must be given"
+                f"single_track: C_H l_H - C_V l_V is {moment:.4g} N m/rad; it must not be below 0 (an oversteering "
+                "car) for eq. 4 to give a characteristic speed, or characteristic_speed_kmh must be given"
             )
             raise ParameterError(msg)
+        self._stiffness_ratio = cv / ch
+        self._front_moment_kgm, self._rear_moment_kgm = p.mass_kg * lv, p.mass_kg * lh
+        self._front_moment_Nm, self._rear_moment_Nm = cv * lv * wheelbase, ch * lh * wheelbase
+        self._yaw_inertia_kgm2 = p.yaw_inertia_kgm2
 
     def yaw_rate_gain(self, speed_mps: float) -> float:
         """Steady-state yaw rate per front steer angle, eq. 3 [1/s].
@@ -99,15 +104,13 @@ class SingleTrack:
         Returns:
             K_H [-], K_H T_z [s], T_1 [s].
         """
-        p = self.parameters
-        cv, ch, lv, lh = p.front_stiffness_Nprad, p.rear_stiffness_Nprad, p.cg_to_front_m, p.cg_to_rear_m
-        inertia_force = p.mass_kg * speed_mps * speed_mps
-        denominator = inertia_force * lh + cv * lv * self.wheelbase_m
-        ratio = cv / ch
-        gain = ratio * (inertia_force * lv - ch * lh * self.wheelbase_m) / denominator
-        lead = -ratio * p.yaw_inertia_kgm2 * speed_mps / denominator
-        lag = p.yaw_inertia_kgm2 * speed_mps / denominator
-        return gain, lead, lag
+        # Every step of a run comes here: what does not depend on speed is computed beforehand.
+        square = speed_mps * speed_mps
+        denominator = self._rear_moment_kgm * square + self._front_moment_Nm
+        ratio = self._stiffness_ratio
+        gain = ratio * (self._front_moment_kgm * square - self._rear_moment_Nm) / denominator
+        lag = self._yaw_inertia_kgm2 * speed_mps / denominator
+        return gain, -ratio * lag, lag
 
     def state_space(self, speed_mps: float) -> control.StateSpace:
         """The model at a speed, eqs. 1 and 2.

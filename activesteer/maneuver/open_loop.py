@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated
 
 from activesteer.config import Range
@@ -62,7 +63,7 @@ class OpenLoop(Maneuver):
             ManeuverError: a table's columns differ in length, or its times do not increase.
         """
         if self.drive not in {"hold_speed", "coast"}:
-            msg = f"{self.name or self.kind}: drive is {self.drive!r}; allowed are 'hold_speed' and 'coast'"
+            msg = f"drive: is {self.drive!r}; allowed are 'hold_speed' and 'coast'"
             raise ManeuverError(msg)
         for key, table, column in (
             ("steering", self.steering, "steering_wheel_rad"),
@@ -73,13 +74,12 @@ class OpenLoop(Maneuver):
                 self._check(key, table.time_s, getattr(table, column))
 
     def _check(self, key: str, times: tuple[float, ...], values: tuple[float, ...]) -> None:
-        where = f"{self.name or self.kind}: {key}"
         if not times or len(times) != len(values):
-            msg = f"{where} has {len(times)} times and {len(values)} values; as many of each are needed, at least one"
+            msg = f"{key}: has {len(times)} times and {len(values)} values; as many of each are needed, at least one"
             raise ManeuverError(msg)
-        for earlier, later in zip(times, times[1:], strict=False):
+        for earlier, later in pairwise(times):
             if later <= earlier:
-                msg = f"{where}.time_s does not increase from {earlier:g} to {later:g} s"
+                msg = f"{key}.time_s: does not increase from {earlier:g} to {later:g} s"
                 raise ManeuverError(msg)
 
     def reference(self, time_s: float) -> Reference:

@@ -35,20 +35,20 @@ class StepSteer(Maneuver):
     """The step."""
 
     def __post_init__(self) -> None:
-        """Exactly one of amplitude and aim must be known.
+        """Amplitude or aim must be known; where both are, the amplitude is what the aim once led to.
 
         Raises:
-            ManeuverError: neither or both of them are given, or the step starts after the end.
+            ManeuverError: neither of them is given, or the step starts after the end.
         """
         step = self.steer
         if step.steering_wheel_rad is None and step.lateral_acceleration_mps2 is None:
             msg = (
-                f"{self.name or self.kind}: steer needs steering_wheel_deg (the amplitude) or "
-                "lateral_acceleration_g (what the control-free car shall reach)"
+                "steer: steering_wheel_deg (the amplitude) or lateral_acceleration_g (what the control-free car shall "
+                "reach) is needed"
             )
             raise ManeuverError(msg)
         if step.start_s >= self.duration_s:
-            msg = f"{self.name or self.kind}: steer.start_s is {step.start_s:g} s, but the run ends at {self.duration_s:g} s"
+            msg = f"steer.start_s: is {step.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)"
             raise ManeuverError(msg)
 
     def reference(self, time_s: float) -> Reference:

@@ -9,11 +9,11 @@ rim [m], `deflection_x_m` along and `deflection_y_m` across the wheel's heading 
 
 Three additions make them usable from standstill to any speed:
 
-* The rates are those of an implicit Euler step, (f(u) h)/(1 + |V_x| h / sigma), and the forces belong to the end of the
-  step. Nothing gets stiff when sigma becomes small, and at rest the tyre is a spring, not an amplifier.
+* The rates are mean values over the step, exact for slip speeds held within it, and the forces belong to its end. Nothing gets stiff when sigma becomes small, and at rest the tyre is a spring, not an amplifier.
 * At low speed the deflection stops growing where the contact patch slides as a whole (the "wind-up" of Pacejka, eq.
-  8.125 ff.): |V_x| is replaced by max(|V_x|, |V_s| / slip_limit). Above `low_speed_mps` the slip limit is that of the
-  tyre file, so that the formula's steady state is reached exactly within its range of validity.
+  8.125 ff.): |V_x| is replaced by max(|V_x|, |V_s| / slip_limit), at rest with one |V_s| / slip_limit for both axes, so
+  that a sliding tyre pulls against its sliding. Above `low_speed_mps` the slip limit is that of the tyre file, for each
+  axis by itself, so that the formula's steady state is reached exactly within its range of validity.
 * At low speed a viscous term acts beside the spring (Pacejka, eq. 8.129: k_Vlow), faded out by a cosine. It enters as a
   slip, so that the friction limit bounds it.
 """
@@ -26,12 +26,14 @@ from typing import Final, NamedTuple
 from numba import njit
 
 from activesteer.tyre import parameters as prm
-from activesteer.tyre.magic_formula import (
+from activesteer.tyre.limits import limit_flags
+from activesteer.tyre.magic_formula import magic_formula, slip_stiffnesses
+from activesteer.tyre.relaxation import relaxation_lengths
+from activesteer.tyre.vertical import (
+    bottoming_force,
     effective_rolling_radius,
-    magic_formula,
-    relaxation_lengths,
-    slip_stiffnesses,
-    vertical_force,
+    free_radius,
+    vertical_force_loaded,
 )
 
 _MIN_RELAXATION_LENGTH_M: Final = 0.02
@@ -40,6 +42,13 @@ _LIFTED_DECAY_PER_S: Final = 20.0
 """How fast the deflection of a lifted tyre decays [1/s]: a carcass rings down within some tenths of a second."""
 _SLIDING_TO_LINEAR: Final = 3.0
 """Slip of full sliding over slip at which the linear force would reach the friction limit: 3 for a brush model."""
+_SMALLEST_SLIP_LIMIT: Final = 0.01
+"""Slip that a deflection may stand for at least, whatever the range of a tyre file."""
+_MOST_LOAD_STEPS: Final = 8
+_CAUTIOUS: Final = 0.1
+"""What is left of the load where a step of its search would lift the tyre."""
+_LOAD_TOLERANCE: Final = 1e-9
+"""How closely the load has to agree with the horizontal forces that soften the tyre, relative to the load."""
 
 
 class WheelForces(NamedTuple):
@@ -65,14 +74,82 @@ class WheelForces(NamedTuple):
     limited: float
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _mean_decay(x):
+    """Mean of exp(-t) over t from 0 to x: what is left, over a step, of the rate at its beginning."""
+    return -math.expm1(-x) / x if x > 1e-9 else 1.0
+
+
+@njit(cache=True, error_model="numpy")
 def _low_speed_slip_limit(file_limit, sliding_slip, share):
     """Slip at which the deflection stops growing: where the tyre slides at rest, the file's limit when rolling."""
     return file_limit + (min(sliding_slip, file_limit) - file_limit) * share
 
 
-@njit(cache=True)
-def tyre_on_road(  # noqa: PLR0915 - one evaluation, compiled as one function
+@njit(cache=True, error_model="numpy")
+def _rolling_tyre(
+    p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, gamma, u, v
+):
+    """Forces, slips, rates of the relaxation states and whether a limit is exceeded, at a load above zero.
+
+    The arguments are those of `tyre_on_road`, with the load [N], the velocities of the contact point along and across
+    the heading [m/s], the spin [rad/s], the camber [rad] and the relaxation states [m].
+    """
+    vsx = vx - spin * effective_rolling_radius(p, fz, spin, pressure_Pa)
+    sigma_x, sigma_y = relaxation_lengths(p, fz, gamma, pressure_Pa)
+    sigma_x = max(sigma_x, _MIN_RELAXATION_LENGTH_M)
+    sigma_y = max(sigma_y, _MIN_RELAXATION_LENGTH_M)
+    limit_x = max(p[prm.KPUMAX] if vsx < 0.0 else -p[prm.KPUMIN], _SMALLEST_SLIP_LIMIT)
+    limit_y = max(math.tan(min(p[prm.ALPMAX] if vsy > 0.0 else -p[prm.ALPMIN], 1.5)), _SMALLEST_SLIP_LIMIT)
+    speed = abs(vx)
+    share = 0.0
+    damping_slip_x = 0.0
+    damping_slip_y = 0.0
+    if speed < low_speed_mps:
+        share = 0.5 * (1.0 + math.cos(math.pi * speed / low_speed_mps))
+        stiffness_x, stiffness_y = slip_stiffnesses(p, fz, gamma, pressure_Pa, mu)
+        stiffness_x = abs(stiffness_x)
+        stiffness_y = abs(stiffness_y)
+        sliding = _SLIDING_TO_LINEAR * mu * fz
+        limit_x = _low_speed_slip_limit(limit_x, sliding / stiffness_x, share)
+        limit_y = _low_speed_slip_limit(limit_y, sliding / stiffness_y, share)
+        damping_slip_x = -low_speed_damping_Nspm * share * vsx / stiffness_x
+        damping_slip_y = low_speed_damping_Nspm * share * vsy / stiffness_y
+
+    sliding_x = abs(vsx) / limit_x
+    sliding_y = abs(vsy) / limit_y
+    if share > 0.0:
+        # A patch that slides as a whole is dragged along the direction of sliding, so one rate serves both deflections.
+        together = share * math.sqrt(sliding_x * sliding_x + sliding_y * sliding_y)
+        sliding_x = (1.0 - share) * sliding_x + together
+        sliding_y = (1.0 - share) * sliding_y + together
+    carry_x = max(speed, sliding_x)
+    carry_y = max(speed, sliding_y)
+    rate_x = (-vsx - carry_x * u / sigma_x) * _mean_decay(timestep_s * carry_x / sigma_x)
+    rate_y = (vsy - carry_y * v / sigma_y) * _mean_decay(timestep_s * carry_y / sigma_y)
+    kappa = (u + timestep_s * rate_x) / sigma_x + damping_slip_x
+    alpha = math.atan((v + timestep_s * rate_y) / sigma_y + damping_slip_y)
+
+    # Where the wind-up limit of a rolling tyre holds the deflection, the slip that it should have is out of range.
+    limited = 0.0
+    held = speed >= low_speed_mps and (carry_x > speed or carry_y > speed)
+    if held or limit_flags(p, fz, kappa, alpha, gamma, pressure_Pa) != 0:
+        limited = 1.0
+    fx, fy, mx, my, mz = magic_formula(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu)
+    return fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, limited
+
+
+@njit(cache=True, error_model="numpy")
+def _load(p, deflection, spin, pressure_Pa, damping_N, fx, fy, gamma):
+    """Load [N] under horizontal forces; the damper adds or takes at most what the spring carries."""
+    elastic = vertical_force_loaded(p, deflection, spin, pressure_Pa, fx, fy, gamma)
+    elastic += bottoming_force(p, deflection, spin)
+    # So the load is continuous where the tyre touches down or lifts off, and the road never pulls.
+    return elastic + min(max(damping_N, -elastic), elastic)
+
+
+@njit(cache=True, error_model="numpy")
+def tyre_on_road(
     p,
     mu,
     pressure_Pa,
@@ -139,12 +216,11 @@ def tyre_on_road(  # noqa: PLR0915 - one evaluation, compiled as one function
     vx = velocity_x_mps * heading_x + velocity_y_mps * heading_y
     vsy = contact_y * heading_x - contact_x * heading_y
 
-    deflection = p[prm.UNLOADED_RADIUS] - loaded_radius
-    fz = 0.0
-    if deflection > 0.0:
-        axis_z_rate = turn_x * axis_y - turn_y * axis_x
-        closing = -(velocity_z_mps / horizontal + centre_height_m * axis_z * axis_z_rate / horizontal**3)
-        fz = vertical_force(p, deflection, spin, pressure_Pa) + p[prm.VERTICAL_DAMPING] * closing
+    deflection = free_radius(p, spin) - loaded_radius
+    axis_z_rate = turn_x * axis_y - turn_y * axis_x
+    closing = -(velocity_z_mps / horizontal + centre_height_m * axis_z * axis_z_rate / horizontal**3)
+    damping = p[prm.VERTICAL_DAMPING] * closing
+    fz = _load(p, deflection, spin, pressure_Pa, damping, 0.0, 0.0, gamma)
     if fz <= 0.0:
         decay = -_LIFTED_DECAY_PER_S
         return (
@@ -152,42 +228,27 @@ def tyre_on_road(  # noqa: PLR0915 - one evaluation, compiled as one function
             loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, 0.0,
         )  # fmt: skip
 
-    vsx = vx - spin * effective_rolling_radius(p, fz, spin, pressure_Pa)
-    sigma_x, sigma_y = relaxation_lengths(p, fz, gamma, pressure_Pa)
-    sigma_x = max(sigma_x, _MIN_RELAXATION_LENGTH_M)
-    sigma_y = max(sigma_y, _MIN_RELAXATION_LENGTH_M)
-    limit_x = p[prm.KPUMAX]
-    limit_y = math.tan(min(p[prm.ALPMAX], 1.5))
-    speed = abs(vx)
-    damping_slip_x = 0.0
-    damping_slip_y = 0.0
-    if speed < low_speed_mps:
-        share = 0.5 * (1.0 + math.cos(math.pi * speed / low_speed_mps))
-        stiffness_x, stiffness_y = slip_stiffnesses(p, fz, gamma, pressure_Pa, mu)
-        stiffness_x = abs(stiffness_x)
-        stiffness_y = abs(stiffness_y)
-        sliding = _SLIDING_TO_LINEAR * mu * fz
-        limit_x = _low_speed_slip_limit(limit_x, sliding / stiffness_x, share)
-        limit_y = _low_speed_slip_limit(limit_y, sliding / stiffness_y, share)
-        damping_slip_x = -low_speed_damping_Nspm * share * vsx / stiffness_x
-        damping_slip_y = low_speed_damping_Nspm * share * vsy / stiffness_y
-
-    carry_x = max(speed, abs(vsx) / limit_x)
-    carry_y = max(speed, abs(vsy) / limit_y)
-    rate_x = (-vsx - carry_x * deflection_x_m / sigma_x) / (1.0 + timestep_s * carry_x / sigma_x)
-    rate_y = (vsy - carry_y * deflection_y_m / sigma_y) / (1.0 + timestep_s * carry_y / sigma_y)
-    kappa = (deflection_x_m + timestep_s * rate_x) / sigma_x + damping_slip_x
-    alpha = math.atan((deflection_y_m + timestep_s * rate_y) / sigma_y + damping_slip_y)
-
-    limited = 0.0
-    if (
-        not p[prm.FZMIN] <= fz <= p[prm.FZMAX]
-        or not p[prm.KPUMIN] <= kappa <= p[prm.KPUMAX]
-        or not p[prm.ALPMIN] <= alpha <= p[prm.ALPMAX]
-        or not p[prm.CAMMIN] <= gamma <= p[prm.CAMMAX]
-    ):
-        limited = 1.0
-    fx, fy, mx, my, mz = magic_formula(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu)
+    fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, limited = _rolling_tyre(
+        p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, gamma,
+        deflection_x_m, deflection_y_m,
+    )  # fmt: skip
+    if p[prm.Q_FCX] != 0.0 or p[prm.Q_FCY] != 0.0:
+        # Horizontal forces soften the tyre, and the load makes the horizontal forces: a secant search for both.
+        fz_before = fz
+        step = _load(p, deflection, spin, pressure_Pa, damping, fx, fy, gamma) - fz
+        fz = fz + step if fz + step > 0.0 else _CAUTIOUS * fz
+        for _ in range(_MOST_LOAD_STEPS):
+            fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, limited = _rolling_tyre(
+                p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, gamma,
+                deflection_x_m, deflection_y_m,
+            )  # fmt: skip
+            missing = _load(p, deflection, spin, pressure_Pa, damping, fx, fy, gamma) - fz
+            if abs(missing) <= _LOAD_TOLERANCE * fz or missing == step:
+                break
+            fz_next = fz + missing * (fz - fz_before) / (step - missing)
+            fz_before = fz
+            step = missing
+            fz = fz_next if fz_next > 0.0 else _CAUTIOUS * fz
     return (
         fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y,
         loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, limited,

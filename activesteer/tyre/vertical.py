@@ -14,7 +14,6 @@ from numba import njit
 from activesteer.tyre import parameters as c
 
 MF62 = 62.0
-_SMALLEST_DEFLECTION_M = 1e-12
 _SOFTEST = 0.1
 """What horizontal forces leave of the vertical stiffness at least; real tyres stay above 0.8."""
 
@@ -79,8 +78,6 @@ def vertical_force_loaded(
     gamma, fy = p[c.SIDE] * gamma_rad, p[c.SIDE] * fy_N
     q1 = p[c.Q_FZ1] + p[c.Q_FZ3] * gamma * gamma
     if p[c.MF_VERSION] == MF62:
-        if deflection_m <= 0.0 and gamma == 0.0:
-            return 0.0
         free = free_radius(p, omega_radps)
         loaded = free - deflection_m
         ratio = loaded / free
@@ -92,7 +89,10 @@ def vertical_force_loaded(
             tread = (1.075 - 0.5 * p[c.ASPECT_RATIO]) * p[c.WIDTH]
             shape = (p[c.Q_CAM1] * loaded + p[c.Q_CAM2] * loaded * loaded) / denominator
             rho_camber = shape * shape * tread / 8.0 * abs(math.tan(gamma)) - p[c.Q_CAM3] * rho_free * abs(gamma)
-        rho = max(rho_free + rho_camber, _SMALLEST_DEFLECTION_M) / r0
+        # A cambered tyre touches with its shoulder before its middle does.
+        rho = (deflection_m + rho_camber) / r0
+        if rho <= 0.0:
+            return 0.0
         x = p[c.Q_FCX] * fx_N / fz0
         y = rho ** p[c.Q_FCY2] * p[c.Q_FCY] * (fy - offset) / fz0
         soft = 1.0 + p[c.Q_V2] * abs(omega_radps) * r0 / p[c.LONGVL] - x * x - y * y
@@ -148,7 +148,7 @@ def deflection_under_load(
         q1 = p[c.Q_FZ1] + p[c.Q_FZ3] * gamma_rad * gamma_rad
         # The root that stays finite where the quadratic term vanishes.
         return r0 * 2.0 * load / (q1 + math.sqrt(q1 * q1 + 4.0 * p[c.Q_FZ2] * load))
-    low, high = 0.0, r0
+    low, high = -0.5 * r0, r0
     for _ in range(100):
         middle = 0.5 * (low + high)
         if vertical_force_loaded(p, middle, omega_radps, pressure_Pa, fx_N, fy_N, gamma_rad) < fz_N:

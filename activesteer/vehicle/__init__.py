@@ -1,7 +1,7 @@
 """The car in MuJoCo: MJCF and parameters in, commands in, measurements and raw rows out."""
 
-from activesteer.vehicle.car import Vehicle
+from activesteer.vehicle.car import Vehicle, engine_warnings_held
 from activesteer.vehicle.channels import ChannelMap, RawRows
 from activesteer.vehicle.parameters import Road, VehicleParameters
 
-__all__ = ["ChannelMap", "RawRows", "Road", "Vehicle", "VehicleParameters"]
+__all__ = ["ChannelMap", "RawRows", "Road", "Vehicle", "VehicleParameters", "engine_warnings_held"]

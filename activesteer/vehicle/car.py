@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -23,6 +25,22 @@ from activesteer.vehicle.parameters import Road, VehicleParameters
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _FASTEST_MPS: Final = 200.0
 """No car of ours goes faster; a speed beyond it, or none at all, is a run that has diverged [m/s]."""
+
+
+@contextlib.contextmanager
+def engine_warnings_held() -> Iterator[None]:
+    """While this lasts, the engine's warnings are left to `Vehicle.check`, not written to a file in the user's folder.
+
+    A handler that someone else has installed stays in force.
+    """
+    if mujoco.get_mju_user_warning() is not None:
+        yield
+        return
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(None)
 
 
 class Vehicle:
@@ -57,12 +75,16 @@ class Vehicle:
         """
         install_native_forces()
         self.parameters = parameters
-        self.model = model = load_model(mjcf, parameters, tyres, road, timestep_s)
-        self.data = mujoco.MjData(model)
         self.timestep_s = timestep_s
-        self.channels = ChannelMap(model, parameters)
-        self._bind()
-        self._place()
+        try:
+            self.model = load_model(mjcf, parameters, tyres, road, timestep_s)
+            self.data = mujoco.MjData(self.model)
+            self.channels = ChannelMap(self.model, parameters)
+            self._bind()
+            self._place()
+        except ModelError as reason:
+            msg = f"{mjcf}: {reason}"
+            raise ModelError(msg) from reason
 
     def _bind(self) -> None:
         """Looks up addresses once; the step uses nothing but integers and views."""
@@ -75,21 +97,21 @@ class Vehicle:
             return int(model.sensor_adr[find(model, mujoco.mjtObj.mjOBJ_SENSOR, name)])
 
         self._ctrl = data.ctrl
+        self._qvel = data.qvel
         self._steering_wheel = actuator("steering_wheel")
         self._superposition = actuator("superposition")
         self._rear = actuator("rl_steer"), actuator("rr_steer")
-        self._drives = tuple(actuator(f"{corner}_drive") for corner in CORNERS)
-        self._brakes = tuple(actuator(f"{corner}_brake") for corner in CORNERS)
-        self._accelerometer, self._gyro = sensor("cg_accelerometer"), sensor("cg_gyro")
+        self._accelerometer = sensor("cg_accelerometer")
         self._velocimeter = sensor("cg_velocimeter")
         self._angles = tuple(
             sensor(name) for name in ("steering_wheel_angle", "superposition_angle", "rl_steer_angle", "rr_steer_angle")
         )
         self._wheel_speed = sensor("fl_wheel_speed")
-        last = max(self._wheel_speed + 3, *self._angles, self._velocimeter, self._gyro + 2, self._accelerometer + 1)
+        last = max(self._wheel_speed + 3, *self._angles, self._velocimeter, self._accelerometer + 1)
         self._sensed = data.sensordata[: last + 1]
         self._root = int(model.jnt_qposadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
         self._root_dof = int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
+        self._yaw_dof = self._root_dof + 5
         self._spins = [
             int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_spin")]) for corner in CORNERS
         ]
@@ -98,10 +120,10 @@ class Vehicle:
             raise ModelError(msg)
         powertrain, brakes = self.parameters.powertrain, self.parameters.brakes
         front, rear = 0.5 * powertrain.front_share, 0.5 * (1.0 - powertrain.front_share)
-        self._drive_shares = (front, front, rear, rear)
-        self._brake_torques = (
-            brakes.front_torque_Nm, brakes.front_torque_Nm, brakes.rear_torque_Nm, brakes.rear_torque_Nm,
-        )  # fmt: skip
+        shares = zip(CORNERS, (front, front, rear, rear), strict=True)
+        self._drives = tuple((actuator(f"{corner}_drive"), share) for corner, share in shares if share > 0.0)
+        torques = (brakes.front_torque_Nm, brakes.front_torque_Nm, brakes.rear_torque_Nm, brakes.rear_torque_Nm)
+        self._brakes = tuple((actuator(f"{corner}_brake"), most) for corner, most in zip(CORNERS, torques, strict=True))
         self._ratio = self.parameters.steering.ratio
         self._drive_torque_Nm = 0.0
         self._brake = 0.0
@@ -175,16 +197,19 @@ class Vehicle:
         ctrl[left] = ctrl[right] = steer.rear_steer_rad
         if command.drive_torque_Nm != self._drive_torque_Nm:
             self._drive_torque_Nm = torque = command.drive_torque_Nm
-            for index, share in zip(self._drives, self._drive_shares, strict=True):
+            for index, share in self._drives:
                 ctrl[index] = share * torque
         if command.brake != self._brake:
             self._brake = command.brake
-            for index, torque in zip(self._brakes, self._brake_torques, strict=True):
+            for index, torque in self._brakes:
                 ctrl[index] = command.brake * torque
         mujoco.mj_step(self.model, self.data)
 
     def measure(self) -> Measurement:
-        """What the car's sensors say of the instant at which the last step began.
+        """What the car's sensors say of the instant at which the last step began, and the yaw rate at its end.
+
+        The yaw rate goes straight into the corrector's loop, where a step of age would shift the response with the
+        step's length: it is taken from the state (the gyro's third axis is that of the chassis).
 
         Raises:
             SimulationDiverged: the speed is not finite or beyond all reason.
@@ -199,7 +224,7 @@ class Vehicle:
         return Measurement(
             self.data.time,
             speed,
-            values[self._gyro + 2],
+            float(self._qvel[self._yaw_dof]),
             values[self._accelerometer + 1],
             values[self._accelerometer],
             values[wheel],
@@ -224,6 +249,9 @@ class Vehicle:
             bad = np.flatnonzero(~np.isfinite(data.qvel))
             joints = sorted({self.model.joint(int(self.model.dof_jntid[dof])).name for dof in bad})
             msg = f"the state is not finite at {data.time:.3f} s; joints: {', '.join(joints)}"
+            raise SimulationDiverged(msg)
+        if not np.isfinite(data.act).all():
+            msg = f"an activation (slip of a tyre, angle of a servo) is not finite at {data.time:.3f} s"
             raise SimulationDiverged(msg)
 
     def raw_rows(self, count: int) -> RawRows:

@@ -13,12 +13,18 @@ from activesteer.conventions import CORNERS
 from activesteer.errors import ModelError, nearest_names
 from activesteer.signals import Channel
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.loading import find
 from activesteer.vehicle.parameters import VehicleParameters
 
 Array = NDArray[np.float64]
 
 _STANDSTILL_MPS: Final = 0.2
 """Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""
+
+_MOTION_SENSORS: Final = (
+    "cg_position", "front_axle_position", "chassis_orientation", "cg_velocity", "cg_accelerometer", "cg_gyro",
+)  # fmt: skip
+"""What `_Frame` reads."""
 
 _CORNER_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 
@@ -63,6 +69,9 @@ class ChannelMap:
         self._parameters = parameters
         self._last_yaw_rad = 0.0
         self._sensors = {model.sensor(index).name: index for index in range(model.nsensor)}
+        for name in _MOTION_SENSORS:
+            # They are read block by block; a missing one is to show now.
+            self._sensor(name)
         signals = [*self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators()]
         self.channels = tuple(signal.channel for signal in signals)
         self._values = tuple(signal.values for signal in signals)
@@ -74,10 +83,12 @@ class ChannelMap:
             rows: Raw rows of n steps, n > 0.
             out: Where the values go, shape (n, len(channels)).
         """
-        self._frame = _Frame(rows, self._sensor, self._model.opt.gravity, self._last_yaw_rad)
-        self._last_yaw_rad = float(self._frame.yaw_rad[-1])
-        for column, values in enumerate(self._values):
-            out[:, column] = values(rows)
+        # The last rows of a run that diverged are not finite; they are to be recorded, not complained about.
+        with np.errstate(invalid="ignore", over="ignore"):
+            self._frame = _Frame(rows, self._sensor, self._model.opt.gravity, self._last_yaw_rad)
+            self._last_yaw_rad = float(self._frame.yaw_rad[-1])
+            for column, values in enumerate(self._values):
+                out[:, column] = values(rows)
 
     def _sensor(self, name: str) -> slice:
         index = self._sensors.get(name)
@@ -119,7 +130,7 @@ class ChannelMap:
         rack = self._sensor("rack_travel").start
         rear = [self._sensor(f"{corner}_steer_angle").start for corner in ("rl", "rr")]
         front = [self._sensor(f"{corner}_wheel_axis") for corner in ("fl", "fr")]
-        demand = self._model.actuator("steering_wheel").id
+        demand = find(self._model, mujoco.mjtObj.mjOBJ_ACTUATOR, "steering_wheel")
 
         def channel(name: str, unit: str, meaning: str) -> Channel:
             return Channel(name, unit, meaning, "vehicle")

@@ -15,6 +15,8 @@ _DIFFERENCE: Final = 1e-7
 """Step of the finite differences [m, rad]: links of 1e7 N/m change their force by 1 N."""
 _LARGEST_STEP: Final = 0.02
 """Most that a coordinate may move in one iteration [m, rad], so that stops are met from outside."""
+_ROUNDING_N: Final = 1e-4
+"""Residual force below which a step that gets no closer ends the search [N, N m]."""
 _TOLERANCE_N: Final = 1e-7
 """Residual force at which the search ends [N, N m]; weight is 1.4e4."""
 
@@ -51,12 +53,15 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
             stiffness[:, column] = (_residual(model, data, free) - residual) / _DIFFERENCE
             data.qpos[:] = start
         step = np.linalg.lstsq(stiffness, -residual, rcond=None)[0]
-        step *= min(1.0, _LARGEST_STEP / np.abs(step).max())
+        largest = np.abs(step).max()
+        step *= min(1.0, _LARGEST_STEP / largest) if largest > 0.0 else 0.0
         move[:] = 0.0
         move[free] = step
         mujoco.mj_integratePos(model, data.qpos, move, 1.0)
         smaller = _residual(model, data, free)
-        if np.abs(step).max() < 1e-12 or (np.abs(smaller).max() >= np.abs(residual).max() < 1e-4):
+        if np.abs(residual).max() < _ROUNDING_N and (
+            largest < 1e-12 or np.abs(smaller).max() >= np.abs(residual).max()
+        ):
             # The last digits: rounding decides, no step gets closer.
             return
         residual = smaller

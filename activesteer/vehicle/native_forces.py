@@ -29,7 +29,7 @@ from activesteer.vehicle.native_memory import array_at, f64_pointer, word
 _MARKER: Final = fb.MARKER
 
 
-@njit(inline="always")
+@njit(inline="always", error_model="numpy")
 def _our_block(model, m_count, m_numbers):
     """The block of a model of ours, or an empty array."""
     count = word(model + m_count)
@@ -39,7 +39,7 @@ def _our_block(model, m_count, m_numbers):
     return numbers[int(numbers[count - 2]) :]
 
 
-@njit(inline="always")
+@njit(inline="always", error_model="numpy")
 def _apply(qfrc, cdof, chain, fx, fy, fz, tx, ty, tz):
     """Adds J^T w for a wrench about the tree's centre of mass."""
     for index in range(chain.size):
@@ -51,7 +51,7 @@ def _apply(qfrc, cdof, chain, fx, fy, fz, tx, ty, tz):
         )  # fmt: skip
 
 
-@njit(inline="always")
+@njit(inline="always", error_model="numpy")
 def _interpolate(x, xs, ys, count):
     """Piecewise linear curve, continued with the slope of its ends."""
     index = 1
@@ -60,7 +60,7 @@ def _interpolate(x, xs, ys, count):
     return ys[index - 1] + (x - xs[index - 1]) * (ys[index] - ys[index - 1]) / (xs[index] - xs[index - 1])
 
 
-@njit(inline="always")
+@njit(inline="always", error_model="numpy")
 def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc):
     for index in range(int(block[fb.N_WHEELS])):
         wheel = block[int(block[fb.WHEELS_START]) + index * fb.WHEEL_SIZE :]
@@ -124,7 +124,7 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
         )
 
 
-@njit(inline="always")
+@njit(inline="always", error_model="numpy")
 def _dampers(block, ten_velocity, jacobian, userdata, qfrc):
     first_slot = int(block[fb.N_WHEELS]) * fb.USERDATA_PER_WHEEL
     for index in range(int(block[fb.N_DAMPERS])):
@@ -141,7 +141,7 @@ def _dampers(block, ten_velocity, jacobian, userdata, qfrc):
             qfrc[int(damper[fb.D_CHAIN + entry])] += jacobian[row + entry] * force
 
 
-@njit(inline="always")
+@njit(inline="always", error_model="numpy")
 def _drag(block, xpos, xmat, com, cvel, cdof, qfrc):
     """Aerodynamic drag: against the velocity of the pressure point, in the plane of the road."""
     body = int(block[fb.CHASSIS_BODY])
@@ -173,7 +173,7 @@ def _make_callbacks(layout: EngineLayout, fingerprint: str) -> tuple[Any, Any]:
     ) = layout  # fmt: skip
     key = int(fingerprint[:12], 16)
 
-    @cfunc(types.void(types.intp, types.intp), cache=True)
+    @cfunc(types.void(types.intp, types.intp), cache=True, error_model="numpy")
     def passive(model, data):
         block = _our_block(model, m_count, m_numbers)
         if block.size == 0 or key == 0:
@@ -195,7 +195,7 @@ def _make_callbacks(layout: EngineLayout, fingerprint: str) -> tuple[Any, Any]:
         _dampers(block, ten_velocity, jacobian, userdata, qfrc)
         _drag(block, xpos, xmat, com, cvel, cdof, qfrc)
 
-    @cfunc(types.double(types.intp, types.intp, types.intc), cache=True)
+    @cfunc(types.double(types.intp, types.intp, types.intc), cache=True, error_model="numpy")
     def actuator_rate(model, data, actuator):
         block = _our_block(model, m_count, m_numbers)
         if block.size == 0 or key == 0:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated
 
 from activesteer.config import Range
+from activesteer.errors import ParameterError
+from activesteer.vehicle.force_block import MAX_CURVE_POINTS
 
 Positive = Annotated[float, Range(1e-12)]
 NotNegative = Annotated[float, Range(0.0)]
@@ -38,6 +41,23 @@ class DamperCurve:
     """Compression velocities, increasing [m/s]."""
     force_N: tuple[float, ...]
     """Forces that resist them [N]."""
+
+    def __post_init__(self) -> None:
+        """Checks the points.
+
+        Raises:
+            ParameterError: there are too few or too many, or the velocities do not increase.
+        """
+        count = len(self.velocity_mps)
+        if not 2 <= count <= MAX_CURVE_POINTS or len(self.force_N) != count:
+            msg = (
+                f"{count} velocities and {len(self.force_N)} forces given; 2 to {MAX_CURVE_POINTS} points are needed, "
+                "as many velocities as forces"
+            )
+            raise ParameterError(msg)
+        if any(right <= left for left, right in pairwise(self.velocity_mps)):
+            msg = f"the velocities {list(self.velocity_mps)} m/s do not increase"
+            raise ParameterError(msg)
 
 
 @dataclass(frozen=True)

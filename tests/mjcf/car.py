@@ -34,7 +34,7 @@ JOINTS = (
 )
 TENDONS = (
     LINKS
-    + [f"{c}_{part}" for part in ("spring", "damper", "bump_stop", "rebound_stop") for c in CORNERS]
+    + [f"{c}_{part}" for part in ("spring", "damper") for c in CORNERS]
     + ["front_anti_roll_bar", "rear_anti_roll_bar", "steering_column"]
 )
 ACTUATORS = (

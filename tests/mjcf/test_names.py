@@ -92,11 +92,25 @@ def test_states_of_the_callback_are_user_dynamics_without_force(model: mujoco.Mj
     np.testing.assert_allclose(model.actuator("rl_steer").ctrlrange, [-0.0523598776, 0.0523598776])
 
 
-def test_dampers_carry_no_force_of_their_own(model: mujoco.MjModel) -> None:
+def test_dampers_have_no_damping_of_their_own(model: mujoco.MjModel) -> None:
     for corner in CORNERS:
-        damper = model.tendon(f"{corner}_damper").id
-        assert model.tendon_stiffness[damper] == 0.0
-        assert model.tendon_damping[damper] == 0.0
+        assert model.tendon_damping[model.tendon(f"{corner}_damper").id] == 0.0
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+def test_stops_leave_the_damper_its_travel_and_push_back_beyond_it(model: mujoco.MjModel, corner: str) -> None:
+    damper = model.tendon(f"{corner}_damper").id
+    design_m = model.tendon_length0[damper]
+    bump_m, rebound_m = model.tendon_lengthspring[damper] - design_m
+    assert -0.045 < bump_m < -0.025
+    assert 0.055 < rebound_m < 0.075
+    beyond_m = np.linspace(0.001, 0.06, 60)
+    a, b, c = model.tendon_stiffness[damper], *model.tendon_stiffnesspoly[damper]
+    on_bump_N = -(a * -beyond_m + b * beyond_m**2 + c * -(beyond_m**3))
+    on_rebound_N = a * beyond_m + b * beyond_m**2 + c * beyond_m**3
+    assert (np.diff(on_bump_N, prepend=0.0) > 0.0).all()
+    assert (on_rebound_N > on_bump_N).all()
+    assert on_bump_N[-1] > 5e3
 
 
 def test_column_couples_rack_to_the_sum_of_both_angles(model: mujoco.MjModel) -> None:

@@ -52,6 +52,13 @@ def test_no_deflection_gives_no_force() -> None:
     assert vertical_force(tyre().array, -0.01, 50.0, 230e3) == 0.0
 
 
+def test_a_cambered_mf62_tyre_touches_with_its_shoulder_and_lifts_off() -> None:
+    p = _mf62().array
+    first = vertical_force_loaded(p, 0.0, 0.0, 230e3, 0.0, 0.0, 0.05)
+    assert 0.0 < first < 1000.0
+    assert vertical_force_loaded(p, -0.05, 0.0, 230e3, 0.0, 0.0, 0.05) == 0.0
+
+
 def test_pressure_and_speed_stiffen_the_tyre() -> None:
     p = tyre().array
     assert vertical_force(p, 0.02, 0.0, 280e3) > vertical_force(p, 0.02, 0.0, 230e3)

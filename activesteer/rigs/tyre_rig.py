@@ -1,0 +1,298 @@
+"""A tyre test rig: one wheel in the engine, moved as wanted, its forces measured at its body.
+
+The wheel hangs on joints whose positions and velocities are imposed: three slides, heading, inclination, spin. The
+tyre is the compiled callback of the car. What it does to the wheel is read back from the generalised passive forces
+through the engine's own Jacobian, so that frames, signs and the way the forces reach the joints are all part of the
+measurement.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from activesteer.errors import ParameterError
+from activesteer.rigs.tyre_rig_model import compile_rig
+from activesteer.rigs.wheel_motion import Motion, RigForces, Vector, stacked, turned
+from activesteer.tyre.evaluation import MagicFormula
+from activesteer.tyre.tyre_parameters import Side, TyreParameters
+from activesteer.tyre.vertical import effective_rolling_radius
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.native_forces import install_native_forces
+from activesteer.vehicle.parameters import TyreFitment
+
+_PLACE_M: Final = (12.0, -7.0)
+"""Where the wheel touches the road: not at the origin, so that an arm taken about the wrong point shows."""
+_SPIN_ANGLE_RAD: Final = 0.7
+"""Where the wheel stands about its axis: not at zero, so that a force applied in the spinning frame shows."""
+_LOAD_TOLERANCE: Final = 1e-10
+_RATE_TOLERANCE_MPS: Final = 1e-9
+"""How far from steady the relaxation may be: at 3 m/s and 0.5 m of relaxation length 2e-10 of slip."""
+_MOST_STEPS: Final = 30
+
+
+class TyreRig:
+    """One wheel on a plane road.
+
+    Attributes:
+        formula: The tyre as `MagicFormula` evaluates it, mounted on the rig's side.
+        mu: Friction of the road relative to that of the tyre file.
+        pressure_Pa: Inflation pressure [Pa].
+        timestep_s: Step of the engine [s].
+    """
+
+    def __init__(
+        self,
+        tyre: TyreParameters,
+        side: Side = "LEFT",
+        mu: float = 1.0,
+        pressure_Pa: float | None = None,
+        *,
+        low_speed_mps: float = TyreFitment.low_speed_mps,
+        low_speed_damping_Nspm: float = TyreFitment.low_speed_damping_Nspm,
+        timestep_s: float = 0.001,
+    ) -> None:
+        """Compiles the rig and installs the native forces.
+
+        Args:
+            tyre: Tyre file.
+            side: Side of the vehicle that the tyre is mounted on.
+            mu: Friction of the road relative to that of the tyre file, > 0.
+            pressure_Pa: Inflation pressure [Pa]; None is that of the file.
+            low_speed_mps: Speed below which the standstill behaviour fades in [m/s], > 0.
+            low_speed_damping_Nspm: Viscous coefficient of the contact patch at rest [N s/m], >= 0.
+            timestep_s: Step of the engine [s], > 0.
+
+        Raises:
+            ParameterError: an argument is outside its range.
+            ModelError: another part of the program has taken MuJoCo's callbacks.
+        """
+        pressure = tyre["INFLPRES"] if pressure_Pa is None else pressure_Pa
+        positive = {"mu": mu, "pressure_Pa": pressure, "low_speed_mps": low_speed_mps, "timestep_s": timestep_s}
+        for name, value in positive.items():
+            if not 0.0 < value < math.inf:
+                raise ParameterError(f"tyre rig: {name} is {value:g}, must be finite and greater than 0")
+        if not 0.0 <= low_speed_damping_Nspm < math.inf:
+            raise ParameterError(
+                f"tyre rig: low_speed_damping_Nspm is {low_speed_damping_Nspm:g}, must be finite and not negative"
+            )
+        mounted = tyre.mounted_on(side)
+        self.formula = MagicFormula(mounted)
+        self.mu, self.pressure_Pa, self.timestep_s = mu, pressure, timestep_s
+        install_native_forces()
+        self._model = model = compile_rig(mounted, mu, pressure, low_speed_mps, low_speed_damping_Nspm, timestep_s)
+        self._data = mujoco.MjData(model)
+        self._wheel = model.body("wheel").id
+        self._jacobian = np.zeros((6, model.nv))
+        self.reset()
+
+    def reset(self) -> None:
+        """Unstressed tyre, wheel at the rig's place."""
+        mujoco.mj_resetData(self._model, self._data)
+        self._data.qpos[:2] = _PLACE_M
+        self._data.qpos[5] = _SPIN_ANGLE_RAD
+
+    def advance(self, motion: Motion) -> RigForces:
+        """Forces at the present deflection of the tyre and a motion; then the deflection goes on by one step.
+
+        Args:
+            motion: What is imposed on the wheel at this instant.
+        """
+        self._impose(motion)
+        deflections = self._data.act.copy()
+        # The step moves the wheel as well, but what matters of that is imposed anew: the road is plane. Places, motion
+        # axes and passive forces stay those of the step's beginning, so that they can be read afterwards.
+        mujoco.mj_step(self._model, self._data)
+        return self._read(motion, deflections)
+
+    def steady(
+        self,
+        slip_angle_rad: float,
+        slip_ratio: float,
+        inclination_rad: float,
+        load_N: float,
+        speed_mps: float,
+        heading_rad: float = 0.0,
+    ) -> RigForces:
+        """Forces of a tyre that rolls steadily at an operating point.
+
+        Height and relaxation states are searched for in the engine, until it carries the load and the states rest.
+        The spin is the one at which the formula's rolling radius gives the slip.
+
+        Args:
+            slip_angle_rad: Slip angle against the speed's absolute value [rad], ISO-W: positive moves the contact
+                point to the left of the heading, the force is to the right.
+            slip_ratio: Longitudinal slip, positive drives, also in reverse: against the sliding of the contact patch.
+            inclination_rad: Camber [rad], positive leans the top to the right.
+            load_N: Vertical load [N], > 0.
+            speed_mps: Speed along the heading [m/s], negative in reverse, not 0.
+            heading_rad: Heading in the world [rad].
+
+        Raises:
+            ParameterError: the load is not positive, the speed is zero, or there is no such steady state.
+        """
+        if not load_N > 0.0:
+            raise ParameterError(f"tyre rig: load_N is {load_N:g}, must be greater than 0")
+        if speed_mps == 0.0:
+            raise ParameterError("tyre rig: speed_mps is 0, steady rolling needs a speed; use advance() at rest")
+        expected = self.formula.evaluate(
+            load_N, slip_ratio, slip_angle_rad, inclination_rad, self.pressure_Pa, speed_mps, road_friction=self.mu
+        )
+        spin = self._spin(load_N, slip_ratio, speed_mps)
+        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+        across = abs(speed_mps) * math.tan(slip_angle_rad)
+
+        def motion(height: float) -> Motion:
+            return Motion(
+                height,
+                (cos * speed_mps - sin * across, sin * speed_mps + cos * across, 0.0),
+                spin,
+                heading_rad,
+                inclination_rad,
+            )
+
+        height = float(expected.loaded_radius_m) * math.cos(inclination_rad)
+        unknown: Vector = np.array([height, 0.0, 0.0])
+        residual = self._residual(motion(unknown[0]), unknown, load_N)
+        scale = np.array([_LOAD_TOLERANCE * load_N, _RATE_TOLERANCE_MPS, _RATE_TOLERANCE_MPS])
+        for _ in range(_MOST_STEPS):
+            if (np.abs(residual) <= scale).all():
+                return self._read(motion(unknown[0]), unknown[1:])
+            slopes = np.empty((3, 3))
+            for index in range(3):
+                step = 1e-7
+                moved = unknown.copy()
+                moved[index] += step
+                slopes[:, index] = (self._residual(motion(moved[0]), moved, load_N) - residual) / step
+            unknown -= np.linalg.solve(slopes, residual)
+            residual = self._residual(motion(unknown[0]), unknown, load_N)
+        raise ParameterError(
+            f"tyre rig: no steady state at load {load_N:g} N, slip ratio {slip_ratio:g}, slip angle "
+            f"{slip_angle_rad:g} rad, inclination {inclination_rad:g} rad, speed {speed_mps:g} m/s; "
+            f"load is off by {residual[0]:.3g} N, deflections change by {residual[1]:.3g}, {residual[2]:.3g} m/s"
+        )
+
+    def sweep(
+        self,
+        slip_angle_rad: ArrayLike,
+        slip_ratio: ArrayLike,
+        inclination_rad: ArrayLike,
+        load_N: ArrayLike,
+        speed_mps: ArrayLike,
+        heading_rad: ArrayLike = 0.0,
+    ) -> RigForces:
+        """`steady` at every point of arrays, which broadcast to shape (n,).
+
+        Raises:
+            ParameterError: the shapes do not broadcast to one dimension, or a point has no steady state.
+        """
+        given = (slip_angle_rad, slip_ratio, inclination_rad, load_N, speed_mps, heading_rad)
+        try:
+            points = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, dtype=np.float64)) for value in given))
+        except ValueError as error:
+            raise ParameterError(f"tyre rig: {error}") from error
+        if points[0].ndim != 1:
+            raise ParameterError(f"tyre rig: the points have {points[0].ndim} dimensions, one is needed")
+        return stacked([self.steady(*point) for point in zip(*(array.tolist() for array in points), strict=True)])
+
+    def transient(
+        self,
+        time_s: ArrayLike,
+        velocity_mps: ArrayLike,
+        spin_radps: ArrayLike,
+        centre_height_m: ArrayLike,
+        heading_rad: ArrayLike = 0.0,
+        inclination_rad: ArrayLike = 0.0,
+    ) -> RigForces:
+        """The tyre's forces over time under an imposed motion, from its present deflection.
+
+        Args:
+            time_s: Instants [s], shape (n,), at the rig's time step.
+            velocity_mps: Velocity of the wheel centre in the plane of the road, along and across the wheel's heading
+                (x forward, y left) [m/s], shape (2,) or (n, 2).
+            spin_radps: Spin [rad/s], a number or shape (n,), as the following ones.
+            centre_height_m: Height of the wheel centre [m]; it, heading and inclination move with the rates of their
+                differences.
+            heading_rad: Heading [rad].
+            inclination_rad: Inclination [rad].
+
+        Returns:
+            The forces at every instant.
+
+        Raises:
+            ParameterError: the instants are not at the rig's time step, or a shape does not fit.
+        """
+        time = np.asarray(time_s, dtype=np.float64)
+        if time.ndim != 1 or len(time) < 2 or not np.allclose(np.diff(time), self.timestep_s, rtol=1e-6, atol=0.0):
+            raise ParameterError(f"tyre rig: time_s must have one dimension and steps of {self.timestep_s:g} s")
+        try:
+            velocity = np.broadcast_to(np.asarray(velocity_mps, dtype=np.float64), (len(time), 2))
+            spin, height, heading, tilt = (
+                np.broadcast_to(np.asarray(value, dtype=np.float64), time.shape)
+                for value in (spin_radps, centre_height_m, heading_rad, inclination_rad)
+            )
+        except ValueError as error:
+            raise ParameterError(f"tyre rig: {error}") from error
+        height_rate, heading_rate, tilt_rate = (np.gradient(value, time) for value in (height, heading, tilt))
+        plane = turned(np.column_stack([velocity, height_rate]), heading)
+        columns = (height, plane, spin, heading, tilt, heading_rate, tilt_rate)
+        return stacked([self.advance(Motion(*row)) for row in zip(*columns, strict=True)])
+
+    def _spin(self, load_N: float, slip_ratio: float, speed_mps: float) -> float:
+        """Spin [rad/s] at a slip ratio; the rolling radius grows with it."""
+        array = self.formula.parameters.array
+        spin = 0.0
+        for _ in range(_MOST_STEPS):
+            radius = effective_rolling_radius(array, load_N, spin, self.pressure_Pa)
+            spin = (speed_mps + slip_ratio * abs(speed_mps)) / radius
+        return spin
+
+    def _impose(self, motion: Motion) -> None:
+        data = self._data
+        data.qpos[2] = motion.centre_height_m
+        data.qpos[3] = motion.heading_rad
+        data.qpos[4] = motion.inclination_rad
+        data.qvel[:3] = motion.velocity_mps
+        data.qvel[3] = motion.heading_rate_radps
+        data.qvel[4] = motion.inclination_rate_radps
+        data.qvel[5] = motion.spin_radps
+
+    def _residual(self, motion: Motion, unknown: Vector, load_N: float) -> Vector:
+        """Missing load [N] and rates of the two relaxation states [m/s]."""
+        self._impose(motion)
+        self._data.act[:] = unknown[1:]
+        mujoco.mj_forward(self._model, self._data)
+        return np.array([self._wrench(self._contact_point())[2] - load_N, *self._data.act_dot])
+
+    def _contact_point(self) -> Vector:
+        """From the wheel centre down in the wheel plane, onto the road; world frame [m]."""
+        x, y, z = self._data.xmat[self._wheel, 1::3]
+        # The part of the vertical that is in the wheel plane.
+        up = np.array([-z * x, -z * y, 1.0 - z * z])
+        centre = self._data.xpos[self._wheel]
+        return centre - up * (centre[2] / up[2])
+
+    def _wrench(self, point: Vector) -> Vector:
+        """Force [N] and moment about a point [Nm] that the passive forces stand for, world frame."""
+        model, data, jacobian = self._model, self._data, self._jacobian
+        mujoco.mj_jac(model, data, jacobian[:3], jacobian[3:], point, self._wheel)
+        return np.linalg.solve(jacobian.T, data.qfrc_passive)
+
+    def _read(self, motion: Motion, deflections_m: Vector) -> RigForces:
+        point = self._contact_point()
+        wrench = self._wrench(point)
+        return RigForces(
+            wrench[:3],
+            wrench[3:],
+            point,
+            np.array(motion.heading_rad),
+            np.array(math.dist(self._data.xpos[self._wheel], point)),
+            np.array(motion.spin_radps),
+            np.array(deflections_m[0]),
+            np.array(deflections_m[1]),
+            np.array(self._data.userdata[fb.U_LIMITED]),
+        )

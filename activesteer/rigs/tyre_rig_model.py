@@ -1,0 +1,88 @@
+"""The tyre rig's model: a wheel on joints for every motion, with its tyre in the block of the native forces."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import mujoco
+
+from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.loading import chain_to
+
+_MJCF: Final = """
+<mujoco model="tyre rig">
+  <compiler angle="radian"/>
+  <option integrator="discrete" gravity="0 0 0" jacobian="dense"/>
+  <worldbody>
+    <body name="carrier">
+      <joint name="x" type="slide" axis="1 0 0"/>
+      <joint name="y" type="slide" axis="0 1 0"/>
+      <joint name="z" type="slide" axis="0 0 1"/>
+      <joint name="heading" axis="0 0 1"/>
+      <joint name="inclination" axis="1 0 0"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+      <body name="wheel">
+        <joint name="spin" axis="0 1 0"/>
+        <inertial pos="0 0 0" mass="20" diaginertia="0.6 1 0.6"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <general name="slip_x" joint="spin" dyntype="user" gaintype="fixed" gainprm="0" biastype="none"/>
+    <general name="slip_y" joint="spin" dyntype="user" gaintype="fixed" gainprm="0" biastype="none"/>
+  </actuator>
+</mujoco>
+"""
+
+
+def compile_rig(
+    tyre: TyreParameters,
+    mu: float,
+    pressure_Pa: float,
+    low_speed_mps: float,
+    low_speed_damping_Nspm: float,
+    timestep_s: float,
+) -> mujoco.MjModel:
+    """The rig's model with its block for the native callbacks."""
+    spec = mujoco.MjSpec.from_string(_MJCF)
+    spec.option.timestep = timestep_s
+    spec.nuserdata = fb.USERDATA_PER_WHEEL
+    model = spec.compile()
+    wheel = model.body("wheel").id
+    carrier = model.body("carrier").id
+    chain = chain_to(model, wheel)
+    block = fb.ForceBlock(
+        n_dofs=model.nv,
+        n_bodies=model.nbody,
+        n_userdata=model.nuserdata,
+        n_activations=model.na,
+        n_controls=model.nu,
+        n_tendons=model.ntendon,
+        n_tendon_jacobian=model.nJten,
+        chassis_body=carrier,
+        chassis_root=int(model.body_rootid[carrier]),
+        chassis_chain=[],
+        drag_Ns2pm2=0.0,
+        aero_point_m=(0.0, 0.0, 0.0),
+    )
+    states = [int(address) for address in model.actuator_actadr]
+    block.wheels.append(
+        fb.WheelEntry(
+            body=wheel,
+            root=int(model.body_rootid[wheel]),
+            act_x=states[0],
+            act_y=states[1],
+            mu=mu,
+            pressure_Pa=pressure_Pa,
+            low_speed_mps=low_speed_mps,
+            low_speed_damping_Nspm=low_speed_damping_Nspm,
+            chain=chain,
+            tyre=tyre.array,
+        )
+    )
+    for address, slot in zip(states, (fb.U_RATE_X, fb.U_RATE_Y), strict=True):
+        block.actuators.append((fb.KIND_SLIP, float(address), float(slot), 0.0, 0.0, 0.0))
+    array = block.to_array()
+    spec.add_numeric(name=fb.BLOCK_NAME, size=array.size + fb.TRAILER_SIZE, data=fb.with_trailer(array, 0))
+    return spec.compile()

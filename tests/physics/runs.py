@@ -1,0 +1,81 @@
+"""Runs that the physics tests share: every run is made once in a process."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import activesteer
+from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
+from activesteer.recorder import Recorder
+from activesteer.recording import Recording
+from activesteer.scenario import Scenario, resolve
+from activesteer.simulation import Simulation
+from activesteer.vehicle import Vehicle
+
+STEP_DEG = 36.5
+"""Steering wheel angle of the step steers whose input must not depend on a search: about 0.4 g at 80 km/h."""
+COAST_OR_BRAKE = {"kind": "open_loop", "speed_kmh": 80, "duration_s": 3.0, "drive": "coast"}
+"""A car that rolls at 80 km/h with the clutch open, driven to that speed before."""
+
+
+@functools.cache
+def _run(maneuver: str, controller: str, overrides: tuple[tuple[str, Any], ...], timestep_s: float) -> Recording:
+    given = {key: list(value) if isinstance(value, tuple) else value for key, value in overrides}
+    return activesteer.simulate(maneuver, controller, overrides=given, timestep_s=timestep_s)
+
+
+def run(
+    maneuver: str, controller: str = "none", *, timestep_s: float = DEFAULT_TIMESTEP_S, **overrides: Any
+) -> Recording:
+    """A manoeuvre of the library; a double underscore in an override's name stands for a dot."""
+    keys = tuple(sorted((key.replace("__", "."), value) for key, value in overrides.items()))
+    return _run(maneuver, controller, keys, timestep_s)
+
+
+def step_steer(controller: str = "none", *, timestep_s: float = DEFAULT_TIMESTEP_S, side: float = 1.0) -> Recording:
+    """A step steer of known amplitude, to the left (side 1) or to the right (side -1)."""
+    return run("step_steer", controller, timestep_s=timestep_s, steer__steering_wheel_deg=side * STEP_DEG)
+
+
+def step_steer_scenario() -> Scenario:
+    """The same, not yet run."""
+    return resolve("step_steer", overrides={"steer.steering_wheel_deg": STEP_DEG})
+
+
+def in_the_corner(controller: str = "none", steps: int = 900) -> Simulation:
+    """A step steer in its transient: 0.4 s after the steering wheel began to turn."""
+    simulation = Simulation(step_steer_scenario(), controller)
+    simulation.advance(steps)
+    return simulation
+
+
+def go_on(simulation: Simulation, steps: int) -> NDArray[np.float64]:
+    """Every channel of the next steps, shape (steps, number of channels)."""
+    recorder = Recorder(simulation.vehicle, steps)
+    simulation.advance(steps, recorder)
+    return recorder.result()[1]
+
+
+def car(maneuver: str = "standstill") -> Vehicle:
+    """The car in static ride."""
+    scenario = resolve(maneuver)
+    return Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.road)
+
+
+def mass_kg(vehicle: Vehicle) -> float:
+    """Mass of the whole car."""
+    return float(vehicle.model.body_mass.sum())
+
+
+def corners(recording: Recording, quantity: str) -> NDArray[np.float64]:
+    """A quantity of all corners, shape (n, 4), order of `CORNERS`."""
+    return np.stack([recording[f"{corner}_{quantity}"] for corner in CORNERS], axis=1)
+
+
+def last(recording: Recording, duration_s: float) -> NDArray[np.bool_]:
+    """Which rows belong to the end of a run, shape (n,)."""
+    return recording.time_s > recording.time_s[-1] - duration_s

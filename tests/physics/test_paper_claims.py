@@ -1,0 +1,36 @@
+"""What the paper says about the step steer, from three recordings of one steering input."""
+
+from __future__ import annotations
+
+import pytest
+
+from activesteer.analysis.claims import Claim, step_steer_claims
+from activesteer.conventions import GRAVITY_MPS2
+from tests.physics.runs import last, run
+
+
+@pytest.fixture(scope="module")
+def claims() -> dict[str, Claim]:
+    recordings = {system: run("step_steer", system) for system in ("none", "ars", "afs")}
+    return {claim.id: claim for claim in step_steer_claims(recordings)}
+
+
+@pytest.mark.parametrize("number", ["S1", "S2", "S3", "S4", "S5"])
+def test_claim_holds(claims: dict[str, Claim], number: str) -> None:
+    claim = claims[number]
+    assert claim.passed, f"{claim.text} {claim.criterion} {claim.values}"
+
+
+def test_the_manoeuvre_is_the_paper_s() -> None:
+    """80 km/h, 0.4 g in the steady state of the control-free car, the steering wheel faster than 200 deg/s."""
+    recording = run("step_steer")
+    end = last(recording, 0.5)
+    assert recording["ay_mps2"][end].mean() == pytest.approx(0.4 * GRAVITY_MPS2, rel=1e-3)
+    assert recording["speed_mps"][end].mean() * 3.6 == pytest.approx(80.0, rel=0.01)
+    assert recording.metrics["steering_wheel_max_rate_radps"] > 3.49
+
+
+def test_all_systems_get_the_same_steering_input() -> None:
+    inputs = [run("step_steer", system)["steering_wheel_demand_rad"] for system in ("none", "ars", "afs")]
+    assert (inputs[0] == inputs[1]).all()
+    assert (inputs[0] == inputs[2]).all()

@@ -1,0 +1,18 @@
+"""The step of 1 ms is short enough: a quarter of it gives the same answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.physics.runs import step_steer
+
+PEAKS = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
+
+
+@pytest.mark.parametrize("controller", ["none", "ars", "afs"])
+@pytest.mark.parametrize("channel", PEAKS)
+def test_peaks_agree_between_steps(channel: str, controller: str) -> None:
+    coarse, fine = step_steer(controller), step_steer(controller, timestep_s=2.5e-4)
+    peak, reference = (float(np.abs(recording[channel]).max()) for recording in (coarse, fine))
+    assert peak == pytest.approx(reference, rel=5e-3)

@@ -1,0 +1,207 @@
+"""Controllers by name and from a user's file, and what is said when they are wrong."""
+
+from __future__ import annotations
+
+import copy
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from activesteer.controllers import BUILT_IN, FrontSuperposition, NoControl, RearSteer, load_controller
+from activesteer.controllers.loading import check_command, is_sane, user_file
+from activesteer.errors import ControllerError
+from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from tests.unit.controllers.cars import measured, setup, steering
+
+HEAD = "import math\nimport numpy as np\nfrom activesteer import SteerCommand\n\n"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(body: str, name: str = "mine.py") -> Path:
+        path = tmp_path / name
+        path.write_text(HEAD + textwrap.dedent(body))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def returning(write):
+    """A controller whose step returns an expression."""
+
+    def returning(expression: str):
+        path = write(f"class Mine:\n    def step(self, command, measurement):\n        return {expression}\n")
+        return load_controller(f"{path}:Mine", setup())
+
+    return returning
+
+
+@pytest.mark.parametrize(("name", "kind"), [("none", NoControl), ("ars", RearSteer), ("afs", FrontSuperposition)])
+def test_built_in_controllers_are_found_by_name(name, kind):
+    assert type(load_controller(name, setup())) is kind
+    assert BUILT_IN[name] is kind
+
+
+def test_users_controller_is_made_and_asked(write):
+    path = write(
+        """
+        class Mine:
+            def step(self, command, measurement):
+                return SteerCommand(rear_steer_rad=-0.1 * command.front_steer_rad)
+        """
+    )
+    controller = load_controller(f"{path}:Mine", setup())
+    assert controller.step(steering(0.2), measured(0.0)) == SteerCommand(rear_steer_rad=-0.1 * 0.2)
+
+
+def test_users_controller_may_ask_for_the_car(write):
+    path = write(
+        """
+        class Mine:
+            def __init__(self, wheelbase_m):
+                self.wheelbase_m = wheelbase_m
+
+            @classmethod
+            def from_vehicle(cls, setup):
+                return cls(setup.single_track.cg_to_front_m + setup.single_track.cg_to_rear_m)
+
+            def step(self, command, measurement):
+                return SteerCommand(yaw_rate_desired_radps=self.wheelbase_m)
+        """
+    )
+    steer = load_controller(f"{path}:Mine", setup()).step(steering(0.0), measured(0.0))
+    assert steer.yaw_rate_desired_radps == 2.5
+
+
+def test_users_controller_can_be_copied_with_its_state(write):
+    path = write(
+        """
+        class Mine:
+            count = 0
+
+            def step(self, command, measurement):
+                self.count += 1
+                return SteerCommand(0.001 * self.count)
+        """
+    )
+    controller = load_controller(f"{path}:Mine", setup())
+    controller.step(steering(0.0), measured(0.0))
+    saved = copy.deepcopy(controller)
+    assert controller.step(steering(0.0), measured(0.0)) == saved.step(steering(0.0), measured(0.0))
+
+
+def test_users_file_is_kept_with_the_recording(write):
+    path = write("class Mine: ...")
+    assert user_file(f"{path}:Mine") == {"mine.py": path.read_bytes()}
+    assert user_file("ars") == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("asr", r"no controller 'asr'; did you mean 'ars'.*my_file\.py:MyController"),
+        ("xyz", r"no controller 'xyz'; known are: afs, ars, none"),
+        ("mine.py", r"no controller 'mine\.py'.*my_file\.py:MyController"),
+        ("mine.py:", r"no controller 'mine\.py:'"),
+        (":Mine", r"no controller ':Mine'"),
+        ("nowhere/mine.py:Mine", r"controller nowhere/mine\.py:Mine: there is no file nowhere/mine\.py"),
+    ],
+)
+def test_wrong_name_is_answered(name, told):
+    with pytest.raises(ControllerError, match=told):
+        load_controller(name, setup())
+
+
+def test_missing_class_is_answered_with_the_ones_in_the_file(write):
+    path = write("from pathlib import Path\nclass MyController: ...\nclass Other: ...\n")
+    with pytest.raises(ControllerError, match=r"mine\.py has no class 'MyControler'; did you mean 'MyController'\?"):
+        load_controller(f"{path}:MyControler", setup())
+    with pytest.raises(ControllerError, match=r"has no class 'Zzz'; known are: MyController, Other$"):
+        load_controller(f"{path}:Zzz", setup())
+
+
+def test_file_that_does_not_run_is_answered_with_its_line(write):
+    path = write("\n1 / 0\n")
+    with pytest.raises(ControllerError, match=r"cannot be run: ZeroDivisionError: .*\(mine\.py, line 6\)"):
+        load_controller(f"{path}:Mine", setup())
+    path = write("def step(:\n")
+    with pytest.raises(ControllerError, match=r"mine\.py cannot be run: SyntaxError"):
+        load_controller(f"{path}:Mine", setup())
+
+
+def test_file_that_is_no_python_is_answered(write):
+    path = write("class Mine: ...", "mine.txt")
+    with pytest.raises(ControllerError, match=r"mine\.txt is no Python file"):
+        load_controller(f"{path}:Mine", setup())
+
+
+def test_constructor_that_raises_is_answered(write):
+    path = write("class Mine:\n    def __init__(self):\n        raise ValueError('no gains')\n")
+    with pytest.raises(ControllerError, match=r"mine\.py:Mine: Mine cannot be made: ValueError: no gains \(mine\.py,"):
+        load_controller(f"{path}:Mine", setup())
+
+
+def test_constructor_that_wants_more_is_answered(write):
+    path = write("class Mine:\n    def __init__(self, gains):\n        self.gains = gains\n")
+    with pytest.raises(ControllerError, match=r"Mine cannot be made: TypeError: .*gains"):
+        load_controller(f"{path}:Mine", setup())
+
+
+def test_class_without_step_is_answered(write):
+    path = write("class Mine:\n    def stepp(self): ...\n")
+    with pytest.raises(ControllerError, match=r"mine\.py:Mine: Mine has no method step\(command, measurement\)"):
+        load_controller(f"{path}:Mine", setup())
+
+
+@pytest.mark.parametrize(
+    ("expression", "told"),
+    [
+        ("None", r"step returned None; an activesteer\.SteerCommand is needed"),
+        ("0.1", r"step returned 0\.1; an activesteer\.SteerCommand is needed"),
+        ("(0.1, 0.0, 0.0, 0.0, 0.0, False)", r"step returned \(0\.1, .*SteerCommand is needed"),
+        ("SteerCommand(math.nan)", r"rear_steer_rad = nan; a finite angle of at most 1 rad"),
+        ("SteerCommand(math.inf)", r"rear_steer_rad = inf; a finite angle"),
+        ("SteerCommand(3.0)", r"rear_steer_rad = 3\.0; .*radians, not degrees"),
+        ("SteerCommand(superposition_rad=-2.5)", r"superposition_rad = -2\.5; .*radians, not degrees"),
+        ("SteerCommand('left')", r"rear_steer_rad = 'left'; a number is needed"),
+        ("SteerCommand(None)", r"rear_steer_rad = None; a number is needed"),
+        ("SteerCommand(np.zeros(2))", r"rear_steer_rad = array.*; a number is needed"),
+        ("SteerCommand(0.0, 0.0, None)", r"yaw_rate_desired_radps = None; a number is needed"),
+        ("SteerCommand(saturated='no')", r"saturated = 'no'; a number is needed"),
+        ("1 / 0", r"step raised ZeroDivisionError: .*\(mine\.py, line 7\)"),
+        ("command.speed", r"step raised AttributeError: .*speed"),
+        ("measurement.sideslip_rad", r"step raised AttributeError: .*sideslip_rad"),
+    ],
+)
+def test_nonsense_is_answered_with_file_and_class(returning, expression, told):
+    with pytest.raises(ControllerError, match=rf"mine\.py:Mine: {told}"):
+        returning(expression).step(steering(0.0), measured(0.0))
+
+
+@pytest.mark.parametrize("expression", ["SteerCommand(np.float32(0.1))", "SteerCommand(0)", "SteerCommand(-1.0, 1.0)"])
+def test_numbers_of_all_kinds_are_taken(returning, expression):
+    assert isinstance(returning(expression).step(steering(0.0), measured(0.0)), SteerCommand)
+
+
+def test_good_command_passes_the_check():
+    steer = SteerCommand(0.05, -0.02, 0.3, 0.01, 0.04, True)
+    assert is_sane(steer)
+    check_command(steer, "mine.py:Mine")
+
+
+def test_controllers_are_told_what_sensors_measure_and_nothing_else():
+    allowed = {
+        "time_s",
+        "speed_mps",
+        "yaw_rate_radps",
+        "ay_mps2",
+        "ax_mps2",
+        "steering_wheel_rad",
+        "rear_steer_rad",
+        "superposition_rad",
+        "wheel_speed_radps",
+    }
+    assert set(Measurement._fields) == allowed
+    assert set(DriverCommand._fields) == {"steering_wheel_rad", "front_steer_rad", "drive_torque_Nm", "brake"}

@@ -1,0 +1,143 @@
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer.errors import ModelError, ParameterError
+from activesteer.rigs.tyre_rig import Motion, TyreRig
+from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
+from tests.unit.tyre.tyres import tyre
+
+AT = {"slip_angle_rad": 0.05, "slip_ratio": 0.02, "inclination_rad": 0.03, "load_N": 4000.0, "speed_mps": 20.0}
+
+
+def test_a_sweep_is_its_points() -> None:
+    rig = TyreRig(tyre())
+    angles = np.array([-0.1, 0.0, 0.1])
+    swept = rig.sweep(**(AT | {"slip_angle_rad": angles}))
+    assert swept.force_N.shape == (3, 3)
+    assert swept.loaded_radius_m.shape == (3,)
+    one = rig.steady(**(AT | {"slip_angle_rad": 0.1}))
+    assert one.force_N.shape == (3,)
+    assert swept.force_N[2] == pytest.approx(one.force_N, rel=1e-9)
+
+
+def test_points_do_not_depend_on_what_was_measured_before() -> None:
+    rig = TyreRig(tyre())
+    first = rig.steady(**AT)
+    rig.steady(-0.2, 0.3, -0.1, 8000.0, -50.0, 2.0)
+    rig.advance(Motion(0.25, (3.0, 2.0, -1.0), 50.0, 1.0, 0.1, 2.0, 1.0))
+    assert rig.steady(**AT).force_N == pytest.approx(first.force_N, rel=1e-8)
+
+
+def test_the_wheel_frame_is_the_world_turned_by_the_heading() -> None:
+    forces = TyreRig(tyre()).steady(**AT, heading_rad=0.5)
+    force, moment = forces.in_wheel_frame()
+    x, y, z = force
+    assert forces.force_N == pytest.approx(
+        [math.cos(0.5) * x - math.sin(0.5) * y, math.sin(0.5) * x + math.cos(0.5) * y, z]
+    )
+    assert np.linalg.norm(moment) == pytest.approx(np.linalg.norm(forces.moment_Nm))
+
+
+def test_a_steady_motion_in_time_is_the_steady_state() -> None:
+    rig = TyreRig(tyre())
+    steady = rig.steady(**AT, heading_rad=0.5)
+    time = np.arange(1000) * rig.timestep_s
+    velocity = (20.0, 20.0 * math.tan(0.05))
+    height = float(steady.loaded_radius_m) * math.cos(0.03)
+    rig.reset()
+    forces = rig.transient(time, velocity, float(steady.spin_radps), height, 0.5, 0.03)
+    assert forces.force_N[0] != pytest.approx(steady.force_N, rel=0.1)
+    assert forces.force_N[-1] == pytest.approx(steady.force_N, rel=1e-6)
+
+
+def test_reset_releases_the_tyre() -> None:
+    rig = TyreRig(tyre())
+    motion = Motion(0.29, (0.0, 0.05, 0.0))
+    first = rig.advance(motion)
+    wound = [rig.advance(motion) for _ in range(50)][-1]
+    assert abs(wound.force_N[1]) > 3 * abs(first.force_N[1])
+    rig.reset()
+    assert rig.advance(motion).force_N == pytest.approx(first.force_N, rel=1e-12)
+
+
+def test_inclination_and_heading_rates_move_the_contact_point() -> None:
+    rig = TyreRig(tyre())
+    rolling = Motion(0.29, (20.0, 0.0, 0.0), 65.0)
+    straight = rig.advance(rolling).force_N[1]
+    rig.reset()
+    # The top falls to the right, so the contact point moves to the left: force to the right.
+    tilting = rig.advance(Motion(0.29, (20.0, 0.0, 0.0), 65.0, inclination_rate_radps=1.0)).force_N[1]
+    assert tilting < straight
+    rig.reset()
+    # Turning about the vertical through an upright wheel leaves the contact point where it is.
+    turning = rig.advance(Motion(0.29, (20.0, 0.0, 0.0), 65.0, heading_rate_radps=1.0)).force_N[1]
+    assert turning == pytest.approx(straight, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"mu": 0.0}, "mu is 0, must be finite and greater than 0"),
+        ({"mu": math.nan}, "mu is nan"),
+        ({"pressure_Pa": -1.0}, "pressure_Pa is -1"),
+        ({"timestep_s": math.inf}, "timestep_s is inf"),
+        ({"low_speed_damping_Nspm": -1.0}, "low_speed_damping_Nspm is -1, must be finite and not negative"),
+        ({"side": "left"}, "'LEFT' and 'RIGHT'"),
+    ],
+)
+def test_a_rig_that_cannot_be_is_an_error(changes, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        TyreRig(tyre(), **changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"load_N": 0.0}, "load_N is 0, must be greater than 0"),
+        ({"speed_mps": 0.0}, "speed_mps is 0"),
+        ({"load_N": math.nan}, "load_N is nan"),
+        ({"slip_angle_rad": math.nan}, "must be finite"),
+    ],
+)
+def test_an_operating_point_that_cannot_be_is_an_error(changes, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        TyreRig(tyre()).steady(**(AT | changes))
+
+
+def test_shapes_that_do_not_fit_are_errors() -> None:
+    rig = TyreRig(tyre())
+    with pytest.raises(ParameterError, match="broadcast"):
+        rig.sweep(np.zeros(2), np.zeros(3), 0.0, 4000.0, 20.0)
+    with pytest.raises(ParameterError, match="2 dimensions"):
+        rig.sweep(np.zeros((2, 2)), 0.0, 0.0, 4000.0, 20.0)
+    with pytest.raises(ParameterError, match=r"steps of 0\.001 s"):
+        rig.transient(np.linspace(0.0, 1.0, 11), (1.0, 0.0), 0.0, 0.29)
+    with pytest.raises(ParameterError, match="broadcast"):
+        rig.transient(np.arange(10) * 0.001, np.zeros((9, 2)), 0.0, 0.29)
+
+
+def test_the_rig_measures_the_callback_and_nothing_else() -> None:
+    rig = TyreRig(tyre())
+    motion = Motion(0.29, (20.0, 1.0, 0.0), 65.0)
+    assert rig.advance(motion).force_N[2] > 1000.0
+    remove_native_forces()
+    try:
+        assert (rig.advance(motion).force_N == 0.0).all()
+    finally:
+        install_native_forces()
+
+
+def test_a_callback_of_someone_else_is_reported() -> None:
+    remove_native_forces()
+    mujoco.set_mjcb_passive(lambda model, data: None)
+    try:
+        with pytest.raises(ModelError, match="mjcb_passive is already taken"):
+            TyreRig(tyre())
+    finally:
+        mujoco.set_mjcb_passive(None)
+        install_native_forces()

@@ -1,0 +1,194 @@
+"""Steering servos, brakes and drive: lag, limits, holding and slipping, and what each torque reacts on."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer.conventions import CORNERS
+from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.vehicle import Vehicle
+from tests.unit.vehicle.cars import activation, actuator, dof, floating, standing, step
+
+SERVOS = ("superposition", "rl_steer", "rr_steer")
+
+
+def lag_and_rate(vehicle: Vehicle, name: str) -> tuple[float, float]:
+    lag, rate = vehicle.model.actuator_dynprm[actuator(vehicle, name), :2]
+    return float(lag), float(rate)
+
+
+@pytest.mark.parametrize("name", SERVOS)
+def test_a_small_step_follows_with_the_lag(name: str) -> None:
+    vehicle = floating()
+    lag_s, rate = lag_and_rate(vehicle, name)
+    target = 0.5 * rate * lag_s
+    vehicle.data.ctrl[actuator(vehicle, name)] = target
+    step(vehicle, round(lag_s / vehicle.timestep_s))
+    # Of a first-order lag; half a step of its 25 is what the time grid leaves open.
+    assert activation(vehicle, name) / target == pytest.approx(1.0 - math.exp(-1.0), abs=0.02)
+    step(vehicle, round(9.0 * lag_s / vehicle.timestep_s))
+    assert activation(vehicle, name) == pytest.approx(target, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", SERVOS)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_large_step_follows_at_the_rate_limit(name: str, side: float) -> None:
+    vehicle = floating()
+    lag_s, rate = lag_and_rate(vehicle, name)
+    high = float(vehicle.model.actuator_ctrlrange[actuator(vehicle, name), 1])
+    vehicle.data.ctrl[actuator(vehicle, name)] = side * high
+    limited_s = high / rate - lag_s
+    assert limited_s > 0.03
+    before = 0.0
+    for _ in range(round(limited_s / vehicle.timestep_s) - 1):
+        step(vehicle, 1)
+        now = activation(vehicle, name)
+        assert side * (now - before) == pytest.approx(rate * vehicle.timestep_s, rel=1e-6)
+        before = now
+
+
+@pytest.mark.parametrize("name", SERVOS)
+def test_a_demand_beyond_the_range_stops_at_the_range(name: str) -> None:
+    vehicle = floating()
+    high = float(vehicle.model.actuator_ctrlrange[actuator(vehicle, name), 1])
+    vehicle.data.ctrl[actuator(vehicle, name)] = 5.0 * high
+    step(vehicle, 600)
+    assert activation(vehicle, name) <= high
+    assert activation(vehicle, name) == pytest.approx(high, rel=1e-3)
+    assert vehicle.data.joint(name).qpos[0] == pytest.approx(high, rel=0.02)
+
+
+@pytest.mark.parametrize("name", SERVOS)
+def test_the_wheel_s_hinge_follows_its_servo(name: str) -> None:
+    vehicle = floating()
+    vehicle.data.ctrl[actuator(vehicle, name)] = 0.02
+    step(vehicle, 400)
+    assert vehicle.data.joint(name).qpos[0] == pytest.approx(0.02, abs=5e-4)
+
+
+@pytest.mark.parametrize("name", ["rl_steer", "rr_steer"])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_rear_hinges_stop_at_three_degrees(name: str, side: float) -> None:
+    """Demanded to go further, and pushed by as much as the servo can give, over a tenth of a second."""
+    vehicle = floating()
+    vehicle.data.ctrl[actuator(vehicle, name)] = side * 0.2
+    largest = 0.0
+    for index in range(500):
+        vehicle.data.qfrc_applied[dof(vehicle, name)] = side * 800.0 * min(1.0, index / 100)
+        step(vehicle, 1)
+        largest = max(largest, abs(float(vehicle.data.joint(name).qpos[0])))
+    assert math.degrees(largest) < 3.15
+    assert math.degrees(abs(float(vehicle.data.joint(name).qpos[0]))) == pytest.approx(3.0, abs=0.05)
+
+
+def test_the_commands_reach_their_actuators() -> None:
+    vehicle = standing()
+    ratio = vehicle.parameters.steering.ratio
+    vehicle.step(DriverCommand(0.3, 0.3 / ratio, 800.0, 0.25), SteerCommand(0.01, 0.02))
+    ctrl = vehicle.data.ctrl
+    brakes = vehicle.parameters.brakes
+    assert ctrl[actuator(vehicle, "steering_wheel")] == 0.3
+    assert ctrl[actuator(vehicle, "superposition")] == pytest.approx(0.02 * ratio)
+    assert [ctrl[actuator(vehicle, f"{corner}_steer")] for corner in ("rl", "rr")] == [0.01, 0.01]
+    assert sum(ctrl[actuator(vehicle, f"{corner}_drive")] for corner in CORNERS) == pytest.approx(800.0)
+    assert ctrl[actuator(vehicle, "fl_brake")] == pytest.approx(0.25 * brakes.front_torque_Nm)
+    assert ctrl[actuator(vehicle, "rr_brake")] == pytest.approx(0.25 * brakes.rear_torque_Nm)
+
+
+def push(vehicle: Vehicle, corner: str, torque_Nm: float, steps: int) -> float:
+    """Pushes a wheel round for some steps; its speed then [rad/s]."""
+    vehicle.data.qfrc_applied[dof(vehicle, f"{corner}_spin")] = torque_Nm
+    step(vehicle, steps)
+    return float(vehicle.data.qvel[dof(vehicle, f"{corner}_spin")])
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_brake_holds_up_to_its_torque_and_slips_beyond(corner: str, side: float) -> None:
+    vehicle = floating()
+    vehicle.data.ctrl[actuator(vehicle, f"{corner}_brake")] = 300.0
+    push(vehicle, corner, side * 280.0, 3000)
+    assert abs(push(vehicle, corner, side * 280.0, 500)) < 0.02
+    held_rad = float(vehicle.data.joint(f"{corner}_spin").qpos[0])
+    assert abs(held_rad) < 0.1
+    # Wound up by the torque that it holds.
+    assert activation(vehicle, f"{corner}_brake") == pytest.approx(
+        side * 280.0 / vehicle.parameters.brakes.stiffness_Nmprad, rel=0.05
+    )
+    slipping = floating()
+    slipping.data.ctrl[actuator(slipping, f"{corner}_brake")] = 300.0
+    assert side * push(slipping, corner, side * 400.0, 100) > 1.0
+    force = slipping.data.actuator_force[actuator(slipping, f"{corner}_brake")]
+    assert force == pytest.approx(-side * 300.0, rel=1e-6)
+
+
+def test_a_brake_demand_beyond_its_strength_gives_its_strength() -> None:
+    vehicle = floating()
+    vehicle.data.ctrl[actuator(vehicle, "rl_brake")] = 1e5
+    push(vehicle, "rl", 3000.0, 100)
+    most = vehicle.parameters.brakes.rear_torque_Nm
+    assert vehicle.data.actuator_force[actuator(vehicle, "rl_brake")] == pytest.approx(-most, rel=1e-6)
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+def test_a_spinning_wheel_in_the_air_runs_out_by_the_drag_of_its_brake_and_stays(corner: str) -> None:
+    vehicle = floating({"brakes.drag_torque_Nm": 1.5})
+    spin = dof(vehicle, f"{corner}_spin")
+    inertia = vehicle.model.body_inertia[vehicle.model.body(f"{corner}_wheel").id].max()
+    vehicle.data.qvel[spin] = 1.0
+    mujoco.mj_forward(vehicle.model, vehicle.data)
+    speeds = []
+    for _ in range(1200):
+        step(vehicle, 1)
+        speeds.append(float(vehicle.data.qvel[spin]))
+    slope = (speeds[300] - speeds[100]) / 0.2
+    # The wheel's own inertia, less what the light knuckle gives way.
+    assert slope == pytest.approx(-1.5 / inertia, rel=0.1)
+    assert abs(speeds[-1]) < 0.01
+    assert np.abs(speeds[900:]).max() < 0.03
+
+
+def test_tyres_in_the_air_lose_their_deflection() -> None:
+    vehicle = floating()
+    model, data = vehicle.model, vehicle.data
+    slips = [model.actuator_actadr[actuator(vehicle, f"{corner}_slip_{axis}")] for corner in CORNERS for axis in "xy"]
+    data.act[slips] = 0.02
+    step(vehicle, 50)
+    np.testing.assert_allclose(data.act[slips], 0.02 * math.exp(-1.0), rtol=0.03)
+    step(vehicle, 450)
+    assert np.abs(data.act[slips]).max() < 2e-6
+
+
+def generalised(vehicle: Vehicle, name: str) -> np.ndarray:
+    """Generalised forces of 100 Nm of an actuator, shape (nv,)."""
+    vehicle.data.ctrl[actuator(vehicle, name)] = 100.0
+    mujoco.mj_forward(vehicle.model, vehicle.data)
+    return vehicle.data.qfrc_actuator.copy()
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+def test_drive_torque_reacts_on_the_chassis(corner: str) -> None:
+    """The half-shaft bypasses the suspension: its joints carry the torque, the car as a whole gains nothing."""
+    vehicle = floating()
+    force = generalised(vehicle, f"{corner}_drive")
+    root = dof(vehicle, "root")
+    np.testing.assert_allclose(force[root : root + 6], 0.0, atol=1e-9)
+    assert force[dof(vehicle, f"{corner}_spin")] == pytest.approx(100.0, rel=1e-3)
+    ball = dof(vehicle, f"{corner}_topmount" if corner.startswith("f") else f"{corner}_rot")
+    assert force[ball + 1] == pytest.approx(100.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+def test_brake_torque_reacts_on_the_knuckle(corner: str) -> None:
+    """Between wheel and knuckle, so that the suspension's links must carry it: no other joint feels it."""
+    vehicle = floating()
+    vehicle.data.qvel[dof(vehicle, f"{corner}_spin")] = 30.0
+    force = generalised(vehicle, f"{corner}_brake")
+    spin = dof(vehicle, f"{corner}_spin")
+    assert force[spin] == pytest.approx(-100.0, rel=1e-6)
+    others = np.delete(force, [dof(vehicle, f"{each}_spin") for each in CORNERS])
+    np.testing.assert_allclose(others, 0.0, atol=1e-9)

@@ -1,0 +1,133 @@
+"""A run that goes wrong ends with a clear error, and what was recorded before is kept, in memory and on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer.errors import SimulationDiverged
+from activesteer.recording import Recording
+from activesteer.runner import run_scenario
+from activesteer.scenario import resolve
+from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.simulation import Simulation
+from activesteer.vehicle import Vehicle
+
+SPOILED_S = 1.2345
+
+
+def not_a_number(vehicle: Vehicle) -> None:
+    vehicle.data.qvel[vehicle.model.joint("rl_rot").dofadr[0]] = np.nan
+
+
+def not_a_position(vehicle: Vehicle) -> None:
+    vehicle.data.qpos[vehicle.model.joint("fr_jounce").qposadr[0]] = np.inf
+
+
+def too_fast(vehicle: Vehicle) -> None:
+    vehicle.data.qvel[vehicle.model.joint("fl_spin").dofadr[0]] = 1e12
+
+
+def not_a_force(vehicle: Vehicle) -> None:
+    vehicle.data.act[vehicle.model.actuator_actadr[vehicle.model.actuator("fr_slip_y").id]] = np.nan
+
+
+SPOILERS = [not_a_number, not_a_position, too_fast, not_a_force]
+
+
+@pytest.fixture(autouse=True)
+def engine_s_log_goes_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """MuJoCo writes its warnings to a file in the working directory."""
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def spoil(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Vehicle], None]], None]:
+    """Makes the next run's state wrong at one instant, once the manoeuvre is under way."""
+
+    def install(change: Callable[[Vehicle], None]) -> None:
+        step, rebase = Vehicle.step, Vehicle.rebase
+        under_way: list[bool] = []
+
+        def started(vehicle: Vehicle) -> None:
+            rebase(vehicle)
+            under_way.append(True)
+
+        def spoiled(vehicle: Vehicle, command: DriverCommand, steer: SteerCommand) -> None:
+            if under_way and abs(vehicle.data.time - SPOILED_S) < 0.5 * vehicle.timestep_s:
+                change(vehicle)
+                under_way.clear()
+            step(vehicle, command, steer)
+
+        monkeypatch.setattr(Vehicle, "rebase", started)
+        monkeypatch.setattr(Vehicle, "step", spoiled)
+
+    return install
+
+
+def good_run() -> Recording:
+    return run_scenario(resolve("straight_line", overrides={"duration_s": 3.0}))
+
+
+@pytest.mark.parametrize("change", SPOILERS)
+def test_a_state_that_is_not_finite_ends_the_run(
+    spoil: Callable[[Callable[[Vehicle], None]], None], change: Callable[[Vehicle], None]
+) -> None:
+    expected = good_run()
+    spoil(change)
+    with pytest.raises(SimulationDiverged, match=r"at 1\.[23]\d* s") as caught:
+        good_run()
+    kept = caught.value.recording
+    assert SPOILED_S - 0.002 < kept.time_s[-1] < SPOILED_S + 0.101
+    before = kept.time_s < SPOILED_S - 1e-3
+    np.testing.assert_array_equal(kept.values[before], expected.values[: before.sum()])
+    assert kept.metadata["complete"] is False
+    assert kept.metadata["error"].startswith("SimulationDiverged: ")
+
+
+@pytest.mark.parametrize("change", SPOILERS)
+def test_what_was_recorded_is_on_disk_and_opens(
+    tmp_path: Path, spoil: Callable[[Callable[[Vehicle], None]], None], change: Callable[[Vehicle], None]
+) -> None:
+    spoil(change)
+    path = tmp_path / "broken.mcap"
+    with pytest.raises(SimulationDiverged) as caught:
+        run_scenario(resolve("straight_line", overrides={"duration_s": 3.0}), path=path)
+    assert any(str(path) in note for note in caught.value.__notes__)
+    opened = Recording.open(path)
+    assert len(opened) == len(caught.value.recording)
+    assert len(opened) > 1000 * SPOILED_S
+    assert opened["speed_mps"][0] == pytest.approx(80.0 / 3.6, rel=0.01)
+    assert opened.metadata["complete"] is False
+    assert "SimulationDiverged" in opened.metadata["error"]
+
+
+def test_no_row_after_the_failure_looks_like_a_car_that_drives_on(
+    spoil: Callable[[Callable[[Vehicle], None]], None],
+) -> None:
+    """The engine may not put a broken state back to its start and go on."""
+    spoil(not_a_number)
+    with pytest.raises(SimulationDiverged) as caught:
+        good_run()
+    kept = caught.value.recording
+    after = kept.time_s > SPOILED_S
+    assert not (np.abs(kept["speed_mps"][after]) < 10.0).any()
+    assert not (np.abs(kept["x_m"][after]) < 1.0).any()
+
+
+def test_a_warning_of_the_engine_ends_the_run() -> None:
+    simulation = Simulation(resolve("straight_line"))
+    simulation.advance(10)
+    simulation.vehicle.data.warning[mujoco.mjtWarning.mjWARN_INERTIA].number += 1
+    with pytest.raises(SimulationDiverged, match=r"MuJoCo warns at 0\.\d+ s: .*[Ii]nertia"):
+        simulation.advance(10)
+
+
+def test_without_a_fault_nothing_is_reported() -> None:
+    simulation = Simulation(resolve("straight_line"))
+    simulation.advance(300)
+    simulation.vehicle.check()

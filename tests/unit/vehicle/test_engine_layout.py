@@ -1,0 +1,63 @@
+"""Where MuJoCo keeps its arrays: measured, confirmed on the car itself, and an error where it cannot be found."""
+
+from __future__ import annotations
+
+import ctypes
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer.errors import ModelError
+from activesteer.vehicle import engine_layout
+from activesteer.vehicle.engine_layout import measure_engine_layout
+from tests.unit.vehicle.cars import standing
+
+
+def word(address: int) -> int:
+    return ctypes.c_uint64.from_address(address).value
+
+
+def test_every_offset_leads_to_the_car_s_own_array() -> None:
+    vehicle = standing()
+    model, data = vehicle.model, vehicle.data
+    layout = measure_engine_layout()
+    for field in layout._fields:
+        if field.startswith("d_"):
+            array = getattr(data, field.removeprefix("d_"))
+            assert word(data._address + getattr(layout, field)) == array.ctypes.data, field
+    assert word(model._address + layout.m_numeric_data) == model.numeric_data.ctypes.data
+    assert ctypes.c_double.from_address(model._address + layout.m_timestep).value == model.opt.timestep
+    count = ctypes.c_int64.from_address(model._address + layout.m_nnumericdata).value
+    assert count == model.numeric_data.size
+
+
+def test_offsets_differ_and_are_aligned() -> None:
+    layout = measure_engine_layout()
+    model_part, data_part = layout[:3], layout[3:]
+    assert len(set(model_part)) == len(model_part)
+    assert len(set(data_part)) == len(data_part)
+    assert all(offset % 8 == 0 for offset in layout)
+
+
+def test_an_unknown_struct_is_an_error_that_names_the_member(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine_layout, "_DATA_BYTES", 64)
+    with pytest.raises(ModelError, match=rf"MuJoCo {mujoco.__version__}.*mjData\.qvel.*not supported"):
+        measure_engine_layout()
+
+
+def test_two_models_that_disagree_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = measure_engine_layout()
+    answers = iter([found, found._replace(d_qvel=found.d_qvel + 8)])
+    monkeypatch.setattr(engine_layout, "_measure", lambda *_: next(answers))
+    with pytest.raises(ModelError, match="different struct layouts"):
+        measure_engine_layout()
+
+
+def test_arrays_that_are_found_are_views_of_the_engine_s_memory() -> None:
+    vehicle = standing()
+    data, layout = vehicle.data, measure_engine_layout()
+    address = word(data._address + layout.d_qvel)
+    view = np.ctypeslib.as_array((ctypes.c_double * vehicle.model.nv).from_address(address))
+    data.qvel[3] = 0.125
+    assert view[3] == 0.125

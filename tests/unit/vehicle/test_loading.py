@@ -1,0 +1,73 @@
+"""What a model file may get wrong: each gives a ModelError with the file and the name that is missing."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from activesteer.errors import ModelError
+from tests.unit.vehicle.cars import changed_model, scenario, vehicle_of
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "words"),
+    [
+        ("compact.xml", '<body name="chassis">', '<body name="hull">', "chassis"),
+        ("front_axle.xml", 'name="fl_spin"', 'name="fl_turn"', "fl_spin"),
+        ("compact.xml", '<gyro name="cg_gyro"', '<gyro name="cg_gyroscope"', "no sensor 'cg_gyro'.*'cg_gyroscope'"),
+        ("compact.xml", 'name="chassis_orientation"', 'name="attitude"', "no sensor 'chassis_orientation'"),
+        ("compact.xml", 'name="rl_wheel_speed"', 'name="rl_wheel_spin"', "no sensor 'rl_wheel_speed'"),
+        ("compact.xml", 'name="steering_wheel_angle"', 'name="handwheel"', "no sensor 'steering_wheel_angle'"),
+        ("compact.xml", 'name="fr_damper"', 'name="fr_shock"', "no tendon 'fr_damper'"),
+        ("compact.xml", '<position name="steering_wheel"', '<position name="wheel"', "no actuator 'steering_wheel'"),
+        ("compact.xml", '<general name="rr_steer"', '<general name="rr_hinge"', "no actuator 'rr_steer'"),
+        ("compact.xml", '<general name="fl_slip_x"', '<general name="fl_kappa"', "no actuator 'fl_slip_x'"),
+        ("compact.xml", '<motor name="fl_drive"', '<motor name="fl_shaft"', "no actuator 'fl_drive'"),
+        ("compact.xml", 'dynprm="0.025 0.5"', 'dynprm="0 0.5"', "rl_steer.*lag"),
+        ("compact.xml", 'dynprm="0.025 8"', 'dynprm="0.025 0"', "superposition.*rate"),
+        ("compact.xml", "</mujoco>", "", "XML"),
+        ("compact.xml", '<freejoint name="root"/>', "", "root"),
+        ("rear_axle.xml", 'mass="12.5"', 'mass="heavy"', "mass"),
+    ],
+)
+def test_a_wrong_model_is_an_error_with_file_and_name(
+    tmp_path: Path, file: str, old: str, new: str, words: str
+) -> None:
+    given = scenario()
+    broken = dataclasses.replace(given, mjcf=changed_model(tmp_path, file, old, new))
+    with pytest.raises(ModelError, match=rf"(?s)compact\.xml.*{words}"):
+        vehicle_of(broken)
+
+
+def test_a_renamed_wheel_body_is_named(tmp_path: Path) -> None:
+    path = changed_model(tmp_path, "rear_axle.xml", "rl_wheel", "rl_tire")
+    main = path.read_text(encoding="utf-8").replace('objname="rl_wheel"', 'objname="rl_tire"')
+    path.write_text(main.replace('site="rl_wheel_centre"', 'site="rl_tire_centre"'), encoding="utf-8")
+    with pytest.raises(ModelError, match=r"(?s)compact\.xml.*no body 'rl_wheel'; did you mean"):
+        vehicle_of(dataclasses.replace(scenario(), mjcf=path))
+
+
+def test_a_missing_file_is_an_error_that_names_it(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r"absent\.xml"):
+        vehicle_of(dataclasses.replace(scenario(), mjcf=tmp_path / "absent.xml"))
+
+
+def test_an_unchanged_copy_loads(tmp_path: Path) -> None:
+    """The counterpart: it is the change that fails above."""
+    path = changed_model(tmp_path, "compact.xml", 'model="compact"', 'model="copy"')
+    vehicle = vehicle_of(dataclasses.replace(scenario(), mjcf=path))
+    assert vehicle.model.nv > 30
+
+
+def test_the_load_changes_mass_and_centre_of_gravity() -> None:
+    plain, loaded = (
+        vehicle_of(scenario()),
+        vehicle_of(scenario({"load.mass_factor": 1.2, "load.cg_height_change_m": 0.1})),
+    )
+    chassis = plain.model.body("chassis").id
+    assert loaded.model.body_mass[chassis] == pytest.approx(1.2 * plain.model.body_mass[chassis])
+    assert loaded.model.body_inertia[chassis] == pytest.approx(1.2 * plain.model.body_inertia[chassis])
+    assert loaded.model.body_ipos[chassis, 2] == pytest.approx(plain.model.body_ipos[chassis, 2] + 0.1)
+    assert loaded.data.qpos[2] < plain.data.qpos[2] - 0.01
