@@ -33,6 +33,7 @@ _LOAD_TOLERANCE: Final = 1e-10
 _RATE_TOLERANCE_MPS: Final = 1e-9
 """How far from steady the relaxation may be: at 3 m/s and 0.5 m of relaxation length 2e-10 of slip."""
 _MOST_STEPS: Final = 30
+_LOWERING_M: Final = 0.005
 
 
 class TyreRig:
@@ -156,24 +157,43 @@ class TyreRig:
             )
 
         height = float(expected.loaded_radius_m) * math.cos(inclination_rad)
-        unknown: Vector = np.array([height, 0.0, 0.0])
+        # Only where the search begins; it ends where the engine's own rates vanish.
+        unknown: Vector = np.array(
+            [
+                height,
+                slip_ratio * float(expected.relaxation_length_x_m),
+                math.tan(slip_angle_rad) * float(expected.relaxation_length_y_m),
+            ]
+        )
         residual = self._residual(motion(unknown[0]), unknown, load_N)
         scale = np.array([_LOAD_TOLERANCE * load_N, _RATE_TOLERANCE_MPS, _RATE_TOLERANCE_MPS])
         for _ in range(_MOST_STEPS):
             if (np.abs(residual) <= scale).all():
                 return self._read(motion(unknown[0]), unknown[1:])
+            if residual[0] <= -load_N:
+                # Lifted: nothing of the tyre depends on the height here.
+                unknown[0] -= _LOWERING_M
+                residual = self._residual(motion(unknown[0]), unknown, load_N)
+                continue
             slopes = np.empty((3, 3))
             for index in range(3):
                 step = 1e-7
                 moved = unknown.copy()
                 moved[index] += step
                 slopes[:, index] = (self._residual(motion(moved[0]), moved, load_N) - residual) / step
-            unknown -= np.linalg.solve(slopes, residual)
+            try:
+                unknown -= np.linalg.solve(slopes, residual)
+            except np.linalg.LinAlgError:
+                break
+            if not unknown[0] > 0.0:
+                # The rim would be below the road.
+                break
             residual = self._residual(motion(unknown[0]), unknown, load_N)
         raise ParameterError(
             f"tyre rig: no steady state at load {load_N:g} N, slip ratio {slip_ratio:g}, slip angle "
             f"{slip_angle_rad:g} rad, inclination {inclination_rad:g} rad, speed {speed_mps:g} m/s; "
-            f"load is off by {residual[0]:.3g} N, deflections change by {residual[1]:.3g}, {residual[2]:.3g} m/s"
+            f"at a height of {unknown[0]:.3g} m load is off by {residual[0]:.3g} N, deflections change by "
+            f"{residual[1]:.3g} and {residual[2]:.3g} m/s"
         )
 
     def sweep(
@@ -262,11 +282,11 @@ class TyreRig:
         data.qvel[5] = motion.spin_radps
 
     def _residual(self, motion: Motion, unknown: Vector, load_N: float) -> Vector:
-        """Missing load [N] and rates of the two relaxation states [m/s]."""
+        """Missing load [N] and rates of the deflections along and across [m/s]; a steady wheel is not twisted."""
         self._impose(motion)
-        self._data.act[:] = unknown[1:]
+        self._data.act[:] = (unknown[1], unknown[2], 0.0)
         mujoco.mj_forward(self._model, self._data)
-        return np.array([self._wrench(self._contact_point())[2] - load_N, *self._data.act_dot])
+        return np.array([self._wrench(self._contact_point())[2] - load_N, *self._data.act_dot[:2]])
 
     def _contact_point(self) -> Vector:
         """From the wheel centre down in the wheel plane, onto the road; world frame [m]."""

@@ -31,6 +31,7 @@ _MJCF: Final = """
   <actuator>
     <general name="slip_x" joint="spin" dyntype="user" gaintype="fixed" gainprm="0" biastype="none"/>
     <general name="slip_y" joint="spin" dyntype="user" gaintype="fixed" gainprm="0" biastype="none"/>
+    <general name="slip_z" joint="spin" dyntype="user" gaintype="fixed" gainprm="0" biastype="none"/>
   </actuator>
 </mujoco>
 """
@@ -73,6 +74,7 @@ def compile_rig(
             root=int(model.body_rootid[wheel]),
             act_x=states[0],
             act_y=states[1],
+            act_z=states[2],
             mu=mu,
             pressure_Pa=pressure_Pa,
             low_speed_mps=low_speed_mps,
@@ -81,7 +83,7 @@ def compile_rig(
             tyre=tyre.array,
         )
     )
-    for address, slot in zip(states, (fb.U_RATE_X, fb.U_RATE_Y), strict=True):
+    for address, slot in zip(states, (fb.U_RATE_X, fb.U_RATE_Y, fb.U_RATE_Z), strict=True):
         block.actuators.append((fb.KIND_SLIP, float(address), float(slot), 0.0, 0.0, 0.0))
     array = block.to_array()
     spec.add_numeric(name=fb.BLOCK_NAME, size=array.size + fb.TRAILER_SIZE, data=fb.with_trailer(array, 0))

@@ -1,15 +1,21 @@
 """One wheel on the road: contact kinematics, slip with relaxation, standstill, and the Magic Formula.
 
-Pure functions of the state. The two relaxation states of a tyre are the deflections of its contact patch against the
-rim [m], `deflection_x_m` along and `deflection_y_m` across the wheel's heading (Pacejka, Tire and Vehicle Dynamics,
-3rd ed. 2012, section 8.6, the restricted fully non-linear model):
+Pure functions of the state. The three relaxation states of a tyre are the deflections of its contact patch against the
+rim: `deflection_x_m` along and `deflection_y_m` across the wheel's heading [m], and `deflection_z_rad`, the twist about
+the normal of the road (Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 8.6, the restricted fully non-linear
+model; the twist in the same form over half the contact length a):
 
     d(u)/dt = -V_sx - |V_x| u / sigma_kappa        kappa' = u / sigma_kappa
     d(v)/dt =  V_sy - |V_x| v / sigma_alpha        tan(alpha') = v / sigma_alpha      (ISO-W sign of alpha)
+    d(w)/dt =  psi_dot - |V_x| w / a               phi' = w / a                       (turn slip)
+
+The turn slip enters the formula at low speed only, where steering twists the patch (parking); it fades out with the
+other standstill terms, so that at speed the formula is the usual one without turn slip.
 
 Three additions make them usable from standstill to any speed:
 
-* The rates are mean values over the step, exact for slip speeds held within it, and the forces belong to its end. Nothing gets stiff when sigma becomes small, and at rest the tyre is a spring, not an amplifier.
+* The rates are mean values over the step, exact for slip speeds held within it, and the forces belong to its end.
+  Nothing gets stiff when sigma becomes small, and at rest the tyre is a spring, not an amplifier.
 * At low speed the deflection stops growing where the contact patch slides as a whole (the "wind-up" of Pacejka, eq.
   8.125 ff.): |V_x| is replaced by max(|V_x|, |V_s| / slip_limit), at rest with one |V_s| / slip_limit for both axes, so
   that a sliding tyre pulls against its sliding. Above `low_speed_mps` the slip limit is that of the tyre file, for each
@@ -27,10 +33,11 @@ from numba import njit
 
 from activesteer.tyre import parameters as prm
 from activesteer.tyre.limits import limit_flags
-from activesteer.tyre.magic_formula import magic_formula, slip_stiffnesses
+from activesteer.tyre.magic_formula import slip_stiffnesses, steady_state
 from activesteer.tyre.relaxation import relaxation_lengths
 from activesteer.tyre.vertical import (
     bottoming_force,
+    contact_patch,
     effective_rolling_radius,
     free_radius,
     vertical_force_loaded,
@@ -42,6 +49,8 @@ _LIFTED_DECAY_PER_S: Final = 20.0
 """How fast the deflection of a lifted tyre decays [1/s]: a carcass rings down within some tenths of a second."""
 _SLIDING_TO_LINEAR: Final = 3.0
 """Slip of full sliding over slip at which the linear force would reach the friction limit: 3 for a brush model."""
+_SLIDING_TWIST_RAD: Final = 0.12
+"""Twist at which the whole patch slides about its middle [rad]: parking torques level off after some 5 to 8 degrees."""
 _SMALLEST_SLIP_LIMIT: Final = 0.01
 """Slip that a deflection may stand for at least, whatever the range of a tyre file."""
 _MOST_LOAD_STEPS: Final = 8
@@ -65,6 +74,7 @@ class WheelForces(NamedTuple):
     inclination_rad: float
     deflection_x_rate_mps: float
     deflection_y_rate_mps: float
+    deflection_z_rate_radps: float
     loaded_radius_m: float
     heading_x: float
     heading_y: float
@@ -88,12 +98,12 @@ def _low_speed_slip_limit(file_limit, sliding_slip, share):
 
 @njit(cache=True, error_model="numpy")
 def _rolling_tyre(
-    p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, gamma, u, v
+    p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn, gamma, u, v, w
 ):
     """Forces, slips, rates of the relaxation states and whether a limit is exceeded, at a load above zero.
 
     The arguments are those of `tyre_on_road`, with the load [N], the velocities of the contact point along and across
-    the heading [m/s], the spin [rad/s], the camber [rad] and the relaxation states [m].
+    the heading [m/s], the spin and the yaw rate of the wheel plane [rad/s], the camber [rad] and the relaxation states.
     """
     vsx = vx - spin * effective_rolling_radius(p, fz, spin, pressure_Pa)
     sigma_x, sigma_y = relaxation_lengths(p, fz, gamma, pressure_Pa)
@@ -127,6 +137,9 @@ def _rolling_tyre(
     carry_y = max(speed, sliding_y)
     rate_x = (-vsx - carry_x * u / sigma_x) * _mean_decay(timestep_s * carry_x / sigma_x)
     rate_y = (vsy - carry_y * v / sigma_y) * _mean_decay(timestep_s * carry_y / sigma_y)
+    half_length = max(0.5 * contact_patch(p, fz, pressure_Pa)[0], _MIN_RELAXATION_LENGTH_M)
+    carry_z = max(speed, abs(turn) * half_length / _SLIDING_TWIST_RAD)
+    rate_z = (turn - carry_z * w / half_length) * _mean_decay(timestep_s * carry_z / half_length)
     kappa = (u + timestep_s * rate_x) / sigma_x + damping_slip_x
     alpha = math.atan((v + timestep_s * rate_y) / sigma_y + damping_slip_y)
 
@@ -135,8 +148,10 @@ def _rolling_tyre(
     held = speed >= low_speed_mps and (carry_x > speed or carry_y > speed)
     if held or limit_flags(p, fz, kappa, alpha, gamma, pressure_Pa) != 0:
         limited = 1.0
-    fx, fy, mx, my, mz = magic_formula(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu)
-    return fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, limited
+    turn_slip = share * (w + timestep_s * rate_z) / half_length
+    result = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, turn_slip)
+    fx, fy, mx, my, mz = result[0], result[1], result[2], result[3], result[4]
+    return fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited
 
 
 @njit(cache=True, error_model="numpy")
@@ -168,6 +183,7 @@ def tyre_on_road(
     spin_z_radps,
     deflection_x_m,
     deflection_y_m,
+    deflection_z_rad,
 ):
     """Forces of a tyre on the plane road z = 0 and the rates of its relaxation states.
 
@@ -190,6 +206,7 @@ def tyre_on_road(
         spin_z_radps: Its z component.
         deflection_x_m: Relaxation state along the heading [m].
         deflection_y_m: Relaxation state across the heading [m].
+        deflection_z_rad: Relaxation state about the normal of the road [rad].
 
     Returns:
         The members of `WheelForces` in their order. `heading_x`, `heading_y` is the unit vector of the wheel's heading
@@ -225,12 +242,12 @@ def tyre_on_road(
         decay = -_LIFTED_DECAY_PER_S
         return (
             0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gamma, decay * deflection_x_m, decay * deflection_y_m,
-            loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, 0.0,
+            decay * deflection_z_rad, loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, 0.0,
         )  # fmt: skip
 
-    fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, limited = _rolling_tyre(
-        p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, gamma,
-        deflection_x_m, deflection_y_m,
+    fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited = _rolling_tyre(
+        p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn_z, gamma,
+        deflection_x_m, deflection_y_m, deflection_z_rad,
     )  # fmt: skip
     if p[prm.Q_FCX] != 0.0 or p[prm.Q_FCY] != 0.0:
         # Horizontal forces soften the tyre, and the load makes the horizontal forces: a secant search for both.
@@ -238,9 +255,9 @@ def tyre_on_road(
         step = _load(p, deflection, spin, pressure_Pa, damping, fx, fy, gamma) - fz
         fz = fz + step if fz + step > 0.0 else _CAUTIOUS * fz
         for _ in range(_MOST_LOAD_STEPS):
-            fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, limited = _rolling_tyre(
-                p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, gamma,
-                deflection_x_m, deflection_y_m,
+            fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited = _rolling_tyre(
+                p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn_z, gamma,
+                deflection_x_m, deflection_y_m, deflection_z_rad,
             )  # fmt: skip
             missing = _load(p, deflection, spin, pressure_Pa, damping, fx, fy, gamma) - fz
             if abs(missing) <= _LOAD_TOLERANCE * fz or missing == step:
@@ -250,6 +267,6 @@ def tyre_on_road(
             step = missing
             fz = fz_next if fz_next > 0.0 else _CAUTIOUS * fz
     return (
-        fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y,
+        fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, rate_z,
         loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, limited,
     )  # fmt: skip

@@ -148,8 +148,8 @@ def _side_force(formula: MagicFormula) -> Figure:
         _style(axis, "", "")
     for axis in axes[1]:
         axis.set_xlabel("slip angle [°]")
-        # The last number of the left panel would touch the first of the right one.
-        axis.margins(x=0.03)
+        # A little room, or the last number of the left panel touches the first of the right one.
+        axis.set_xlim(1.03 * _DEGREES * alpha[0], 1.03 * _DEGREES * alpha[-1])
     axes[0, 0].set_ylabel("side force $F_y$ [kN]")
     axes[1, 0].set_ylabel("aligning moment $M_z$ [Nm]")
     axes[0, 0].set_title("load, no camber", fontsize="small")

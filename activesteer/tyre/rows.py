@@ -62,4 +62,4 @@ def rolling_rows(p, inputs, forces, rolling) -> None:
         rolling[i, 5] = omega
         rolling[i, 6], rolling[i, 7] = contact_patch(p, fz, pressure)
         if fz <= 0.0:
-            rolling[i, 3] = p[c.UNLOADED_RADIUS] if omega == 0.0 else free_radius(p, omega)
+            rolling[i, 3] = free_radius(p, omega)

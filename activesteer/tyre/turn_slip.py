@@ -25,7 +25,7 @@ def rolling_speed(p, fz: float, kappa: float, pressure: float, vx: float):
     radius = p[c.UNLOADED_RADIUS]
     omega = 0.0
     for _ in range(30):
-        omega = vx * (1.0 + kappa) / radius
+        omega = (vx + kappa * abs(vx)) / radius
         after = max(effective_rolling_radius(p, fz, omega, pressure), 0.1 * p[c.UNLOADED_RADIUS])
         change = abs(after - radius)
         radius = after

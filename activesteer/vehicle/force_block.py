@@ -31,9 +31,9 @@ MAX_CHAIN: Final = 32
 
 # One record per wheel; the chain of degrees of freedom follows.
 (
-    W_BODY, W_ROOT, W_ACT_X, W_ACT_Y, W_MU, W_PRESSURE_Pa, W_LOW_SPEED_mps, W_LOW_SPEED_DAMPING_Nspm,
+    W_BODY, W_ROOT, W_ACT_X, W_ACT_Y, W_ACT_Z, W_MU, W_PRESSURE_Pa, W_LOW_SPEED_mps, W_LOW_SPEED_DAMPING_Nspm,
     W_TYRE_START, W_CHAIN_LENGTH, W_CHAIN,
-) = range(11)  # fmt: skip
+) = range(12)  # fmt: skip
 WHEEL_SIZE: Final = W_CHAIN + MAX_CHAIN
 
 # One record per damper: a tendon, its place in the sparse tendon Jacobian, and a piecewise linear curve.
@@ -51,9 +51,9 @@ KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE = 0.0, 1.0, 2.0, 3.0
 # What the callback writes into mjData.userdata: one record per wheel, then the force of each damper.
 (
     U_FX, U_FY, U_FZ, U_MX, U_MY, U_MZ, U_SLIP_RATIO, U_SLIP_ANGLE, U_INCLINATION, U_RATE_X, U_RATE_Y,
-    U_LOADED_RADIUS, U_LIMITED,
-) = range(13)  # fmt: skip
-USERDATA_PER_WHEEL: Final = 13
+    U_RATE_Z, U_LOADED_RADIUS, U_LIMITED,
+) = range(14)  # fmt: skip
+USERDATA_PER_WHEEL: Final = 14
 
 
 @dataclass
@@ -64,6 +64,7 @@ class WheelEntry:
     root: int
     act_x: int
     act_y: int
+    act_z: int
     mu: float
     pressure_Pa: float
     low_speed_mps: float
@@ -126,7 +127,7 @@ class ForceBlock:
         for index, wheel in enumerate(self.wheels):
             record = block[self.wheel_start(index) : self.wheel_start(index + 1)]
             record[:W_CHAIN] = (
-                wheel.body, wheel.root, wheel.act_x, wheel.act_y, wheel.mu, wheel.pressure_Pa,
+                wheel.body, wheel.root, wheel.act_x, wheel.act_y, wheel.act_z, wheel.mu, wheel.pressure_Pa,
                 wheel.low_speed_mps, wheel.low_speed_damping_Nspm, tyre_start, len(wheel.chain),
             )  # fmt: skip
             record[W_CHAIN : W_CHAIN + len(wheel.chain)] = wheel.chain

@@ -17,6 +17,8 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.parameters import DamperCurve, Road, VehicleParameters
 
 _USER_DYNAMICS: Final = int(mujoco.mjtDyn.mjDYN_USER)
+_RATES: Final = {"slip_x": fb.U_RATE_X, "slip_y": fb.U_RATE_Y, "slip_z": fb.U_RATE_Z}
+"""Relaxation state of a tyre, as its actuator is called behind the corner -> where the callback leaves its rate."""
 
 
 def load_model(
@@ -167,6 +169,7 @@ def _wheel(
         root=int(model.body_rootid[body]),
         act_x=_activation(model, f"{corner}_slip_x"),
         act_y=_activation(model, f"{corner}_slip_y"),
+        act_z=_activation(model, f"{corner}_slip_z"),
         mu=road.mu,
         pressure_Pa=pressure if pressure is not None else float(tyre.array[tyre_index.INFLPRES]),
         low_speed_mps=fitment.low_speed_mps,
@@ -200,9 +203,10 @@ def _actuator(
         return (fb.KIND_NONE, 0.0, 0.0, 0.0, 0.0, 0.0)
     name = model.actuator(index).name
     address = float(model.actuator_actadr[index])
-    if name.endswith(("_slip_x", "_slip_y")):
-        wheel = CORNERS.index(name[:2])
-        slot = wheel * fb.USERDATA_PER_WHEEL + (fb.U_RATE_X if name.endswith("x") else fb.U_RATE_Y)
+    corner, _, state = name.partition("_")
+    if state in _RATES:
+        wheel = CORNERS.index(corner)
+        slot = wheel * fb.USERDATA_PER_WHEEL + _RATES[state]
         return (fb.KIND_SLIP, address, float(slot), 0.0, 0.0, 0.0)
     if name.endswith("_brake"):
         brakes = parameters.brakes

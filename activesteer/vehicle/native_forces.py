@@ -72,7 +72,7 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
         wx, wy, wz = cvel[6 * body], cvel[6 * body + 1], cvel[6 * body + 2]
         tyre_start = int(wheel[fb.W_TYRE_START])
         (
-            fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, radius, hx, hy, arm_x, arm_y, arm_z, limited,
+            fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, rate_z, radius, hx, hy, arm_x, arm_y, arm_z, limited,
         ) = tyre_on_road(
             block[tyre_start : tyre_start + TYRE_PARAMETERS],
             wheel[fb.W_MU],
@@ -92,6 +92,7 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
             wz,
             act[int(wheel[fb.W_ACT_X])],
             act[int(wheel[fb.W_ACT_Y])],
+            act[int(wheel[fb.W_ACT_Z])],
         )  # fmt: skip
         out = userdata[index * fb.USERDATA_PER_WHEEL :]
         out[fb.U_FX] = fx
@@ -105,6 +106,7 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
         out[fb.U_INCLINATION] = gamma
         out[fb.U_RATE_X] = rate_x
         out[fb.U_RATE_Y] = rate_y
+        out[fb.U_RATE_Z] = rate_z
         out[fb.U_LOADED_RADIUS] = radius
         out[fb.U_LIMITED] = limited
         gx = fx * hx - fy * hy

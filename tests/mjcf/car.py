@@ -40,7 +40,7 @@ TENDONS = (
 ACTUATORS = (
     ["steering_wheel", "superposition", "rl_steer", "rr_steer"]
     + [f"{c}_{part}" for part in ("drive", "brake") for c in CORNERS]
-    + [f"{c}_slip_{axis}" for c in CORNERS for axis in "xy"]
+    + [f"{c}_slip_{axis}" for c in CORNERS for axis in "xyz"]
 )
 SENSORS = (
     ["cg_accelerometer", "cg_gyro", "cg_velocimeter", "cg_position", "chassis_orientation", "cg_velocity"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from activesteer.controllers import ControllerParameters, ControllerSetup, SingleTrackParameters
-from activesteer.signals import DriverCommand, Measurement
+from activesteer.controllers import Controller, ControllerParameters, ControllerSetup, SingleTrackParameters
+from activesteer.signals import DriverCommand, Measurement, SteerCommand
 
 CAR = SingleTrackParameters(
     mass_kg=1400.0,
@@ -49,5 +49,10 @@ def measured(yaw_rate_radps: float, speed_mps: float = 25.0) -> Measurement:
         steering_wheel_rad=0.0,
         rear_steer_rad=0.0,
         superposition_rad=0.0,
-        wheel_speed_radps=(speed_mps / 0.31,) * 4,
+        wheel_speed_radps=(spin := speed_mps / 0.31, spin, spin, spin),
     )
+
+
+def held(controller: Controller, command: DriverCommand, measurement: Measurement, steps: int = 1000) -> SteerCommand:
+    """What a controller answers in the end to messages that do not change."""
+    return [controller.step(command, measurement) for _ in range(steps)][-1]

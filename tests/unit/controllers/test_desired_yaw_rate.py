@@ -20,9 +20,7 @@ def desired(mu: float = 1.0, timestep_s: float = 0.001, **parameters: float) -> 
 
 
 def settled(block: DesiredYawRate, front_steer_rad: float, speed_mps: float) -> float:
-    for _ in range(SETTLED):
-        value = block.step(front_steer_rad, speed_mps)
-    return value
+    return [block.step(front_steer_rad, speed_mps) for _ in range(SETTLED)][-1]
 
 
 @pytest.mark.parametrize("speed_mps", [0.5, 5.0, 22.2, 40.0])
@@ -39,27 +37,26 @@ def test_large_angles_settle_at_the_lateral_acceleration_that_the_road_allows(sp
 
 def test_step_reaches_63_percent_after_the_delay():
     block = desired(delay_s=0.08)
-    values = [block.step(0.001, 20.0) for _ in range(80)]
+    values = [block.step(0.001, 20.0) for _ in range(81)]
     final = 0.001 * MODEL.yaw_rate_gain(20.0)
-    # Exact for an input held between steps, at every step.
-    for count, value in enumerate(values, 1):
+    # Exact for an input held between steps, at every step; the first answer is that of the instant of the step.
+    for count, value in enumerate(values):
         assert value == pytest.approx(final * (1.0 - math.exp(-count * 0.001 / 0.08)), rel=1e-12)
     assert values[-1] / final == pytest.approx(0.632, abs=1e-3)
 
 
 def test_limit_acts_before_the_lag_so_that_leaving_it_is_not_delayed():
-    block = desired()
+    block = desired(delay_s=0.06)
     settled(block, 0.5, 20.0)
-    assert block.step(0.0, 20.0) < 8.0 / 20.0
+    first, second = block.step(0.0, 20.0), block.step(0.0, 20.0)
+    assert second == pytest.approx(first * math.exp(-0.001 / 0.06), rel=1e-9)
 
 
 def test_step_size_does_not_change_the_answer():
     coarse, fine = desired(timestep_s=0.001), desired(timestep_s=0.00025)
-    for _ in range(100):
-        slow = coarse.step(0.01, 20.0)
-        for _ in range(4):
-            quick = fine.step(0.01, 20.0)
-        assert quick == pytest.approx(slow, rel=1e-12)
+    slow = [coarse.step(0.01, 20.0) for _ in range(100)]
+    quick = [fine.step(0.01, 20.0) for _ in range(400)]
+    assert quick[::4] == pytest.approx(slow, rel=1e-12)
 
 
 def test_left_and_right_are_mirrored_to_the_bit():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import control
 import numpy as np
@@ -13,7 +14,7 @@ from activesteer.controllers import ControllerParameters, RearSteer, SingleTrack
 from activesteer.controllers.corrector import tolerance
 from activesteer.controllers.parameters import CorrectorParameters, RearSteerParameters
 from activesteer.controllers.rear_steer import RearPrediction
-from tests.unit.controllers.cars import CAR, NO_PREDICTION_MPS, measured, setup, steering
+from tests.unit.controllers.cars import CAR, NO_PREDICTION_MPS, held, measured, setup, steering
 
 MODEL = SingleTrack(CAR)
 LIMIT_RAD = math.radians(3.0)
@@ -30,21 +31,22 @@ def controller(prediction_gain: float = 0.0, limit_rad: float = LIMIT_RAD, **cor
 def test_prediction_in_time_is_the_transfer_function(speed_mps, rng):
     gain, lead_s, lag_s = MODEL.rear_prediction(speed_mps)
     discrete = control.sample_system(control.tf([lead_s, gain], [lag_s, 1.0]), 0.001, "zoh")
-    front_rad = 0.05 * np.cumsum(rng.standard_normal(400)) / 20.0
+    front_rad: Any = 0.05 * np.cumsum(rng.standard_normal(400)) / 20.0
     expected = control.forced_response(discrete, inputs=front_rad).outputs
     prediction = RearPrediction(MODEL, 0.001)
     assert [prediction.step(angle, speed_mps) for angle in front_rad] == pytest.approx(expected, rel=1e-9, abs=1e-14)
 
 
 def test_prediction_of_a_ramp_is_the_continuous_response():
-    """Against the continuous system, which knows nothing of steps; the difference is half a step of the ramp."""
+    """Against the continuous system, which knows nothing of steps: held inputs are half a step late."""
     gain, lead_s, lag_s = MODEL.rear_prediction(22.22)
     time_s = np.arange(0.0, 0.5, 0.001)
-    front_rad = np.minimum(0.4 * time_s, 0.03)
+    front_rad: Any = np.minimum(0.4 * time_s, 0.03)
     expected = control.forced_response(control.tf([lead_s, gain], [lag_s, 1.0]), time_s, front_rad).outputs
     prediction = RearPrediction(MODEL, 0.001)
     result = np.array([prediction.step(angle, 22.22) for angle in front_rad])
-    assert np.abs(result - expected).max() < 0.5 * 0.4 * 0.001 * 0.75
+    # Half a step of the ramp, times the variation of the step response: down by C_V/C_H, then up to K_H.
+    assert np.abs(result - np.asarray(expected)).max() < 0.5 * 0.001 * 0.4 * (0.75 + 0.75 + gain)
     assert result[-1] == pytest.approx(gain * 0.03, rel=1e-3)
 
 
@@ -60,13 +62,14 @@ def test_single_track_car_with_prediction_does_not_slip_sideways():
     """The whole chain in time: the model, steered by the block, at constant speed."""
     speed_mps, timestep_s = 25.0, 1e-4
     plant = control.sample_system(MODEL.state_space(speed_mps), timestep_s, "zoh")
+    system, inputs = np.asarray(plant.A), np.asarray(plant.B)
     prediction = RearPrediction(MODEL, timestep_s)
     state, without = np.zeros(2), np.zeros(2)
     largest = largest_without = 0.0
     for count in range(5000):
         front = 0.02 * math.sin(2.0 * math.pi * count * timestep_s)
-        state = plant.A @ state + plant.B @ (front, prediction.step(front, speed_mps))
-        without = plant.A @ without + plant.B @ (front, 0.0)
+        state = system @ state + inputs @ (front, prediction.step(front, speed_mps))
+        without = system @ without + inputs @ (front, 0.0)
         largest, largest_without = max(largest, abs(state[1])), max(largest_without, abs(without[1]))
     assert largest < 1e-3 * largest_without
 
@@ -82,8 +85,7 @@ def test_single_track_car_with_prediction_does_not_slip_sideways():
 )
 def test_correction_turns_the_rear_wheels_by_the_decision_table(front, yaw_rate, sign):
     block = controller(proportional_gain_s=0.05)
-    for _ in range(1000):
-        steer = block.step(steering(front), measured(yaw_rate))
+    steer = held(block, steering(front), measured(yaw_rate))
     assert math.copysign(1, steer.rear_steer_rad) == sign
     assert steer.superposition_rad == 0.0
     assert not steer.saturated
@@ -117,21 +119,18 @@ def test_angle_stops_at_the_limit_and_says_so(side):
 @pytest.mark.parametrize("side", [1, -1])
 def test_integral_does_not_wind_up_while_the_limit_is_active(side):
     block = controller(proportional_gain_s=0.0, integral_gain=1.0)
-    for _ in range(5000):
-        steer = block.step(steering(0.0), measured(side * 0.3))
+    steer = held(block, steering(0.0), measured(side * 0.3), steps=5000)
     assert steer.saturated
     assert abs(steer.correction_rad) < LIMIT_RAD + 0.3 * 0.001 + 1e-12
-    steer = block.step(steering(0.0), measured(-side * 0.3))
-    steer = block.step(steering(0.0), measured(-side * 0.3))
+    steer = held(block, steering(0.0), measured(-side * 0.3), steps=2)
     assert not steer.saturated
 
 
 def test_integral_can_leave_a_limit_that_the_prediction_holds():
     """Prediction alone is over the limit; the corrector must be able to pull the angle back."""
     block = controller(prediction_gain=1.0, proportional_gain_s=0.0, integral_gain=1.0)
-    for _ in range(3000):
-        # Slow car, left: the prediction is far to the right, the car yaws too much, so the corrector turns left.
-        steer = block.step(steering(0.1), measured(0.5, speed_mps=5.0))
+    # Slow car, left: the prediction is far to the right, the car yaws too much, so the corrector turns left.
+    steer = held(block, steering(0.1), measured(0.5, speed_mps=5.0), steps=3000)
     assert steer.prediction_rad < -LIMIT_RAD
     assert steer.correction_rad > 0.1
     assert steer.rear_steer_rad > -LIMIT_RAD
@@ -148,8 +147,7 @@ def test_rear_steering_rests_below_three_metres_per_second():
 
 def test_rest_clears_the_integral():
     block = controller(proportional_gain_s=0.0, integral_gain=1.0)
-    for _ in range(100):
-        used = block.step(steering(0.0), measured(0.3))
+    used = held(block, steering(0.0), measured(0.3), steps=100)
     block.step(steering(0.0), measured(0.3, 1.0))
     assert block.step(steering(0.0), measured(0.3)).rear_steer_rad == pytest.approx(used.rear_steer_rad / 100, rel=1e-9)
 
@@ -168,8 +166,7 @@ def test_left_and_right_are_mirrored_to_the_bit(rng):
 def test_car_that_does_as_asked_is_left_alone():
     block = controller(prediction_gain=0.0)
     wanted = 0.01 * MODEL.yaw_rate_gain(25.0)
-    for _ in range(1000):
-        steer = block.step(steering(0.01), measured(wanted))
+    steer = held(block, steering(0.01), measured(wanted))
     assert steer.rear_steer_rad == 0.0
 
 

@@ -102,6 +102,7 @@ def test_a_rig_that_cannot_be_is_an_error(changes, message: str) -> None:
         ({"speed_mps": 0.0}, "speed_mps is 0"),
         ({"load_N": math.nan}, "load_N is nan"),
         ({"slip_angle_rad": math.nan}, "must be finite"),
+        ({"load_N": 1e9}, r"no steady state at load 1e\+09 N"),
     ],
 )
 def test_an_operating_point_that_cannot_be_is_an_error(changes, message: str) -> None:

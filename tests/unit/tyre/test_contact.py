@@ -25,7 +25,7 @@ def _contact(**changes: Any) -> WheelForces:
         "low_speed_damping_Nspm": DAMPING_NSPM, "timestep_s": STEP_S, "centre_height_m": 0.295,
         "axis_x": 0.0, "axis_y": 1.0, "axis_z": 0.0, "velocity_x_mps": 0.0, "velocity_y_mps": 0.0,
         "velocity_z_mps": 0.0, "spin_x_radps": 0.0, "spin_y_radps": 0.0, "spin_z_radps": 0.0,
-        "deflection_x_m": 0.0, "deflection_y_m": 0.0,
+        "deflection_x_m": 0.0, "deflection_y_m": 0.0, "deflection_z_rad": 0.0,
     }  # fmt: skip
     assert changes.keys() <= inputs.keys()
     return WheelForces(*tyre_on_road(*(inputs | changes).values()))
@@ -304,3 +304,27 @@ def test_nothing_a_wheel_can_do_gives_a_force_that_is_not_finite(name: str, soft
         )  # fmt: skip
         assert np.isfinite(forces).all()
         assert forces.fz_N >= 0.0
+
+
+def test_steering_at_rest_twists_the_patch_and_the_moment_resists() -> None:
+    left, right = _contact(deflection_z_rad=0.03), _contact(deflection_z_rad=-0.03)
+    assert left.mz_Nm < -20.0
+    assert right.mz_Nm > 20.0
+    assert _contact(spin_z_radps=0.2).deflection_z_rate_radps == pytest.approx(0.2, rel=0.01)
+
+
+def test_the_twist_stops_growing_where_the_patch_slides_about_its_middle() -> None:
+    twist_rad = 0.0
+    for _ in range(20_000):
+        twist_rad += STEP_S * _contact(spin_z_radps=0.3, deflection_z_rad=twist_rad).deflection_z_rate_radps
+    assert twist_rad == pytest.approx(0.12, rel=1e-3)
+
+
+def test_rolling_untwists_the_patch_within_its_own_length_and_above_low_speed_it_has_no_moment() -> None:
+    rolled = _contact(velocity_x_mps=1.0, spin_y_radps=1.0 / 0.31, deflection_z_rad=0.05)
+    assert rolled.deflection_z_rate_radps < -0.3
+    free, twisted = (
+        _contact(velocity_x_mps=1.1 * LOW_SPEED_MPS, spin_y_radps=1.1 * LOW_SPEED_MPS / 0.31, deflection_z_rad=twist)
+        for twist in (0.0, 0.05)
+    )
+    assert twisted.mz_Nm == free.mz_Nm

@@ -1,0 +1,118 @@
+"""The state of a rolling car without its cyclic coordinates: what is left does not depend on where it is or heads.
+
+Tyres on a level, even road do not know the position on the road, the heading or the rotation angles of the wheels.
+Taken out of the state, with the velocities turned into the heading, they leave a state in which driving straight on
+is a point of rest, about which the car can be linearised.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import CORNERS
+from activesteer.vehicle.car import Vehicle
+from activesteer.vehicle.loading import find
+
+Array = NDArray[np.float64]
+
+_AXES: Final = ("x", "y", "z", "roll", "pitch", "yaw")
+_JOINT_DOFS: Final = {0: _AXES, 1: ("_x", "_y", "_z"), 2: ("",), 3: ("",)}
+"""MuJoCo's kinds of joints (free, ball, slide, hinge) -> what is added to the joint's name for each of its dofs."""
+
+
+class LocalState:
+    """Reads and writes the state of a vehicle as one vector of differences from a reference state.
+
+    The vector holds: coordinates (roll and pitch as rotations about the chassis' axes), velocities (those of the
+    chassis' origin along heading, left, up; rotations about the chassis' axes), activations (servos, carcass
+    deflections of the tyres). Left out are position on the road, heading, rotation angles of the wheels, and the
+    wind-up of the brake pads, which slip in a rolling wheel and have no motion of their own.
+
+    Attributes:
+        names: Names of the elements: a coordinate has its joint's name, its velocity `d_` in front.
+        vehicle: The car.
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """Takes the present state of the vehicle as the reference.
+
+        Args:
+            vehicle: The car, rolling along the world's x axis.
+        """
+        self.vehicle = vehicle
+        model = vehicle.model
+        dof_names = []
+        for joint in range(model.njnt):
+            free = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+            name = "" if free else model.joint(joint).name
+            dof_names += [name + end for end in _JOINT_DOFS[int(model.jnt_type[joint])]]
+        spins = {f"{corner}_spin" for corner in CORNERS}
+        cyclic = {"x", "y", "yaw"} | spins
+        self._coordinates = np.array([dof for dof, name in enumerate(dof_names) if name not in cyclic])
+        self._spins = np.array([int(model.joint(name).qposadr[0]) for name in sorted(spins)])
+        actuators = {
+            int(model.actuator_actadr[index]): model.actuator(index).name
+            for index in range(model.nu)
+            if model.actuator_actadr[index] >= 0
+        }
+        self._activations = np.array([adr for adr, name in sorted(actuators.items()) if not name.endswith("_brake")])
+        self.names = (
+            *(dof_names[dof] for dof in self._coordinates),
+            *(f"d_{name}" for name in dof_names),
+            *(f"act_{actuators[int(adr)]}" for adr in self._activations),
+        )
+        self._chassis_dof = int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
+        self.take_reference()
+
+    def take_reference(self) -> None:
+        """Makes the present state of the vehicle the reference, after turning it to the origin and the x axis."""
+        self._turn_home()
+        data = self.vehicle.data
+        self._qpos, self._qvel, self._act = data.qpos.copy(), data.qvel.copy(), data.act.copy()
+        self._state = self.vehicle.save_state()
+
+    def read(self) -> Array:
+        """Difference of the present state from the reference, shape (len(names),). Turns the car home."""
+        self._turn_home()
+        data, model = self.vehicle.data, self.vehicle.model
+        difference = np.empty(model.nv)
+        mujoco.mj_differentiatePos(model, difference, 1.0, self._qpos, data.qpos)
+        return np.concatenate(
+            [difference[self._coordinates], data.qvel - self._qvel, (data.act - self._act)[self._activations]]
+        )
+
+    def write(self, difference: Array) -> None:
+        """Sets the vehicle to the reference and a difference from it.
+
+        Args:
+            difference: Shape (len(names),).
+        """
+        vehicle = self.vehicle
+        data, model = vehicle.data, vehicle.model
+        vehicle.restore_state(self._state)
+        count = len(self._coordinates)
+        move = np.zeros(model.nv)
+        move[self._coordinates] = difference[:count]
+        mujoco.mj_integratePos(model, data.qpos, move, 1.0)
+        data.qvel += difference[count : count + model.nv]
+        data.act[self._activations] += difference[count + model.nv :]
+
+    def _turn_home(self) -> None:
+        """Puts the car at the origin of the road with heading 0 and unturned wheels; its motion stays."""
+        data, first = self.vehicle.data, self._chassis_dof
+        w, x, y, z = data.qpos[3:7]
+        # Heading of the chassis' x axis (ISO 8855): a rotation about that axis leaves it alone.
+        yaw = math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+        turned = np.empty(4)
+        mujoco.mju_mulQuat(turned, np.array([math.cos(yaw / 2), 0.0, 0.0, -math.sin(yaw / 2)]), data.qpos[3:7])
+        data.qpos[:2] = 0.0
+        data.qpos[3:7] = turned
+        data.qpos[self._spins] = 0.0
+        vx, vy = data.qvel[first : first + 2]
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        data.qvel[first : first + 2] = cos * vx + sin * vy, cos * vy - sin * vx

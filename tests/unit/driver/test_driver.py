@@ -1,0 +1,103 @@
+"""The open-loop driver and the speed hold."""
+
+from __future__ import annotations
+
+import pytest
+
+from activesteer.driver import DriverParameters, OpenLoopDriver, SpeedHold
+from activesteer.signals import Measurement, Reference
+
+MASS_KG, RADIUS_M = 1400.0, 0.31
+
+
+def speed_hold(timestep_s: float = 0.001) -> SpeedHold:
+    return SpeedHold(DriverParameters(), max_torque_Nm=1900.0, engine_brake_torque_Nm=350.0, timestep_s=timestep_s)
+
+
+def driver() -> OpenLoopDriver:
+    return OpenLoopDriver(speed_hold(), steering_ratio=16.0, steering_wheel_limit_rad=8.0)
+
+
+def at(speed_mps: float) -> Measurement:
+    return Measurement(0.0, speed_mps, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+
+
+def drive(block: SpeedHold, wanted_mps: float, speed_mps: float, drag_N: float, steps: int) -> list[float]:
+    """Speeds of a point mass that the block drives."""
+    speeds = []
+    for _ in range(steps):
+        torque = block.step(wanted_mps, speed_mps)
+        speed_mps += (torque / RADIUS_M - drag_N) / MASS_KG * 0.001
+        speeds.append(speed_mps)
+    return speeds
+
+
+def test_speed_is_held_against_drag_without_an_error_that_stays():
+    speeds = drive(speed_hold(), 22.0, 22.0, drag_N=400.0, steps=20_000)
+    assert min(speeds) > 21.8
+    assert speeds[-1] == pytest.approx(22.0, abs=1e-4)
+
+
+def test_speed_error_is_answered_in_proportion():
+    assert speed_hold().step(20.0, 19.9) == pytest.approx(0.1 * DriverParameters().speed_gain_Nmspm)
+
+
+@pytest.mark.parametrize(("wanted_mps", "torque_Nm"), [(60.0, 1900.0), (0.0, -350.0)])
+def test_torque_stops_at_the_limits_of_the_engine_and_says_so(wanted_mps, torque_Nm):
+    block = speed_hold()
+    assert block.step(wanted_mps, 25.0) == torque_Nm
+    assert block.saturated
+    block.step(25.0, 25.0)
+    assert not block.saturated
+
+
+def test_long_acceleration_at_full_throttle_does_not_wind_up():
+    speeds = drive(speed_hold(), 30.0, 10.0, drag_N=300.0, steps=30_000)
+    assert max(speeds) < 30.3
+    assert speeds[-1] == pytest.approx(30.0, abs=1e-3)
+
+
+def test_wish_to_stand_still_needs_no_torque_at_rest():
+    block = speed_hold()
+    block.step(0.0, 0.2)
+    assert block.step(0.0, 0.01) == 0.0
+    assert block.step(0.0, -0.01) == 0.0
+
+
+def test_reset_forgets_the_trim():
+    used = speed_hold()
+    drive(used, 22.0, 22.0, drag_N=400.0, steps=5000)
+    assert used.step(22.0, 22.0) > 50.0
+    used.reset()
+    assert used.step(22.0, 22.0) == 0.0
+
+
+def test_driver_turns_the_steering_wheel_as_asked():
+    command = driver().step(Reference(0.8, 20.0, 0.0, True), at(20.0))
+    assert command.steering_wheel_rad == 0.8
+    assert command.front_steer_rad == pytest.approx(0.05)
+    assert command.brake == 0.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_steering_wheel_stops_at_its_lock(side):
+    command = driver().step(Reference(side * 9.0, 20.0, 0.0, True), at(20.0))
+    assert command.steering_wheel_rad == side * 8.0
+    assert command.front_steer_rad == side * 0.5
+
+
+def test_driver_holds_speed_only_where_asked_and_presses_the_brake():
+    asked = driver()
+    assert asked.step(Reference(0.0, 21.0, 0.0, True), at(20.0)).drive_torque_Nm > 0.0
+    command = asked.step(Reference(0.0, 21.0, 0.6, False), at(20.0))
+    assert command.drive_torque_Nm == 0.0
+    assert command.brake == 0.6
+
+
+def test_driver_starts_anew_after_braking():
+    used = driver()
+    for _ in range(3000):
+        used.step(Reference(0.0, 21.0, 0.0, True), at(20.5))
+    used.step(Reference(0.0, 21.0, 0.6, False), at(20.0))
+    held = Reference(0.0, 20.0, 0.0, True)
+    assert used.step(held, at(19.9)).drive_torque_Nm == driver().step(held, at(19.9)).drive_torque_Nm

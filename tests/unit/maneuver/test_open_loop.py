@@ -1,0 +1,77 @@
+"""Open-loop manoeuvres: tables over time."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from activesteer.config import Source
+from activesteer.errors import ManeuverError
+from activesteer.maneuver import OpenLoop, build_maneuver
+
+SOURCE = Source("mine.toml", error=ManeuverError)
+
+
+def open_loop(**keys: Any) -> OpenLoop:
+    built = build_maneuver({"kind": "open_loop", "speed_kmh": 36, "duration_s": 5.0} | keys, SOURCE)
+    assert isinstance(built, OpenLoop)
+    return built
+
+
+def test_nothing_is_asked_but_the_speed_where_no_table_is_given():
+    assert open_loop().reference(2.0) == (0.0, 10.0, 0.0, True)
+
+
+def test_tables_are_linear_between_their_times_and_constant_outside():
+    maneuver = open_loop(steering={"time_s": [1.0, 2.0, 4.0], "steering_wheel_deg": [0.0, 90.0, -90.0]})
+    asked = {0.0: 0.0, 1.0: 0.0, 1.5: 45.0, 2.0: 90.0, 3.0: 0.0, 4.0: -90.0, 9.0: -90.0}
+    for time_s, angle_deg in asked.items():
+        assert math.degrees(maneuver.reference(time_s).steering_wheel_rad) == pytest.approx(angle_deg, abs=1e-12)
+
+
+def test_table_of_one_time_is_constant():
+    assert open_loop(brake={"time_s": [0.0], "pedal": [0.4]}).reference(3.0).brake == 0.4
+
+
+def test_drive_is_off_while_the_brake_is_pressed():
+    maneuver = open_loop(brake={"time_s": [1.0, 1.5, 2.0], "pedal": [0.0, 0.5, 0.0]})
+    assert [maneuver.reference(time_s).hold_speed for time_s in (1.0, 1.25, 1.5, 2.0)] == [True, False, False, True]
+
+
+def test_coasting_car_is_not_driven():
+    assert not open_loop(drive="coast").reference(1.0).hold_speed
+
+
+def test_speed_follows_its_table():
+    maneuver = open_loop(speed={"time_s": [1.0, 3.0], "speed_kmh": [36.0, 72.0]})
+    assert [maneuver.reference(time_s).speed_mps for time_s in (0.0, 2.0, 4.0)] == pytest.approx([10.0, 15.0, 20.0])
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"drive": "cruise"}, r"drive: is 'cruise'; allowed are 'hold_speed' and 'coast'"),
+        ({"steering": {"time_s": [0, 1], "steering_wheel_deg": [0]}}, r"steering: has 2 times and 1 values"),
+        ({"brake": {"time_s": [], "pedal": []}}, r"brake: has 0 times and 0 values; .* at least one"),
+        ({"speed": {"time_s": [0, 2, 2], "speed_kmh": [0, 1, 2]}}, r"speed\.time_s: does not increase from 2 to 2 s"),
+        ({"brake": {"time_s": [0], "pedal": [1.5]}}, r"brake\.pedal: 1\.5 is out of range; allowed is 0 to 1"),
+        ({"speed": {"time_s": [0]}}, r"speed: the key speed_mps or speed_kmh is missing"),
+    ],
+)
+def test_wrong_table_is_answered_with_file_and_key(keys, told):
+    with pytest.raises(ManeuverError, match=rf"^mine\.toml: {told}"):
+        open_loop(**keys)
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ({"speed_kmh": 80}, r"mine\.toml: kind: is missing; known are: open_loop, step_steer"),
+        ({"kind": "step_ster"}, r"mine\.toml: kind: there is no kind 'step_ster'; did you mean 'step_steer'"),
+    ],
+)
+def test_unknown_kind_is_answered_with_the_known_ones(table, told):
+    with pytest.raises(ManeuverError, match=told):
+        build_maneuver(table, SOURCE)

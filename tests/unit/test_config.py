@@ -1,0 +1,270 @@
+"""TOML tables into dataclasses: what is taken, and what is said about the rest."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import pytest
+
+from activesteer.config import Range, Source, build, key_paths, merged, read_toml, to_table
+from activesteer.errors import ManeuverError, ParameterError
+
+
+@dataclass(frozen=True)
+class Wheel:
+    radius_m: Annotated[float, Range(0.1, 1.0)]
+    name: str = "steel"
+
+
+@dataclass(frozen=True)
+class Car:
+    speed_mps: Annotated[float, Range(0.0, 100.0)]
+    steer_rad: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    yaw_rate_radps: float = 0.0
+    ay_mps2: Annotated[float, Range(high=9.81)] = 0.0
+    doors: int = 5
+    open: bool = False
+    curve: tuple[float, ...] = ()
+    angles_rad: Annotated[tuple[float, ...], Range(-1.0, 1.0)] = ()
+    spare: Wheel | None = None
+    wheels: dict[str, Wheel] = field(default_factory=dict)
+    limit_rad: Annotated[float, Range(0.0)] | None = None
+
+    def __post_init__(self) -> None:
+        if self.doors == 13:
+            msg = "doors: 13 bring bad luck"
+            raise ParameterError(msg)
+
+
+TEXT = """\
+# A car.
+speed_kmh = 90
+spare.radius_m = 0.3
+
+[wheels.front]  # with a comment
+radius_m = 0.31
+name = "alloy"
+"""
+
+
+def source(text: str = TEXT, name: str = "car.toml") -> Source:
+    return Source(name, text)
+
+
+def car(**keys: Any) -> Car:
+    return build(Car, {"speed_mps": 10.0} | keys, source())
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(text: str) -> Car:
+        path = tmp_path / "car.toml"
+        path.write_text(text)
+        return build(Car, *read_toml(path))
+
+    return read
+
+
+def test_table_becomes_a_dataclass(read):
+    assert read(TEXT) == Car(speed_mps=pytest.approx(25.0), spare=Wheel(0.3), wheels={"front": Wheel(0.31, "alloy")})
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "name", "si"),
+    [
+        ("speed_kmh", 36, "speed_mps", 10.0),
+        ("steer_deg", 9.0, "steer_rad", math.radians(9.0)),
+        ("yaw_rate_degps", -180, "yaw_rate_radps", -math.pi),
+        ("ay_g", 0.5, "ay_mps2", 0.5 * 9.81),
+        ("angles_deg", [0, 45], "angles_rad", (0.0, math.radians(45.0))),
+        ("limit_deg", 3, "limit_rad", math.radians(3.0)),
+    ],
+)
+def test_edge_units_become_si(key, value, name, si):
+    table = {"speed_mps": 1.0, key: value}
+    if name == "speed_mps":
+        del table["speed_mps"]
+    assert getattr(build(Car, table, source()), name) == pytest.approx(si, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"speed_mps": 101}, r"speed_mps: 101 is out of range; allowed is 0 to 100$"),
+        ({"steer_deg": 45}, r"steer_deg: 45 is out of range; allowed is -28\.6479 to 28\.6479$"),
+        ({"ay_g": 1.5}, r"ay_g: 1\.5 is out of range; allowed is at most 1$"),
+        ({"limit_deg": -1}, r"limit_deg: -1 is out of range; allowed is at least 0$"),
+        ({"angles_deg": [0.0, 90.0]}, r"angles_deg: 90\.0 is out of range; allowed is -57\.2958 to 57\.2958$"),
+        ({"spare": {"radius_m": 2.0}}, r"spare\.radius_m: 2\.0 is out of range; allowed is 0\.1 to 1$"),
+    ],
+)
+def test_value_out_of_range_is_answered_in_its_own_unit(keys, told):
+    with pytest.raises(ParameterError, match=told):
+        car(**keys)
+
+
+def test_both_ends_of_a_range_are_allowed():
+    assert car(speed_mps=0.0).speed_mps == 0.0
+    assert car(speed_mps=100).speed_mps == 100.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"speed_mps": "fast"}, r"speed_mps: 'fast' is not a number"),
+        ({"speed_mps": True}, r"speed_mps: True is not a number"),
+        ({"speed_mps": [1.0]}, r"speed_mps: \[1\.0\] is not a number"),
+        ({"speed_mps": math.nan}, r"speed_mps: nan is not finite"),
+        ({"yaw_rate_degps": math.inf}, r"yaw_rate_degps: inf is not finite"),
+        ({"yaw_rate_radps": 10**400}, r"yaw_rate_radps: 1000+ is not finite"),
+        ({"yaw_rate_degps": 10**400}, r"yaw_rate_degps: 1000+ is not finite"),
+        ({"doors": 2.5}, r"doors: 2\.5 is not a whole number"),
+        ({"doors": True}, r"doors: True is not a whole number"),
+        ({"open": 1}, r"open: 1 is not true or false"),
+        ({"curve": 1.0}, r"curve: 1\.0 is no list of numbers"),
+        ({"curve": [1.0, "x"]}, r"curve: 'x' is not a number"),
+        ({"spare": 3}, r"spare: 3 is no table; a table \[spare\] is needed"),
+        ({"spare": {"radius_m": 0.3, "name": 7}}, r"spare\.name: 7 is not a text"),
+        ({"wheels": 3}, r"wheels: 3 is no table"),
+        ({"wheels": {"rear": {}}}, r"wheels\.rear: the key radius_m is missing"),
+    ],
+)
+def test_value_of_the_wrong_type_is_answered(keys, told):
+    with pytest.raises(ParameterError, match=told):
+        car(**keys)
+
+
+def test_whole_number_is_taken_for_a_number_and_becomes_one():
+    speed = car(speed_mps=10).speed_mps
+    assert isinstance(speed, float)
+
+
+def test_unknown_key_is_answered_with_the_nearest_its_file_and_line(read):
+    with pytest.raises(
+        ParameterError, match=r"^car\.toml, line 2: sped_kmh: there is no such key; did you mean 'speed_"
+    ):
+        read("# A car.\nsped_kmh = 90\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "key"),
+    [
+        (TEXT.replace("0.31", "31"), 6, r"wheels\.front\.radius_m"),
+        (TEXT.replace("0.3\n", "30\n"), 3, r"spare\.radius_m"),
+        (TEXT.replace("90", "900"), 2, "speed_kmh"),
+        (TEXT + "[wheels.rear]\nradius_m = 9\n", 9, r"wheels\.rear\.radius_m"),
+        (TEXT + "[wheels.rear]\nname = 'x'\n", 8, r"wheels\.rear"),
+        (TEXT.replace("spare", "curve = [\n  [1],\n]\nspare"), 3, "curve"),
+    ],
+)
+def test_error_names_the_line(read, text, line, key):
+    with pytest.raises(ParameterError, match=rf"^car\.toml, line {line}: {key}: "):
+        read(text)
+
+
+def test_missing_key_is_answered_with_its_spellings():
+    with pytest.raises(ParameterError, match=r"^car\.toml: the key speed_mps or speed_kmh is missing$"):
+        build(Car, {}, source())
+
+
+def test_key_given_in_two_units_is_answered():
+    with pytest.raises(ParameterError, match=r"speed_kmh: speed_mps and speed_kmh are the same in two units"):
+        car(speed_kmh=36)
+
+
+def test_checks_of_the_class_itself_are_told_with_the_file():
+    with pytest.raises(ParameterError, match=r"^car\.toml: doors: 13 bring bad luck$"):
+        car(doors=13)
+
+
+def test_error_is_of_the_class_that_the_source_asks_for():
+    with pytest.raises(ManeuverError, match=r"^m\.toml: speed_mps: 'x' is not a number"):
+        build(Car, {"speed_mps": "x"}, Source("m.toml", error=ManeuverError))
+
+
+def test_overridden_value_is_not_blamed_on_the_file():
+    overridden = Source("car.toml", TEXT, overridden=frozenset({"speed_kmh", "spare"}))
+    with pytest.raises(ParameterError, match=r"^override speed_kmh: 900 is out of range"):
+        build(Car, {"speed_kmh": 900}, overridden)
+    with pytest.raises(ParameterError, match=r"^override spare\.radius_m: 9 is out of range"):
+        build(Car, {"speed_mps": 9, "spare": {"radius_m": 9}}, overridden)
+    with pytest.raises(ParameterError, match=r"^car\.toml, line 6: wheels\.front\.radius_m: 9 is out of range"):
+        build(Car, {"speed_mps": 9, "wheels": {"front": {"radius_m": 9}}}, overridden)
+
+
+def test_file_that_is_no_toml_is_answered_with_path_and_line(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text("speed_kmh = 80\nroad = = 1\n")
+    with pytest.raises(ManeuverError, match=r"bad\.toml: no valid TOML: .*line 2"):
+        read_toml(path, ManeuverError)
+
+
+@pytest.mark.parametrize("make", [lambda path: None, Path.mkdir, lambda path: path.write_bytes(b"\xff\xfe\x00")])
+def test_file_that_cannot_be_read_is_answered(tmp_path, make):
+    path = tmp_path / "bad.toml"
+    make(path)
+    with pytest.raises(ParameterError, match=r"cannot read .*bad\.toml: "):
+        read_toml(path)
+
+
+def replaced(path: str, value: Any, table: dict[str, Any] | None = None) -> dict[str, Any]:
+    given = {"speed_kmh": 90, "wheels": {"front": {"radius_m": 0.31}}} if table is None else table
+    return merged(Car, given, path.split("."), value, Source(f"override {path}"))
+
+
+def test_override_in_another_unit_replaces_the_value_of_the_file():
+    assert replaced("speed_mps", 10)["speed_mps"] == 10
+    assert "speed_kmh" not in replaced("speed_mps", 10)
+    assert replaced("speed_kmh", 36, {"speed_mps": 1.0}) == {"speed_kmh": 36}
+
+
+def test_override_reaches_nested_keys_and_leaves_the_rest():
+    assert replaced("spare.radius_m", 0.4)["spare"] == {"radius_m": 0.4}
+    assert replaced("wheels.front.radius_m", 0.4)["wheels"] == {"front": {"radius_m": 0.4}}
+    assert replaced("wheels.front.name", "x")["wheels"] == {"front": {"radius_m": 0.31, "name": "x"}}
+
+
+def test_override_does_not_change_the_table_it_is_given():
+    table = {"speed_kmh": 90, "wheels": {"front": {"radius_m": 0.31}}}
+    before = json.dumps(table)
+    replaced("wheels.front.radius_m", 0.4, table)
+    replaced("speed_mps", 1.0, table)
+    assert json.dumps(table) == before
+
+
+@pytest.mark.parametrize(
+    ("path", "told"),
+    [
+        ("sped_kmh", r"^override sped_kmh: sped_kmh: there is no such key; did you mean 'speed_kmh'"),
+        ("spare.radus_m", r"radus_m: there is no such key; did you mean 'radius_m'\?"),
+        ("speed_mps.x", r"speed_mps is a value, not a table"),
+        ("wheels.frnt.radius_m", r"wheels\.frnt\.radius_m: there is no such key; did you mean 'front'\?"),
+    ],
+)
+def test_override_of_a_key_that_does_not_exist_is_answered(path, told):
+    with pytest.raises(ParameterError, match=told):
+        replaced(path, 1.0)
+
+
+def test_tables_come_back_as_they_went():
+    given = Car(12.5, 0.1, curve=(1.0, 2.0), spare=Wheel(0.3), wheels={"a": Wheel(0.2, "b")}, limit_rad=0.1)
+    table = to_table(given)
+    assert json.loads(json.dumps(table)) == table
+    assert build(Car, table, source()) == given
+
+
+def test_values_that_are_not_given_are_left_out_of_the_table():
+    table = to_table(Car(1.0))
+    assert "spare" not in table
+    assert "limit_rad" not in table
+    assert build(Car, table, source()) == Car(1.0)
+
+
+def test_all_keys_are_known_in_all_their_units():
+    paths = key_paths(Car)
+    for path in ("speed_mps", "speed_kmh", "yaw_rate_degps", "ay_g", "spare.radius_m", "spare.name", "doors"):
+        assert path in paths
