@@ -14,6 +14,8 @@ from activesteer.recorder import Recorder
 from activesteer.runner import RunContext, prepared
 from activesteer.scenario import Scenario, resolve
 from activesteer.simulation import Simulation
+from activesteer.tyre.bench import bench as tyre_bench
+from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
 
 _ROUNDS: Final = 5
@@ -117,6 +119,31 @@ def _with_file(scenario: Scenario, path: Path) -> float:
         recorder.flush()
         writer.close()
         return (time.perf_counter() - start) / simulation.steps * 1e6
+
+
+def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
+    """What the tyres cost: one evaluation of the front tyre, and all four in the engine.
+
+    Args:
+        rounds: How often everything is measured; the best counts.
+
+    Returns:
+        What `activesteer.tyre.bench` measures, and `four_tyres_us`: microseconds that four tyres with contact, relaxation
+        and the application of their forces add to the engine's passive forces, in one and the same state.
+    """
+    scenario = resolve("straight_line")
+    simulation = Simulation(scenario)
+    model, data = simulation.vehicle.model, simulation.vehicle.data
+    numbers = model.numeric_data
+    count = int(numbers[-fb.TRAILER_SIZE]) + fb.N_WHEELS
+    wheels = numbers[count]
+    with_tyres: list[float] = []
+    without: list[float] = []
+    for _ in range(rounds):
+        for measured, present in ((with_tyres, wheels), (without, 0.0)):
+            numbers[count] = present
+            measured.append(_per_step_us(lambda: _repeat(mujoco.mj_passive, model, data, _CALLS), _CALLS))
+    return tyre_bench(scenario.tyres[0], rounds) | {"four_tyres_us": min(with_tyres) - min(without)}
 
 
 def _blocks(scenario: Scenario) -> dict[str, float]:

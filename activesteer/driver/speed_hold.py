@@ -13,6 +13,8 @@ _STANDSTILL_MPS: Final = 0.05
 class SpeedHold:
     """Holds a speed by drive torque and engine braking; the integral stands still while a limit is active.
 
+    A speed below zero engages the reverse gear: the engine then drives backwards and brakes forwards.
+
     Attributes:
         saturated: Whether the engine's limit was reached in the last step.
     """
@@ -30,8 +32,8 @@ class SpeedHold:
         """
         self._gain = parameters.speed_gain_Nmspm
         self._integral_gain = parameters.speed_integral_gain_Nmpm
-        self._high = max_torque_Nm
-        self._low = -engine_brake_torque_Nm
+        self._forward = -engine_brake_torque_Nm, max_torque_Nm
+        self._reverse = -max_torque_Nm, engine_brake_torque_Nm
         self._timestep_s = timestep_s
         self._integral_Nm = 0.0
         self.saturated = False
@@ -51,12 +53,13 @@ class SpeedHold:
             return 0.0
         error = wanted_mps - speed_mps
         torque = self._gain * error + self._integral_Nm
-        if torque > self._high:
+        low, high = self._forward if wanted_mps >= 0.0 else self._reverse
+        if torque > high:
             self.saturated = True
-            return self._high
-        if torque < self._low:
+            return high
+        if torque < low:
             self.saturated = True
-            return self._low
+            return low
         self.saturated = False
         self._integral_Nm += self._integral_gain * error * self._timestep_s
         return torque

@@ -33,7 +33,7 @@ from numba import njit
 
 from activesteer.tyre import parameters as prm
 from activesteer.tyre.limits import limit_flags
-from activesteer.tyre.magic_formula import slip_stiffnesses, steady_state
+from activesteer.tyre.magic_formula import magic_formula, slip_stiffnesses, steady_state
 from activesteer.tyre.relaxation import relaxation_lengths
 from activesteer.tyre.vertical import (
     bottoming_force,
@@ -51,6 +51,8 @@ _SLIDING_TO_LINEAR: Final = 3.0
 """Slip of full sliding over slip at which the linear force would reach the friction limit: 3 for a brush model."""
 _SLIDING_TWIST_RAD: Final = 0.12
 """Twist at which the whole patch slides about its middle [rad]: parking torques level off after some 5 to 8 degrees."""
+_NO_TURN_SLIP_1PM: Final = 1e-12
+"""Stands for no turn slip where the formula with turn slip is meant; zero would choose the formula without it."""
 _SMALLEST_SLIP_LIMIT: Final = 0.01
 """Slip that a deflection may stand for at least, whatever the range of a tyre file."""
 _MOST_LOAD_STEPS: Final = 8
@@ -148,9 +150,20 @@ def _rolling_tyre(
     held = speed >= low_speed_mps and (carry_x > speed or carry_y > speed)
     if held or limit_flags(p, fz, kappa, alpha, gamma, pressure_Pa) != 0:
         limited = 1.0
-    turn_slip = share * (w + timestep_s * rate_z) / half_length
-    result = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, turn_slip)
-    fx, fy, mx, my, mz = result[0], result[1], result[2], result[3], result[4]
+    # Camber works by the path that the tread takes through the patch of a rolling tyre: at rest there is none.
+    gamma *= 1.0 - share
+    fx, fy, mx, my, mz = magic_formula(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu)
+    if share > 0.0:
+        # The formula with turn slip treats camber differently, even without any: the two are blended, never switched.
+        turn_slip = (w + timestep_s * rate_z) / half_length
+        if turn_slip == 0.0:
+            turn_slip = _NO_TURN_SLIP_1PM
+        twisted = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, turn_slip)
+        fx += share * (twisted[0] - fx)
+        fy += share * (twisted[1] - fy)
+        mx += share * (twisted[2] - mx)
+        my += share * (twisted[3] - my)
+        mz += share * (twisted[4] - mz)
     return fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited
 
 

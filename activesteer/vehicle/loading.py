@@ -62,8 +62,11 @@ def load_model(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Lets forces follow the activation that a step reaches, not a step late; gives the brakes their stiffness."""
+    """Gives the drive its lag and the brakes their stiffness; forces follow the activation that a step reaches."""
     for actuator in spec.actuators:
+        if actuator.name.endswith("_drive"):
+            actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
+            actuator.dynprm[0] = parameters.powertrain.lag_s
         actuator.actearly = int(actuator.dyntype) == _USER_DYNAMICS
         if actuator.name.endswith("_brake"):
             actuator.gainprm[0] = -parameters.brakes.stiffness_Nmprad

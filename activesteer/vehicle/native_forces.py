@@ -72,7 +72,8 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
         wx, wy, wz = cvel[6 * body], cvel[6 * body + 1], cvel[6 * body + 2]
         tyre_start = int(wheel[fb.W_TYRE_START])
         (
-            fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, rate_z, radius, hx, hy, arm_x, arm_y, arm_z, limited,
+            fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, rate_z, radius, hx, hy, arm_x, arm_y, arm_z,
+            limited,
         ) = tyre_on_road(
             block[tyre_start : tyre_start + TYRE_PARAMETERS],
             wheel[fb.W_MU],

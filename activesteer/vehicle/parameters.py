@@ -90,6 +90,8 @@ class Powertrain:
     """Most drive torque at all wheels together [N m]."""
     engine_brake_torque_Nm: NotNegative
     """Most braking torque of the engine at all wheels together [N m]."""
+    lag_s: Annotated[float, Range(0.001, 2.0)] = 0.1
+    """Time constant of the torque behind its demand: filling of the engine, twist of the driveline [s]."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from activesteer.recording import Recording
 from activesteer.scenario import resolve
 from activesteer.tyre.magic_formula import magic_formula
 from activesteer.tyre.parameters import INFLPRES
+from activesteer.vehicle.force_block import USERDATA_PER_WHEEL
 from tests.physics.runs import COAST_OR_BRAKE, car, corners, in_the_corner, last, mass_kg, run, step_steer
 
 PARAMETERS = resolve("standstill").car
@@ -80,7 +81,7 @@ def test_change_of_momentum_is_the_impulse_of_the_outer_forces() -> None:
         for index, corner in enumerate(CORNERS):
             axis = data.xmat[model.body(f"{corner}_wheel").id].reshape(3, 3)[:, 1]
             heading = np.array([axis[1], -axis[0], 0.0]) / np.hypot(axis[0], axis[1])
-            fx, fy, fz = data.userdata[index * 13 : index * 13 + 3]
+            fx, fy, fz = data.userdata[index * USERDATA_PER_WHEEL : index * USERDATA_PER_WHEEL + 3]
             left = np.array([-heading[1], heading[0], 0.0])
             impulse += 1e-3 * (fx * heading + fy * left + np.array([0.0, 0.0, fz]))
         velocity = data.subtree_linvel[model.body("chassis").id]

@@ -174,12 +174,22 @@ def generalised(vehicle: Vehicle, name: str) -> np.ndarray:
 def test_drive_torque_reacts_on_the_chassis(corner: str) -> None:
     """The half-shaft bypasses the suspension: its joints carry the torque, the car as a whole gains nothing."""
     vehicle = floating()
+    # The torque lags behind its demand: here it has arrived.
+    vehicle.data.act[vehicle.model.actuator_actadr[actuator(vehicle, f"{corner}_drive")]] = 100.0
     force = generalised(vehicle, f"{corner}_drive")
     root = dof(vehicle, "root")
     np.testing.assert_allclose(force[root : root + 6], 0.0, atol=1e-9)
     assert force[dof(vehicle, f"{corner}_spin")] == pytest.approx(100.0, rel=1e-3)
     ball = dof(vehicle, f"{corner}_topmount" if corner.startswith("f") else f"{corner}_rot")
     assert force[ball + 1] == pytest.approx(100.0, rel=1e-3)
+
+
+def test_drive_torque_lags_behind_its_demand() -> None:
+    vehicle = floating()
+    index = actuator(vehicle, "fl_drive")
+    vehicle.data.ctrl[index] = 100.0
+    step(vehicle, round(vehicle.parameters.powertrain.lag_s / vehicle.timestep_s))
+    assert vehicle.data.act[vehicle.model.actuator_actadr[index]] == pytest.approx(63.2, abs=0.7)
 
 
 @pytest.mark.parametrize("corner", CORNERS)

@@ -1,0 +1,49 @@
+"""`activesteer tyre FILE.tir`: what a tyre is, what is unusual in it, and its pictures."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from activesteer.commands.output import print_json
+from activesteer.errors import TyreFileError, nearest_names
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("tyre", help="what a .tir file holds, what is unusual in it, and its pictures")
+    parser.add_argument("file", metavar="FILE.tir", help="a path, or a name in models/tyres")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for the pictures; none without it")
+    parser.add_argument("--json", action="store_true", help="print key figures as JSON and nothing else")
+    parser.set_defaults(action=_tyre)
+
+
+def _tyre(options: argparse.Namespace) -> int:
+    from activesteer.tyre import load_tir
+    from activesteer.tyre.report import describe, key_figures
+
+    params = load_tir(_find(options.file))
+    if options.json:
+        print_json(key_figures(params))
+    else:
+        print(describe(params))
+    if options.output is not None:
+        from activesteer.tyre.figures import draw
+
+        for path in draw(params, options.output):
+            if not options.json:
+                print(f"figure: {path}")
+    return 0
+
+
+def _find(name: str) -> Path:
+    from activesteer.resources import models_dir
+
+    folder = models_dir() / "tyres"
+    for candidate in (Path(name), folder / name, folder / f"{name}.tir"):
+        if candidate.is_file():
+            return candidate
+    names = [path.name for path in folder.glob("*.tir")]
+    msg = f"there is no tyre file {name}, neither as a path nor in models/tyres; {nearest_names(name, names)}"
+    raise TyreFileError(msg)
