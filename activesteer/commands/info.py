@@ -1,0 +1,41 @@
+"""`activesteer info FILE.mcap`: what a recording holds."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("info", help="what a recording holds")
+    parser.add_argument("file", type=Path, metavar="FILE.mcap")
+    parser.set_defaults(action=_info)
+
+
+def _info(options: argparse.Namespace) -> int:
+    from activesteer.analysis.tables import comparison
+    from activesteer.recording import Recording
+
+    recording = Recording.open(options.file, recover=True)
+    metadata = recording.metadata
+    time_s = recording.time_s
+    span = f"{time_s[0]:.3f} to {time_s[-1]:.3f} s, {len(time_s)} steps" if len(time_s) else "no steps"
+    print(f"{options.file}: {span}")
+    for key in ("maneuver", "vehicle"):
+        table = metadata.get(key, {})
+        print(f"{key}: {table.get('name', '?')} {table.get('title', '')}".rstrip())
+    print(f"controller: {metadata.get('controller', '?')}")
+    for key in ("overrides", "versions"):
+        if metadata.get(key):
+            print(f"{key}: " + ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
+    if not metadata.get("complete", True):
+        print(f"INCOMPLETE: {metadata.get('error', 'the run did not end properly')}")
+    if recording.metrics:
+        print(comparison({"metrics": recording.metrics}))
+    print("channels:")
+    for channel in recording.channels:
+        print(f"  {channel.name:32} {channel.unit or '-':6} {channel.meaning}")
+    print("attachments: " + ", ".join(recording.attachments))
+    return 0

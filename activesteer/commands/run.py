@@ -1,0 +1,165 @@
+"""`activesteer run MANEUVER`: drives a manoeuvre with one controller after the other and records it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from activesteer.commands.output import print_json
+from activesteer.errors import ParameterError
+
+_DEFAULT_FOLDER: Final = Path("runs")
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    run = commands.add_parser("run", help="drive a manoeuvre and record it")
+    run.add_argument("maneuver", metavar="MANEUVER", help="a name from `activesteer list`, or a TOML file")
+    run.add_argument(
+        "-c", "--controller", action="append", metavar="CONTROLLER",
+        help="none, ars, afs, or my_file.py:MyController; one run for each (default: none)",
+    )  # fmt: skip
+    run.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
+    run.add_argument(
+        "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
+        help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
+    )  # fmt: skip
+    run.add_argument(
+        "-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="FILE_OR_DIR",
+        help="a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap (default: runs)",
+    )  # fmt: skip
+    run.add_argument("--plot", action="store_true", help="also draw the runs (step steer)")
+    run.add_argument("--json", action="store_true", help="print metrics as JSON and nothing else")
+    run.set_defaults(action=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from activesteer.analysis.tables import comparison
+    from activesteer.controllers import load_controller
+    from activesteer.conventions import DEFAULT_TIMESTEP_S
+    from activesteer.runner import prepared, run_scenario
+    from activesteer.scenario import resolve
+
+    controllers = options.controller or ["none"]
+    scenario = resolve(options.maneuver, options.vehicle, dict(_override(text) for text in options.overrides))
+    # What is wrong with the last controller or the plot is said before the first run, not after it.
+    for controller in controllers:
+        load_controller(controller, scenario.controller_setup(DEFAULT_TIMESTEP_S))
+    if options.plot and scenario.maneuver.kind != "step_steer":
+        msg = f"--plot: there is a figure for step_steer, none yet for {scenario.maneuver.kind}"
+        raise ParameterError(msg)
+    paths = _output_paths(options.output, scenario.maneuver.name, controllers)
+    scenario = prepared(scenario)
+    recordings = {}
+    for controller, path in zip(controllers, paths, strict=True):
+        label = _label(controller)
+        with _Progress(f"{scenario.maneuver.name} {label}", quiet=options.json) as progress:
+            recordings[label] = run_scenario(scenario, controller, path=path, progress=progress)
+        if not options.json:
+            print(f"{scenario.maneuver.name} {label}: {path}", file=sys.stderr)
+        if problem := recordings[label].metadata.get("metrics_error"):
+            print(f"{scenario.maneuver.name} {label}: no metrics: {problem}", file=sys.stderr)
+    claims = _claims(recordings)
+    if options.json:
+        runs = [
+            {"controller": controller, "file": str(path), "metrics": recording.metrics}
+            for controller, path, recording in zip(controllers, paths, recordings.values(), strict=True)
+        ]
+        print_json({"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs, "claims": claims})
+    elif any(recording.metrics for recording in recordings.values()):
+        print(comparison({label: recording.metrics for label, recording in recordings.items()}))
+        for claim in claims:
+            print(f"{claim['id']} {'passed' if claim['passed'] else 'FAILED'}: {claim['text']}")
+    if options.plot:
+        _plot(recordings, paths[0].parent / f"{scenario.maneuver.name}.png", quiet=options.json)
+    return 0
+
+
+def _label(controller: str) -> str:
+    """How a controller is called in files and tables: the class of a user's own."""
+    return controller.rpartition(":")[2]
+
+
+def _output_paths(output: Path, maneuver: str, controllers: Sequence[str]) -> list[Path]:
+    labels = [_label(controller) for controller in controllers]
+    if len(set(labels)) != len(labels):
+        msg = f"-c {' -c '.join(controllers)}: two of them have the same name, which tells runs and files apart"
+        raise ParameterError(msg)
+    if output.suffix == ".mcap":
+        if len(controllers) > 1:
+            msg = f"-o {output}: {len(controllers)} controllers make as many files; give a folder"
+            raise ParameterError(msg)
+        folder, paths = output.parent, [output]
+    else:
+        folder, paths = output, [output / f"{maneuver}-{label}.mcap" for label in labels]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        msg = f"-o {output}: cannot make the folder {folder}: {reason.strerror}"
+        raise ParameterError(msg) from reason
+    return paths
+
+
+def _override(text: str) -> tuple[str, Any]:
+    """`key=value`, the value as in TOML; what is no TOML value is a text."""
+    key, sign, value = text.partition("=")
+    if not sign or not key:
+        msg = f"--set {text}: KEY=VALUE is needed, as in --set road.mu=0.4"
+        raise ParameterError(msg)
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value
+
+
+def _claims(recordings: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The paper's claims, where the runs are those that they speak of."""
+    from activesteer.analysis.claims import SYSTEMS, step_steer_claims
+
+    first = next(iter(recordings.values()))
+    if first.metadata["maneuver"]["kind"] != "step_steer" or not set(SYSTEMS) <= set(recordings):
+        return []
+    if not all(recordings[system].metrics for system in SYSTEMS):
+        return []
+    return [
+        {
+            "id": claim.id,
+            "text": claim.text,
+            "passed": claim.passed,
+            "values": claim.values,
+            "criterion": claim.criterion,
+        }
+        for claim in step_steer_claims(recordings)
+    ]
+
+
+def _plot(recordings: Mapping[str, Any], path: Path, *, quiet: bool) -> None:
+    from activesteer.analysis.plots import step_steer_figure
+
+    step_steer_figure(recordings, path)
+    if not quiet:
+        print(f"figure: {path}")
+
+
+class _Progress:
+    """A bar on the terminal, gone when the run ends; silent where standard error is none."""
+
+    def __init__(self, label: str, *, quiet: bool) -> None:
+        self._label = label
+        self._shown = not quiet and sys.stderr.isatty()
+
+    def __enter__(self) -> _Progress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._shown:
+            print("\r" + " " * (len(self._label) + 40) + "\r", end="", file=sys.stderr)
+
+    def __call__(self, share: float) -> None:
+        if self._shown:
+            filled = round(30 * share)
+            print(f"\r{self._label} [{'#' * filled}{' ' * (30 - filled)}] {share:4.0%}", end="", file=sys.stderr)

@@ -1,0 +1,68 @@
+"""What the tests of the command line share."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from activesteer.cli import main
+
+
+class Told(NamedTuple):
+    """What a command said.
+
+    Attributes:
+        status: Exit status.
+        out: Standard output.
+        err: Standard error.
+    """
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        """Standard output as JSON, which it must be from the first character to the last."""
+
+        def refuse(word: str) -> None:
+            pytest.fail(f"{word} is no JSON")
+
+        return json.loads(self.out, parse_constant=refuse)
+
+
+Call = Callable[..., Told]
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Call:
+    """Runs a command in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words: object) -> Told:
+        capsys.readouterr()
+        status = main([str(word) for word in words])
+        out, err = capsys.readouterr()
+        return Told(status, out, err)
+
+    return call
+
+
+@pytest.fixture
+def controller(tmp_path: Path) -> Callable[..., str]:
+    """Writes a user's controller and returns what to give to `-c`."""
+
+    def write(body: str, name: str = "mine.py", cls: str = "Mine") -> str:
+        (tmp_path / name).write_text(
+            "from activesteer import SteerCommand\n\n\n"
+            f"class {cls}:\n    steps = 0\n\n    def step(self, command, measurement):\n        self.steps += 1\n"
+            + textwrap.indent(textwrap.dedent(body), " " * 8)
+        )
+        return f"{name}:{cls}"
+
+    return write

@@ -1,0 +1,151 @@
+"""`activesteer list`, `info` and `bench`, and the options of the program itself."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import activesteer
+from activesteer.cli import main
+from activesteer.resources import list_maneuvers
+from activesteer.version import __version__
+
+KEYS = {
+    "bare_step_us",
+    "plant_step_us",
+    "closed_loop_step_us",
+    "with_file_step_us",
+    "closed_loop_to_bare_ratio",
+    "with_file_to_bare_ratio",
+    "real_time_factor",
+    "real_time_factor_with_file",
+}
+"""Those that the interface promises."""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory) -> Path:
+    """A recording of 2.5 s, so of three blocks."""
+    path = tmp_path_factory.mktemp("run") / "run.mcap"
+    settings = ("settle_s=0", "duration_s=2.5", "road.mu=0.7")
+    words = [word for setting in settings for word in ("--set", setting)]
+    assert main(["run", "straight_line", "-c", "ars", *words, "-o", str(path), "--json"]) == 0
+    return path
+
+
+def test_list_names_everything_that_can_be_run(call):
+    told = call("list")
+    assert told.status == 0
+    for name in (*list_maneuvers(), "none", "ars", "afs", "compact", "my_file.py:MyController"):
+        assert f"\n  {name} " in told.out + " " or f"\n  {name}\n" in told.out
+    assert "Step steer, 80 km/h, 0.4 g, dry" in told.out
+
+
+def test_info_tells_what_a_recording_holds(call, file):
+    told = call("info", file)
+    assert told.status == 0
+    for text in (
+        f"{file}: 0.000 to 2.499 s, 2500 steps",
+        "maneuver: straight_line Straight line, 80 km/h",
+        "vehicle: compact",
+        "controller: ars",
+        "road.mu 0.7",
+        f"activesteer {__version__}",
+        "lateral acceleration peak abs",
+        "mjcf/compact/compact.xml",
+    ):
+        assert text in told.out
+    for channel in activesteer.Recording.open(file).channels:
+        assert channel.name in told.out
+        assert channel.meaning in told.out
+    assert "INCOMPLETE" not in told.out
+
+
+def test_info_of_a_file_cut_short_tells_what_is_left(call, file, tmp_path):
+    data = file.read_bytes()
+    short = tmp_path / "short.mcap"
+    short.write_bytes(data[: len(data) * 7 // 10])
+    told = call("info", short)
+    assert told.status == 0
+    assert "INCOMPLETE: " in told.out
+    assert "controller: ars" in told.out
+    steps = int(told.out.splitlines()[0].split(", ")[1].split()[0])
+    assert steps in {1000, 2000}
+
+
+def test_info_of_a_damaged_file_tells_what_comes_before(call, file, tmp_path):
+    data = bytearray(file.read_bytes())
+    middle = len(data) * 7 // 10
+    data[middle : middle + 1000] = bytes(1000)
+    damaged = tmp_path / "damaged.mcap"
+    damaged.write_bytes(data)
+    told = call("info", damaged)
+    assert told.status == 0
+    assert "1000 steps" in told.out or "2000 steps" in told.out
+    assert "INCOMPLETE" in told.out
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [(None, "cannot read"), (b"not an MCAP file", "is not an MCAP file"), (b"", "is not an MCAP file")],
+)
+def test_info_of_something_else_is_an_error(call, tmp_path, data, told):
+    path = tmp_path / "x.mcap"
+    if data is not None:
+        path.write_bytes(data)
+    answer = call("info", path)
+    assert answer.status == 1
+    assert answer.out == ""
+    assert answer.err.startswith("activesteer: ")
+    assert told in answer.err
+    assert str(path) in answer.err
+
+
+def test_bench_has_the_promised_keys(call):
+    told = call("bench", "--rounds", "1", "--json")
+    assert told.status == 0
+    assert told.err == ""
+    assert set(told.json) >= KEYS
+    assert all(value > 0.0 for value in told.json.values())
+    found = told.json
+    assert found["closed_loop_to_bare_ratio"] == pytest.approx(found["closed_loop_step_us"] / found["bare_step_us"])
+    assert found["with_file_to_bare_ratio"] == pytest.approx(found["with_file_step_us"] / found["bare_step_us"])
+    assert found["real_time_factor"] == pytest.approx(1000.0 / found["closed_loop_step_us"])
+    assert found["real_time_factor_with_file"] == pytest.approx(1000.0 / found["with_file_step_us"])
+
+
+def test_bench_needs_a_round(call):
+    told = call("bench", "--rounds", "0")
+    assert told.status == 1
+    assert "--rounds 0: at least 1 is needed" in told.err
+
+
+def test_version_is_told(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0
+    assert capsys.readouterr().out == f"activesteer {__version__}\n"
+
+
+@pytest.mark.parametrize("words", [[], ["fly"], ["run"], ["info"]])
+def test_misused_command_line_is_told_with_its_usage(capsys, words):
+    with pytest.raises(SystemExit) as stop:
+        main(words)
+    assert stop.value.code == 2
+    assert "usage: activesteer" in capsys.readouterr().err
+
+
+def test_reader_that_stops_early_is_no_error(file):
+    """As in `activesteer info FILE | head -1`."""
+    program = f"import sys; from activesteer.cli import main; sys.exit(main(['info', {str(file)!r}]))"
+    root = Path(__file__).resolve().parents[2]
+    with subprocess.Popen(
+        [sys.executable, "-u", "-c", program], cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == ""

@@ -1,0 +1,197 @@
+"""`activesteer run`: files, table, JSON, overrides."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import activesteer
+from activesteer import Recording
+from activesteer.resources import find_vehicle
+from activesteer.version import __version__
+
+SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.3")
+STEP = ("--set", "settle_s=0.1", "--set", "steer.steering_wheel_deg=30", "--set", "steer.start_s=0.1")
+EVALUATED = (*STEP, "--set", "duration_s=2.4")
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_each_controller_makes_a_file_and_a_column(call, tmp_path):
+    told = call("run", "step_steer", "-c", "none", "-c", "ars", "--controller", "afs", *EVALUATED, "-o", "out")
+    assert told.status == 0
+    files = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert files == ["step_steer-afs.mcap", "step_steer-ars.mcap", "step_steer-none.mcap"]
+    lines = told.out.splitlines()
+    assert lines[0].split() == ["none", "ars", "afs"]
+    (peak,) = (line for line in lines if line.startswith("yaw rate peak  "))
+    shown = [float(number) for number in peak.split()[-3:]]
+    for name, value in zip(("none", "ars", "afs"), shown, strict=True):
+        metrics = Recording.open(tmp_path / "out" / f"step_steer-{name}.mcap").metrics
+        assert value == pytest.approx(math.degrees(metrics["yaw_rate_peak_radps"]), abs=6e-4)
+    for claim in ("S1", "S2", "S3", "S4", "S5"):
+        assert sum(line.startswith(f"{claim} ") for line in lines) == 1
+    for name in ("none", "ars", "afs"):
+        assert f"step_steer {name}: out/step_steer-{name}.mcap" in told.err
+
+
+def test_metadata_holds_what_is_needed_to_run_again(call, tmp_path):
+    assert call("run", "step_steer", "-c", "ars", *STEP, "--set", "duration_s=0.3", "-o", "out").status == 0
+    recording = Recording.open(tmp_path / "out" / "step_steer-ars.mcap")
+    known = recording.metadata
+    assert known["complete"] is True
+    assert known["controller"] == "ars"
+    assert known["maneuver"]["name"] == "step_steer"
+    assert known["vehicle"]["name"] == "compact"
+    assert known["versions"]["activesteer"] == __version__
+    assert {"mujoco", "numpy", "numba", "python"} <= set(known["versions"])
+    assert known["overrides"] == {
+        "settle_s": 0.1, "steer.steering_wheel_deg": 30, "steer.start_s": 0.1, "duration_s": 0.3,
+    }  # fmt: skip
+    assert known["maneuver"]["steer"]["steering_wheel_rad"] == pytest.approx(math.radians(30.0))
+    assert {"maneuver.toml", "vehicle.toml", "mjcf/compact/compact.xml"} <= set(recording.attachments)
+    again = activesteer.simulate(known["maneuver"], "ars", known["vehicle"])
+    for name in ("yaw_rate_radps", "rear_steer_rad", "fl_tyre_fy_N"):
+        assert np.array_equal(again[name].astype(np.float32), recording[name].astype(np.float32))
+
+
+def test_json_is_nothing_but_json(call):
+    told = call("run", "step_steer", "-c", "none", "-c", "ars", *EVALUATED, "--json")
+    assert told.status == 0
+    assert told.err == ""
+    assert set(told.json) == {"maneuver", "vehicle", "runs", "claims"}
+    assert (told.json["maneuver"], told.json["vehicle"]) == ("step_steer", "compact")
+    assert [run["controller"] for run in told.json["runs"]] == ["none", "ars"]
+    for run in told.json["runs"]:
+        stored = Recording.open(run["file"]).metrics
+        assert set(run["metrics"]) == set(stored)
+        for name, value in run["metrics"].items():
+            assert value is None if math.isnan(stored[name]) else value == stored[name]
+
+
+def test_json_says_null_where_a_metric_is_not_defined(call):
+    # The least step that counts as one: the sideslip angle is too small to say when it peaked.
+    told = call(
+        "run", "step_steer", "--json", "--set", "steer.steering_wheel_deg=0.51", "--set", "steer.start_s=0.1",
+        "--set", "duration_s=2.4", "--set", "settle_s=0.5",
+    )  # fmt: skip
+    values = told.json["runs"][0]["metrics"]
+    assert None in values.values()
+    assert any(isinstance(value, float) for value in values.values())
+
+
+def test_claims_of_the_paper_are_in_the_json_of_the_three_systems(call):
+    told = call("run", "step_steer", "-c", "none", "-c", "ars", "-c", "afs", *EVALUATED, "--json")
+    assert [claim["id"] for claim in told.json["claims"]] == ["S1", "S2", "S3", "S4", "S5"]
+    assert all(isinstance(claim["passed"], bool) and claim["values"] for claim in told.json["claims"])
+
+
+def test_output_may_be_a_file(call, tmp_path):
+    assert call("run", "straight_line", *SHORT, "-o", "deep/er/run.mcap").status == 0
+    assert len(Recording.open(tmp_path / "deep" / "er" / "run.mcap")) == 300
+
+
+def test_output_goes_to_runs_where_nothing_is_said(call, tmp_path):
+    assert call("run", "straight_line", *SHORT).status == 0
+    assert (tmp_path / "runs" / "straight_line-none.mcap").is_file()
+
+
+def test_file_that_exists_is_replaced(call, tmp_path):
+    (tmp_path / "run.mcap").write_text("something else")
+    assert call("run", "straight_line", *SHORT, "-o", "run.mcap").status == 0
+    assert len(Recording.open(tmp_path / "run.mcap")) == 300
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "value"),
+    [
+        ("road.mu=0.4", ("maneuver", "road", "mu"), 0.4),
+        ("speed_kmh=72", ("maneuver", "speed_mps"), 20.0),
+        ("title=a short one", ("maneuver", "title"), "a short one"),
+        ('title="quoted"', ("maneuver", "title"), "quoted"),
+        ("controllers.ars.limit_deg=2", ("vehicle", "controllers", "ars", "limit_rad"), math.radians(2.0)),
+        ("aerodynamics.pressure_point_m=[-1, 0, 0.5]", ("vehicle", "aerodynamics", "pressure_point_m"), [-1, 0, 0.5]),
+        ("brake={time_s=[0.0], pedal=[0.1]}", ("maneuver", "brake", "pedal"), [0.1]),
+    ],
+)
+def test_set_takes_values_as_toml_does(call, text, key, value):
+    assert call("run", "straight_line", *SHORT, "--set", text, "-o", "run.mcap").status == 0
+    found = Recording.open("run.mcap").metadata
+    for part in key:
+        found = found[part]
+    assert found == (pytest.approx(value) if isinstance(value, float) else value)
+
+
+def test_last_of_two_values_counts(call):
+    call("run", "straight_line", *SHORT, "--set", "road.mu=0.4", "--set", "road.mu=0.6", "-o", "run.mcap")
+    assert Recording.open("run.mcap").metadata["maneuver"]["road"]["mu"] == 0.6
+
+
+def test_maneuver_and_vehicle_may_be_files(call, tmp_path):
+    (tmp_path / "roll.toml").write_text('kind = "open_loop"\nspeed_kmh = 30\nduration_s = 0.2\nsettle_s = 0\n')
+    shipped = find_vehicle("compact").read_text()
+    (tmp_path / "heavy.toml").write_text(shipped + "\n[load]\nmass_factor = 1.2\n")
+    assert call("run", "roll.toml", "--vehicle", "heavy.toml", "-o", "out").status == 0
+    recording = Recording.open(tmp_path / "out" / "roll-none.mcap")
+    assert recording.metadata["vehicle"]["name"] == "heavy"
+    assert recording.metadata["vehicle"]["load"]["mass_factor"] == 1.2
+    assert recording.attachments["vehicle.toml"] == (tmp_path / "heavy.toml").read_bytes()
+
+
+def test_users_controller_drives_and_is_kept(call, controller, tmp_path):
+    name = controller("return SteerCommand(rear_steer_rad=0.02)")
+    told = call("run", "straight_line", "-c", "none", "-c", name, *SHORT, "-o", "out")
+    assert told.status == 0
+    assert told.out.splitlines()[0].split() == ["none", "Mine"]
+    recording = Recording.open(tmp_path / "out" / "straight_line-Mine.mcap")
+    assert recording.metadata["controller"] == name
+    assert recording.attachments["mine.py"] == (tmp_path / "mine.py").read_bytes()
+    assert recording["rear_steer_demand_rad"] == pytest.approx(0.02, rel=1e-7)
+    # Rear wheels to the left turn the car to the right.
+    assert recording["yaw_rate_radps"][-1] < -0.01
+
+
+def test_run_that_is_too_short_to_evaluate_says_so_and_is_kept(call):
+    told = call("run", "step_steer", *STEP, "--set", "duration_s=0.5", "-o", "run.mcap")
+    assert told.status == 0
+    assert "no metrics: the run ends" in told.err
+    assert told.out == ""
+    recording = Recording.open("run.mcap")
+    assert recording.metadata["complete"] is True
+    assert recording.metrics == {}
+    assert "need at least 2 s" in recording.metadata["metrics_error"]
+
+
+def test_search_for_the_amplitude_is_the_same_for_all_controllers(call):
+    told = call(
+        "run", "step_steer", "-c", "none", "-c", "ars", "--set", "settle_s=0.5", "--set", "duration_s=4", "--json"
+    )
+    none, ars = (Recording.open(run["file"]) for run in told.json["runs"])
+    assert np.array_equal(none["steering_wheel_demand_rad"], ars["steering_wheel_demand_rad"])
+    assert told.json["runs"][0]["metrics"]["ay_steady_state_mps2"] == pytest.approx(0.4 * 9.81, rel=0.01)
+
+
+def test_program_starts_from_a_shell(tmp_path):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", "import sys; from activesteer.cli import main; sys.exit(main())",
+         "run", "straight_line", *SHORT, "--json"],
+        cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert done.stdout.startswith("{")
+    assert (tmp_path / "runs" / "straight_line-none.mcap").is_file()
+
+
+def test_plot_is_drawn_beside_the_files(call, tmp_path):
+    pytest.importorskip("matplotlib")
+    told = call("run", "step_steer", "-c", "none", "-c", "ars", "-c", "afs", *EVALUATED, "--plot", "-o", "out")
+    assert told.status == 0
+    assert (tmp_path / "out" / "step_steer.png").stat().st_size > 10_000
+    assert "figure: out/step_steer.png" in told.out
