@@ -99,7 +99,7 @@ def _low_speed_slip_limit(file_limit, sliding_slip, share):
 
 
 @njit(cache=True, error_model="numpy")
-def _rolling_tyre(
+def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn, gamma, u, v, w
 ):
     """Forces, slips, rates of the relaxation states and whether a limit is exceeded, at a load above zero.

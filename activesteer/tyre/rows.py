@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from numba import njit
 
-from activesteer.tyre import parameters as c
 from activesteer.tyre.limits import limit_flags
 from activesteer.tyre.magic_formula import steady_state
 from activesteer.tyre.relaxation import relaxation_lengths

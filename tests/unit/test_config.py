@@ -70,7 +70,7 @@ def read(tmp_path):
 
 
 def test_table_becomes_a_dataclass(read):
-    assert read(TEXT) == Car(speed_mps=pytest.approx(25.0), spare=Wheel(0.3), wheels={"front": Wheel(0.31, "alloy")})
+    assert read(TEXT) == Car(speed_mps=90 / 3.6, spare=Wheel(0.3), wheels={"front": Wheel(0.31, "alloy")})
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from activesteer.conventions import CORNERS
 from activesteer.recorder import BLOCK_ROWS, CONTROL_CHANNELS, POSE_INTERVAL_S, Recorder, channels_of
 from activesteer.recording import McapWriter, Recording
 from activesteer.scenario import resolve
@@ -12,6 +13,14 @@ from activesteer.signals import DriverCommand, SteerCommand
 from activesteer.simulation import Simulation
 
 KEYS = {"settle_s": 0.0, "duration_s": 5.0, "steer.start_s": 0.01, "steer.steering_wheel_deg": 40}
+PROMISED = """
+    x_m y_m yaw_rad roll_rad pitch_rad vx_mps vy_mps speed_mps yaw_rate_radps ax_mps2 ay_mps2 sideslip_rad
+    front_axle_x_m front_axle_y_m steering_wheel_rad steering_wheel_demand_rad front_steer_rad superposition_rad
+    rear_steer_rad yaw_rate_desired_radps controller_saturated
+"""
+AT_EACH_WHEEL = """
+    tyre_fx_N tyre_fy_N tyre_fz_N tyre_mz_Nm slip_ratio slip_angle_rad inclination_rad wheel_speed_radps travel_m
+"""
 COMMAND = DriverCommand(0.3, 0.02, 150.0, 0.25)
 STEER = SteerCommand(-0.01, 0.003, 0.2, 0.004, -0.014, True)
 
@@ -39,16 +48,8 @@ def test_every_channel_is_named_once_and_ends_in_its_unit():
 
 def test_channels_that_the_interface_promises_are_there():
     names = {channel.name for channel in channels_of(simulation().vehicle)}
-    promised = (
-        "x_m y_m yaw_rad roll_rad pitch_rad vx_mps vy_mps speed_mps yaw_rate_radps ax_mps2 ay_mps2 sideslip_rad "
-        "front_axle_x_m front_axle_y_m steering_wheel_rad steering_wheel_demand_rad front_steer_rad superposition_rad "
-        "rear_steer_rad yaw_rate_desired_radps controller_saturated"
-    ).split()
-    corner = (
-        "tyre_fx_N tyre_fy_N tyre_fz_N tyre_mz_Nm slip_ratio slip_angle_rad inclination_rad wheel_speed_radps travel_m"
-    ).split()
-    promised += [f"{place}_{name}" for place in ("fl", "fr", "rl", "rr") for name in corner]
-    assert not set(promised) - names
+    promised = {*PROMISED.split(), *(f"{corner}_{name}" for corner in CORNERS for name in AT_EACH_WHEEL.split())}
+    assert not promised - names
 
 
 def test_commands_are_recorded_as_they_were_given():
@@ -69,7 +70,11 @@ def test_first_row_is_the_start_and_rows_are_a_step_apart():
     assert values.shape == (50, len(recorder.channels))
     assert column(recorder, "speed_mps")[0] == pytest.approx(speed, abs=1e-3)
     assert abs(column(recorder, "x_m")[0]) < 1e-6
-    assert np.diff(column(recorder, "x_m")) == pytest.approx(0.001 * speed, rel=1e-3)
+    along = column(recorder, "vx_mps") * np.cos(column(recorder, "yaw_rad")) - column(recorder, "vy_mps") * np.sin(
+        column(recorder, "yaw_rad")
+    )
+    # Positions and velocities of the same instants: the trapezoidal rule holds between them.
+    assert np.diff(column(recorder, "x_m")) == pytest.approx(0.0005 * (along[1:] + along[:-1]), rel=1e-4)
 
 
 def test_rows_do_not_depend_on_when_they_are_flushed():
@@ -115,14 +120,18 @@ def test_nothing_recorded_is_nothing():
     assert (len(time_s), len(values), len(poses.time_s)) == (0, 0, 0)
 
 
-def test_blocks_are_in_the_file_before_the_run_ends(tmp_path):
-    simulated = simulation()
+def test_whole_blocks_are_in_the_file_while_the_run_goes_on(tmp_path):
+    driven, again = simulation(), simulation()
     path = tmp_path / "run.mcap"
-    with McapWriter(path, channels_of(simulated.vehicle), simulated.vehicle.body_names) as writer:
-        recorder = Recorder(simulated.vehicle, 5000, writer)
-        simulated.advance(2 * BLOCK_ROWS + 10, recorder)
-        writer.close({"complete": False})
+    with McapWriter(path, channels_of(driven.vehicle), driven.vehicle.body_names) as writer:
+        driven.advance(3 * BLOCK_ROWS + 10, Recorder(driven.vehicle, 5000, writer))
+        # The last block may still be on its way: the writer has a thread of its own.
+        so_far = Recording.open(path)
+        assert len(so_far) >= 2 * BLOCK_ROWS
+        assert so_far.metadata["complete"] is False
     kept = Recording.open(path)
-    assert len(kept) == 2 * BLOCK_ROWS
+    assert len(kept) == 3 * BLOCK_ROWS
+    memory = Recorder(again.vehicle, 3 * BLOCK_ROWS)
+    again.advance(3 * BLOCK_ROWS, memory)
     # Single precision in the file where the channel says so.
-    assert kept.values == pytest.approx(recorder.result()[1][: 2 * BLOCK_ROWS], rel=1e-6, abs=1e-30)
+    assert np.allclose(kept.values, memory.result()[1], rtol=1e-7, atol=1e-30)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from activesteer.errors import ParameterError, TyreFileError
 from activesteer.tyre import TyreParameters, load_tir
@@ -193,29 +195,34 @@ def _mutated(data: bytes, chance: random.Random) -> bytes:
     return bytes(pieces)
 
 
-def _fuzz(count: int, seed: int) -> tuple[int, int]:
-    chance = random.Random(seed)
-    seeds = [MINIMAL.encode(), (TYRES / "compact_205_55R16.tir").read_bytes()[:3000] + MINIMAL.encode()]
-    read = refused = 0
-    for _ in range(count):
-        text = _mutated(chance.choice(seeds), chance).decode("latin-1")
-        try:
-            array = tir_from_text(text, FILE).array
-        except TyreFileError:
-            refused += 1
-        else:
-            read += 1
-            assert np.isfinite(array).all()
-    return read, refused
+WHOLE_FILES = (MINIMAL.encode(), (TYRES / "compact_205_55R16.tir").read_bytes()[:3000] + MINIMAL.encode())
 
 
-def test_damaged_files_end_in_a_tyre_file_error_or_a_finite_tyre() -> None:
-    read, refused = _fuzz(1500, 1)
-    assert read > 50
-    assert refused > 50
+def _is_read(damaged: bytes) -> bool:
+    """Whether a damaged file is read, then to finite numbers; nothing but `TyreFileError` may refuse it."""
+    try:
+        array = tir_from_text(damaged.decode("latin-1"), FILE).array
+    except TyreFileError:
+        return False
+    assert np.isfinite(array).all()
+    return True
+
+
+@settings(max_examples=500, deadline=None, derandomize=True, database=None)
+@given(whole=st.sampled_from(WHOLE_FILES), chance=st.randoms(use_true_random=False))
+def test_damaged_files_end_in_a_tyre_file_error_or_a_finite_tyre(whole: bytes, chance: random.Random) -> None:
+    _is_read(_mutated(whole, chance))
+
+
+@settings(max_examples=500, deadline=None, derandomize=True, database=None)
+@given(st.binary(max_size=400))
+def test_bytes_at_random_end_in_a_tyre_file_error(noise: bytes) -> None:
+    assert not _is_read(noise)
+    _is_read(MINIMAL.encode() + noise)
 
 
 @pytest.mark.slow
 def test_a_hundred_thousand_damaged_files() -> None:
-    read, refused = _fuzz(100_000, 2)
-    assert min(read, refused) > 1000
+    chance = random.Random(2)
+    read = sum(_is_read(_mutated(chance.choice(WHOLE_FILES), chance)) for _ in range(100_000))
+    assert 1000 < read < 99_000
