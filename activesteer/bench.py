@@ -128,8 +128,8 @@ def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
         rounds: How often everything is measured; the best counts.
 
     Returns:
-        What `activesteer.tyre.bench` measures, and `four_tyres_us`: microseconds that four tyres with contact, relaxation
-        and the application of their forces add to the engine's passive forces, in one and the same state.
+        What `activesteer.tyre.bench` measures, and `four_tyres_us`: microseconds that four tyres with contact,
+        relaxation and the application of their forces add to the engine's passive forces, in the same state.
     """
     scenario = resolve("straight_line")
     simulation = Simulation(scenario)
