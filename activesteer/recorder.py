@@ -20,6 +20,7 @@ CONTROL_CHANNELS: Final = (
     Channel("front_steer_demand_rad", "rad", "the driver's demand at the road wheel", "control"),
     Channel("drive_torque_demand_Nm", "Nm", "drive torque demanded, all wheels together", "control"),
     Channel("brake_pedal", "", "brake pedal position, 0 to 1", "control"),
+    Channel("driver_limited", "", "1 where the steering is at its lock or the engine at its limit", "control"),
     Channel("rear_steer_demand_rad", "rad", "rear angle that the controller demands", "control"),
     Channel("superposition_demand_rad", "rad", "angle that the controller adds at the front wheels", "control"),
     Channel("yaw_rate_desired_radps", "rad/s", "yaw rate that the controller steers for", "control"),
@@ -76,7 +77,7 @@ class Recorder:
         for rows, live in self._copies:
             rows[row] = live
         self._control[row] = (
-            command.front_steer_rad, command.drive_torque_Nm, command.brake, steer.rear_steer_rad,
+            command.front_steer_rad, command.drive_torque_Nm, command.brake, command.limited, steer.rear_steer_rad,
             steer.superposition_rad, steer.yaw_rate_desired_radps, steer.prediction_rad, steer.correction_rad,
             steer.saturated,
         )  # fmt: skip

@@ -34,12 +34,14 @@ class Reference(NamedTuple):
         speed_mps: Speed to hold [m/s].
         brake: Brake pedal position, 0 to 1.
         hold_speed: Whether the drive holds `speed_mps`; where False the car coasts.
+        curvature_1pm: Curvature to drive [1/m], left positive; where given, the driver finds the steering wheel angle.
     """
 
     steering_wheel_rad: float
     speed_mps: float
     brake: float
     hold_speed: bool
+    curvature_1pm: float | None = None
 
 
 class DriverCommand(NamedTuple):
@@ -50,12 +52,14 @@ class DriverCommand(NamedTuple):
         front_steer_rad: The same at the road wheel: divided by the overall steering ratio [rad].
         drive_torque_Nm: Torque at the driven wheels together [Nm]; negative is engine braking.
         brake: Brake pedal position, 0 to 1.
+        limited: Whether the lock of the steering or a limit of the engine is active.
     """
 
     steering_wheel_rad: float
     front_steer_rad: float
     drive_torque_Nm: float
     brake: float
+    limited: bool = False
 
 
 class Measurement(NamedTuple):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from activesteer.controllers import Controller, load_controller
 from activesteer.controllers.loading import check_command, is_sane
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.driver import OpenLoopDriver, SpeedHold
+from activesteer.driver import ConstantRadiusDriver, OpenLoopDriver, SpeedHold
 from activesteer.maneuver import Maneuver
 from activesteer.recorder import Recorder
 from activesteer.scenario import Scenario
@@ -60,7 +60,11 @@ class Simulation:
         self.vehicle = Vehicle(scenario.mjcf, car, scenario.tyres, scenario.road, timestep_s)
         torque = car.powertrain
         speed_hold = SpeedHold(car.driver, torque.max_torque_Nm, torque.engine_brake_torque_Nm, timestep_s)
-        self.driver = OpenLoopDriver(speed_hold, car.steering.ratio, car.steering.steering_wheel_limit_rad)
+        robot = OpenLoopDriver(speed_hold, car.steering.ratio, car.steering.steering_wheel_limit_rad)
+        self.driver: OpenLoopDriver | ConstantRadiusDriver = robot
+        if self.maneuver.settling_reference().curvature_1pm is not None:
+            wheelbase_m = car.single_track.cg_to_front_m + car.single_track.cg_to_rear_m
+            self.driver = ConstantRadiusDriver(robot, wheelbase_m, timestep_s)
         self.controller: Controller = load_controller(controller, scenario.controller_setup(timestep_s))
         self._controller_name = controller
         self._measurement = self.vehicle.start(self.maneuver.speed_mps)

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from activesteer.analysis import general, step_response
+from activesteer.analysis import frequency_response, general, handling, step_response
 from activesteer.analysis.source import RecordingLike, maneuver_kind
 
 BY_KIND: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "step_steer": step_response.metrics,
+    "slowly_increasing_steer": handling.metrics,
+    "constant_radius": handling.metrics,
+    "sine_sweep": frequency_response.metrics,
 }
 """Kinds of manoeuvre with metrics of their own; every other kind gets those of `general`."""
 

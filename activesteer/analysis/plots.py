@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import ParameterError, RecordingError
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering", "afs": "3 active front steering"}
 """What the curves of the three systems are called, numbered as in the paper's figures."""
 
-_COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
+COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
 """Colours that colour-blind readers can tell apart (Okabe and Ito, 2008)."""
 
 _LEAST_ANGLE_RAD: Final = math.radians(1e-3)
@@ -91,7 +92,7 @@ def step_steer_figure(recordings: Mapping[str, RecordingLike], path: str | os.Pa
     """
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
-    figure = _new_figure(width_in=7.5, height_in=9.5)
+    figure = new_figure(width_in=7.5, height_in=9.5)
     axes: list[Axes] = list(figure.subplots(2 + len(REST), 1, sharex=True))
     curves = _curves(recordings)
     for curve in curves:
@@ -115,10 +116,57 @@ def step_steer_figure(recordings: Mapping[str, RecordingLike], path: str | os.Pa
     figure.align_ylabels(axes)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=min(len(curves), 3), frameon=False)
-    return _save(figure, Path(path))
+    return save(figure, Path(path))
 
 
-def _new_figure(width_in: float, height_in: float) -> Figure:
+def figure_2(
+    recording: RecordingLike,
+    path: str | os.PathLike[str],
+    models: Mapping[str, Mapping[str, NDArray[np.float64]]] | None = None,
+) -> Path:
+    """Draw yaw rate and roll angle after a step of the steering, in the form of the paper's figure 2, and save it.
+
+    Args:
+        recording: A step steer.
+        path: File to write; its ending says the format (.png, .pdf, .svg).
+        models: Label -> channel -> values over the time of the recording, to stand beside it: the single-track model
+            (`identification.single_track_response`), which has no roll, the linear car
+            (`linearisation.linear_response`).
+
+    Returns:
+        The path written.
+
+    Raises:
+        ParameterError: matplotlib is not installed.
+        RecordingError: a channel is missing, or the file cannot be written.
+
+    Source: V. Dorsch, Mecatronics-REM 2012, figure 2.
+    """
+    figure = new_figure(width_in=7.5, height_in=5.5)
+    axes: list[Axes] = list(figure.subplots(2, 1, sharex=True))
+    roll = next(panel for panel in REST if panel.channel == "roll_rad")
+    for axis, panel in zip(axes, (YAW_RATE, roll), strict=True):
+        _draw(axis, Curve(recording, "", COLOURS[0]), panel, label="multibody car", width=2.0)
+        for (label, channels), colour in zip((models or {}).items(), COLOURS[1:], strict=False):
+            if panel.channel in channels:
+                values = channels[panel.channel] * panel.factor
+                axis.plot(recording.time_s, values, "--", color=colour, linewidth=1.4, label=label)
+        axis.set_ylabel(panel.title)
+        axis.grid(visible=True, color="#dddddd", linewidth=0.6)
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.legend(loc="lower right", frameon=False)
+    axes[-1].set_xlabel("time [s]")
+    axes[-1].set_xlim(0.0, float(recording.time_s[-1]))
+    figure.align_ylabels(axes)
+    return save(figure, Path(path))
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure.
+
+    Raises:
+        ParameterError: matplotlib is not installed.
+    """
     try:
         from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
     except ImportError as error:
@@ -129,7 +177,12 @@ def _new_figure(width_in: float, height_in: float) -> Figure:
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
-def _save(figure: Figure, path: Path) -> Path:
+def save(figure: Figure, path: Path) -> Path:
+    """Writes a figure and returns the path.
+
+    Raises:
+        RecordingError: it cannot be written.
+    """
     try:
         figure.savefig(path, dpi=150)
     except (OSError, ValueError) as error:
@@ -141,8 +194,8 @@ def _curves(recordings: Mapping[str, RecordingLike]) -> list[Curve]:
     """The runs in the paper's order, the three systems always in the same colours."""
     known = [label for label in LABELS if label in recordings]
     others = [label for label in recordings if label not in LABELS]
-    colours = dict(zip(LABELS, _COLOURS, strict=False))
-    spare = _COLOURS[len(LABELS) :]
+    colours = dict(zip(LABELS, COLOURS, strict=False))
+    spare = COLOURS[len(LABELS) :]
     colours |= {label: spare[i % len(spare)] for i, label in enumerate(others)}
     return [Curve(recordings[label], LABELS.get(label, label), colours[label]) for label in known + others]
 

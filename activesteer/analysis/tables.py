@@ -8,6 +8,11 @@ from typing import Final
 
 _DISPLAY: Final = (
     # Longest suffix first: `_srad` also ends in `rad`.
+    ("_radpmps2", "deg/g", math.degrees(9.81)),
+    ("_mps2prad", "g/100deg", math.radians(100.0) / 9.81),
+    ("_radprad", "deg/deg", 1.0),
+    ("_1ps", "1/s", 1.0),
+    ("_Hz", "Hz", 1.0),
     ("_radps", "deg/s", math.degrees(1.0)),
     ("_srad", "s deg", math.degrees(1.0)),
     ("_rad", "deg", math.degrees(1.0)),

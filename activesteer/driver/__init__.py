@@ -1,7 +1,8 @@
 """The driver: from what is asked (and, for a path, what is seen) to steering wheel, drive and brake."""
 
+from activesteer.driver.constant_radius import ConstantRadiusDriver
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
 from activesteer.driver.speed_hold import SpeedHold
 
-__all__ = ["DriverParameters", "OpenLoopDriver", "SpeedHold"]
+__all__ = ["ConstantRadiusDriver", "DriverParameters", "OpenLoopDriver", "SpeedHold"]

@@ -11,6 +11,7 @@ class OpenLoopDriver:
 
     Attributes:
         speed_hold: The cruise control.
+        steering_ratio: Steering wheel angle over road-wheel angle [-].
     """
 
     def __init__(self, speed_hold: SpeedHold, steering_ratio: float, steering_wheel_limit_rad: float) -> None:
@@ -22,7 +23,7 @@ class OpenLoopDriver:
             steering_wheel_limit_rad: Lock angle [rad]; more cannot be turned.
         """
         self.speed_hold = speed_hold
-        self._ratio = steering_ratio
+        self.steering_ratio = steering_ratio
         self._limit_rad = steering_wheel_limit_rad
 
     def step(self, reference: Reference, measurement: Measurement) -> DriverCommand:
@@ -36,13 +37,15 @@ class OpenLoopDriver:
             The command.
         """
         angle = reference.steering_wheel_rad
+        limited = False
         if angle > self._limit_rad:
-            angle = self._limit_rad
+            angle, limited = self._limit_rad, True
         elif angle < -self._limit_rad:
-            angle = -self._limit_rad
+            angle, limited = -self._limit_rad, True
         if reference.hold_speed:
             torque = self.speed_hold.step(reference.speed_mps, measurement.speed_mps)
+            limited = limited or self.speed_hold.saturated
         else:
             self.speed_hold.reset()
             torque = 0.0
-        return DriverCommand(angle, angle / self._ratio, torque, reference.brake)
+        return DriverCommand(angle, angle / self.steering_ratio, torque, reference.brake, limited)

@@ -8,10 +8,19 @@ from typing import Any, Final
 from activesteer.config import Source, build
 from activesteer.errors import nearest_names
 from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.constant_radius import ConstantRadius
 from activesteer.maneuver.open_loop import OpenLoop
+from activesteer.maneuver.sine_sweep import SineSweep
+from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
 from activesteer.maneuver.step_steer import StepSteer
 
-KINDS: Final[dict[str, type[Maneuver]]] = {"step_steer": StepSteer, "open_loop": OpenLoop}
+KINDS: Final[dict[str, type[Maneuver]]] = {
+    "step_steer": StepSteer,
+    "open_loop": OpenLoop,
+    "slowly_increasing_steer": SlowlyIncreasingSteer,
+    "constant_radius": ConstantRadius,
+    "sine_sweep": SineSweep,
+}
 """Value of `kind` in a file -> class."""
 
 

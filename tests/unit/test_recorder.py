@@ -21,7 +21,7 @@ PROMISED = """
 AT_EACH_WHEEL = """
     tyre_fx_N tyre_fy_N tyre_fz_N tyre_mz_Nm slip_ratio slip_angle_rad inclination_rad wheel_speed_radps travel_m
 """
-COMMAND = DriverCommand(0.3, 0.02, 150.0, 0.25)
+COMMAND = DriverCommand(0.3, 0.02, 150.0, 0.25, limited=True)
 STEER = SteerCommand(-0.01, 0.003, 0.2, 0.004, -0.014, True)
 
 
@@ -57,7 +57,7 @@ def test_commands_are_recorded_as_they_were_given():
     recorder = Recorder(simulated.vehicle, 3)
     recorder.record(COMMAND, STEER)
     values = [column(recorder, channel.name)[0] for channel in CONTROL_CHANNELS]
-    assert values == [0.02, 150.0, 0.25, -0.01, 0.003, 0.2, 0.004, -0.014, 1.0]
+    assert values == [0.02, 150.0, 0.25, 1.0, -0.01, 0.003, 0.2, 0.004, -0.014, 1.0]
 
 
 def test_first_row_is_the_start_and_rows_are_a_step_apart():

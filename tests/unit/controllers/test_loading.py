@@ -204,4 +204,10 @@ def test_controllers_are_told_what_sensors_measure_and_nothing_else():
         "wheel_speed_radps",
     }
     assert set(Measurement._fields) == allowed
-    assert set(DriverCommand._fields) == {"steering_wheel_rad", "front_steer_rad", "drive_torque_Nm", "brake"}
+    assert set(DriverCommand._fields) == {
+        "steering_wheel_rad",
+        "front_steer_rad",
+        "drive_torque_Nm",
+        "brake",
+        "limited",
+    }

@@ -101,3 +101,8 @@ def test_driver_starts_anew_after_braking():
     used.step(Reference(0.0, 21.0, 0.6, False), at(20.0))
     held = Reference(0.0, 20.0, 0.0, True)
     assert used.step(held, at(19.9)).drive_torque_Nm == driver().step(held, at(19.9)).drive_torque_Nm
+
+
+def test_reversing_car_is_driven_backwards_and_braked_forwards_by_the_engine():
+    assert speed_hold().step(-10.0, 0.0) == -1900.0
+    assert speed_hold().step(-1.0, -10.0) == 350.0

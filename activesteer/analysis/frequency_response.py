@@ -1,0 +1,140 @@
+"""Frequency response of a recorded run to its steering, and its metrics, by ISO 7401 (continuous sinusoidal input).
+
+The run begins and ends with the car going straight on, so that the discrete Fourier transform of the whole run has no
+leakage. The response at a frequency is the cross spectrum over the spectrum of the input, both summed over the
+neighbouring lines; the coherence says how much of the output follows from the input by a linear system.
+
+Source: ISO 7401, Road vehicles - Lateral transient response test methods; J. S. Bendat and A. G. Piersol, Random Data
+(2010), chapter 6 (the estimate H1 and the coherence).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.analysis.series import timestep
+from activesteer.analysis.source import RecordingLike
+from activesteer.errors import RecordingError
+
+INPUT: Final = "steering_wheel_demand_rad"
+"""What the driver asks for: the steering wheel follows it within a millisecond."""
+OUTPUTS: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
+"""Channels whose response is evaluated."""
+HALF_BAND_LINES: Final = 2
+"""Lines to either side that are summed into one value."""
+LEAST_SPECTRUM: Final = 1e-3
+"""Share of its largest amplitude that the input must have at a frequency for a response there to mean something."""
+LOWEST_Hz: Final = 0.2
+HIGHEST_Hz: Final = 4.0
+"""Range that metrics are evaluated in [Hz]."""
+
+
+class FrequencyResponse(NamedTuple):
+    """Response of one output to the input.
+
+    Attributes:
+        frequency_Hz: Frequencies [Hz], shape (n,).
+        response: Output over input, complex, shape (n,).
+        coherence: 0 to 1, shape (n,).
+    """
+
+    frequency_Hz: NDArray[np.float64]
+    response: NDArray[np.complex128]
+    coherence: NDArray[np.float64]
+
+
+def frequency_response(
+    recording: RecordingLike,
+    output: str,
+    frequency_Hz: NDArray[np.float64],
+    input_channel: str = INPUT,
+) -> FrequencyResponse:
+    """Response of a channel to the steering.
+
+    Args:
+        recording: A run that begins and ends going straight on, with all frequencies in its steering.
+        output: Channel.
+        frequency_Hz: Where it is wanted [Hz]; the nearest lines of the spectrum are returned.
+        input_channel: Channel that the response is referred to.
+
+    Returns:
+        Response and coherence at these lines.
+
+    Raises:
+        RecordingError: a channel is missing, or the steering does not contain a frequency.
+    """
+    time_s = np.asarray(recording.time_s, dtype=np.float64)
+    step_s = timestep(time_s)
+    u = np.fft.rfft(np.asarray(recording[input_channel], dtype=np.float64))
+    y = np.fft.rfft(np.asarray(recording[output], dtype=np.float64))
+    lines_Hz = np.asarray(np.fft.rfftfreq(len(time_s), step_s), dtype=np.float64)
+    asked = np.atleast_1d(np.asarray(frequency_Hz, dtype=np.float64))
+    places = np.rint(asked / lines_Hz[1]).astype(int)
+    if places.min() <= HALF_BAND_LINES or places.max() + HALF_BAND_LINES >= len(lines_Hz):
+        raise RecordingError(
+            f"a run of {len(time_s) * step_s:.3g} s holds no response from {asked.min():.3g} to {asked.max():.3g} Hz; "
+            f"it reaches from {lines_Hz[HALF_BAND_LINES + 1]:.3g} to {lines_Hz[-HALF_BAND_LINES - 2]:.3g} Hz"
+        )
+    band = places[:, None] + np.arange(-HALF_BAND_LINES, HALF_BAND_LINES + 1)
+    power_u = (np.abs(u[band]) ** 2).sum(axis=1)
+    power_y = (np.abs(y[band]) ** 2).sum(axis=1)
+    cross = (u[band].conj() * y[band]).sum(axis=1)
+    largest = float((np.abs(u) ** 2).max())
+    missing = ~(power_u > LEAST_SPECTRUM**2 * largest)
+    if missing.any():
+        raise RecordingError(
+            f"the steering ({input_channel}) does not contain {asked[missing][0]:.3g} Hz: "
+            "no response can be evaluated there"
+        )
+    with np.errstate(invalid="ignore"):
+        coherence = np.abs(cross) ** 2 / (power_u * power_y)
+    # Without any output the response is zero and nothing contradicts it.
+    return FrequencyResponse(lines_Hz[places], cross / power_u, np.where(power_y > 0.0, coherence, 1.0))
+
+
+def metrics(recording: RecordingLike) -> dict[str, float]:
+    """Metrics of a sine sweep, from 0.2 to 4 Hz.
+
+    Returns:
+        For yaw rate, lateral acceleration (`ay`) and roll: `<name>_gain_...` at 0.2 Hz per steering wheel angle,
+        `<name>_phase_at_1Hz_rad`. For the yaw rate also the largest gain over the one at 0.2 Hz with its frequency, the
+        frequency at which the phase passes -45 deg, and the bandwidth (gain at 0.7 of the one at 0.2 Hz); nan where
+        they are not reached. `coherence_min` is the least of all three up to 2 Hz.
+
+    Raises:
+        RecordingError: a channel is missing, or the run is no sweep over this range.
+    """
+    frequencies = np.geomspace(LOWEST_Hz, HIGHEST_Hz, 80)
+    values: dict[str, float] = {}
+    coherence = 1.0
+    for name, channel, unit in (
+        ("yaw_rate", "yaw_rate_radps", "1ps"), ("ay", "ay_mps2", "mps2prad"), ("roll", "roll_rad", "radprad"),
+    ):  # fmt: skip
+        found = frequency_response(recording, channel, frequencies)
+        phase_rad = np.unwrap(np.angle(found.response))
+        gain = np.abs(found.response)
+        values[f"{name}_gain_{unit}"] = float(gain[0])
+        values[f"{name}_phase_at_1Hz_rad"] = float(np.interp(1.0, found.frequency_Hz, phase_rad))
+        coherence = min(coherence, float(found.coherence[found.frequency_Hz <= 2.0].min()))
+        if name == "yaw_rate":
+            top = int(gain.argmax())
+            values["yaw_rate_peak_gain_ratio"] = float(gain[top] / gain[0])
+            values["yaw_rate_peak_gain_Hz"] = float(found.frequency_Hz[top]) if top else math.nan
+            values["yaw_rate_45deg_Hz"] = _falls_to(found.frequency_Hz, phase_rad, -math.pi / 4.0)
+            values["yaw_rate_bandwidth_Hz"] = _falls_to(found.frequency_Hz, gain / gain[0], math.sqrt(0.5))
+    values["coherence_min"] = coherence
+    values["speed_end_mps"] = float(recording["speed_mps"][-1])
+    return values
+
+
+def _falls_to(x: NDArray[np.float64], y: NDArray[np.float64], level: float) -> float:
+    """Where y first falls to a level, interpolated; nan where it never does."""
+    below = np.flatnonzero((y[1:] <= level) & (y[:-1] > level))
+    if below.size == 0:
+        return math.nan
+    i = int(below[0])
+    return float(x[i] + (x[i + 1] - x[i]) * (y[i] - level) / (y[i] - y[i + 1]))

@@ -1,0 +1,194 @@
+"""Steady-state handling from a slow ramp at constant speed or on a constant radius, by ISO 4138.
+
+The understeer gradient is the gradient of the steer angle (steering wheel over overall ratio) over lateral
+acceleration, less that of the Ackermann angle l/R; with the measured curvature yaw rate over speed it is one and the
+same line in both tests:
+
+    steering wheel / ratio - l * yaw rate / speed = offset + EG * lateral acceleration
+
+Gradients are fitted over `FIT_MPS2`, where tyres and suspension are linear. The offset is the little by which the car
+lags behind the ramp.
+
+Source: ISO 4138, Passenger cars - Steady-state circular driving behaviour; v_ch = sqrt(l/EG) is the speed at which the
+yaw rate per steer angle is largest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.analysis.series import timestep
+from activesteer.analysis.source import RecordingLike
+from activesteer.errors import RecordingError
+
+Array = NDArray[np.float64]
+
+FIT_MPS2: Final = (0.5, 2.0)
+"""Range of lateral acceleration over which gradients are fitted [m/s2]."""
+DEPARTURE: Final = 0.05
+"""Share by which the steer angle departs from the line where the linear range ends."""
+SMOOTHING_S: Final = 0.5
+"""Window of the moving average that limits are read from [s]."""
+LEAST_SPEED_MPS: Final = 1.0
+"""Slower than this, curvature is not evaluated [m/s]."""
+
+
+class Car(NamedTuple):
+    """What the evaluation must know of the car.
+
+    Attributes:
+        cg_to_front_m: Distance of the centre of gravity to the front axle, l_V [m].
+        cg_to_rear_m: Distance of the centre of gravity to the rear axle, l_H [m].
+        steering_ratio: Steering wheel angle over road-wheel angle [-].
+    """
+
+    cg_to_front_m: float
+    cg_to_rear_m: float
+    steering_ratio: float
+
+    @property
+    def wheelbase_m(self) -> float:
+        """Wheelbase l [m]."""
+        return self.cg_to_front_m + self.cg_to_rear_m
+
+
+class Handling(NamedTuple):
+    """Steady-state handling in one test. Gradients are over lateral acceleration; nan where a test does not define one.
+
+    Attributes:
+        understeer_gradient_radpmps2: EG, at the road wheel [rad/(m/s2)].
+        steer_gradient_radpmps2: Gradient of steering wheel over ratio [rad/(m/s2)].
+        ackermann_gradient_radpmps2: Gradient of l/R [rad/(m/s2)].
+        linear_range_mps2: Lateral acceleration at which the steer angle is 5 % off the line [m/s2].
+        characteristic_speed_mps: sqrt(l/EG); nan for a car that does not understeer [m/s].
+        roll_gradient_radpmps2: Roll angle, outwards positive [rad/(m/s2)].
+        sideslip_gradient_radpmps2: Sideslip angle at the centre of gravity, in a left turn [rad/(m/s2)].
+        front_slip_gradient_radpmps2: Effective slip angle of the front axle, steering and roll steer included.
+        rear_slip_gradient_radpmps2: The same of the rear axle.
+        yaw_rate_gain_1ps: Yaw rate per steering wheel angle [1/s]; at constant speed.
+        steering_wheel_gain_mps2prad: Lateral acceleration per steering wheel angle [(m/s2)/rad]; at constant speed.
+        limit_acceleration_mps2: Largest lateral acceleration [m/s2].
+    """
+
+    understeer_gradient_radpmps2: float
+    steer_gradient_radpmps2: float
+    ackermann_gradient_radpmps2: float
+    linear_range_mps2: float
+    characteristic_speed_mps: float
+    roll_gradient_radpmps2: float
+    sideslip_gradient_radpmps2: float
+    front_slip_gradient_radpmps2: float
+    rear_slip_gradient_radpmps2: float
+    yaw_rate_gain_1ps: float
+    steering_wheel_gain_mps2prad: float
+    limit_acceleration_mps2: float
+
+
+def car_of(recording: RecordingLike) -> Car:
+    """The car of a recording, from its metadata.
+
+    Raises:
+        RecordingError: the metadata do not say.
+    """
+    vehicle: Any = recording.metadata.get("vehicle")
+    try:
+        single_track, steering = vehicle["single_track"], vehicle["steering"]
+        return Car(float(single_track["cg_to_front_m"]), float(single_track["cg_to_rear_m"]), float(steering["ratio"]))
+    except (KeyError, TypeError, ValueError) as error:
+        shown = sorted(vehicle) if isinstance(vehicle, Mapping) else vehicle
+        raise RecordingError(
+            "the metadata of the recording do not describe the car: vehicle.single_track.cg_to_front_m, "
+            f"vehicle.single_track.cg_to_rear_m and vehicle.steering.ratio are needed; vehicle holds {shown!r}"
+        ) from error
+
+
+def evaluate(recording: RecordingLike, car: Car | None = None) -> Handling:
+    """Steady-state handling from a test.
+
+    Args:
+        recording: A slow ramp to either side, from straight ahead: of the steering wheel at constant speed, or of the
+            speed on a circle.
+        car: The car; from the recording's metadata where not given.
+
+    Returns:
+        Gradients and limits.
+
+    Raises:
+        RecordingError: a channel is missing, or the run does not cover the range that gradients are fitted over.
+    """
+    car = car or car_of(recording)
+
+    def channel(name: str) -> Array:
+        return np.asarray(recording[name], dtype=np.float64)
+
+    ay = channel("ay_mps2")
+    side = math.copysign(1.0, float(ay[int(np.abs(ay).argmax())]))
+    ay = side * ay
+    speed = channel("vx_mps")
+    step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))
+    smoothed = _moving_average(ay, step_s)
+    # Only what comes before the limit: behind it the same acceleration is passed again.
+    top = int(smoothed.argmax())
+    first = int(np.argmax(smoothed > FIT_MPS2[0]))
+    rising = np.zeros(len(ay), dtype=bool)
+    rising[first : top + 1] = True
+    fit = rising & (smoothed <= FIT_MPS2[1]) & (speed > LEAST_SPEED_MPS)
+    if smoothed[top] < FIT_MPS2[1] or fit.sum() < 10:
+        raise RecordingError(
+            f"the run reaches {smoothed[top]:.3g} m/s2 of lateral acceleration; gradients are fitted from "
+            f"{FIT_MPS2[0]:g} to {FIT_MPS2[1]:g} m/s2"
+        )
+    wheel = side * channel("steering_wheel_rad")
+    steer = wheel / car.steering_ratio
+    yaw_rate = side * channel("yaw_rate_radps")
+    curvature = yaw_rate / np.maximum(speed, LEAST_SPEED_MPS)
+    sideslip = side * channel("sideslip_rad")
+
+    def gradient(values: Array) -> float:
+        return _line(ay[fit], values[fit])[0]
+
+    understeer, offset = _line(ay[fit], (steer - car.wheelbase_m * curvature)[fit])
+    constant_speed = float(np.ptp(speed[fit])) < 0.02 * float(speed[fit].mean())
+    expected = car.wheelbase_m * curvature + understeer * ay + offset
+    departed = rising & (np.abs(_moving_average(steer - expected, step_s)) > DEPARTURE * np.abs(expected))
+    departed &= smoothed > FIT_MPS2[1]
+    return Handling(
+        understeer_gradient_radpmps2=understeer,
+        steer_gradient_radpmps2=gradient(steer),
+        ackermann_gradient_radpmps2=gradient(car.wheelbase_m * curvature),
+        linear_range_mps2=float(smoothed[int(departed.argmax())]) if departed.any() else math.nan,
+        characteristic_speed_mps=math.sqrt(car.wheelbase_m / understeer) if understeer > 0.0 else math.nan,
+        roll_gradient_radpmps2=gradient(side * channel("roll_rad")),
+        sideslip_gradient_radpmps2=gradient(sideslip),
+        front_slip_gradient_radpmps2=gradient(steer - sideslip - car.cg_to_front_m * curvature),
+        rear_slip_gradient_radpmps2=gradient(car.cg_to_rear_m * curvature - sideslip),
+        yaw_rate_gain_1ps=_line(wheel[fit], yaw_rate[fit])[0] if constant_speed else math.nan,
+        steering_wheel_gain_mps2prad=_line(wheel[fit], ay[fit])[0] if constant_speed else math.nan,
+        limit_acceleration_mps2=float(smoothed[top]),
+    )
+
+
+def metrics(recording: RecordingLike) -> dict[str, float]:
+    """The values of `evaluate`, and the speed at the end."""
+    return {**evaluate(recording)._asdict(), "speed_end_mps": float(recording["speed_mps"][-1])}
+
+
+def _line(x: Array, y: Array) -> tuple[float, float]:
+    """Slope and offset of the line through points, by least squares."""
+    spread = x - x.mean()
+    slope = float(spread @ (y - y.mean()) / (spread @ spread))
+    return slope, float(y.mean() - slope * x.mean())
+
+
+def _moving_average(values: Array, step_s: float) -> Array:
+    """Mean over a window around every sample; towards the ends over as much of it as there is."""
+    half = max(1, round(0.5 * SMOOTHING_S / step_s))
+    total = np.concatenate(([0.0], np.cumsum(values)))
+    index = np.arange(len(values))
+    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
+    return (total[high] - total[low]) / (high - low)

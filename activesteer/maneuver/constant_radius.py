@@ -1,0 +1,61 @@
+"""Constant radius (ISO 4138): the driver keeps the car on a circle while its speed slowly rises to the limit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from activesteer.config import Range
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.base import Maneuver
+from activesteer.signals import Reference
+
+
+@dataclass(frozen=True)
+class Circle:
+    """The circle and how it is driven."""
+
+    radius_m: Annotated[float, Range(-2000.0, 2000.0)] = 100.0
+    """Radius of the path of the centre of gravity [m], positive to the left."""
+    entry_s: Annotated[float, Range(0.1, 60.0)] = 4.0
+    """Time in which the curvature rises from straight ahead to the circle's, at the speed of the start [s]."""
+    acceleration_mps2: Annotated[float, Range(0.01, 2.0)] = 0.4
+    """How fast the speed rises after the entry [m/s2]."""
+    end_speed_mps: Annotated[float, Range(0.0, 100.0)] = 30.0
+    """Speed at which it stops rising [m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstantRadius(Maneuver):
+    """A circle at slowly rising speed."""
+
+    circle: Circle = Circle()
+    """The circle."""
+
+    def __post_init__(self) -> None:
+        """The circle must be wider than a car can turn, and the speed must be able to rise.
+
+        Raises:
+            ManeuverError: it is not.
+        """
+        circle = self.circle
+        if abs(circle.radius_m) < 10.0:
+            msg = f"circle.radius_m: is {circle.radius_m:g} m; at least 10 m to either side are needed"
+            raise ManeuverError(msg)
+        if circle.end_speed_mps <= self.speed_mps:
+            msg = (
+                f"circle.end_speed_kmh: is {3.6 * circle.end_speed_mps:g} km/h; it must be above the speed at the "
+                f"start, {3.6 * self.speed_mps:g} km/h (speed_kmh)"
+            )
+            raise ManeuverError(msg)
+
+    def reference(self, time_s: float) -> Reference:
+        """Curvature and speed; see the base class."""
+        circle = self.circle
+        share = min(max(time_s / circle.entry_s, 0.0), 1.0)
+        # Half a wave of a cosine: the curvature begins and ends to rise without a kink.
+        curvature = 0.5 * (1.0 - math.cos(math.pi * share)) / circle.radius_m
+        rising_s = max(time_s - circle.entry_s, 0.0)
+        speed = min(self.speed_mps + rising_s * circle.acceleration_mps2, circle.end_speed_mps)
+        return Reference(0.0, speed, 0.0, hold_speed=True, curvature_1pm=curvature)

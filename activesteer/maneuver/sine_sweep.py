@@ -1,0 +1,72 @@
+"""Sine sweep (ISO 7401): a small sine at the steering wheel whose frequency rises, for the frequency response."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from activesteer.config import Range
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.base import Maneuver
+from activesteer.signals import Reference
+
+Frequency = Annotated[float, Range(0.01, 50.0)]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The sweep at the steering wheel: amplitude, and frequency rising by the same factor every second."""
+
+    start_s: Annotated[float, Range(0.0)] = 0.5
+    """When it begins [s]."""
+    length_s: Annotated[float, Range(1.0)] = 60.0
+    """How long it takes [s]."""
+    amplitude_rad: Annotated[float, Range(0.0, 15.0)] = math.radians(9.0)
+    """Amplitude [rad]."""
+    first_Hz: Frequency = 0.1
+    """Frequency at its beginning [Hz]."""
+    last_Hz: Frequency = 5.0
+    """Frequency at its end [Hz]."""
+    fade_s: Annotated[float, Range(0.0)] = 1.0
+    """Time in which the amplitude rises at the beginning and falls at the end [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SineSweep(Maneuver):
+    """A sine of constant amplitude and rising frequency at constant speed."""
+
+    sweep: Sweep = Sweep()
+    """The sweep."""
+
+    def __post_init__(self) -> None:
+        """The sweep must rise and end within the run.
+
+        Raises:
+            ManeuverError: it does not.
+        """
+        sweep = self.sweep
+        if sweep.last_Hz <= sweep.first_Hz:
+            msg = f"sweep.last_Hz: is {sweep.last_Hz:g} Hz; it must be above first_Hz, {sweep.first_Hz:g} Hz"
+            raise ManeuverError(msg)
+        if sweep.start_s + sweep.length_s > self.duration_s:
+            end = sweep.start_s + sweep.length_s
+            msg = f"sweep.length_s: the sweep ends at {end:g} s, but the run at {self.duration_s:g} s (duration_s)"
+            raise ManeuverError(msg)
+        if 2.0 * sweep.fade_s > sweep.length_s:
+            msg = f"sweep.fade_s: twice {sweep.fade_s:g} s is longer than the sweep, {sweep.length_s:g} s (length_s)"
+            raise ManeuverError(msg)
+
+    def reference(self, time_s: float) -> Reference:
+        """Steering wheel angle of the sweep; see the base class."""
+        sweep = self.sweep
+        t = time_s - sweep.start_s
+        angle = 0.0
+        if 0.0 < t < sweep.length_s:
+            growth = math.log(sweep.last_Hz / sweep.first_Hz) / sweep.length_s
+            phase = 2.0 * math.pi * sweep.first_Hz * math.expm1(growth * t) / growth
+            angle = sweep.amplitude_rad * math.sin(phase)
+            to_edge = min(t, sweep.length_s - t)
+            if to_edge < sweep.fade_s:
+                angle *= 0.5 - 0.5 * math.cos(math.pi * to_edge / sweep.fade_s)
+        return Reference(angle, self.speed_mps, 0.0, hold_speed=True)

@@ -1,0 +1,52 @@
+"""Slowly increasing steer (ISO 4138, constant speed): the steering wheel turns so slowly that the car stays settled."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from activesteer.config import Range
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.base import Maneuver
+from activesteer.signals import Reference
+
+
+@dataclass(frozen=True)
+class SlowRamp:
+    """The ramp of the steering wheel."""
+
+    start_s: Annotated[float, Range(0.0)] = 0.5
+    """When the steering wheel begins to turn [s]."""
+    rate_radps: Annotated[float, Range(-2.0, 2.0)] = math.radians(5.0)
+    """How fast it turns [rad/s], left positive."""
+    end_rad: Annotated[float, Range(0.0, 15.0)] = math.radians(200.0)
+    """Angle to either side at which it stops [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlowlyIncreasingSteer(Maneuver):
+    """A slow ramp of the steering wheel angle at constant speed, up to the limit of the car."""
+
+    steer: SlowRamp = SlowRamp()
+    """The ramp."""
+
+    def __post_init__(self) -> None:
+        """The ramp must begin within the run, and turn.
+
+        Raises:
+            ManeuverError: it does not.
+        """
+        ramp = self.steer
+        if ramp.start_s >= self.duration_s:
+            msg = f"steer.start_s: is {ramp.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)"
+            raise ManeuverError(msg)
+        if ramp.rate_radps == 0.0 or ramp.end_rad == 0.0:
+            msg = "steer: rate_degps and end_deg must not be 0, or the steering wheel does not turn"
+            raise ManeuverError(msg)
+
+    def reference(self, time_s: float) -> Reference:
+        """Steering wheel angle of the ramp; see the base class."""
+        ramp = self.steer
+        turned = min(max(time_s - ramp.start_s, 0.0) * abs(ramp.rate_radps), ramp.end_rad)
+        return Reference(math.copysign(turned, ramp.rate_radps), self.speed_mps, 0.0, hold_speed=True)

@@ -1,0 +1,147 @@
+"""Modes of a linearised car and what they are called: after the parts that take part in them.
+
+The participation of state i in mode k is |w_ki v_ik|, w and v being left and right eigenvectors, divided by the sum
+over all states; it does not depend on the units of the states. Bounce, roll and pitch each name the one mode in which
+they take part most, every other mode has the name of another part that takes part most. Where two modes come close, as
+roll and yaw/sideslip of a fast car, they mix, and exchange their names.
+
+Source: Perez-Arriaga, Verghese and Schweppe, Selective modal analysis, IEEE Trans. Power Apparatus and Systems 101
+(1982), participation factors.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_PARTS: Final = (
+    ("speed", r"d_x"),
+    ("yaw/sideslip", r"d_y|d_yaw"),
+    ("bounce", r"(d_)?z"),
+    ("roll", r"(d_)?roll"),
+    ("pitch", r"(d_)?pitch"),
+    ("front wheel hop", r"(d_)?f[lr]_jounce"),
+    ("rear wheel hop", r"(d_)?r[lr]_z"),
+    ("front wheel steer", r"(d_)?(f[lr]_topmount_z|rack)"),
+    ("front wheel fore-aft", r"(d_)?f[lr]_topmount_y"),
+    ("front wheel camber", r"(d_)?f[lr]_topmount_x"),
+    ("rear wheel steer", r"(d_)?r[lr]_(rot_z|steer)"),
+    ("rear wheel fore-aft", r"(d_)?r[lr]_(x|rot_y)"),
+    ("rear wheel camber", r"(d_)?r[lr]_(y|rot_x)"),
+    ("front wheel rotation", r"d_f[lr]_spin|act_f[lr]_slip_x"),
+    ("rear wheel rotation", r"d_r[lr]_spin|act_r[lr]_slip_x"),
+    ("front tyre lateral", r"act_f[lr]_slip_y"),
+    ("rear tyre lateral", r"act_r[lr]_slip_y"),
+    ("front tyre turn slip", r"act_f[lr]_slip_z"),
+    ("rear tyre turn slip", r"act_r[lr]_slip_z"),
+    ("drive", r"act_[fr][lr]_drive"),
+    ("rear steering servo", r"act_r[lr]_steer"),
+    ("superposition servo", r"act_superposition"),
+    ("superposition gear", r"(d_)?superposition"),
+    ("steering wheel", r"(d_)?steering_wheel"),
+)
+"""Parts of a car and the states (see `LocalState`) that belong to them; other states are their own part."""
+
+_BODY_PARTS: Final = ("bounce", "roll", "pitch")
+"""Motions of the body that have one mode each."""
+
+_EQUAL_SHARE: Final = 0.9
+"""How much alike left and right must move for a mode to count as parallel or opposite."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode, or a conjugate pair.
+
+    Attributes:
+        name: After the part that takes part most; with `parallel` or `opposite` where it is one of the wheels.
+        eigenvalue_1ps: s [1/s], imaginary part not negative.
+        shares: Participation of the parts, largest first; the sum is 1.
+        shape: Right eigenvector, complex, shape (n,).
+        left: Left eigenvector, complex, shape (n,); its product with `shape` is 1.
+    """
+
+    name: str
+    eigenvalue_1ps: complex
+    shares: dict[str, float]
+    shape: NDArray[np.complex128]
+    left: NDArray[np.complex128]
+
+    @property
+    def natural_frequency_Hz(self) -> float:
+        """Undamped natural frequency |s|/2pi [Hz]."""
+        return abs(self.eigenvalue_1ps) / (2.0 * math.pi)
+
+    @property
+    def damping_ratio(self) -> float:
+        """Damping ratio [-]; 1 for a mode that only decays."""
+        return -self.eigenvalue_1ps.real / abs(self.eigenvalue_1ps)
+
+
+def find_modes(a: NDArray[np.float64], states: tuple[str, ...], timestep_s: float) -> list[Mode]:
+    """Modes of a system in discrete time.
+
+    Args:
+        a: System matrix of one step, shape (n, n).
+        states: Names of the states, n.
+        timestep_s: Length of a step [s].
+
+    Returns:
+        Modes by natural frequency; of a conjugate pair the one with positive imaginary part.
+    """
+    values, right = np.linalg.eig(a)
+    left = np.linalg.inv(right)
+    shares = np.abs(right * left.T)
+    shares /= shares.sum(axis=0)
+    parts = [_part_of(state) for state in states]
+    by_mode: dict[int, dict[str, float]] = {}
+    for index in np.flatnonzero(np.imag(values) >= 0.0):
+        sums = dict.fromkeys(parts, 0.0)
+        for part, share in zip(parts, shares[:, index], strict=True):
+            sums[part] += float(share)
+        by_mode[int(index)] = dict(sorted(sums.items(), key=lambda item: -item[1]))
+    names: dict[int, str] = {}
+    for part in _BODY_PARTS:
+        most = max(by_mode, key=lambda index: by_mode[index].get(part, 0.0))
+        if by_mode[most].get(part, 0.0) > 0.0:
+            names[most] = part
+    modes = []
+    for index, sums in by_mode.items():
+        # ln of a negative real z would stand for half a turn a step: such a mode is beyond what the steps resolve.
+        s = complex(np.log(complex(values[index]))) / timestep_s
+        name = names.get(index)
+        if name is None:
+            name = next((part for part in sums if part not in _BODY_PARTS), next(iter(sums)))
+            name += _sides(right[:, index], shares[:, index], states)
+        modes.append(Mode(name, s, sums, right[:, index].astype(complex), left[index].astype(complex)))
+    return sorted(modes, key=lambda mode: (abs(mode.eigenvalue_1ps), mode.name))
+
+
+def _part_of(state: str) -> str:
+    for part, pattern in _PARTS:
+        if re.fullmatch(pattern, state):
+            return part
+    return state.removeprefix("d_")
+
+
+def _sides(shape: NDArray[np.complex128], shares: NDArray[np.float64], states: tuple[str, ...]) -> str:
+    """Whether left and right wheels move alike or against each other, where it is the wheels that move."""
+    top = states[int(shares.argmax())]
+    match = re.search(r"(?<![a-z])([fr])([lr])_", top)
+    if match is None:
+        return ""
+    front, side = match.groups()
+    other = top.replace(f"{front}{side}_", f"{front}{'r' if side == 'l' else 'l'}_")
+    if other not in states:
+        return ""
+    one, two = shape[states.index(top)], shape[states.index(other)]
+    alike = float((one.conjugate() * two).real) * 2.0 / float(abs(one) ** 2 + abs(two) ** 2)
+    # Coordinates of both sides point the same way in vehicle axes: wheels that steer alike turn alike.
+    if abs(alike) < _EQUAL_SHARE:
+        return ""
+    return ", parallel" if alike > 0.0 else ", opposite"

@@ -1,0 +1,50 @@
+"""`activesteer identify` and `activesteer linearise`."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+
+from activesteer.cli import main
+from activesteer.resources import find_vehicle
+
+
+@pytest.fixture
+def own_vehicle(tmp_path):
+    """A copy of the compact's file, with another characteristic speed in it."""
+    text = find_vehicle("compact").read_text(encoding="utf-8")
+    file = tmp_path / "own.toml"
+    before, _, after = text.partition("characteristic_speed_kmh = ")
+    file.write_text(before + "characteristic_speed_kmh = 120.0" + after[after.index("\n") :], encoding="utf-8")
+    return file
+
+
+@pytest.mark.slow
+def test_identify_writes_the_single_track_model_into_the_vehicle_file(own_vehicle, capsys):
+    kept = shutil.copy(own_vehicle, own_vehicle.with_name("kept.toml"))
+    assert main(["identify", "--vehicle", str(kept), "--dry-run", "--json"]) == 0
+    assert kept.read_text(encoding="utf-8") == own_vehicle.read_text(encoding="utf-8")
+    found = json.loads(capsys.readouterr().out)["single_track"]
+    assert main(["identify", "--vehicle", str(own_vehicle)]) == 0
+    assert "understeer gradient" in capsys.readouterr().out
+    written = own_vehicle.read_text(encoding="utf-8")
+    assert "120.0" not in written
+    assert f"characteristic_speed_kmh = {3.6 * found['characteristic_speed_mps']:.1f}"[:-2] in written
+    assert "activesteer identify --vehicle" in written
+    assert "[dampers.front]" in written
+
+
+def test_linearise_tells_the_modes_and_draws(tmp_path, capsys):
+    assert main(["linearise", "--speed-kmh", "80", "-o", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    for mode in ("bounce", "pitch", "roll", "yaw/sideslip", "wheel hop"):
+        assert mode in told
+    assert (tmp_path / "bode.png").stat().st_size > 10_000
+    assert (tmp_path / "root_locus.png").stat().st_size > 10_000
+
+
+def test_linearise_needs_a_speed(capsys):
+    assert main(["linearise", "--speed-kmh", "0"]) == 1
+    assert "speed_mps" in capsys.readouterr().err

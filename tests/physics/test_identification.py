@@ -1,0 +1,85 @@
+"""Steady-state handling of the compact by ISO 4138, and whether its vehicle file still says what the car does."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+import pytest
+
+from activesteer.controllers import SingleTrackParameters
+from activesteer.identification import (
+    CONSTANT_SPEED_TESTS,
+    RADIUS_TEST,
+    Identification,
+    identify,
+    identify_single_track,
+)
+from activesteer.scenario import resolve
+from tests.physics.runs import run
+
+DEGPG = math.degrees(9.81)
+
+
+@functools.cache
+def single_track() -> SingleTrackParameters:
+    return identify_single_track("compact")
+
+
+@functools.cache
+def full() -> Identification:
+    return identify("compact")
+
+
+@pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(SingleTrackParameters)])
+def test_stored_single_track_parameter_matches_the_car(name):
+    """Where this fails the car has changed: run `activesteer identify`."""
+    stored = resolve("standstill", "compact").car.single_track
+    assert getattr(stored, name) == pytest.approx(getattr(single_track(), name), rel=0.01)
+
+
+def test_characteristic_speed_is_that_of_the_class():
+    speed_mps = single_track().characteristic_speed_mps
+    assert speed_mps is not None
+    assert 77.0 < 3.6 * speed_mps < 93.0
+
+
+def test_heavier_car_is_seen_by_the_identification():
+    heavier = identify_single_track("compact", {"load.mass_factor": 1.1})
+    assert heavier.mass_kg > single_track().mass_kg + 100.0
+
+
+def test_circle_is_held_while_the_car_is_far_from_its_limit():
+    recording = run("constant_radius", duration_s=40.0)
+    driven = (recording.time_s > 10.0) & (np.abs(recording["ay_mps2"]) < 4.0)
+    curvature = recording["yaw_rate_radps"][driven] / recording["vx_mps"][driven]
+    assert curvature == pytest.approx(0.01, rel=0.02)
+
+
+@pytest.mark.slow
+def test_constant_speed_and_constant_radius_give_the_same_understeer():
+    gradients = [test.understeer_gradient_radpmps2 for test in full().tests.values()]
+    assert list(full().tests) == [*CONSTANT_SPEED_TESTS, RADIUS_TEST]
+    assert max(gradients) / min(gradients) < 1.02
+
+
+@pytest.mark.slow
+def test_short_tests_find_the_same_single_track_model_as_the_full_ones():
+    assert vars(full().single_track) == pytest.approx(vars(single_track()), rel=1e-3)
+
+
+@pytest.mark.slow
+def test_handling_is_that_of_a_car_of_this_class():
+    for test in full().tests.values():
+        assert 2.2 < DEGPG * test.understeer_gradient_radpmps2 < 3.2
+        assert 3.9 < DEGPG * test.roll_gradient_radpmps2 < 6.4
+        assert test.linear_range_mps2 > 3.5
+        assert 7.5 < test.limit_acceleration_mps2 < 9.5
+
+
+@pytest.mark.slow
+def test_left_and_right_turns_are_alike():
+    left, right = (run("slowly_increasing_steer", steer__rate_degps=rate).metrics for rate in (5.0, -5.0))
+    assert left == pytest.approx(right, rel=1e-6)

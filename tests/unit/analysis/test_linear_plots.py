@@ -1,0 +1,72 @@
+"""Pictures of linear cars, and figure 2."""
+
+from __future__ import annotations
+
+import control
+import numpy as np
+import pytest
+
+from activesteer.analysis.frequency_response import OUTPUTS
+from activesteer.analysis.linear_plots import draw_bode, draw_root_locus
+from activesteer.analysis.plots import figure_2
+from activesteer.errors import ParameterError
+from tests.unit.analysis.made_up import step_steer
+from tests.unit.analysis.test_frequency_response import sweep
+
+
+def system(speed_mps: float = 20.0) -> control.StateSpace:
+    """A made-up oscillator whose damping falls with speed; all outputs are its position."""
+    a = np.array([[0.0, 1.0], [-81.0, -200.0 / speed_mps]])
+    return control.StateSpace(
+        a, [[0.0], [81.0]], np.tile([1.0, 0.0], (4, 1)), np.zeros((4, 1)),
+        inputs=["steering_wheel_rad"], outputs=list(OUTPUTS),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """Every Figure that is saved, for looking at its curves."""
+    figure_module = pytest.importorskip("matplotlib.figure")
+    kept = []
+    monkeypatch.setattr(figure_module.Figure, "savefig", lambda self, *_, **__: kept.append(self))
+    return kept
+
+
+def test_bode_diagram_shows_gain_and_phase_of_every_output(figures, tmp_path):
+    draw_bode({"a": system(), "b": system(40.0)}, tmp_path / "bode.png", recording=sweep())
+    axes = figures[0].get_axes()
+    assert len(axes) == 2 * len(OUTPUTS)
+    assert [len(axis.get_lines()) for axis in axes] == [3] * len(axes)
+    curve = axes[0].get_lines()[0]
+    expected = np.abs(system()(2j * np.pi * np.asarray(curve.get_xdata()))[0])
+    assert np.asarray(curve.get_ydata()) == pytest.approx(np.ravel(expected))
+
+
+def test_root_locus_has_the_poles_of_every_speed(figures, tmp_path):
+    speeds = [10.0, 20.0, 40.0]
+    draw_root_locus([system(speed) for speed in speeds], speeds, tmp_path / "locus.png")
+    points = figures[0].get_axes()[0].collections[0]
+    offsets = np.asarray(points.get_offsets())
+    for speed in (20.0, 40.0):
+        pole = next(pole for pole in system(speed).poles() if pole.imag > 0)
+        assert np.hypot(offsets[:, 0] - pole.real, offsets[:, 1] - pole.imag).min() < 1e-9
+    assert set(np.round(np.asarray(points.get_array()), 6)) <= {36.0, 72.0, 144.0}
+
+
+def test_what_cannot_be_drawn_is_an_error(tmp_path):
+    with pytest.raises(ParameterError, match="no linear car"):
+        draw_bode({}, tmp_path / "a.png")
+    with pytest.raises(ParameterError, match="no input 'wheel'"):
+        draw_bode({"a": system()}, tmp_path / "a.png", input_name="wheel")
+    with pytest.raises(ParameterError, match="1 linear cars and 2 speeds"):
+        draw_root_locus([system()], [10.0, 20.0], tmp_path / "a.png")
+
+
+def test_figure_2_draws_a_model_only_where_it_has_the_channel(figures, tmp_path):
+    run = step_steer()
+    figure_2(run, tmp_path / "f.png", {"single-track model": {"yaw_rate_radps": 0.2 * np.ones(len(run.time_s))}})
+    yaw, roll = figures[0].get_axes()
+    assert [line.get_label() for line in yaw.get_lines()] == ["multibody car", "single-track model"]
+    assert [line.get_label() for line in roll.get_lines()] == ["multibody car"]
+    assert float(yaw.get_lines()[1].get_ydata()[-1]) == pytest.approx(np.degrees(0.2))
+    assert float(roll.get_lines()[0].get_ydata()[-1]) == pytest.approx(np.degrees(0.04), rel=1e-3)

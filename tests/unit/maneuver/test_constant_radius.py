@@ -1,0 +1,49 @@
+"""Constant radius: curvature and speed that are asked of the driver."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from activesteer.config import Source
+from activesteer.errors import ManeuverError
+from activesteer.maneuver import ConstantRadius, build_maneuver
+
+SOURCE = Source("mine.toml", error=ManeuverError)
+
+
+def circle(**keys: Any) -> ConstantRadius:
+    table = {"kind": "constant_radius", "speed_mps": 6.0, "duration_s": 60.0, "circle": keys}
+    built = build_maneuver(table, SOURCE)
+    assert isinstance(built, ConstantRadius)
+    return built
+
+
+@pytest.mark.parametrize("radius_m", [100.0, -40.0])
+def test_curvature_rises_smoothly_to_that_of_the_circle(radius_m):
+    maneuver = circle(radius_m=radius_m, entry_s=4.0)
+    asked = np.array([maneuver.reference(time_s).curvature_1pm for time_s in np.linspace(0.0, 10.0, 1001)]) * radius_m
+    assert asked[0] == 0.0
+    assert asked[400:] == pytest.approx(1.0)
+    assert np.diff(asked).min() >= -1e-12
+    assert np.diff(asked)[0] < 1e-3 * np.diff(asked).max() * 10
+
+
+def test_speed_rises_after_the_entry_and_stops_at_its_end():
+    maneuver = circle(entry_s=4.0, acceleration_mps2=0.5, end_speed_mps=16.0)
+    for time_s, speed_mps in {0.0: 6.0, 4.0: 6.0, 14.0: 11.0, 24.0: 16.0, 50.0: 16.0}.items():
+        assert maneuver.reference(time_s).speed_mps == pytest.approx(speed_mps)
+
+
+def test_car_settles_straight_ahead():
+    assert circle().settling_reference().curvature_1pm == 0.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"), [({"radius_m": 5.0}, "at least 10 m"), ({"end_speed_kmh": 20.0}, "above the speed at the start")]
+)
+def test_circle_that_cannot_be_driven_is_an_error(keys, words):
+    with pytest.raises(ManeuverError, match=words):
+        circle(**keys)

@@ -1,0 +1,39 @@
+"""Slowly increasing steer: a ramp of the steering wheel."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from activesteer.config import Source
+from activesteer.errors import ManeuverError
+from activesteer.maneuver import SlowlyIncreasingSteer, build_maneuver
+
+SOURCE = Source("mine.toml", error=ManeuverError)
+
+
+def ramp(**steer: Any) -> SlowlyIncreasingSteer:
+    table = {"kind": "slowly_increasing_steer", "speed_kmh": 80, "duration_s": 20.0, "steer": steer}
+    built = build_maneuver(table, SOURCE)
+    assert isinstance(built, SlowlyIncreasingSteer)
+    return built
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_steering_wheel_turns_at_the_rate_to_its_end(side):
+    maneuver = ramp(start_s=1.0, rate_degps=side * 5.0, end_deg=40.0)
+    for time_s, angle_deg in {0.0: 0.0, 1.0: 0.0, 3.0: 10.0, 9.0: 40.0, 15.0: 40.0}.items():
+        assert math.degrees(maneuver.reference(time_s).steering_wheel_rad) == pytest.approx(side * angle_deg, abs=1e-9)
+    assert maneuver.reference(15.0).speed_mps == pytest.approx(80 / 3.6)
+    assert maneuver.reference(15.0).hold_speed
+
+
+@pytest.mark.parametrize(
+    ("steer", "words"),
+    [({"start_s": 20.0}, "start_s"), ({"rate_degps": 0.0}, "rate_degps"), ({"end_deg": 0}, "end_deg")],
+)
+def test_ramp_that_does_not_turn_is_an_error(steer, words):
+    with pytest.raises(ManeuverError, match=words):
+        ramp(**steer)
