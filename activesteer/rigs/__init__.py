@@ -1,3 +1,6 @@
 """Test rigs: one part of the car on its own, moved as on a bench."""
 
-from __future__ import annotations
+from activesteer.rigs.kc import KcResult, kinematics_compliance
+from activesteer.rigs.tyre_rig import TyreRig
+
+__all__ = ["KcResult", "TyreRig", "kinematics_compliance"]

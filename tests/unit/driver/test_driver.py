@@ -84,6 +84,8 @@ def test_steering_wheel_stops_at_its_lock(side):
     command = driver().step(Reference(side * 9.0, 20.0, 0.0, True), at(20.0))
     assert command.steering_wheel_rad == side * 8.0
     assert command.front_steer_rad == side * 0.5
+    assert command.limited
+    assert not driver().step(Reference(side * 7.0, 20.0, 0.0, True), at(20.0)).limited
 
 
 def test_driver_holds_speed_only_where_asked_and_presses_the_brake():

@@ -1,0 +1,30 @@
+"""`activesteer kc`: kinematics and compliance of both axles, measured as on a rig."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("kc", help="kinematics and compliance of the suspensions, as on a rig")
+    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for the pictures; none without it")
+    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    parser.set_defaults(action=_kc)
+
+
+def _kc(options: argparse.Namespace) -> int:
+    from activesteer.rigs import kinematics_compliance
+
+    result = kinematics_compliance(options.vehicle)
+    print(result.to_json() if options.json else result.table())
+    if options.output is not None:
+        from activesteer.rigs.kc import draw
+
+        for path in draw(result, options.output):
+            if not options.json:
+                print(f"figure: {path}")
+    return 0

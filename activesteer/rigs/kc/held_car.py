@@ -1,0 +1,262 @@
+"""The car with its chassis held and its wheels on pads: equilibrium by Newton's method on the forces at rest.
+
+It is the model of the simulations with the six coordinates of the chassis, and the rotation of the wheels, left out of
+the search. The chassis is held 1 m above where it stands, so that the tyre forces of that model vanish and the pads
+take their place: each pad holds the height of its wheel, pushes straight up at the contact point, and carries whatever
+horizontal force or moment it is told to. A wheel is fastened to its pad, which can pull as well.
+
+The wheel is rigid and has the loaded radius that it has in the standing car: what the rig measures is the suspension.
+Dry friction and joint limits are constraints of the engine and take no part.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from dataclasses import dataclass, field
+from typing import Final, Literal, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import CORNERS
+from activesteer.errors import ModelError
+from activesteer.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Springs = Literal["in", "out", "locked"]
+Hold = Literal["centre", "contact", "nothing"]
+
+_LIFT_M: Final = 1.0
+"""How far the chassis is lifted off the road [m]."""
+_DIFFERENCE: Final = 1e-7
+"""Step of the finite differences [m, rad]: a link of 1e7 N/m changes its force by 1 N."""
+_LARGEST_STEP: Final = 0.02
+"""Most that a coordinate may move in one iteration [m, rad], so that stops are met from outside."""
+_ITERATIONS: Final = 60
+_SMALLEST_STEP: Final = 1e-11
+"""A step of Newton's method below this ends the search [m, rad] where rounding keeps the forces from vanishing."""
+_TOLERANCE: Final = 1e-6
+"""Residual at which the search ends [N, N m], heights in units of 0.1 mm."""
+_ROUNDING: Final = 1e-2
+"""Largest residual that rounding may leave behind; links of 1e9 N/m leave 1e-4."""
+_HEIGHT_SCALE_NPM: Final = 1e4
+"""Heights are multiplied by this, so that their residual is of the size of the forces'."""
+_STALE: Final = 0.3
+"""A step that leaves more than this share of the residual shows that the stiffness in use is out of date."""
+_LOCK_NPM: Final = 1e9
+_NO_MOMENT: Final = np.zeros(3)
+_SPRING_ENDINGS: Final = ("_spring", "_damper", "_anti_roll_bar")
+"""Tendons whose names end so carry the car."""
+
+
+class WheelPose(NamedTuple):
+    """Where one wheel is: world axes, its rotation about its own axle locked to the knuckle."""
+
+    centre_m: Array
+    rotation: Array
+    contact_m: Array
+
+
+@dataclass
+class Case:
+    """What the rig does to the car at one point of a sweep; arrays by corner."""
+
+    hold: Hold = "centre"
+    """What the pads hold: the heights of the wheel centres, of the contact points, or nothing at all."""
+    height_m: Array = field(default_factory=lambda: np.zeros(4))
+    """Height above the one in the standing car [m], shape (4,)."""
+    patch_N: Array = field(default_factory=lambda: np.zeros((4, 3)))
+    """Force at the contact points beside the pads' vertical one [N], shape (4, 3)."""
+    centre_N: Array = field(default_factory=lambda: np.zeros((4, 3)))
+    """Force at the wheel centres [N], shape (4, 3)."""
+    moment_Nm: Array = field(default_factory=lambda: np.zeros((4, 3)))
+    """Moment on the wheels [N m], shape (4, 3)."""
+    steering_wheel_rad: float = 0.0
+    rear_steer_rad: float = 0.0
+
+
+class HeldCar:
+    """A car on the rig.
+
+    Attributes:
+        model: The engine's model.
+        data: Its state.
+        radius_m: Loaded radii of the standing car [m], shape (4,).
+        origin_m: Position of the chassis' origin in the world [m], shape (3,).
+        load_N: Vertical forces of the pads in the last equilibrium [N], shape (4,).
+    """
+
+    def __init__(self, vehicle: Vehicle, springs: Springs = "in") -> None:
+        """Puts the car on the rig, in the attitude in which it stands.
+
+        Args:
+            vehicle: The car, in static ride on a level road.
+            springs: `in`; `out`: without springs, stops, anti-roll bars and weight, the links carry nothing and have
+                their design lengths; `locked`: the same with the lengths of the dampers fixed, as for turning the
+                wheels about their steering axes.
+        """
+        self.model = model = vehicle.model if springs == "in" else copy.copy(vehicle.model)
+        self.data = data = mujoco.MjData(model)
+        self._wheels = [model.body(f"{corner}_wheel").id for corner in CORNERS]
+        self._bind()
+        standing = vehicle.data.xpos[self._wheels, 2]
+        lean = vehicle.data.xmat[self._wheels, 7]
+        self.radius_m = standing / np.sqrt(1.0 - lean * lean)
+        self._radii = self.radius_m.tolist()
+        self._reference_m = {"centre": standing + _LIFT_M, "contact": np.full(4, _LIFT_M)}
+        data.qpos[:] = vehicle.data.qpos if springs == "in" else model.qpos0
+        data.qpos[self._root : self._root + 7] = vehicle.data.qpos[self._root : self._root + 7]
+        data.qpos[self._root + 2] += _LIFT_M
+        self.origin_m = data.qpos[self._root : self._root + 3].copy()
+        self._inverse: Array = np.empty((0, 0))
+        self._held: Hold = "nothing"
+        self.load_N = np.zeros(4)
+        if springs != "in":
+            self._take_out_springs(lock_dampers=springs == "locked")
+        self.equilibrium(Case("nothing" if springs == "locked" else "centre"))
+        self._start = data.qpos.copy(), self.load_N.copy(), self._inverse.copy(), self._held
+
+    def _bind(self) -> None:
+        model = self.model
+        root = model.joint("root")
+        self._root = int(root.qposadr[0])
+        held = [*range(int(root.dofadr[0]), int(root.dofadr[0]) + 6)]
+        held += [int(model.joint(f"{corner}_spin").dofadr[0]) for corner in CORNERS]
+        self._free = np.setdiff1d(np.arange(model.nv), held)
+        self._steering_wheel = int(model.actuator("steering_wheel").id)
+        self._rear = [int(model.actuator(f"{corner}_steer").id) for corner in CORNERS[2:]]
+
+    def _take_out_springs(self, *, lock_dampers: bool) -> None:
+        model, data = self.model, self.data
+        model.opt.gravity[:] = 0.0
+        mujoco.mj_fwdPosition(model, data)
+        for tendon in range(model.ntendon):
+            name = model.tendon(tendon).name
+            if name.endswith(_SPRING_ENDINGS):
+                lock = lock_dampers and name.endswith("_damper")
+                model.tendon_stiffness[tendon] = _LOCK_NPM if lock else 0.0
+                model.tendon_stiffnesspoly[tendon] = 0.0
+                model.tendon_lengthspring[tendon] = data.ten_length[tendon]
+
+    def reset(self) -> None:
+        """Back to the first equilibrium, in every digit."""
+        qpos, load, inverse, self._held = self._start
+        self.data.qpos[:] = qpos
+        self.load_N, self._inverse = load.copy(), inverse.copy()
+        self.data.ctrl[:] = 0.0
+        self.data.act[:] = 0.0
+        mujoco.mj_fwdPosition(self.model, self.data)
+
+    def wheel(self, corner: int) -> WheelPose:
+        """Where a wheel is; the contact point is the lowest point of the rigid wheel's circle."""
+        body = self._wheels[corner]
+        centre = self.data.xpos[body].copy()
+        return WheelPose(centre, self.data.xmat[body].reshape(3, 3).copy(), centre + self._down(corner))
+
+    def _down(self, corner: int) -> Array:
+        """From a wheel's centre to its contact point [m], world axes, shape (3,)."""
+        _, x, _, _, y, _, _, z, _ = self.data.xmat[self._wheels[corner]].tolist()
+        across = math.sqrt(1.0 - z * z)
+        scale = self._radii[corner] / across
+        return np.array([scale * x * z, scale * y * z, -self._radii[corner] * across])
+
+    def equilibrium(self, case: Case) -> None:
+        """Moves the car into equilibrium, from where it is.
+
+        Args:
+            case: What the rig does.
+
+        Raises:
+            ModelError: no equilibrium was found.
+        """
+        self._command(case)
+        residual = self._residual(case)
+        size = np.abs(residual).max()
+        if self._inverse.size == 0 or self._held != case.hold:
+            self._renew(case, residual)
+        for _ in range(_ITERATIONS):
+            if size < _TOLERANCE:
+                return
+            step = -self._inverse @ residual
+            largest = np.abs(step[:-4]).max()
+            if largest < _SMALLEST_STEP and size < _ROUNDING:
+                return
+            self._move(step * min(1.0, _LARGEST_STEP / largest if largest > 0.0 else 1.0))
+            residual = self._residual(case)
+            before, size = size, np.abs(residual).max()
+            if size > _STALE * before and size > _TOLERANCE:
+                self._renew(case, residual)
+        dofs = [*(self.model.joint(int(self.model.dof_jntid[dof])).name for dof in self._free), *CORNERS]
+        msg = (
+            f"kinematics and compliance rig: no equilibrium found in {_ITERATIONS} iterations; {size:.3g} N (or N m) "
+            f"remain at {dofs[int(np.abs(residual).argmax())]!r}; do the links leave each wheel one way to travel?"
+        )
+        raise ModelError(msg)
+
+    def _command(self, case: Case) -> None:
+        """Commands the servos. The search begins where they will arrive: further away one is at its torque's limit."""
+        commands = [(self._steering_wheel, case.steering_wheel_rad)]
+        commands += [(actuator, case.rear_steer_rad) for actuator in self._rear]
+        for actuator, angle in commands:
+            if self.data.ctrl[actuator] != angle:
+                self.data.ctrl[actuator] = angle
+                state = int(self.model.actuator_actadr[actuator])
+                if state >= 0:
+                    # A servo that has arrived: its state is its command, and its rate zero.
+                    self.data.act[state] = angle
+                self.data.qpos[int(self.model.jnt_qposadr[self.model.actuator_trnid[actuator, 0]])] = angle
+
+    def _residual(self, case: Case) -> Array:
+        """Forces that are not balanced [N, N m], and heights that are not met (scaled), shape (free + 4,)."""
+        model, data = self.model, self.data
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_fwdActuation(model, data)
+        forces = data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator
+        pushes = case.patch_N.copy()
+        pushes[:, 2] += self.load_N
+        at_centre = case.centre_N.any()
+        missing = self.load_N.copy()
+        for index, body in enumerate(self._wheels):
+            centre = data.xpos[body]
+            contact = centre + self._down(index)
+            mujoco.mj_applyFT(model, data, pushes[index], case.moment_Nm[index], contact, body, forces)
+            if at_centre:
+                mujoco.mj_applyFT(model, data, case.centre_N[index], _NO_MOMENT, centre, body, forces)
+            if case.hold != "nothing":
+                height = centre[2] if case.hold == "centre" else contact[2]
+                wanted = self._reference_m[case.hold][index] + case.height_m[index]
+                missing[index] = (height - wanted) * _HEIGHT_SCALE_NPM
+        return np.concatenate([forces[self._free], missing])
+
+    def _move(self, step: Array) -> None:
+        move = np.zeros(self.model.nv)
+        move[self._free] = step[:-4]
+        mujoco.mj_integratePos(self.model, self.data.qpos, move, 1.0)
+        self.load_N += step[-4:]
+
+    def _renew(self, case: Case, residual: Array) -> None:
+        """Measures the stiffness of the car where it is, pads included, and inverts it."""
+        data, count = self.data, self._free.size
+        matrix = np.empty((count + 4, count + 4))
+        start, load = data.qpos.copy(), self.load_N.copy()
+        move = np.zeros(self.model.nv)
+        for column, dof in enumerate(self._free):
+            move[:] = 0.0
+            move[dof] = _DIFFERENCE
+            mujoco.mj_integratePos(self.model, data.qpos, move, 1.0)
+            matrix[:, column] = (self._residual(case) - residual) / _DIFFERENCE
+            data.qpos[:] = start
+        for corner in range(4):
+            self.load_N[corner] += 1.0
+            matrix[:, count + corner] = self._residual(case) - residual
+            self.load_N[:] = load
+        self._residual(case)
+        try:
+            self._inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+        except np.linalg.LinAlgError as reason:
+            msg = "kinematics and compliance rig: a part of the car moves without any force; is a link missing?"
+            raise ModelError(msg) from reason
+        self._held = case.hold

@@ -1,0 +1,254 @@
+"""Natural frequencies and damping of the standing car on its tyres, from the linearised model.
+
+The car is free, each tyre a spring at the contact point: vertical with the stiffness that it has under static load, and
+sideways with that of its carcass, since it does not slide (a four-post rig). Along the car the wheels roll. Dampers,
+links and servos act as in the simulations; the slope of a damper is the mean of its bump and rebound slopes at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.errors import ModelError
+from activesteer.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from activesteer.rigs.kc.programme import TyreStiffness
+
+Array = NDArray[np.float64]
+
+_LIFT_M: Final = 1.0
+_DIFFERENCE: Final = 1e-6
+"""Step of the central differences [m, rad, and per second]."""
+_FASTEST_HZ: Final = 40.0
+"""Modes above this are those of links and steering, not of body and wheels."""
+NAMES: Final = (
+    "body_bounce",
+    "body_pitch",
+    "body_roll",
+    "wheel_hop_front",
+    "wheel_hop_rear",
+    "tramp_front",
+    "tramp_rear",
+)
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode of the car."""
+
+    frequency_Hz: float
+    """Of the undamped oscillation: magnitude of the eigenvalue."""
+    damping_ratio: float
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The modes of body and wheels, and how the car leans."""
+
+    by_name: dict[str, Mode]
+    """The modes of `NAMES`."""
+    body_roll_sliding: Mode
+    """Body roll with tyres that slide sideways without resistance, as on air bearings."""
+    roll_gradient_radps2pm: float
+    """Roll angle per lateral acceleration [rad s2/m], positive to the outside of the turn."""
+    pitch_gradient_radps2pm: float
+    """Pitch angle per deceleration, brakes as distributed at full pedal [rad s2/m], positive nose down."""
+
+
+class _Linear:
+    """The standing car: M a + C v + K x = f, in the engine's degrees of freedom without the wheels' rotation."""
+
+    def __init__(
+        self, vehicle: Vehicle, load_N: Array, tyres: tuple[TyreStiffness, TyreStiffness], grip: float
+    ) -> None:
+        self.model = model = vehicle.model
+        self.data = data = mujoco.MjData(model)
+        self.wheels = [model.body(f"{corner}_wheel").id for corner in CORNERS]
+        self._load_N = load_N
+        self._vertical = np.repeat([tyre.vertical_Npm for tyre in tyres], 2)
+        self._lateral = np.repeat([tyre.lateral_Npm for tyre in tyres], 2) * grip
+        data.qpos[:] = vehicle.data.qpos
+        root = model.joint("root")
+        data.qpos[int(root.qposadr[0]) + 2] += _LIFT_M
+        self.root = int(root.dofadr[0])
+        spins = [int(model.joint(f"{corner}_spin").dofadr[0]) for corner in CORNERS]
+        self.free = np.setdiff1d(np.arange(model.nv), spins)
+        mujoco.mj_fwdPosition(model, data)
+        self._radius = (data.xpos[self.wheels, 2] - _LIFT_M) / np.sqrt(1.0 - data.xmat[self.wheels, 7] ** 2)
+        self._start_m = self.contacts()
+        self.stiffness, self.damping = self._differences()
+        self.mass = self._mass()
+
+    def contacts(self) -> Array:
+        """Contact points [m], shape (4, 3)."""
+        x, y, z = self.data.xmat[self.wheels][:, 1::3].T
+        across = np.sqrt(1.0 - z * z)
+        down = np.stack([x * z, y * z, -across * across], axis=1) / across[:, None]
+        return self.data.xpos[self.wheels] + self._radius[:, None] * down
+
+    def at_contacts(self, forces_N: Array) -> Array:
+        """Generalised forces of forces at the contact points, shape (nv,)."""
+        total = np.zeros(self.model.nv)
+        for body, point, force in zip(self.wheels, self.contacts(), forces_N, strict=True):
+            mujoco.mj_applyFT(self.model, self.data, force, np.zeros(3), point, body, total)
+        return total
+
+    def _forces(self) -> Array:
+        model, data = self.model, self.data
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_fwdActuation(model, data)
+        moved = self.contacts() - self._start_m
+        pads = np.zeros((4, 3))
+        pads[:, 1] = -self._lateral * moved[:, 1]
+        pads[:, 2] = self._load_N - self._vertical * moved[:, 2]
+        return (data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator + self.at_contacts(pads))[self.free]
+
+    def _differences(self) -> tuple[Array, Array]:
+        data, start = self.data, self.data.qpos.copy()
+        stiffness, damping = (np.empty((self.free.size, self.free.size)) for _ in range(2))
+        move = np.zeros(self.model.nv)
+        for column, dof in enumerate(self.free):
+            sides = []
+            for sign in (1.0, -1.0):
+                move[:] = 0.0
+                move[dof] = sign * _DIFFERENCE
+                mujoco.mj_integratePos(self.model, data.qpos, move, 1.0)
+                displaced = self._forces()
+                data.qpos[:] = start
+                data.qvel[:] = move
+                sides.append((displaced, self._forces()))
+                data.qvel[:] = 0.0
+            stiffness[:, column] = (sides[1][0] - sides[0][0]) / (2.0 * _DIFFERENCE)
+            damping[:, column] = (sides[1][1] - sides[0][1]) / (2.0 * _DIFFERENCE)
+        self._forces()
+        return stiffness, damping
+
+    def _mass(self) -> Array:
+        columns = []
+        for dof in self.free:
+            unit, product = np.zeros(self.model.nv), np.zeros(self.model.nv)
+            unit[dof] = 1.0
+            mujoco.mj_mulM(self.model, self.data, product, unit)
+            columns.append(product[self.free])
+        return np.array(columns)
+
+    def velocity_map(self, body: int, point_m: Array) -> tuple[Array, Array]:
+        """Jacobians (3, free) of a point's velocity and of the body's rotation."""
+        along, about = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jac(self.model, self.data, along, about, point_m, body)
+        return along[:, self.free], about[:, self.free]
+
+
+def modes(vehicle: Vehicle, load_N: Array, tyres: tuple[TyreStiffness, TyreStiffness]) -> Modes:
+    """Linearises the standing car and names its modes.
+
+    Args:
+        vehicle: The car, in static ride.
+        load_N: Its wheel loads [N], shape (4,).
+        tyres: Its tyres, front and rear.
+
+    Returns:
+        Frequencies, damping ratios, and the gradients of roll and pitch.
+
+    Raises:
+        ModelError: a mode of the body does not oscillate.
+    """
+    stuck = _Linear(vehicle, load_N, tyres, grip=1.0)
+    sliding = _Linear(vehicle, load_N, tyres, grip=0.0)
+    named = _named(stuck)
+    return Modes(
+        named,
+        _named(sliding)["body_roll"],
+        _roll_gradient(stuck),
+        _pitch_gradient(stuck, vehicle),
+    )
+
+
+def _named(linear: _Linear) -> dict[str, Mode]:
+    """Each mode goes to the motion that holds most of its kinetic energy."""
+    size = linear.free.size
+    lower = -np.linalg.solve(linear.mass, np.hstack([linear.stiffness, linear.damping]))
+    upper = np.hstack([np.zeros((size, size)), np.eye(size)])
+    found = np.linalg.eig(np.vstack([upper, lower]))
+    roots, vectors = (np.asarray(part, dtype=np.complex128) for part in found)
+    keep = (roots.imag > 1e-3) & (np.abs(roots) < 2.0 * math.pi * _FASTEST_HZ)
+    roots, shapes = roots[keep], vectors[size:, keep]
+    energy = np.einsum("im,ij,jm->m", shapes.conj(), linear.mass, shapes).real
+    named = {}
+    for name, (inertia, rows) in _motions(linear).items():
+        share = inertia * np.sum(np.abs(rows @ shapes) ** 2, axis=0) / energy
+        if not share.size or share.max() < 0.1:
+            msg = f"kinematics and compliance rig: no mode of the standing car below {_FASTEST_HZ:g} Hz is its {name}"
+            raise ModelError(msg)
+        if name == "body_pitch":
+            # Bounce and pitch share two modes; what bounces more is the bounce.
+            taken = np.isclose(np.abs(roots), 2.0 * math.pi * named["body_bounce"].frequency_Hz)
+            share[taken] = 0.0
+        # Sideways on its tyres the body sways and rolls in two modes; the slower one is the roll.
+        best = (
+            int(np.flatnonzero(share > 0.25)[np.abs(roots)[share > 0.25].argmin()])
+            if name == "body_roll"
+            else int(share.argmax())
+        )
+        size_of = float(np.abs(roots[best]))
+        named[name] = Mode(size_of / (2.0 * math.pi), float(-roots[best].real / size_of))
+    return named
+
+
+def _motions(linear: _Linear) -> dict[str, tuple[float, Array]]:
+    """Inertia and Jacobian rows of each motion that gives a mode its name."""
+    model, data = linear.model, linear.data
+    chassis = model.body("chassis").id
+    along, about = linear.velocity_map(chassis, data.xipos[chassis])
+    mass, inertia = float(model.body_mass[chassis]), model.body_inertia[chassis]
+    wheels = [linear.velocity_map(body, data.xpos[body])[0][2] for body in linear.wheels]
+    unsprung = [float(model.body_subtreemass[model.body(f"{corner}_knuckle").id]) for corner in CORNERS]
+    motions = {
+        "body_bounce": (mass, along[2:3]),
+        "body_pitch": (float(inertia[1]), about[1:2]),
+        "body_roll": (float(inertia[0]), about[0:1]),
+    }
+    for axle, left, right in (("front", 0, 1), ("rear", 2, 3)):
+        half = 0.5 * unsprung[left]
+        motions[f"wheel_hop_{axle}"] = (half, (wheels[left] + wheels[right])[None])
+        motions[f"tramp_{axle}"] = (half, (wheels[left] - wheels[right])[None])
+    return motions
+
+
+def _roll_gradient(linear: _Linear) -> float:
+    """From the inertial forces of a lateral acceleration, carried by the tyres' side forces."""
+    sideways = np.zeros(linear.free.size)
+    sideways[linear.root + 1] = 1.0
+    moved = np.linalg.lstsq(linear.stiffness, -linear.mass @ sideways, rcond=1e-13)[0]
+    return float(moved[linear.root + 3])
+
+
+def _pitch_gradient(linear: _Linear, vehicle: Vehicle) -> float:
+    """From the inertial forces of a deceleration, carried by the brakes' forces at the contact points."""
+    brakes = vehicle.parameters.brakes
+    share = np.repeat([brakes.front_torque_Nm, brakes.rear_torque_Nm], 2)
+    total = share.sum()
+    if total <= 0.0:
+        return math.nan
+    weight = float(linear.model.body_subtreemass[0])
+    push = np.zeros((4, 3))
+    push[:, 0] = -weight * share / total
+    forwards = np.zeros(linear.free.size)
+    forwards[linear.root] = 1.0
+    force = linear.mass @ forwards + linear.at_contacts(push)[linear.free]
+    moved = np.linalg.lstsq(linear.stiffness, force, rcond=1e-13)[0]
+    return float(moved[linear.root + 4])
+
+
+def per_g(gradient_radps2pm: float) -> float:
+    """A gradient in degrees per g."""
+    return math.degrees(gradient_radps2pm) * GRAVITY_MPS2

@@ -1,0 +1,243 @@
+"""The rig's programme: all sweeps and steering axes of a car, in SI units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import CORNERS
+from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
+from activesteer.rigs.kc.modes import Modes, modes
+from activesteer.rigs.kc.steering_axis import SteeringAxis, steering_axis
+from activesteer.rigs.kc.sweep import INWARDS, Sweep, run
+from activesteer.tyre import parameters as tyre_index
+from activesteer.tyre.relaxation import carcass_stiffnesses
+from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.tyre.vertical import deflection_under_load, vertical_force
+from activesteer.vehicle import Vehicle, VehicleParameters
+from activesteer.vehicle import force_block as fb
+
+Array = NDArray[np.float64]
+
+_TRAVEL_M: Final = np.linspace(-0.08, 0.08, 33)
+_SIDE_FORCE_N: Final = np.linspace(-4000.0, 4000.0, 17)
+_PATCH_FORCE_N: Final = np.linspace(-5000.0, 3000.0, 17)
+_CENTRE_FORCE_N: Final = np.linspace(-3000.0, 5000.0, 17)
+_MOMENT_NM: Final = np.linspace(-150.0, 150.0, 13)
+_STEERING_POINTS: Final = 24
+"""Points of the steering sweep to either side."""
+_AXIS_STEER_RAD: Final = math.radians(5.0)
+"""Steering wheel angle to either side between which the steering axis is found: a third of a degree at the wheel."""
+_AXIS_REAR_RAD: Final = math.radians(0.3)
+PARKING_FRICTION: Final = 0.9
+"""Coefficient of friction under the tyres that are turned at rest."""
+
+
+@dataclass(frozen=True)
+class TyreStiffness:
+    """A tyre under its static load."""
+
+    vertical_Npm: float
+    lateral_Npm: float
+    width_m: float
+    pressure_Pa: float
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Everything that the rig found out about a car."""
+
+    vehicle: Vehicle
+    sweeps: dict[str, Sweep]
+    axes: tuple[SteeringAxis, ...]
+    """Steering axes by corner; at the rear those of the steering hinges."""
+    tyres: tuple[TyreStiffness, TyreStiffness]
+    """Front and rear."""
+    static_load_N: Array
+    """Wheel loads of the standing car, shape (4,)."""
+    modes: Modes
+
+    @property
+    def parameters(self) -> VehicleParameters:
+        """The vehicle file."""
+        return self.vehicle.parameters
+
+
+def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> Measured:
+    """Runs the whole programme.
+
+    Args:
+        vehicle: The car, in static ride on a level road.
+        tyres: Tyres of the front and of the rear axle.
+
+    Returns:
+        What was measured.
+
+    Raises:
+        ModelError: the car has no equilibrium somewhere.
+    """
+    slots = vehicle.data.userdata[: 4 * fb.USERDATA_PER_WHEEL].reshape(4, fb.USERDATA_PER_WHEEL)
+    load_N = slots[:, fb.U_FZ].copy()
+    stiffness = (
+        _stiffness(tyres[0], vehicle.parameters.tyres.front_pressure_Pa, float(load_N[:2].mean())),
+        _stiffness(tyres[1], vehicle.parameters.tyres.rear_pressure_Pa, float(load_N[2:].mean())),
+    )
+    car = HeldCar(vehicle)
+    return Measured(
+        vehicle,
+        _sweeps(vehicle, car, load_N, stiffness),
+        _axes(vehicle, car),
+        stiffness,
+        load_N,
+        modes(vehicle, load_N, stiffness),
+    )
+
+
+def _stiffness(tyre: TyreParameters, pressure_Pa: float | None, load_N: float) -> TyreStiffness:
+    array = tyre.array
+    pressure = float(array[tyre_index.INFLPRES]) if pressure_Pa is None else pressure_Pa
+    deflection = deflection_under_load(array, load_N, 0.0, pressure, 0.0, 0.0, 0.0)
+    step = 1e-4
+    more, less = (vertical_force(array, deflection + sign * step, 0.0, pressure) for sign in (1.0, -1.0))
+    lateral = carcass_stiffnesses(array, load_N, pressure)[1]
+    return TyreStiffness((more - less) / (2.0 * step), float(lateral), float(array[tyre_index.WIDTH]), pressure)
+
+
+def _sweeps(
+    vehicle: Vehicle, car: HeldCar, load_N: Array, tyres: tuple[TyreStiffness, TyreStiffness]
+) -> dict[str, Sweep]:
+    free = HeldCar(vehicle, springs="out")
+    both, opposed = np.ones(4), INWARDS
+    travel = "wheel travel, positive in bump"
+    steering = "steering wheel angle, positive to the left"
+    scrub = np.repeat(
+        [parking_moment_Nm(load_N[:2].mean(), tyres[0]), parking_moment_Nm(load_N[2:].mean(), tyres[1])], 2
+    )
+    scrub *= [1.0, 1.0, 0.0, 0.0]
+    angles = _steering_angles(vehicle)
+    rear = np.linspace(-1.0, 1.0, 13) * _rear_range(vehicle)
+
+    def sweep(
+        title: str, variable: str, unit: str, points: Array, case: Callable[[float], Case], on: HeldCar = car
+    ) -> Sweep:
+        return run(on, title, variable, unit, {float(x): case(float(x)) for x in points})
+
+    def push(x: float, y: float) -> Callable[[float], Array]:
+        return lambda force: np.outer(both, [x * force, y * force, 0.0])
+
+    along, across = push(1.0, 0.0), push(0.0, 1.0)
+    inwards = [np.outer(opposed, axis) for axis in ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0])]
+    return {
+        "parallel_travel": sweep("parallel wheel travel", travel, "m", _TRAVEL_M, lambda z: Case(height_m=z * both)),
+        "opposite_travel": sweep(
+            "opposite wheel travel", "travel of the right wheels, positive in bump; the left ones go the other way",
+            "m", _TRAVEL_M, lambda z: Case(height_m=z * opposed),
+        ),
+        "parallel_kinematic": sweep(
+            "parallel wheel travel, without springs", travel, "m", _TRAVEL_M, lambda z: Case(height_m=z * both), free
+        ),
+        "lateral_in_phase": sweep(
+            "side force in phase", "side force at each contact point, positive to the left", "N", _SIDE_FORCE_N,
+            lambda force: Case(patch_N=across(force)),
+        ),
+        "lateral_opposed": sweep(
+            "side force out of phase", "side force at each contact point, positive towards the middle of the car", "N",
+            _SIDE_FORCE_N, lambda force: Case(patch_N=force * inwards[0]),
+        ),
+        "longitudinal_patch": sweep(
+            "longitudinal force at the contact points, wheels locked to their knuckles",
+            "force at each wheel, positive forwards: brakes are negative", "N", _PATCH_FORCE_N,
+            lambda force: Case(patch_N=along(force)),
+        ),
+        "longitudinal_centre": sweep(
+            "longitudinal force at the wheel centres", "force at each wheel, positive forwards: drive is positive", "N",
+            _CENTRE_FORCE_N, lambda force: Case(centre_N=along(force)),
+        ),
+        "aligning_in_phase": sweep(
+            "aligning moment in phase", "moment about the vertical on each wheel, positive to the left", "Nm",
+            _MOMENT_NM,
+            lambda moment: Case(moment_Nm=np.outer(both, [0.0, 0.0, moment])),
+        ),
+        "aligning_opposed": sweep(
+            "aligning moment out of phase", "moment about the vertical on each wheel, positive towards toe-in", "Nm",
+            _MOMENT_NM, lambda moment: Case(moment_Nm=moment * inwards[1]),
+        ),
+        "steering_rolling": sweep(
+            "steering wheel sweep, pads without friction", steering, "rad", angles,
+            lambda angle: Case("contact", steering_wheel_rad=angle),
+        ),
+        "steering_at_rest_left": sweep(
+            "steering wheel turned to the left on a dry road, at rest", steering, "rad", angles,
+            lambda angle: Case("contact", steering_wheel_rad=angle, moment_Nm=np.outer(-scrub, [0.0, 0.0, 1.0])),
+        ),
+        "steering_at_rest_right": sweep(
+            "steering wheel turned to the right on a dry road, at rest", steering, "rad", angles,
+            lambda angle: Case("contact", steering_wheel_rad=angle, moment_Nm=np.outer(scrub, [0.0, 0.0, 1.0])),
+        ),
+        "rear_steering": sweep(
+            "rear steering", "angle of the rear steering actuators, positive to the left", "rad", rear,
+            lambda angle: Case("contact", rear_steer_rad=angle),
+        ),
+    }  # fmt: skip
+
+
+def parking_moment_Nm(load_N: float, tyre: TyreStiffness) -> float:
+    """Moment with which a standing tyre resists being turned about the vertical on a dry road [N m].
+
+    Source: V. E. Gough, Practical Tire Research, SAE Transactions 64 (1956): mu / 3 sqrt(load^3 / pressure).
+    """
+    return PARKING_FRICTION / 3.0 * math.sqrt(load_N**3 / tyre.pressure_Pa)
+
+
+def _steering_angles(vehicle: Vehicle) -> Array:
+    """Denser around straight ahead; to the lock of the steering wheel or of the rack, whichever comes first."""
+    model = vehicle.model
+    rack = float(model.jnt_range[model.joint("rack").id, 1])
+    lock = min(vehicle.parameters.steering.steering_wheel_limit_rad, rack / _rack_per_angle(vehicle))
+    small = np.radians([2.5, 5.0, 10.0, 15.0, 20.0])
+    half = np.concatenate([small[small < lock], np.linspace(0.0, lock, _STEERING_POINTS)[2:]])
+    half = np.unique(half)
+    return np.concatenate([-half[::-1], [0.0], half])
+
+
+def _rack_per_angle(vehicle: Vehicle) -> float:
+    """Rack travel per steering wheel angle [m/rad], from the coupling tendon."""
+    model = vehicle.model
+    tendon = model.tendon("steering_column").id
+    first = int(model.tendon_adr[tendon])
+    items = range(first, first + int(model.tendon_num[tendon]))
+    share = {int(model.wrap_objid[item]): float(model.wrap_prm[item]) for item in items}
+    return abs(share[model.joint("steering_wheel").id] / share[model.joint("rack").id])
+
+
+def _rear_range(vehicle: Vehicle) -> float:
+    model = vehicle.model
+    return float(model.actuator_ctrlrange[model.actuator("rl_steer").id, 1])
+
+
+def _axes(vehicle: Vehicle, car: HeldCar) -> tuple[SteeringAxis, ...]:
+    """Steering axes of the unloaded links with the dampers at a fixed length."""
+    locked = HeldCar(vehicle, springs="locked")
+
+    def poses(sign: float) -> list[WheelPose]:
+        locked.reset()
+        locked.equilibrium(
+            Case("nothing", steering_wheel_rad=sign * _AXIS_STEER_RAD, rear_steer_rad=sign * _AXIS_REAR_RAD)
+        )
+        return [_in_vehicle_axes(locked, corner) for corner in range(4)]
+
+    right, left = poses(-1.0), poses(1.0)
+    return tuple(
+        steering_axis(right[corner], left[corner], _in_vehicle_axes(car, corner), float(INWARDS[corner]))
+        for corner in range(len(CORNERS))
+    )
+
+
+def _in_vehicle_axes(car: HeldCar, corner: int) -> WheelPose:
+    pose = car.wheel(corner)
+    return WheelPose(pose.centre_m - car.origin_m, pose.rotation, pose.contact_m - car.origin_m)

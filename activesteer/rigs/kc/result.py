@@ -1,0 +1,147 @@
+"""What the kinematics and compliance rig says of a car: metrics in customary units, curves in SI, tables."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+
+from activesteer.errors import ParameterError, nearest_names
+from activesteer.rigs.kc.definitions import DEFINITIONS, Axle
+from activesteer.rigs.kc.programme import Measured
+from activesteer.rigs.kc.sweep import Sweep
+from activesteer.rigs.kc.targets import Target, Targets
+
+
+@dataclass(frozen=True)
+class KcMetric:
+    """One number of the car.
+
+    Attributes:
+        name: What it is.
+        axle: `front`, `rear` or `car`.
+        value: Its value; nan where the car has none.
+        unit: Its unit.
+        band: Where it should lie; None where nothing is asked.
+        inside: Whether it does; None where nothing is asked.
+        source: Where the band comes from; empty where there is none.
+        definition: What the name means: definition, sign, source.
+        remark: What the band's file says about a value outside it.
+    """
+
+    name: str
+    axle: str
+    value: float
+    unit: str
+    band: tuple[float, float] | None
+    inside: bool | None
+    source: str
+    definition: str
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class KcResult:
+    """Kinematics and compliance of a car.
+
+    Attributes:
+        vehicle: Name of the car.
+        metrics: Its numbers, in the order of the table.
+        curves: The sweeps by name, in SI units, every wheel.
+        measured: All that was measured, steering axes and modes among it.
+    """
+
+    vehicle: str
+    metrics: tuple[KcMetric, ...]
+    curves: dict[str, Sweep]
+    measured: Measured
+
+    def __getitem__(self, key: tuple[str, str]) -> float:
+        """Value of a metric by axle and name.
+
+        Raises:
+            ParameterError: there is no such metric.
+        """
+        for entry in self.metrics:
+            if (entry.axle, entry.name) == key:
+                return entry.value
+        known = [f"{entry.axle}.{entry.name}" for entry in self.metrics]
+        raise ParameterError(f"no metric is named {'.'.join(key)!r}; {nearest_names('.'.join(key), known)}")
+
+    @property
+    def outside(self) -> tuple[KcMetric, ...]:
+        """The metrics that miss their band."""
+        return tuple(entry for entry in self.metrics if entry.inside is False)
+
+    def to_json(self) -> str:
+        """The metrics as JSON: name, axle, value, unit, band, inside, source; a value that does not exist is null."""
+        rows = [
+            {
+                "name": entry.name,
+                "axle": entry.axle,
+                "value": entry.value if math.isfinite(entry.value) else None,
+                "unit": entry.unit,
+                "band": list(entry.band) if entry.band else None,
+                "inside": entry.inside,
+                "source": entry.source,
+            }
+            for entry in self.metrics
+        ]
+        return json.dumps({"metrics": rows}, indent=2)
+
+    def table(self) -> str:
+        """The metrics as text, one a line, with what the bands ask."""
+        lines = [f"{'metric':32} {'axle':5} {'value':>9} {'unit':9} {'target band':>16}  {'':7} source of the band"]
+        for entry in self.metrics:
+            band = f"{entry.band[0]:g} to {entry.band[1]:g}" if entry.band else ""
+            verdict = "" if entry.inside is None else "inside" if entry.inside else "OUTSIDE"
+            lines.append(
+                f"{entry.name:32} {entry.axle:5} {_number(entry.value):>9} {entry.unit:9} {band:>16}  {verdict:7} "
+                f"{entry.source}".rstrip()
+            )
+        asked = [entry for entry in self.metrics if entry.inside is not None]
+        lines += ["", f"{sum(entry.inside is True for entry in asked)} of {len(asked)} target bands met"]
+        lines += [f"outside: {entry.axle} {entry.name}: {entry.remark}" for entry in self.outside if entry.remark]
+        return "\n".join(lines)
+
+
+def _number(value: float) -> str:
+    if not math.isfinite(value):
+        return "-"
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.4g}" if abs(value) >= 1.0 else f"{value:.3f}"
+
+
+def evaluated(vehicle: str, measured: Measured, targets: Targets) -> KcResult:
+    """Works out all metrics and compares them with their bands.
+
+    Args:
+        vehicle: Name of the car.
+        measured: What the rig measured.
+        targets: Bands by axle and metric.
+
+    Returns:
+        The result.
+    """
+    metrics = []
+    for definition in DEFINITIONS:
+        for name in definition.axles:
+            value = definition.evaluate(Axle(name, measured))
+            target = targets.get((name, definition.name))
+            metrics.append(
+                KcMetric(
+                    definition.name,
+                    name,
+                    value,
+                    definition.unit,
+                    (target.band[0], target.band[1]) if target else None,
+                    _inside(value, target),
+                    target.source if target else "",
+                    definition.text,
+                    target.remark if target else "",
+                )
+            )
+    return KcResult(vehicle, tuple(metrics), measured.sweeps, measured)
+
+
+def _inside(value: float, target: Target | None) -> bool | None:
+    return None if target is None else bool(target.band[0] <= value <= target.band[1])

@@ -1,0 +1,53 @@
+"""The kinematics and compliance rig, as it is called."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from activesteer.errors import ModelError
+
+# The metrics enter themselves into the table of definitions, in this order.
+from activesteer.rigs.kc import metrics_kinematics, metrics_compliance, metrics_steering, metrics_modes  # isort: skip  # noqa: F401
+from activesteer.rigs.kc.programme import measure
+from activesteer.rigs.kc.result import KcResult, evaluated
+from activesteer.rigs.kc.targets import load_targets
+from activesteer.scenario import FileOrTable, resolve
+from activesteer.vehicle import Road, Vehicle
+
+
+def kinematics_compliance(
+    vehicle: FileOrTable = "compact",
+    overrides: Mapping[str, Any] | None = None,
+    targets: str | os.PathLike[str] | None = None,
+) -> KcResult:
+    """Measures kinematics and compliance of a car, chassis held, wheels on pads.
+
+    Args:
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key of the vehicle -> value, as `load.mass_factor`.
+        targets: File with target bands; the one of the vehicle's name in `models/targets` where not given.
+
+    Returns:
+        Metrics with their bands, and all curves.
+
+    Raises:
+        ParameterError: the vehicle or the targets are not found or wrong.
+        ModelError: the model is not found, lacks a part, or has no equilibrium.
+        TyreFileError: a tyre file is not found or wrong.
+    """
+    changes = {
+        key if key.startswith("vehicle.") else f"vehicle.{key}": value for key, value in (overrides or {}).items()
+    }
+    # A scenario needs a manoeuvre; the rig uses the car alone.
+    scenario = resolve("step_steer", vehicle, changes)
+    bands = load_targets(scenario.car.name, targets)
+    car = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, Road())
+    try:
+        measured = measure(car, scenario.tyres)
+    except KeyError as reason:
+        # The engine's look-up by name: its message says which there are.
+        msg = f"{scenario.mjcf}: the kinematics and compliance rig needs a part that the model lacks: {reason}"
+        raise ModelError(msg) from reason
+    return evaluated(scenario.car.name, measured, bands)

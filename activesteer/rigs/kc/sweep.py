@@ -1,0 +1,167 @@
+"""What a sweep of the rig measures: where every wheel was, and what its pad carried, at each of its points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import CORNERS
+from activesteer.rigs.kc.held_car import Case, HeldCar
+
+Array = NDArray[np.float64]
+
+INWARDS: Final = np.array([-1.0, 1.0, -1.0, 1.0])
+"""Sign of y towards the middle of the car, by corner."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One sweep of the rig, n points in increasing order of what was swept.
+
+    Vehicle axes of the standing car: x forward, y left, z up, origin on the road below the middle of the front axle.
+    Arrays have the shape (n, 4) or (n, 4, 3), by corner.
+    """
+
+    title: str
+    """What was done."""
+    variable: str
+    """What was swept, with its sign."""
+    unit: str
+    """SI unit of what was swept."""
+    x: Array
+    """What was swept, shape (n,)."""
+    centre_m: Array
+    """Wheel centres."""
+    axle: Array
+    """Unit vectors along the wheels' axles, to the left."""
+    contact_m: Array
+    """Contact points: the lowest points of the wheels."""
+    patch_m: Array
+    """The points of the locked wheels that were the contact points at x = 0 (wheels are locked to their knuckles)."""
+    load_N: Array
+    """Vertical forces of the pads."""
+    wind_up_rad: Array
+    """Rotation of the knuckles about y, positive as a wheel that rolls forward."""
+    damper_m: Array
+    """Lengths of the dampers; of a strut the extension from the design position."""
+    rack_m: Array
+    """Travel of the rack, positive steers left, shape (n,)."""
+    steering_wheel_rad: Array
+    """Steering wheel angle, shape (n,)."""
+    steering_wheel_torque_Nm: Array
+    """Torque that holds the steering wheel, positive to the left, shape (n,)."""
+
+    @property
+    def steer_rad(self) -> Array:
+        """Steer angles: heading of the wheel planes, positive to the left, shape (n, 4)."""
+        return np.arctan2(-self.axle[..., 0], self.axle[..., 1])
+
+    @property
+    def toe_rad(self) -> Array:
+        """Toe angles, positive toe-in (front edge towards the middle of the car), shape (n, 4)."""
+        return self.steer_rad * INWARDS
+
+    @property
+    def camber_rad(self) -> Array:
+        """Camber angles, negative with the top towards the middle of the car, shape (n, 4)."""
+        return np.arcsin(self.axle[..., 2]) * INWARDS
+
+    @property
+    def travel_m(self) -> Array:
+        """Heights of the wheel centres above those at x = 0, positive in bump, shape (n, 4)."""
+        return self.centre_m[..., 2] - self.centre_m[self.zero, :, 2]
+
+    @property
+    def zero(self) -> int:
+        """Index of the point where nothing was swept away from the standing car."""
+        return int(np.abs(self.x).argmin())
+
+    def as_table(self) -> dict[str, object]:
+        """All arrays as lists, for JSON; angles of the wheels among them."""
+        table: dict[str, object] = {"title": self.title, "variable": self.variable, "unit": self.unit}
+        arrays = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in table}
+        arrays |= {"toe_rad": self.toe_rad, "camber_rad": self.camber_rad, "steer_rad": self.steer_rad}
+        return table | {name: value.tolist() for name, value in arrays.items()}
+
+
+@dataclass(frozen=True)
+class _Point:
+    """One row of a sweep."""
+
+    centre_m: Array
+    rotation: Array
+    contact_m: Array
+    load_N: Array
+    damper_m: Array
+    rack_m: float
+    steering_wheel_rad: float
+    steering_wheel_torque_Nm: float
+
+
+def _read(car: HeldCar) -> _Point:
+    model, data = car.model, car.data
+    poses = [car.wheel(corner) for corner in range(4)]
+    wheel = model.joint("steering_wheel")
+    return _Point(
+        np.array([pose.centre_m for pose in poses]) - car.origin_m,
+        np.array([pose.rotation for pose in poses]),
+        np.array([pose.contact_m for pose in poses]) - car.origin_m,
+        car.load_N.copy(),
+        np.array([data.ten_length[model.tendon(f"{corner}_damper").id] for corner in CORNERS]),
+        float(data.qpos[model.joint("rack").qposadr[0]]),
+        float(data.qpos[wheel.qposadr[0]]),
+        float(data.qfrc_actuator[wheel.dofadr[0]]),
+    )
+
+
+def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float, Case]) -> Sweep:
+    """Goes through the points of a sweep, from zero outwards to either side.
+
+    Args:
+        car: The car on the rig; left at its first equilibrium.
+        title: What is done.
+        variable: What is swept.
+        unit: Its SI unit.
+        cases: What the rig does, by value of the variable; 0 must be among them.
+
+    Returns:
+        What was measured.
+
+    Raises:
+        ModelError: a point has no equilibrium.
+    """
+    points: dict[float, _Point] = {}
+    for side in (sorted(x for x in cases if x >= 0.0), sorted((x for x in cases if x < 0.0), reverse=True)):
+        car.reset()
+        for x in side:
+            car.equilibrium(cases[x])
+            points[x] = _read(car)
+    car.reset()
+    order = sorted(points)
+    rows = [points[x] for x in order]
+    zero = points[min(points, key=abs)]
+    rotation = _stacked(row.rotation for row in rows)
+    at_zero = np.einsum("cji,cj->ci", zero.rotation, zero.contact_m - zero.centre_m)
+    centre = _stacked(row.centre_m for row in rows)
+    return Sweep(
+        title, variable, unit,
+        x=np.array(order),
+        centre_m=centre,
+        axle=rotation[..., 1],
+        contact_m=_stacked(row.contact_m for row in rows),
+        patch_m=centre + np.einsum("ncij,cj->nci", rotation, at_zero),
+        load_N=_stacked(row.load_N for row in rows),
+        wind_up_rad=np.arctan2(-rotation[..., 2, 0], rotation[..., 0, 0]),
+        damper_m=_stacked(row.damper_m for row in rows),
+        rack_m=np.array([row.rack_m for row in rows]),
+        steering_wheel_rad=np.array([row.steering_wheel_rad for row in rows]),
+        steering_wheel_torque_Nm=np.array([row.steering_wheel_torque_Nm for row in rows]),
+    )  # fmt: skip
+
+
+def _stacked(rows: Iterable[Array]) -> Array:
+    return np.stack(list(rows))

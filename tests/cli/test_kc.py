@@ -1,0 +1,35 @@
+"""`activesteer kc`."""
+
+from __future__ import annotations
+
+import json
+
+from activesteer.cli import main
+
+
+def test_kc_prints_a_table_of_metrics_with_bands(capsys):
+    assert main(["kc"]) == 0
+    told = capsys.readouterr().out
+    for words in ("wheel rate", "toe", "camber", "roll centre"):
+        assert words in told.replace("_", " ")
+
+
+def test_kc_json_has_what_is_promised(capsys):
+    assert main(["kc", "--json"]) == 0
+    metrics = json.loads(capsys.readouterr().out)["metrics"]
+    assert len(metrics) >= 40
+    for metric in metrics:
+        assert {"name", "axle", "value", "unit", "band", "inside", "source"} <= set(metric)
+
+
+def test_kc_draws_into_a_folder(tmp_path, capsys):
+    assert main(["kc", "-o", str(tmp_path / "kc")]) == 0
+    assert "figure: " in capsys.readouterr().out
+    pictures = {picture.name for picture in (tmp_path / "kc").glob("*.png")}
+    assert "rear_camber.png" in pictures
+    assert len(pictures) >= 5
+
+
+def test_kc_names_the_vehicles_that_there_are(capsys):
+    assert main(["kc", "--vehicle", "compakt"]) == 1
+    assert "did you mean 'compact'" in capsys.readouterr().err

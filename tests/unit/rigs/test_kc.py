@@ -1,0 +1,181 @@
+from __future__ import annotations
+
+import functools
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from activesteer.errors import ParameterError
+from activesteer.resources import models_dir
+from activesteer.rigs.kc import KcResult, draw, kinematics_compliance
+from activesteer.rigs.kc.definitions import DEFINITIONS
+from activesteer.rigs.kc.held_car import WheelPose
+from activesteer.rigs.kc.steering_axis import steering_axis
+from activesteer.rigs.kc.targets import load_targets
+
+
+@functools.cache
+def compact() -> KcResult:
+    return kinematics_compliance()
+
+
+JUDGED = {
+    ("rear", "softest_bush"),
+    ("rear", "lateral_compliance_centre"),
+    ("rear", "longitudinal_compliance_centre"),
+    ("car", "body_pitch_frequency"),
+    ("car", "body_roll_frequency"),
+}
+"""What the compact may miss; the file of the targets says why."""
+
+
+def test_the_compact_meets_its_targets_but_for_what_is_judged() -> None:
+    missed = {(entry.axle, entry.name): entry.value for entry in compact().outside}
+    assert set(missed) <= JUDGED, missed
+    assert all(entry.remark for entry in compact().outside)
+
+
+def test_json_has_what_is_promised() -> None:
+    table = json.loads(compact().to_json())
+    assert set(table) == {"metrics"}
+    assert len(table["metrics"]) >= 40
+    for row in table["metrics"]:
+        assert list(row) == ["name", "axle", "value", "unit", "band", "inside", "source"]
+        assert row["axle"] in {"front", "rear", "car"}
+        assert row["value"] is None or math.isfinite(row["value"])
+        if row["band"] is None:
+            assert row["inside"] is None
+            assert row["source"] == ""
+        else:
+            low, high = row["band"]
+            assert row["inside"] == (low <= row["value"] <= high)
+            assert row["source"]
+    names = [(row["axle"], row["name"]) for row in table["metrics"]]
+    assert len(set(names)) == len(names)
+
+
+def test_every_metric_is_defined() -> None:
+    for definition in DEFINITIONS:
+        assert len(definition.text) > 30, definition.name
+        assert definition.text.endswith("."), definition.name
+        assert definition.unit
+
+
+def test_every_value_of_the_compact_is_a_number() -> None:
+    assert [entry.name for entry in compact().metrics if not math.isfinite(entry.value)] == []
+
+
+def test_table_names_every_metric_and_counts_the_bands() -> None:
+    text = compact().table()
+    for entry in compact().metrics:
+        assert entry.name in text
+    asked = [entry for entry in compact().metrics if entry.band]
+    assert f"{len(asked) - len(compact().outside)} of {len(asked)} target bands met" in text
+
+
+def test_an_unknown_metric_is_explained() -> None:
+    with pytest.raises(ParameterError, match=r"'front\.wheelrate'.*did you mean 'front\.wheel_rate'"):
+        _ = compact()["front", "wheelrate"]
+
+
+def test_curves_hold_both_wheels_and_go_through_static_ride() -> None:
+    result = compact()
+    for sweep in result.curves.values():
+        assert (np.diff(sweep.x) > 0.0).all()
+        assert sweep.x[sweep.zero] == 0.0
+        assert sweep.centre_m.shape == (sweep.x.size, 4, 3)
+        assert np.linalg.norm(sweep.axle, axis=2) == pytest.approx(1.0)
+        assert sweep.travel_m[sweep.zero] == pytest.approx(0.0)
+    loads = result.curves["parallel_travel"].load_N[result.curves["parallel_travel"].zero]
+    # The standing car's tyres push against each other a little, the rig's pads do not.
+    assert loads == pytest.approx(result.measured.static_load_N, rel=0.01)
+    table = result.curves["parallel_travel"].as_table()
+    assert json.loads(json.dumps(table))["toe_rad"][0] == pytest.approx(result.curves["parallel_travel"].toe_rad[0])
+
+
+def test_a_car_without_targets_has_no_bands() -> None:
+    assert load_targets("no_such_car") == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            '[front.wheelrate]\nband = [1, 2]\nsource = "x"',
+            r"line 1.*front\.wheelrate.*did you mean.*front\.wheel_rate",
+        ),
+        ('[front.wheel_rate]\nband = [3, 2]\nsource = "x"', r"line 2.*lowest and a highest"),
+        ('[front.wheel_rate]\nband = [1, 2, 3]\nsource = "x"', r"line 2.*lowest and a highest"),
+        ("[front.wheel_rate]\nband = [1, 2]", r"source"),
+        ('[front.wheel_rate]\nband = [1, 2]\nsource = "x"\ncolour = 1', r"colour"),
+        ("front = 1", r"a table"),
+        ("[front]\nwheel_rate = 1", r"a table"),
+    ],
+)
+def test_a_wrong_target_file_is_explained(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "targets.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ParameterError, match=message):
+        load_targets("compact", file)
+
+
+def test_every_target_of_the_compact_has_a_source() -> None:
+    targets = load_targets("compact")
+    assert len(targets) >= 30
+    assert all(target.source for target in targets.values())
+    assert (models_dir() / "targets" / "compact_kc.toml").is_file()
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_steering_axis_is_found_from_two_poses(side: float) -> None:
+    """A wheel turned about a line that is known."""
+    direction = np.array([-math.tan(0.12), -side * math.tan(0.2), 1.0])
+    direction /= np.linalg.norm(direction)
+    ground = np.array([0.03, side * 0.70, 0.0])
+    standing = WheelPose(np.array([0.0, side * 0.75, 0.3]), np.eye(3), np.array([0.01, side * 0.76, 0.0]))
+
+    def turned(angle_rad: float) -> WheelPose:
+        turn = Rotation.from_rotvec(angle_rad * direction).as_matrix()
+        return WheelPose(*(ground + turn @ (standing.centre_m - ground), turn, standing.contact_m))
+
+    axis = steering_axis(turned(-0.01), turned(0.01), standing, inwards=-side)
+    assert axis.direction == pytest.approx(direction, abs=1e-9)
+    assert axis.caster_rad == pytest.approx(0.12)
+    assert axis.inclination_rad == pytest.approx(0.2)
+    assert axis.trail_m == pytest.approx(0.02)
+    assert axis.scrub_radius_m == pytest.approx(0.06)
+    assert axis.centre_trail_m == pytest.approx(0.03 - 0.3 * math.tan(0.12))
+    assert axis.centre_offset_m == pytest.approx(0.05 + 0.3 * math.tan(0.2))
+
+
+def test_pictures_are_drawn(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    paths = draw(compact(), tmp_path / "new" / "folder")
+    assert {path.stem for path in paths} >= {"rear_camber", "parallel_travel", "steering", "targets"}
+    for path in paths:
+        assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ParameterError, match="cannot be written"):
+        draw(compact(), tmp_path / "file")
+
+
+def test_an_override_that_is_no_part_of_the_car_is_explained() -> None:
+    with pytest.raises(ParameterError, match="speed_kmh"):
+        kinematics_compliance("compact", {"speed_kmh": 80.0})
+
+
+def test_a_heavier_body_sinks_no_wheel_but_loads_it() -> None:
+    """Overrides reach the rig: the static loads follow the mass, the links' kinematics stay nearly the same."""
+    heavy = kinematics_compliance("compact", {"load.mass_factor": 1.1})
+    light = compact()
+    assert heavy["car", "mass"] == pytest.approx(light["car", "mass"] + 0.1 * 1269.0, abs=1.0)
+    assert heavy["front", "wheel_load"] > 1.05 * light["front", "wheel_load"]
+    assert heavy["front", "ride_frequency"] < light["front", "ride_frequency"]
