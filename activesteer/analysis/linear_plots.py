@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.frequency_response import OUTPUTS, frequency_response
-from activesteer.analysis.plots import COLOURS, new_figure, save
+from activesteer.analysis.plots import COLOURS
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import ParameterError
+from activesteer.pictures import new_figure, save
 
 if TYPE_CHECKING:
     import control
@@ -54,7 +55,7 @@ def draw_bode(
 
     Raises:
         ParameterError: matplotlib is not installed, there is no system, or a system has no such input.
-        RecordingError: the recording is no sweep, or the file cannot be written.
+        RecordingError: the recording is no sweep.
     """
     if not systems:
         raise ParameterError("there is no linear car to draw, at least one is needed")
@@ -107,7 +108,6 @@ def draw_root_locus(
 
     Raises:
         ParameterError: matplotlib is not installed, or there are not as many systems as speeds.
-        RecordingError: the file cannot be written.
     """
     if not systems or len(systems) != len(speeds_mps):
         raise ParameterError(

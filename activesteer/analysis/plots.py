@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import ParameterError, RecordingError
+from activesteer.pictures import new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering", "afs": "3 active front steering"}
 """What the curves of the three systems are called, numbered as in the paper's figures."""
@@ -116,7 +116,7 @@ def step_steer_figure(recordings: Mapping[str, RecordingLike], path: str | os.Pa
     figure.align_ylabels(axes)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=min(len(curves), 3), frameon=False)
-    return save(figure, Path(path))
+    return save(figure, Path(path), RecordingError)
 
 
 def figure_2(
@@ -158,36 +158,7 @@ def figure_2(
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(0.0, float(recording.time_s[-1]))
     figure.align_ylabels(axes)
-    return save(figure, Path(path))
-
-
-def new_figure(width_in: float, height_in: float) -> Figure:
-    """An empty figure.
-
-    Raises:
-        ParameterError: matplotlib is not installed.
-    """
-    try:
-        from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
-    except ImportError as error:
-        raise ParameterError(
-            "plots need matplotlib, which is not installed: pip install 'activesteer[plot]'"
-        ) from error
-    # A Figure of its own instead of pyplot: no backend is chosen and no global state touched for the caller.
-    return Figure(figsize=(width_in, height_in), layout="constrained")
-
-
-def save(figure: Figure, path: Path) -> Path:
-    """Writes a figure and returns the path.
-
-    Raises:
-        RecordingError: it cannot be written.
-    """
-    try:
-        figure.savefig(path, dpi=150)
-    except (OSError, ValueError) as error:
-        raise RecordingError(f"the plot {path} cannot be written: {error}") from error
-    return path
+    return save(figure, Path(path), RecordingError)
 
 
 def _curves(recordings: Mapping[str, RecordingLike]) -> list[Curve]:

@@ -54,15 +54,8 @@ def compile_rig(
     carrier = model.body("carrier").id
     chain = chain_to(model, wheel)
     block = fb.ForceBlock(
-        n_dofs=model.nv,
-        n_bodies=model.nbody,
-        n_userdata=model.nuserdata,
-        n_activations=model.na,
-        n_controls=model.nu,
-        n_tendons=model.ntendon,
-        n_tendon_jacobian=model.nJten,
+        model=model,
         chassis_body=carrier,
-        chassis_root=int(model.body_rootid[carrier]),
         chassis_chain=[],
         drag_Ns2pm2=0.0,
         aero_point_m=(0.0, 0.0, 0.0),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from activesteer.errors import ParameterError
+from activesteer.pictures import new_figure, save_all
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 
@@ -55,32 +55,12 @@ def draw(params: TyreParameters, folder: str | os.PathLike[str]) -> list[Path]:
         "combined_slip": _combined_slip,
         "relaxation_lengths": _relaxation_lengths,
     }
-    directory = Path(folder)
-    paths = []
-    for name, picture in pictures.items():
-        path = directory / f"{name}.png"
-        figure = picture(formula)
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-            figure.savefig(path, dpi=150)
-        except OSError as error:
-            raise ParameterError(f"the plot {path} cannot be written: {error}") from error
-        paths.append(path)
-    return paths
+    return save_all(pictures, formula, folder)
 
 
 def _new_figure(params: TyreParameters, title: str, width_in: float, height_in: float) -> Figure:
-    try:
-        from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
-    except ImportError as error:
-        raise ParameterError(
-            "plots need matplotlib, which is not installed: pip install 'activesteer[plot]'"
-        ) from error
-    # A Figure of its own instead of pyplot: no backend is chosen and no global state touched for the caller.
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
     name = params.source.name if params.source else "tyre"
-    figure.suptitle(f"{name}: {title}", fontsize="medium")
-    return figure
+    return new_figure(width_in, height_in, f"{name}: {title}")
 
 
 def _style(axis: Axes, x: str, y: str) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -86,17 +87,21 @@ class DamperEntry:
 
 @dataclass
 class ForceBlock:
-    """Everything the native forces need, before it becomes an array."""
+    """Everything the native forces need, before it becomes an array.
 
-    n_dofs: int
-    n_bodies: int
-    n_userdata: int
-    n_activations: int
-    n_controls: int
-    n_tendons: int
-    n_tendon_jacobian: int
+    Attributes:
+        model: The model, compiled without the block: sizes and addresses are those that it will have with it.
+        chassis_body: Index of the body that drag acts on.
+        chassis_chain: Degrees of freedom between the world and it.
+        drag_Ns2pm2: Drag over the square of the speed.
+        aero_point_m: Where drag acts, in the body's axes.
+        wheels: The wheels.
+        dampers: The dampers.
+        actuators: One record per actuator, in the model's order.
+    """
+
+    model: mujoco.MjModel
     chassis_body: int
-    chassis_root: int
     chassis_chain: list[int]
     drag_Ns2pm2: float
     aero_point_m: tuple[float, float, float]
@@ -116,9 +121,10 @@ class ForceBlock:
         tyres_start = actuators_start + len(self.actuators) * ACTUATOR_SIZE
         tyres = [wheel.tyre for wheel in self.wheels]
         block = np.zeros(tyres_start + sum(tyre.size for tyre in tyres))
+        model = self.model
         block[:CHASSIS_DOFS] = (
-            len(self.wheels), len(self.dampers), self.n_dofs, self.n_bodies, self.n_userdata, self.n_activations,
-            self.n_controls, self.n_tendons, self.n_tendon_jacobian, self.chassis_body, self.chassis_root,
+            len(self.wheels), len(self.dampers), model.nv, model.nbody, model.nuserdata, model.na, model.nu,
+            model.ntendon, model.nJten, self.chassis_body, model.body_rootid[self.chassis_body],
             len(self.chassis_chain), self.drag_Ns2pm2, *self.aero_point_m, wheels_start, dampers_start, actuators_start,
         )  # fmt: skip
         block[CHASSIS_DOFS] = HEADER_SIZE

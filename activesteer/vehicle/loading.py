@@ -129,15 +129,8 @@ def _force_block(
     chassis = find(model, mujoco.mjtObj.mjOBJ_BODY, "chassis")
     aero = parameters.aerodynamics
     block = fb.ForceBlock(
-        n_dofs=model.nv,
-        n_bodies=model.nbody,
-        n_userdata=model.nuserdata,
-        n_activations=model.na,
-        n_controls=model.nu,
-        n_tendons=model.ntendon,
-        n_tendon_jacobian=model.nJten,
+        model=model,
         chassis_body=chassis,
-        chassis_root=int(model.body_rootid[chassis]),
         chassis_chain=chain_to(model, chassis),
         drag_Ns2pm2=0.5 * aero.air_density_kgpm3 * aero.drag_area_m2,
         aero_point_m=_triple(aero.pressure_point_m),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from activesteer.errors import ParameterError
+from activesteer.pictures import new_figure, save_all
 from activesteer.rigs.kc.definitions import Axle
 from activesteer.rigs.kc.metrics_kinematics import roll_angle_rad
 from activesteer.rigs.kc.metrics_steering import mean_steer_rad, ratio_curve
@@ -79,31 +79,11 @@ def draw(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
         "steering": _steering,
         "targets": _targets,
     }
-    directory = Path(folder)
-    paths = []
-    for name, picture in pictures.items():
-        figure = picture(result)
-        path = directory / f"{name}.png"
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-            figure.savefig(path, dpi=150)
-        except OSError as error:
-            raise ParameterError(f"the plot {path} cannot be written: {error}") from error
-        paths.append(path)
-    return paths
+    return save_all(pictures, result, folder)
 
 
 def _new_figure(result: KcResult, title: str, width_in: float, height_in: float) -> Figure:
-    try:
-        from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
-    except ImportError as error:
-        raise ParameterError(
-            "plots need matplotlib, which is not installed: pip install 'activesteer[plot]'"
-        ) from error
-    # A Figure of its own instead of pyplot: no backend is chosen and no global state touched for the caller.
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
-    figure.suptitle(f"{result.vehicle}: {title}", fontsize="medium")
-    return figure
+    return new_figure(width_in, height_in, f"{result.vehicle}: {title}")
 
 
 def _style(axis: Axes) -> None:

@@ -1,0 +1,73 @@
+"""Figures on paper or in a file: made without a screen, saved with an error that says where."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from activesteer.errors import ActiveSteerError, ParameterError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+T = TypeVar("T")
+
+
+def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
+    """An empty figure.
+
+    Raises:
+        ParameterError: matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
+    except ImportError as error:
+        raise ParameterError(
+            "plots need matplotlib, which is not installed: pip install 'activesteer[plot]'"
+        ) from error
+    # A Figure of its own instead of pyplot: no backend is chosen and no global state touched for the caller.
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    if title:
+        figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterError) -> Path:
+    """Writes a figure and returns the path.
+
+    Raises:
+        ActiveSteerError: it cannot be written; of class `error`.
+    """
+    try:
+        figure.savefig(path, dpi=150)
+    except (OSError, ValueError) as reason:
+        raise error(f"the plot {path} cannot be written: {reason}") from reason
+    return path
+
+
+def save_all(pictures: Mapping[str, Callable[[T], Figure]], subject: T, folder: str | os.PathLike[str]) -> list[Path]:
+    """Draws several figures of one thing and writes them as PNG files.
+
+    Args:
+        pictures: File name without its ending -> what draws the figure.
+        subject: What is drawn.
+        folder: Directory for the files; created where it does not exist.
+
+    Returns:
+        The paths written, in the order given.
+
+    Raises:
+        ParameterError: matplotlib is not installed, or a file cannot be written.
+    """
+    directory = Path(folder)
+    paths = []
+    for name, draw in pictures.items():
+        figure = draw(subject)
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except OSError as reason:
+            raise ParameterError(f"the plot {directory / name}.png cannot be written: {reason}") from reason
+        paths.append(save(figure, directory / f"{name}.png"))
+    return paths
