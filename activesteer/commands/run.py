@@ -75,7 +75,9 @@ def _run(options: argparse.Namespace) -> int:
         for claim in claims:
             print(f"{claim['id']} {'passed' if claim['passed'] else 'FAILED'}: {claim['text']}")
     if options.plot:
-        _plot(recordings, paths[0].parent / f"{scenario.maneuver.name}.png", quiet=options.json)
+        for figure in _plot(recordings, paths[0].parent, scenario):
+            if not options.json:
+                print(f"figure: {figure}")
     return 0
 
 
@@ -137,12 +139,26 @@ def _claims(recordings: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _plot(recordings: Mapping[str, Any], path: Path, *, quiet: bool) -> None:
-    from activesteer.analysis.plots import step_steer_figure
+def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:
+    """All runs over each other; the control-free car beside its single-track model and its linearisation."""
+    from activesteer.analysis.plots import figure_2, step_steer_figure
 
-    step_steer_figure(recordings, path)
-    if not quiet:
-        print(f"figure: {path}")
+    name = scenario.maneuver.name
+    figures = [step_steer_figure(recordings, folder / f"{name}.png")]
+    if "none" in recordings:
+        from activesteer.identification import single_track_response
+        from activesteer.scenario import describe
+
+        run, car = recordings["none"], scenario.car
+        models = {"single-track model": single_track_response(run, car.single_track, car.steering.ratio)}
+        if scenario.maneuver.road.grade == 0.0:
+            from activesteer.linearisation import linear_response, linearise
+
+            road = {"road.mu": scenario.maneuver.road.mu}
+            linear = linearise(describe(scenario)["vehicle"], scenario.maneuver.speed_mps, road)
+            models["linear car"] = linear_response(run, linear)
+        figures.append(figure_2(run, folder / f"{name}-models.png", models))
+    return figures
 
 
 class _Progress:
