@@ -195,3 +195,4 @@ def test_plot_is_drawn_beside_the_files(call, tmp_path):
     assert told.status == 0
     assert (tmp_path / "out" / "step_steer.png").stat().st_size > 10_000
     assert "figure: out/step_steer.png" in told.out
+    assert (tmp_path / "out" / "step_steer-models.png").stat().st_size > 10_000
