@@ -108,9 +108,10 @@ def resolve(
     car_source = replace(car_source, overridden=frozenset(changed["vehicle"]))
     built = build_maneuver(maneuver_table, maneuver_source)
     car = build(CarFile, car_table, car_source)
-    mjcf = _find_file(car.mjcf, models_dir() / "mjcf", car_source, ("mjcf",), ModelError)
+    own = None if isinstance(vehicle, Mapping) else find_vehicle(vehicle).parent
+    mjcf = _find_file(car.mjcf, own, models_dir() / "mjcf", car_source, ("mjcf",), ModelError)
     front, rear = (
-        _find_file(name, models_dir() / "tyres", car_source, ("tyres", axle), TyreFileError)
+        _find_file(name, own, models_dir() / "tyres", car_source, ("tyres", axle), TyreFileError)
         for axle, name in (("front", car.tyres.front), ("rear", car.tyres.rear))
     )
     files |= {f"tyres/{path.name}": path.read_bytes() for path in (front, rear)}
@@ -155,9 +156,16 @@ def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
 
 
 def _find_file(
-    name: str, folder: Path, source: Source, key: tuple[str, ...], error: type[ModelError] | type[TyreFileError]
+    name: str,
+    own: Path | None,
+    folder: Path,
+    source: Source,
+    key: tuple[str, ...],
+    error: type[ModelError] | type[TyreFileError],
 ) -> Path:
-    for candidate in (folder / name, Path(name).expanduser()):
+    """A file that a vehicle file names: beside the vehicle file, among the package's models, or a path of its own."""
+    beside = () if own is None else (own / name,)
+    for candidate in (*beside, folder / name, Path(name).expanduser()):
         if candidate.is_file():
             return candidate
     present = [str(path.relative_to(folder)) for path in folder.rglob(f"*{Path(name).suffix or '.*'}")]

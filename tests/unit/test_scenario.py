@@ -237,3 +237,16 @@ def test_amplitude_to_the_right_is_that_to_the_left():
 def test_aim_that_the_road_does_not_allow_is_answered():
     with pytest.raises(ManeuverError, match=r"no steering wheel angle found that gives 7\.85 m/s2.*road\.mu 0\.3"):
         search(road__mu=0.3, steer__lateral_acceleration_g=0.8)
+
+
+def test_model_and_tyre_beside_the_vehicle_file_come_before_the_shipped_ones(vehicle, monkeypatch, tmp_path):
+    file = vehicle()
+    own_model = file.parent / "compact"
+    shutil.copytree(models_dir() / "mjcf" / "compact", own_model)
+    own_tyre = Path(shutil.copy(models_dir() / "tyres" / "compact_205_55R16.tir", file.parent))
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    scenario = resolve("standstill", file)
+    assert scenario.mjcf == own_model / "compact.xml"
+    assert scenario.tyres[0].source == own_tyre
