@@ -163,7 +163,7 @@ def mass_properties(scenario: Scenario) -> Body:
     Args:
         scenario: The car; what it drives does not matter.
     """
-    vehicle = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.road)
+    vehicle = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.maneuver.road)
     model, data = vehicle.model, vehicle.data
     centre = data.subtree_com[model.body("chassis").id]
     inertia = 0.0

@@ -46,6 +46,7 @@ class Recorder:
             writer: File to write to.
         """
         self.channels = channels_of(vehicle)
+        vehicle.channels.restart()
         self._vehicle = vehicle
         self._writer = writer
         self._timestep_s = vehicle.timestep_s

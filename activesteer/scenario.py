@@ -18,7 +18,7 @@ from activesteer.maneuver import Maneuver, build_maneuver, maneuver_class
 from activesteer.resources import find_maneuver, find_vehicle, models_dir
 from activesteer.tyre.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
-from activesteer.vehicle import Road, VehicleParameters
+from activesteer.vehicle import VehicleParameters
 
 FileOrTable = str | os.PathLike[str] | Mapping[str, Any]
 
@@ -54,11 +54,6 @@ class Scenario:
     tyres: tuple[TyreParameters, TyreParameters]
     overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
-
-    @property
-    def road(self) -> Road:
-        """The road as the vehicle needs it."""
-        return Road(mu=self.maneuver.road.mu, grade=self.maneuver.road.grade)
 
     def controller_setup(self, timestep_s: float) -> ControllerSetup:
         """What controllers may know."""

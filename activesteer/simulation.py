@@ -57,7 +57,7 @@ class Simulation:
         """
         car = scenario.car
         self.maneuver = scenario.maneuver
-        self.vehicle = Vehicle(scenario.mjcf, car, scenario.tyres, scenario.road, timestep_s)
+        self.vehicle = Vehicle(scenario.mjcf, car, scenario.tyres, scenario.maneuver.road, timestep_s)
         torque = car.powertrain
         speed_hold = SpeedHold(car.driver, torque.max_torque_Nm, torque.engine_brake_torque_Nm, timestep_s)
         robot = OpenLoopDriver(speed_hold, car.steering.ratio, car.steering.steering_wheel_limit_rad)

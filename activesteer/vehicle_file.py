@@ -1,4 +1,7 @@
-"""Writes values into a table of a vehicle file, with the command they come from; all else, comments too, stays."""
+"""Writes values into a table of a vehicle file, with the command they come from; all else, comments too, stays.
+
+By lines: tomlkit, which keeps comments as well, puts a new key behind the comment that belongs to the next table.
+"""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from activesteer.vehicle import Vehicle
 def keyframe_xml(vehicle_name: str) -> tuple[str, str]:
     """The text of keyframes.xml, and the path of the file that it belongs into."""
     scenario = resolve("standstill", vehicle_name)
-    vehicle = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.road)
+    vehicle = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.maneuver.road)
     qpos = " ".join(f"{value:.15g}" for value in vehicle.data.qpos)
     text = f"""<mujocoinclude>
   <!-- Written by tools/make_keyframe.py: static equilibrium on the tyres. -->

@@ -7,19 +7,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from activesteer.config import Range
+from activesteer.road import Road
 from activesteer.signals import Reference
 
 Speed = Annotated[float, Range(-20.0, 100.0)]
-
-
-@dataclass(frozen=True)
-class RoadTable:
-    """The road as a manoeuvre file describes it."""
-
-    mu: Annotated[float, Range(0.01, 2.0)] = 1.0
-    """Friction relative to the one of the tyre files [-]."""
-    grade: Annotated[float, Range(-0.5, 0.5)] = 0.0
-    """Rise over run in the direction of travel [-]; positive is uphill."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +29,7 @@ class Maneuver(ABC):
     """Length of the recording [s]."""
     settle_s: Annotated[float, Range(0.0, 60.0)] = 2.0
     """Time before the recording in which the car rolls straight ahead and its speed settles [s]."""
-    road: RoadTable = RoadTable()
+    road: Road = Road()
     """What the wheels roll on."""
 
     @abstractmethod

@@ -2,6 +2,6 @@
 
 from activesteer.vehicle.car import Vehicle, engine_warnings_held
 from activesteer.vehicle.channels import ChannelMap, RawRows
-from activesteer.vehicle.parameters import Road, VehicleParameters
+from activesteer.vehicle.parameters import VehicleParameters
 
-__all__ = ["ChannelMap", "RawRows", "Road", "Vehicle", "VehicleParameters", "engine_warnings_held"]
+__all__ = ["ChannelMap", "RawRows", "Vehicle", "VehicleParameters", "engine_warnings_held"]

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.errors import ModelError, SimulationDiverged
+from activesteer.road import Road
 from activesteer.signals import DriverCommand, Measurement, SteerCommand
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.channels import ChannelMap, RawRows
 from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.loading import find, load_model
 from activesteer.vehicle.native_forces import install_native_forces
-from activesteer.vehicle.parameters import Road, VehicleParameters
+from activesteer.vehicle.parameters import VehicleParameters
 
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _FASTEST_MPS: Final = 200.0
@@ -164,11 +165,10 @@ class Vehicle:
         w, z = data.qpos[root + 3], data.qpos[root + 6]
         half = math.atan2(z, w)
         cos, sin = math.cos(2 * half), math.sin(2 * half)
-        x, y, height = data.qpos[root : root + 3]
+        x, y = data.qpos[root : root + 2]
         cg_x, cg_y = self._cg_offset()
         data.qpos[root] = cos * (x - cg_x) + sin * (y - cg_y)
         data.qpos[root + 1] = -sin * (x - cg_x) + cos * (y - cg_y)
-        data.qpos[root + 2] = height
         turn = np.array([math.cos(half), 0.0, 0.0, -math.sin(half)])
         turned = np.empty(4)
         mujoco.mju_mulQuat(turned, turn, data.qpos[root + 3 : root + 7])
@@ -255,13 +255,8 @@ class Vehicle:
             raise SimulationDiverged(msg)
 
     def raw_rows(self, count: int) -> RawRows:
-        """Empty rows for `count` steps, to be filled by `copy_row`."""
-        data = self.data
-        sizes = (
-            data.sensordata.size, data.userdata.size, data.ten_length.size, data.ten_velocity.size, data.act.size,
-            data.actuator_force.size, data.ctrl.size,
-        )  # fmt: skip
-        return RawRows(*(np.empty((count, size)) for size in sizes))
+        """Empty rows for `count` steps, to be filled from `live_arrays`."""
+        return RawRows(*(np.empty((count, live.size)) for live in self.live_arrays()))
 
     def live_arrays(self) -> tuple[NDArray[np.float64], ...]:
         """The engine's arrays in the order of `RawRows`."""

@@ -67,7 +67,7 @@ class ChannelMap:
         """
         self._model = model
         self._parameters = parameters
-        self._last_yaw_rad = 0.0
+        self.restart()
         self._sensors = {model.sensor(index).name: index for index in range(model.nsensor)}
         for name in _MOTION_SENSORS:
             # They are read block by block; a missing one is to show now.
@@ -75,6 +75,10 @@ class ChannelMap:
         signals = [*self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators()]
         self.channels = tuple(signal.channel for signal in signals)
         self._values = tuple(signal.values for signal in signals)
+
+    def restart(self) -> None:
+        """Begins a new recording: its yaw angle starts within half a turn, whatever was recorded before."""
+        self._last_yaw_rad = 0.0
 
     def evaluate(self, rows: RawRows, out: Array) -> None:
         """Values of all channels. Blocks must come in the order of time, so that the yaw angle stays unwrapped.

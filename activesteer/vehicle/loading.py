@@ -11,10 +11,11 @@ import numpy as np
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError, nearest_names
+from activesteer.road import Road
 from activesteer.tyre import parameters as tyre_index
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.parameters import DamperCurve, Road, VehicleParameters
+from activesteer.vehicle.parameters import DamperCurve, VehicleParameters
 
 _USER_DYNAMICS: Final = int(mujoco.mjtDyn.mjDYN_USER)
 _RATES: Final = {"slip_x": fb.U_RATE_X, "slip_y": fb.U_RATE_Y, "slip_z": fb.U_RATE_Z}

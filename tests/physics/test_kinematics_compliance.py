@@ -19,8 +19,9 @@ from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.rigs.kc.held_car import Case, HeldCar
+from activesteer.road import Road
 from activesteer.scenario import resolve
-from activesteer.vehicle import Road, Vehicle
+from activesteer.vehicle import Vehicle
 from tests.physics.rigid_links import FRONT_LINKS, REAR_LINKS, Pose, RigidCorner
 from tests.physics.static_corner import PINION_M, StaticCorner
 

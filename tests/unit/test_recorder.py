@@ -135,3 +135,14 @@ def test_whole_blocks_are_in_the_file_while_the_run_goes_on(tmp_path):
     again.advance(3 * BLOCK_ROWS, memory)
     # Single precision in the file where the channel says so.
     assert np.allclose(kept.values, memory.result()[1], rtol=1e-7, atol=1e-30)
+
+
+def test_yaw_angle_of_a_recording_does_not_depend_on_the_one_before():
+    simulated = simulation()
+    before = simulated.save_state()
+    # As at the end of a run that has turned round more than once.
+    simulated.vehicle.channels._last_yaw_rad = 7.0
+    recorder = Recorder(simulated.vehicle, 3)
+    simulated.restore_state(before)
+    simulated.advance(3, recorder)
+    assert np.abs(column(recorder, "yaw_rad")).max() < 0.1

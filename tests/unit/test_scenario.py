@@ -73,7 +73,7 @@ def test_overrides_reach_manoeuvre_and_vehicle_in_any_unit():
     assert scenario.car.controllers.ars.limit_rad == pytest.approx(math.radians(2.0))
     assert scenario.car.driver.speed_gain_Nmspm == 1000.0
     assert scenario.car.load.mass_factor == 1.1
-    assert scenario.road.mu == 0.4
+    assert scenario.maneuver.road.mu == 0.4
     assert scenario.controller_setup(0.002).mu == 0.4
 
 

@@ -21,7 +21,7 @@ def scenario(overrides: Mapping[str, Any] | None = None) -> Scenario:
 
 
 def vehicle_of(given: Scenario) -> Vehicle:
-    return Vehicle(given.mjcf, given.car, given.tyres, given.road)
+    return Vehicle(given.mjcf, given.car, given.tyres, given.maneuver.road)
 
 
 def standing(overrides: Mapping[str, Any] | None = None) -> Vehicle:

@@ -1,0 +1,110 @@
+"""One step of the engine as a function that can be differentiated, and the steady state that it repeats."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import ModelError
+from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.vehicle import Vehicle
+from activesteer.vehicle.local_state import LocalState
+
+Array = NDArray[np.float64]
+
+INPUTS: Final = ("steering_wheel_rad", "rear_steer_rad", "superposition_rad")
+"""What is demanded of steering wheel [rad], rear steering [rad], and superposition at the road wheel [rad]."""
+OUTPUTS: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
+"""Channels of a recording that are the outputs."""
+
+_DIFFERENCE: Final = 1e-6
+"""Step of the central differences [m, rad, m/s, rad/s]: eigenvalues agree between 1e-7 and 1e-4 to four digits."""
+_TORQUE_DIFFERENCE_Nm: Final = 1.0
+_TRIM_ITERATIONS: Final = 10
+_TRIM_TOLERANCE: Final = 1e-11
+"""Largest change of the state over a step that counts as none [m, rad, m/s, rad/s]; rounding leaves 1e-14."""
+_SOLVER_TOLERANCE: Final = 1e-14
+"""Of the engine's solver: its error of 1e-8 in a run would be divided by the small difference here."""
+
+
+class StepMap:
+    """One step of the engine about a reference state, as a function of state x, inputs u and drive torque."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        vehicle.model.opt.tolerance = _SOLVER_TOLERANCE
+        self.torque_Nm = 0.0
+        self.local = LocalState(vehicle)
+        names = [channel.name for channel in vehicle.channels.channels]
+        self._columns = [names.index(name) for name in OUTPUTS]
+
+    def __call__(self, x: Array, u: Array, more_torque_Nm: float = 0.0) -> Array:
+        """The state after the step, as a difference from the reference."""
+        self.local.write(x)
+        steering_wheel, rear, added = (float(value) for value in u)
+        command = DriverCommand(steering_wheel, 0.0, self.torque_Nm + more_torque_Nm, 0.0)
+        self.vehicle.step(command, SteerCommand(rear, added))
+        return self.local.read()
+
+    def trim(self, speed_mps: float) -> None:
+        """Makes steady driving straight on the reference, with its drive torque.
+
+        Raises:
+            ModelError: there is none.
+        """
+        size, rest = len(self.local.names), np.zeros(len(INPUTS))
+        speed = self.local.names.index("d_x")
+        x = np.zeros(size)
+        x[speed] = speed_mps - float(self.vehicle.data.qvel[0])
+        self._rebase(x)
+        residual = self(np.zeros(size), rest)
+        for _ in range(_TRIM_ITERATIONS):
+            if np.abs(residual).max() < _TRIM_TOLERANCE:
+                return
+            jacobian = self.derivatives("x")[0] - np.eye(size)
+            # The speed is given; in its place stands the torque that holds it.
+            torque = _TORQUE_DIFFERENCE_Nm
+            jacobian[:, speed] = (self(np.zeros(size), rest, torque) - self(np.zeros(size), rest, -torque)) / (
+                2 * torque
+            )
+            move: Array = np.linalg.lstsq(jacobian, -residual, rcond=None)[0].astype(np.float64)
+            self.torque_Nm += float(move[speed])
+            move[speed] = 0.0
+            self._rebase(move)
+            residual = self(np.zeros(size), rest)
+        worst = self.local.names[int(np.abs(residual).argmax())]
+        msg = (
+            f"the car does not roll steadily straight ahead at {speed_mps:g} m/s: in a step of the engine {worst} "
+            f"still changes by {np.abs(residual).max():.3g} (allowed {_TRIM_TOLERANCE:g})"
+        )
+        raise ModelError(msg)
+
+    def _rebase(self, x: Array) -> None:
+        self.local.write(x)
+        self.local.take_reference()
+
+    def derivatives(self, of: str) -> tuple[Array, Array]:
+        """Derivatives of the state after the step, and of the outputs before it.
+
+        Args:
+            of: `x` or `u`, by what to differentiate.
+
+        Returns:
+            Shapes (n, m) and (len(OUTPUTS), m), m being the size of x or u.
+        """
+        size, rest = len(self.local.names), (np.zeros(len(self.local.names)), np.zeros(len(INPUTS)))
+        count = size if of == "x" else len(INPUTS)
+        following = np.empty((2 * count, size))
+        rows = self.vehicle.raw_rows(2 * count)
+        for row in range(2 * count):
+            x, u = (part.copy() for part in rest)
+            (x if of == "x" else u)[row % count] = _DIFFERENCE if row < count else -_DIFFERENCE
+            following[row] = self(x, u)
+            for block, live in zip(rows, self.vehicle.live_arrays(), strict=True):
+                block[row] = live
+        outputs = np.empty((2 * count, len(self.vehicle.channels.channels)))
+        self.vehicle.channels.evaluate(rows, outputs)
+        outputs = outputs[:, self._columns]
+        return tuple((part[:count] - part[count:]).T / (2.0 * _DIFFERENCE) for part in (following, outputs))  # type: ignore[return-value]
