@@ -24,9 +24,6 @@ LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering", "afs":
 COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
 """Colours that colour-blind readers can tell apart (Okabe and Ito, 2008)."""
 
-_LEAST_ANGLE_RAD: Final = math.radians(1e-3)
-"""An added steering angle that never exceeds this is not drawn: the run has no such system [rad]."""
-
 
 class Panel(NamedTuple):
     """One channel of every run over time.
@@ -101,7 +98,8 @@ def step_steer_figure(recordings: Mapping[str, RecordingLike], path: str | os.Pa
             _draw(axes[0], curve, DESIRED, width=1.0, style="--")
         _draw(axes[1], curve, FRONT, width=0.8)
         for panel in ADDED:
-            if np.abs(curve.recording[panel.channel]).max() > _LEAST_ANGLE_RAD:
+            # What no controller asks for is the give of a hinge, not an added angle.
+            if np.any(curve.recording[panel.channel.replace("_rad", "_demand_rad")]):
                 _draw(axes[1], curve, panel, width=2.2)
         for axis, panel in zip(axes[2:], REST, strict=True):
             _draw(axis, curve, panel)

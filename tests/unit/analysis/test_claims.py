@@ -72,3 +72,8 @@ def test_values_name_system_and_metric():
 def test_a_missing_run_is_named():
     with pytest.raises(ParameterError, match="missing: afs"):
         step_steer_claims({"none": step_steer(), "ars": step_steer()})
+
+
+def test_the_give_of_a_hinge_is_no_added_rear_angle():
+    runs = {system: step_steer(rear_rad=-0.001) for system in ("none", "ars", "afs")}
+    assert not next(claim for claim in step_steer_claims(runs) if claim.id == "S3").passed
