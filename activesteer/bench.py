@@ -6,12 +6,13 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 
+from activesteer.analysis.claims import SCENARIOS, SYSTEMS
 from activesteer.recorder import Recorder
-from activesteer.runner import RunContext, prepared
+from activesteer.runner import RunContext, prepared, run_scenario
 from activesteer.scenario import Scenario, resolve
 from activesteer.simulation import Simulation
 from activesteer.tyre.bench import bench as tyre_bench
@@ -52,6 +53,34 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
     best["real_time_factor"] = step_us / best["closed_loop_step_us"]
     best["real_time_factor_with_file"] = step_us / best["with_file_step_us"]
     return best | _blocks(scenario)
+
+
+def bench_maneuvers() -> list[dict[str, Any]]:
+    """Drives the paper's scenarios with its three systems, without files, one after the other in this process.
+
+    Returns:
+        For each run `maneuver`, `controller`, `simulated_s` (the settling before the recording included), `wall_s`
+        (everything from building the car to the metrics), `real_time_factor`, and `metrics`.
+    """
+    rows = []
+    for name in SCENARIOS:
+        scenario = prepared(resolve(name))
+        for system in SYSTEMS:
+            start = time.perf_counter()
+            recording = run_scenario(scenario, system)
+            wall_s = time.perf_counter() - start
+            simulated_s = scenario.maneuver.settle_s + scenario.maneuver.duration_s
+            rows.append(
+                {
+                    "maneuver": name,
+                    "controller": system,
+                    "simulated_s": simulated_s,
+                    "wall_s": wall_s,
+                    "real_time_factor": simulated_s / wall_s,
+                    "metrics": recording.metrics,
+                }
+            )
+    return rows
 
 
 def _interleaved(stages: dict[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:

@@ -1,4 +1,4 @@
-"""The command line: `activesteer run | list | info | tyre | kc | identify | linearise | bench`."""
+"""The command line: `activesteer run`, `reproduce` and the others; each has a module in `commands`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from activesteer.commands import bench, identify, info, kc, linearise, listing, run, tyre
+from activesteer.commands import bench, figures, identify, info, kc, linearise, listing, reproduce, run, tyre
 from activesteer.errors import ActiveSteerError
 from activesteer.version import __version__
 
@@ -41,6 +41,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="activesteer", description="A multibody car with active steering, in MuJoCo.")
     parser.add_argument("--version", action="version", version=f"activesteer {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for command in (run, listing, info, tyre, kc, identify, linearise, bench):
+    for command in (run, reproduce, figures, listing, info, tyre, kc, identify, linearise, bench):
         command.add_to(commands)
     return parser

@@ -1,7 +1,8 @@
 """TOML tables into frozen dataclasses: every key known, every value of the right type and within its range.
 
-A field's type is its check: `float`, `int`, `bool`, `str`, tuples of floats, a nested dataclass, a dict of nested
-dataclasses, or one of these `| None`. A range is written `Annotated[float, Range(low, high)]`. Inside, everything is SI
+A field's type is its check: `float`, `int`, `bool`, `str`, tuples of floats, a nested dataclass, a dict or a tuple of
+nested dataclasses, or one of these `| None`. An element of a tuple has its number for a key: `road.patches.0.mu` is the
+`mu` of the first [[road.patches]]. A range is written `Annotated[float, Range(low, high)]`. Inside, everything is SI
 and radians; in a file a key may carry an edge unit instead: `speed_kmh` fills `speed_mps`, `angle_deg` fills
 `angle_rad`.
 """
@@ -67,7 +68,8 @@ class Source:
         key = ".".join(path)
         if any(key == other or key.startswith(other + ".") for other in self.overridden):
             return self.error(f"override {key}: {problem}")
-        line = self._line_of(path)
+        # What stands in an inline table or a list has no line of its own.
+        line = next((found for end in range(len(path), 0, -1) if (found := self._line_of(path[:end]))), None)
         where = f"{self.name}, line {line}" if line else self.name
         return self.error(f"{where}: {key}: {problem}" if key else f"{where}: {problem}")
 
@@ -75,9 +77,15 @@ class Source:
         """Line of a key, found in the text: tomllib does not keep it."""
         wanted = ".".join(path)
         table = ""
-        for number, line in enumerate(self.text.splitlines() if path else (), 1):
+        elements: dict[str, int] = {}
+        for number, line in enumerate(self.text.splitlines(), 1):
             if header := re.fullmatch(r"\s*\[([^\[\]]+)\]\s*(#.*)?", line):
-                found = table = header.group(1).strip()
+                found = table = _numbered(header.group(1), elements)
+            elif header := re.fullmatch(r"\s*\[\[([^\[\]]+)\]\]\s*(#.*)?", line):
+                *above, last = header.group(1).strip().split(".")
+                name = ".".join((_numbered(".".join(above), elements), last)) if above else last
+                elements[name] = elements.get(name, -1) + 1
+                found = table = f"{name}.{elements[name]}"
             elif pair := re.match(r"\s*([\w.-]+)\s*=", line):
                 found = f"{table}.{pair.group(1)}" if table else pair.group(1)
             else:
@@ -181,6 +189,15 @@ def merged(cls: type, table: Mapping[str, Any], path: Sequence[str], value: obje
         result[key] = value
         return result
     inner = _dataclass_in(hints[name])
+    if inner is None and (element := _element_of(hints[name])) is not None:
+        elements = list(result.get(key, ()))
+        number = int(rest[0]) if rest[0].isdecimal() else len(elements)
+        if number >= len(elements):
+            numbers = f"0 to {len(elements) - 1}" if elements else "none: the list is empty"
+            raise source.fail(path, f"there is no element {rest[0]!r} of {key}; there are {numbers}")
+        elements[number] = merged(element, elements[number], rest[1:], value, source) if rest[1:] else value
+        result[key] = elements
+        return result
     if inner is None and typing.get_origin(hints[name]) is dict:
         inner = typing.get_args(hints[name])[1]
         branch = dict(result.get(key, {}))
@@ -241,11 +258,27 @@ def _field_of(key: str, fields: Mapping[str, Any]) -> tuple[str | None, float]:
     return None, 1.0
 
 
+def _numbered(name: str, elements: Mapping[str, int]) -> str:
+    """A dotted key with the number of the present element behind the name of every list."""
+    key = ""
+    for part in name.strip().split("."):
+        key = f"{key}.{part}" if key else part
+        if key in elements:
+            key += f".{elements[key]}"
+    return key
+
+
 def _dataclass_in(hint: Any) -> type | None:
     for candidate in (hint, *typing.get_args(hint)):
         if isinstance(candidate, type) and dataclasses.is_dataclass(candidate):
-            return candidate if typing.get_origin(hint) is not dict else None
+            return candidate if typing.get_origin(hint) not in (dict, tuple) else None
     return None
+
+
+def _element_of(hint: Any) -> type | None:
+    """The dataclass that the elements of a tuple are made of, or None."""
+    item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
+    return item if isinstance(item, type) and dataclasses.is_dataclass(item) else None
 
 
 def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[str]) -> Any:
@@ -270,13 +303,24 @@ def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[
         item = typing.get_args(hint)[1]
         return {key: _convert(item, value, 1.0, source, (*path, key)) for key, value in raw.items()}
     if origin is tuple:
-        if not isinstance(raw, (list, tuple)):
-            raise source.fail(path, f"{raw!r} is no list of numbers")
-        item = typing.get_args(hint)[0]
-        if limits is not None:
-            item = typing.Annotated[item, limits]
-        return tuple(_convert(item, value, factor, source, path) for value in raw)
+        return _elements(hint, raw, factor, limits, source, path)
     return _scalar(hint, raw, factor, limits, source, path)
+
+
+def _elements(
+    hint: Any, raw: Any, factor: float, limits: Range | None, source: Source, path: Sequence[str]
+) -> tuple[Any, ...]:
+    """A list of numbers, or of tables."""
+    element = _element_of(hint)
+    if not isinstance(raw, (list, tuple)):
+        wanted = "no list of numbers" if element is None else f"no list; tables [[{'.'.join(path)}]] are needed"
+        raise source.fail(path, f"{raw!r} is {wanted}")
+    if element is not None:
+        return tuple(_convert(element, value, 1.0, source, (*path, str(number))) for number, value in enumerate(raw))
+    item = typing.get_args(hint)[0]
+    if limits is not None:
+        item = typing.Annotated[item, limits]
+    return tuple(_convert(item, value, factor, source, path) for value in raw)
 
 
 def _scalar(hint: Any, raw: Any, factor: float, limits: Range | None, source: Source, path: Sequence[str]) -> Any:

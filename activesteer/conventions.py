@@ -22,3 +22,9 @@ GRAVITY_MPS2: Final = 9.81
 
 DEFAULT_TIMESTEP_S: Final = 0.001
 """Step of the engine and of the control loop [s]."""
+
+SYSTEM_LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering", "afs": "3 active front steering"}
+"""What the runs of the three systems are called, numbered as in the paper's figures."""
+
+RUN_COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
+"""Colours of the three systems, then of further runs; colour-blind readers can tell them apart (Okabe and Ito, 2008)."""

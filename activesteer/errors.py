@@ -45,6 +45,10 @@ class RecordingError(ActiveSteerError):
     """A recording cannot be written or read, or has no such channel."""
 
 
+class PlaybackError(ActiveSteerError):
+    """A recording cannot be shown: no viewer, no display, or a file that cannot be written."""
+
+
 def nearest_names(name: str, known: Iterable[str], most: int = 3) -> str:
     """Words for an error message: which existing names come closest to a wrong one.
 

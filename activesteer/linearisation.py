@@ -14,7 +14,8 @@ Method:
    pitch, speed) none. Of the faster modes the static part is kept, in D, so that the gain at rest is exact.
 
 Validity: small motions about straight driving on a level, even road. Dampers enter with the mean of the slopes of
-their curves on both sides of rest, dry friction as the engine's regularisation of it at rest.
+their curves on both sides of rest, friction of their seals as the road's vibration leaves it at small speeds. Friction
+of the rack is left out: about a point of rest it would hold the rack by its elasticity, while a steered car's rack slides.
 """
 
 from __future__ import annotations
@@ -196,7 +197,8 @@ def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, 
     straight = {
         "kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0, "settle_s": _SETTLE_S,
     }  # fmt: skip
-    step = StepMap(Simulation(resolve(straight, vehicle, overrides)).vehicle)
+    sliding = {**(overrides or {}), "vehicle.friction.rack_N": 0.0}
+    step = StepMap(Simulation(resolve(straight, vehicle, sliding)).vehicle)
     step.trim(speed_mps)
     a, c = step.derivatives("x")
     b, d = step.derivatives("u")

@@ -1,18 +1,79 @@
-"""The road: asked for by the manoeuvre, felt by the vehicle."""
+"""The road: asked for by the manoeuvre, felt by the vehicle.
+
+A road is plane. Its friction may differ from place to place, in world axes of the recording: x along the track from
+where the centre of gravity is when the recording starts, y to the left. What counts for a wheel is the friction at its
+contact point. While the car settles before the recording, it rolls on `mu` alone.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Final, NamedTuple
 
 from activesteer.config import Range
+from activesteer.errors import ManeuverError, nearest_names
+
+Friction = Annotated[float, Range(0.01, 2.0)]
+
+_SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
+"""Name of a side -> its right and left border [m]."""
+
+
+@dataclass(frozen=True)
+class RoadPatch:
+    """A stretch of the track with a friction of its own; keys of a table [[road.patches]]."""
+
+    start_m: float
+    """Where it begins, along x [m]; the beginning belongs to it."""
+    end_m: float
+    """Where it ends [m]; the end does not belong to it."""
+    mu: Friction
+    """Friction relative to the one of the tyre files [-]."""
+    side: str = "both"
+    """`both`, `left` (y > 0) or `right` (y <= 0)."""
+
+    def __post_init__(self) -> None:
+        """Checks the place.
+
+        Raises:
+            ManeuverError: the patch ends before it begins, or its side has an unknown name.
+        """
+        if not self.end_m > self.start_m:
+            msg = f"the patch ends at {self.end_m:g} m, which is not behind its start_m of {self.start_m:g} m"
+            raise ManeuverError(msg)
+        if self.side not in _SIDES:
+            msg = f"side: is {self.side!r}; {nearest_names(self.side, _SIDES)}"
+            raise ManeuverError(msg)
+
+
+class Area(NamedTuple):
+    """A rectangle of the road, x from start to before the end, y from beyond the right border to the left one."""
+
+    start_m: float
+    end_m: float
+    right_m: float
+    left_m: float
+    mu: float
 
 
 @dataclass(frozen=True)
 class Road:
     """What the wheels roll on; keys of the table [road] in a manoeuvre file."""
 
-    mu: Annotated[float, Range(0.01, 2.0)] = 1.0
+    mu: Friction = 1.0
     """Friction relative to the one of the tyre files [-]."""
     grade: Annotated[float, Range(-0.5, 0.5)] = 0.0
     """Rise over run in the direction of travel [-]; positive is uphill."""
+    mu_left: Friction | None = None
+    """Friction where y > 0 [-]; `mu` where not given."""
+    mu_right: Friction | None = None
+    """Friction where y <= 0 [-]; `mu` where not given."""
+    patches: tuple[RoadPatch, ...] = ()
+    """Stretches with a friction of their own; where two overlap, the later one counts."""
+
+    def areas(self) -> tuple[Area, ...]:
+        """Where the friction is not `mu`; where areas overlap, the later one counts."""
+        sides = (("left", self.mu_left), ("right", self.mu_right))
+        split = [Area(-math.inf, math.inf, *_SIDES[side], mu) for side, mu in sides if mu is not None]
+        return (*split, *(Area(it.start_m, it.end_m, *_SIDES[it.side], it.mu) for it in self.patches))

@@ -4,36 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import json
 import platform
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
-
+from activesteer.amplitude_search import amplitude
 from activesteer.analysis.metrics import metrics
 from activesteer.controllers.loading import user_file
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.errors import ActiveSteerError, ManeuverError, RecordingError
-from activesteer.maneuver import StepSteer
+from activesteer.errors import ActiveSteerError, RecordingError
 from activesteer.recorder import Recorder, channels_of
-from activesteer.recording import McapWriter, Primitive, Recording
+from activesteer.recording import McapWriter, Recording, ScenePart
 from activesteer.scenario import FileOrTable, Scenario, describe, resolve
-from activesteer.scene import primitives_of
+from activesteer.scene import scene_of
 from activesteer.signals import Channel
 from activesteer.simulation import Simulation
 from activesteer.version import __version__
-
-_SEARCH_TOLERANCE: Final = 5e-4
-"""Relative error of the lateral acceleration at which the search for the step's amplitude ends."""
-_SEARCH_RUNS: Final = 8
-_SEARCH_S: Final = 4.5
-"""Time after the beginning of the step that a run of the search takes, however long the manoeuvre is [s]."""
-_STEADY_S: Final = 0.5
-"""Length of the end of such a run over which the steady state is taken [s]."""
 
 
 def simulate(
@@ -63,7 +52,7 @@ def simulate(
 
 
 def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scenario:
-    """The scenario with everything known that a search must find first: the amplitude of a step steer.
+    """The scenario with everything known that must be found by driving first: how far the steering wheel is turned.
 
     Args:
         scenario: A scenario.
@@ -75,68 +64,10 @@ def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scen
     Raises:
         ManeuverError: no amplitude gives what is asked for.
     """
-    maneuver = scenario.maneuver
-    if not isinstance(maneuver, StepSteer) or maneuver.steer.steering_wheel_rad is not None:
+    search = scenario.maneuver.search
+    if search is None:
         return scenario
-    described = json.dumps([describe(scenario), timestep_s], sort_keys=True, default=str)
-    key = (described, scenario.mjcf, *sorted(scenario.files.items()))
-    amplitude = _amplitudes.get(key)
-    if amplitude is None:
-        amplitude = _amplitudes[key] = _search_amplitude(scenario, maneuver, timestep_s)
-    return _replace_maneuver(scenario, maneuver.with_amplitude(amplitude))
-
-
-_amplitudes: dict[tuple[object, ...], float] = {}
-"""Results of searches of this process, by everything that they depend on."""
-
-
-def _replace_maneuver(scenario: Scenario, maneuver: StepSteer) -> Scenario:
-    return Scenario(maneuver, scenario.car, scenario.mjcf, scenario.tyres, scenario.overrides, scenario.files)
-
-
-def _search_amplitude(scenario: Scenario, maneuver: StepSteer, timestep_s: float) -> float:
-    """Steering wheel angle that gives the wanted steady-state lateral acceleration without control [rad]."""
-    wanted = maneuver.steer.lateral_acceleration_mps2
-    assert wanted is not None  # StepSteer has checked it
-    if wanted == 0.0:
-        return 0.0
-    maneuver = dataclasses.replace(maneuver, duration_s=maneuver.steer.start_s + _SEARCH_S)
-    simulation = Simulation(scenario, "none", timestep_s)
-    start = simulation.save_state()
-    car, speed = scenario.car.single_track, max(maneuver.speed_mps, 1.0)
-    wheelbase = car.cg_to_front_m + car.cg_to_rear_m
-    # First guess: Ackermann angle with the understeer of a usual car, some 2.5 deg per g.
-    angle = scenario.car.steering.ratio * wanted * (wheelbase / speed**2 + 0.0044)
-    tried: list[tuple[float, float]] = []
-    for _ in range(_SEARCH_RUNS):
-        reached = _steady_acceleration(simulation, maneuver.with_amplitude(angle), start)
-        if abs(reached / wanted - 1.0) < _SEARCH_TOLERANCE:
-            return angle
-        tried.append((angle, reached))
-        if len(tried) == 1:
-            angle *= wanted / reached if reached * wanted > 0.0 else 1.2
-        else:
-            (a0, r0), (a1, r1) = tried[-2:]
-            if r1 == r0:
-                break
-            angle = a1 + (wanted - r1) * (a1 - a0) / (r1 - r0)
-    best = min(tried, key=lambda pair: abs(pair[1] - wanted))
-    msg = (
-        f"{maneuver.name}: no steering wheel angle found that gives {wanted:.3g} m/s2 in the control-free car; the "
-        f"closest was {np.degrees(best[0]):.1f} deg with {best[1]:.3g} m/s2: is the road too slippery "
-        f"(road.mu {maneuver.road.mu:g})?"
-    )
-    raise ManeuverError(msg)
-
-
-def _steady_acceleration(simulation: Simulation, maneuver: StepSteer, start: Any) -> float:
-    simulation.restore_state(start)
-    simulation.maneuver = maneuver
-    recorder = Recorder(simulation.vehicle, simulation.steps)
-    simulation.run(recorder)
-    _, values, _ = recorder.result()
-    column = [channel.name for channel in recorder.channels].index("ay_mps2")
-    return float(values[-round(_STEADY_S / simulation.vehicle.timestep_s) :, column].mean())
+    return dataclasses.replace(scenario, maneuver=search.accept(amplitude(scenario, search, timestep_s)))
 
 
 def run_scenario(
@@ -219,14 +150,14 @@ class RunContext(NamedTuple):
         body_names: Bodies whose poses are recorded.
         metadata: Resolved parameters, versions.
         files: Manoeuvre, vehicle, model and tyre files, and a user's own controller.
-        scene: What the bodies look like.
+        scene: What the car looks like.
     """
 
     channels: tuple[Channel, ...]
     body_names: tuple[str, ...]
     metadata: dict[str, Any]
     files: dict[str, bytes]
-    scene: tuple[Primitive, ...]
+    scene: tuple[ScenePart, ...]
 
     @classmethod
     def of(cls, scenario: Scenario, controller: str, simulation: Simulation) -> RunContext:
@@ -235,11 +166,14 @@ class RunContext(NamedTuple):
         metadata = {
             "controller": controller,
             **describe(scenario),
+            "car": vehicle.dimensions(),
             "timestep_s": vehicle.timestep_s,
             "versions": _versions(),
         }
+        if (course := scenario.maneuver.course) is not None:
+            metadata["course"] = course.describe()
         files = scenario.files | user_file(controller)
-        return cls(channels_of(vehicle), vehicle.body_names, metadata, files, primitives_of(vehicle.model))
+        return cls(channels_of(vehicle), vehicle.body_names, metadata, files, scene_of(vehicle.model))
 
     def writer(self, path: Path) -> McapWriter:
         """A file that rows can be written to.

@@ -1,4 +1,4 @@
-"""What the car looks like, taken from the geoms of its model, for viewers of recordings."""
+"""What the car looks like, taken from geoms and tendons of its model, for viewers of recordings."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from activesteer.recording import Primitive
+from activesteer.recording import Link, Primitive, ScenePart
 
 _KINDS: Final = {
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
@@ -16,6 +16,18 @@ _KINDS: Final = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "sphere",
 }
+
+
+def scene_of(model: mujoco.MjModel) -> tuple[ScenePart, ...]:
+    """All that a viewer can draw of a car.
+
+    Args:
+        model: The car.
+
+    Returns:
+        Solids in the frames of their bodies, and the links, springs and dampers between bodies.
+    """
+    return (*primitives_of(model), *links_of(model))
 
 
 def primitives_of(model: mujoco.MjModel) -> tuple[Primitive, ...]:
@@ -51,3 +63,38 @@ def primitives_of(model: mujoco.MjModel) -> tuple[Primitive, ...]:
             )
         )
     return tuple(solids)
+
+
+def links_of(model: mujoco.MjModel) -> tuple[Link, ...]:
+    """The tendons that run straight from site to site: suspension links, springs, dampers.
+
+    Args:
+        model: The car. A fixed tendon has no shape of its own (the front springs and dampers lie along the strut); it is
+            drawn between the sites `NAME_inner` and `NAME_outer` where the model has them, and left out otherwise.
+
+    Returns:
+        Them, in the order of the model. What is called `..._spring` or `..._damper` is one.
+    """
+    links = []
+    for index in range(model.ntendon):
+        name = model.tendon(index).name
+        first = int(model.tendon_adr[index])
+        wraps = slice(first, first + int(model.tendon_num[index]))
+        if (model.wrap_type[wraps] == int(mujoco.mjtWrap.mjWRAP_SITE)).all():
+            sites = [int(site) for site in model.wrap_objid[wraps]]
+        else:
+            ends = (f"{name}_inner", f"{name}_outer")
+            sites = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, end) for end in ends]
+            if -1 in sites:
+                continue
+        kind = name.rpartition("_")[2]
+        links.append(
+            Link(
+                name,
+                kind if kind in ("spring", "damper") else "link",
+                tuple((model.body(model.site_bodyid[site]).name, tuple(model.site_pos[site].tolist())) for site in sites),
+                float(model.tendon_width[index]),
+                tuple(model.tendon_rgba[index].tolist()),
+            )
+        )
+    return tuple(links)

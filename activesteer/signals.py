@@ -88,6 +88,26 @@ class Measurement(NamedTuple):
     wheel_speed_radps: tuple[float, float, float, float]
 
 
+class Motion(NamedTuple):
+    """Where the car is and how it moves over the ground: what the driver sees and feels; no controller gets it.
+
+    Attributes:
+        x_m: Position of the centre of gravity, world x [m].
+        y_m: The same, world y [m].
+        yaw_rad: Heading [rad], left positive, within half a turn.
+        speed_mps: Speed along the heading [m/s].
+        lateral_speed_mps: Speed across the heading, left positive [m/s].
+        yaw_rate_radps: Yaw rate [rad/s], left positive.
+    """
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    speed_mps: float
+    lateral_speed_mps: float
+    yaw_rate_radps: float
+
+
 class SteerCommand(NamedTuple):
     """What a controller asks of the steering actuators, with its intermediate results for the recording.
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from activesteer.controllers import Controller, load_controller
 from activesteer.controllers.loading import check_command, is_sane
+from activesteer.controllers.single_track import SingleTrack
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.driver import ConstantRadiusDriver, OpenLoopDriver, SpeedHold
+from activesteer.driver import LOOK_INTERVAL_S, ConstantRadiusDriver, OpenLoopDriver, PathPreviewDriver, SpeedHold
 from activesteer.maneuver import Maneuver
 from activesteer.recorder import Recorder
 from activesteer.scenario import Scenario
@@ -58,13 +59,7 @@ class Simulation:
         car = scenario.car
         self.maneuver = scenario.maneuver
         self.vehicle = Vehicle(scenario.mjcf, car, scenario.tyres, scenario.maneuver.road, timestep_s)
-        torque = car.powertrain
-        speed_hold = SpeedHold(car.driver, torque.max_torque_Nm, torque.engine_brake_torque_Nm, timestep_s)
-        robot = OpenLoopDriver(speed_hold, car.steering.ratio, car.steering.steering_wheel_limit_rad)
-        self.driver: OpenLoopDriver | ConstantRadiusDriver = robot
-        if self.maneuver.settling_reference().curvature_1pm is not None:
-            wheelbase_m = car.single_track.cg_to_front_m + car.single_track.cg_to_rear_m
-            self.driver = ConstantRadiusDriver(robot, wheelbase_m, timestep_s)
+        self.driver = _driver(scenario, timestep_s)
         self.controller: Controller = load_controller(controller, scenario.controller_setup(timestep_s))
         self._controller_name = controller
         self._measurement = self.vehicle.start(self.maneuver.speed_mps)
@@ -98,9 +93,14 @@ class Simulation:
     def _advance(self, maneuver: Maneuver | _Settling, steps: int, recorder: Recorder | None) -> None:
         driver, controller, vehicle = self.driver, self.controller, self.vehicle
         timestep_s, measurement = vehicle.timestep_s, self._measurement
+        # While the car settles there is no path yet: the one of the manoeuvre begins where the recording does.
+        eyes = driver if isinstance(driver, PathPreviewDriver) and maneuver.course is not None else None
+        look_every = max(1, round(LOOK_INTERVAL_S / timestep_s))
         with engine_warnings_held():
             for step in range(self._step, self._step + steps):
                 reference = maneuver.reference(step * timestep_s)
+                if eyes is not None and step % look_every == 0:
+                    eyes.look(vehicle.motion())
                 command = driver.step(reference, measurement)
                 steer = controller.step(command, measurement)
                 if steer.__class__ is not SteerCommand or not is_sane(steer):
@@ -131,8 +131,24 @@ class Simulation:
         self._measurement, self._step = state.measurement, state.step
 
 
+def _driver(scenario: Scenario, timestep_s: float) -> OpenLoopDriver | ConstantRadiusDriver | PathPreviewDriver:
+    """Who can do what the manoeuvre asks: a robot, one who keeps a curvature, or one who looks at a path."""
+    maneuver, car = scenario.maneuver, scenario.car
+    torque = car.powertrain
+    speed_hold = SpeedHold(car.driver, torque.max_torque_Nm, torque.engine_brake_torque_Nm, timestep_s)
+    robot = OpenLoopDriver(speed_hold, car.steering.ratio, car.steering.steering_wheel_limit_rad)
+    single_track = SingleTrack(car.single_track)
+    if maneuver.course is not None:
+        return PathPreviewDriver(robot, maneuver.course.path, single_track.matrices, car.driver, timestep_s)
+    if maneuver.settling_reference().curvature_1pm is not None:
+        return ConstantRadiusDriver(robot, single_track.wheelbase_m, timestep_s)
+    return robot
+
+
 class _Settling:
     """Stands in for the manoeuvre before it starts."""
+
+    course = None
 
     def __init__(self, maneuver: Maneuver) -> None:
         self._reference = maneuver.settling_reference()

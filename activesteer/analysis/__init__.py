@@ -1,9 +1,10 @@
-"""Metrics, claims, tables and plots, made from recordings and from nothing else.
+"""Metrics, claims, tables and figures, made from recordings and from nothing else.
 
 - `metrics`: the numbers that belong to the manoeuvre of a recording: `step_response`, `frequency_response` (ISO 7401),
-  `handling` (ISO 4138), `general` for others.
-- `claims`: what the paper says about the three systems, as checks.
-- `tables`, `plots`, `linear_plots`: the same for reading and looking. The plots need matplotlib
+  `handling` (ISO 4138), `sine_with_dwell` (FMVSS 126), `brake_in_turn` (ISO 7975), `path_following` (lane change,
+  slalom, any path), `general` for others.
+- `claims`: what the paper says about the three systems, as checks, with a scorecard.
+- `tables`, `figures`, `linear_plots`: the same for reading and looking. The figures need matplotlib
   (`pip install 'activesteer[plot]'`).
 - `linearise`: the linear car; it belongs to `activesteer.linearisation` and is only offered here.
 """

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.analysis.figures.style import COLOURS
 from activesteer.analysis.frequency_response import OUTPUTS, frequency_response
-from activesteer.analysis.plots import COLOURS
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import ParameterError
 from activesteer.pictures import new_figure, save

@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from activesteer.analysis import frequency_response, general, handling, step_response
+from activesteer.analysis import (
+    brake_in_turn,
+    frequency_response,
+    general,
+    handling,
+    path_following,
+    sine_with_dwell,
+    step_response,
+)
 from activesteer.analysis.source import RecordingLike, maneuver_kind
 
 BY_KIND: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
@@ -13,6 +21,11 @@ BY_KIND: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "slowly_increasing_steer": handling.metrics,
     "constant_radius": handling.metrics,
     "sine_sweep": frequency_response.metrics,
+    "sine_with_dwell": sine_with_dwell.metrics,
+    "lane_change": path_following.metrics,
+    "slalom": path_following.metrics,
+    "follow_path": path_following.metrics,
+    "brake_in_turn": brake_in_turn.metrics,
 }
 """Kinds of manoeuvre with metrics of their own; every other kind gets those of `general`."""
 

@@ -100,6 +100,54 @@ def largest_rate(values: Array, timestep_s: float) -> float:
     return float(np.abs(values[span:] - values[:-span]).max() / (span * timestep_s))
 
 
+def rate_rms(values: Array, timestep_s: float) -> float:
+    """Root mean square of the rate of change, taken over `RATE_SPAN_S`.
+
+    Args:
+        values: Samples at equal distances, shape (n,).
+        timestep_s: Distance of the samples [s].
+
+    Returns:
+        Root mean square, in the unit of `values` per second; nan if the signal is shorter than the span.
+    """
+    span = max(1, round(RATE_SPAN_S / timestep_s))
+    return rms(values[span:] - values[:-span]) / (span * timestep_s)
+
+
+def rms(values: Array) -> float:
+    """Root mean square, in the unit of the values; nan where there are none."""
+    return float(np.sqrt(np.mean(np.square(values, dtype=np.float64)))) if len(values) else math.nan
+
+
+def lag(leader: Array, follower: Array, timestep_s: float, longest_s: float) -> float:
+    """By how much a signal comes after another: the shift at which the two look most alike.
+
+    Args:
+        leader: Samples at equal distances, shape (n,).
+        follower: Samples of the other signal, shape (n,).
+        timestep_s: Distance of the samples [s].
+        longest_s: Longest lag looked for [s].
+
+    Returns:
+        Lag [s], by the maximum of the normalised cross-correlation, with a parabola between samples; nan where the
+        maximum lies at an end of the range (the follower leads, or lags longer), or a signal is zero.
+    """
+    lead, follow = (np.asarray(values, dtype=np.float64) for values in (leader, follower))
+    count, most = len(lead), round(longest_s / timestep_s)
+    if count < 2 * most:
+        return math.nan
+    energies = np.cumsum(lead**2), np.cumsum(follow[::-1] ** 2)
+    scale = np.sqrt([energies[0][count - k - 1] * energies[1][count - k - 1] for k in range(most + 1)])
+    if not scale.all():
+        return math.nan
+    alike = np.array([lead[: count - k] @ follow[k:] for k in range(most + 1)]) / scale
+    top = int(alike.argmax())
+    if top in (0, most):
+        return math.nan
+    before, here, after = alike[top - 1 : top + 2]
+    return float(top + 0.5 * (before - after) / (before - 2.0 * here + after)) * timestep_s
+
+
 def timestep(time_s: Array) -> float:
     """Distance of equidistant samples [s].
 

@@ -23,6 +23,7 @@ _DISPLAY: Final = (
     ("_m", "m", 1.0),
     ("_s", "s", 1.0),
     ("_overshoot", "%", 100.0),
+    ("_share", "%", 100.0),
 )
 """Suffix of a metric's name, unit it is shown in, factor from the SI value."""
 
@@ -40,7 +41,8 @@ def label_and_unit(name: str) -> tuple[str, str, float]:
     """
     for suffix, unit, factor in _DISPLAY:
         if name.endswith(suffix):
-            stem = name if suffix == "_overshoot" else name.removesuffix(suffix)
+            # A pure number has no unit to take off its name; the ending is a word of it.
+            stem = name if unit == "%" else name.removesuffix(suffix)
             return _words(stem), unit, factor
     return _words(name), "-", 1.0
 

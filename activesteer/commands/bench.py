@@ -1,9 +1,9 @@
-"""`activesteer bench`: where the time of a step goes, or what a tyre costs."""
+"""`activesteer bench`: where the time of a step goes, what a tyre costs, or how fast the paper's scenarios run."""
 
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import Any, Final
 
 from activesteer.commands.output import print_json
 from activesteer.errors import ParameterError
@@ -12,7 +12,9 @@ from activesteer.errors import ParameterError
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("bench", help="where the time of a step goes")
-    parser.add_argument("--tyre", action="store_true", help="what a tyre's evaluation costs instead")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--tyre", action="store_true", help="what a tyre's evaluation costs instead")
+    what.add_argument("--maneuvers", action="store_true", help="the paper's scenarios instead, and their key metrics")
     parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
     parser.add_argument("--rounds", type=int, default=5, metavar="N", help="the best of N counts (default: 5)")
     parser.set_defaults(action=_bench)
@@ -24,10 +26,42 @@ def _bench(options: argparse.Namespace) -> int:
     if options.rounds < 1:
         msg = f"--rounds {options.rounds}: at least 1 is needed"
         raise ParameterError(msg)
+    if options.maneuvers:
+        return _maneuvers(as_json=options.json)
     results = bench_tyre(options.rounds) if options.tyre else bench(options.rounds)
     if options.json:
         print_json(results)
         return 0
     for name, value in results.items():
         print(f"{name:28} {value:8.2f}")
+    return 0
+
+
+_KEY_METRICS: Final = (
+    "yaw_rate_peak_radps", "sideslip_peak_rad", "ay_peak_mps2", "yaw_rate_ratio_1_00_s", "yaw_rate_ratio_1_75_s",
+    "after_last_gate_yaw_rate_rms_radps", "after_last_gate_sideslip_rms_rad", "lane_overstep_m",
+)  # fmt: skip
+
+
+def _maneuvers(*, as_json: bool) -> int:
+    from activesteer.analysis.tables import comparison
+    from activesteer.bench import bench_maneuvers
+
+    rows = bench_maneuvers()
+    if as_json:
+        print_json({"runs": rows})
+        return 0
+    for name in dict.fromkeys(row["maneuver"] for row in rows):
+        runs = {row["controller"]: row for row in rows if row["maneuver"] == name}
+        factors = ", ".join(f"{system} {row['real_time_factor']:.1f}" for system, row in runs.items())
+        print(f"{name}: times real time: {factors}")
+        print(
+            comparison(
+                {
+                    system: {metric: row["metrics"][metric] for metric in _KEY_METRICS if metric in row["metrics"]}
+                    for system, row in runs.items()
+                }
+            )
+        )
+        print()
     return 0

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from activesteer.commands.output import print_json
+from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError
 
 _DEFAULT_FOLDER: Final = Path("runs")
@@ -32,7 +33,7 @@ def add_to(commands: Any) -> None:
         "-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="FILE_OR_DIR",
         help="a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap (default: runs)",
     )  # fmt: skip
-    run.add_argument("--plot", action="store_true", help="also draw the runs (step steer)")
+    run.add_argument("--plot", action="store_true", help="also draw the runs")
     run.add_argument("--json", action="store_true", help="print metrics as JSON and nothing else")
     run.set_defaults(action=_run)
 
@@ -49,15 +50,12 @@ def _run(options: argparse.Namespace) -> int:
     # What is wrong with the last controller or the plot is said before the first run, not after it.
     for controller in controllers:
         load_controller(controller, scenario.controller_setup(DEFAULT_TIMESTEP_S))
-    if options.plot and scenario.maneuver.kind != "step_steer":
-        msg = f"--plot: there is a figure for step_steer, none yet for {scenario.maneuver.kind}"
-        raise ParameterError(msg)
     paths = _output_paths(options.output, scenario.maneuver.name, controllers)
     scenario = prepared(scenario)
     recordings = {}
     for controller, path in zip(controllers, paths, strict=True):
         label = _label(controller)
-        with _Progress(f"{scenario.maneuver.name} {label}", quiet=options.json) as progress:
+        with ProgressBar(f"{scenario.maneuver.name} {label}", quiet=options.json) as progress:
             recordings[label] = run_scenario(scenario, controller, path=path, progress=progress)
         if not options.json:
             print(f"{scenario.maneuver.name} {label}: {path}", file=sys.stderr)
@@ -120,10 +118,11 @@ def _override(text: str) -> tuple[str, Any]:
 
 def _claims(recordings: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The paper's claims, where the runs are those that they speak of."""
-    from activesteer.analysis.claims import SYSTEMS, step_steer_claims
+    from activesteer.analysis.claims import SYSTEMS, claims_for
 
     first = next(iter(recordings.values()))
-    if first.metadata["maneuver"]["kind"] != "step_steer" or not set(SYSTEMS) <= set(recordings):
+    check = claims_for(first)
+    if check is None or not set(SYSTEMS) <= set(recordings):
         return []
     if not all(recordings[system].metrics for system in SYSTEMS):
         return []
@@ -135,47 +134,18 @@ def _claims(recordings: Mapping[str, Any]) -> list[dict[str, Any]]:
             "values": claim.values,
             "criterion": claim.criterion,
         }
-        for claim in step_steer_claims(recordings)
+        for claim in check(recordings)
     ]
 
 
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:
-    """All runs over each other; the control-free car beside its single-track model and its linearisation."""
-    from activesteer.analysis.plots import figure_2, step_steer_figure
+    """All runs over each other; of a step steer also the control-free car beside its linear models."""
+    from activesteer.analysis.figures import figure_2, figure_for
+    from activesteer.commands.figures import models_beside
 
-    name = scenario.maneuver.name
-    figures = [step_steer_figure(recordings, folder / f"{name}.png")]
-    if "none" in recordings:
-        from activesteer.identification import single_track_response
-        from activesteer.scenario import describe
-
-        run, car = recordings["none"], scenario.car
-        models = {"single-track model": single_track_response(run, car.single_track, car.steering.ratio)}
-        if scenario.maneuver.road.grade == 0.0:
-            from activesteer.linearisation import linear_response, linearise
-
-            road = {"road.mu": scenario.maneuver.road.mu}
-            linear = linearise(describe(scenario)["vehicle"], scenario.maneuver.speed_mps, road)
-            models["linear car"] = linear_response(run, linear)
-        figures.append(figure_2(run, folder / f"{name}-models.png", models))
+    name, kind = scenario.maneuver.name, scenario.maneuver.kind
+    figures = [figure_for(kind)(recordings, folder / f"{name}.png")]
+    if kind == "step_steer" and "none" in recordings:
+        run = recordings["none"]
+        figures.append(figure_2(run, folder / f"{name}-models.png", models_beside(run)))
     return figures
-
-
-class _Progress:
-    """A bar on the terminal, gone when the run ends; silent where standard error is none."""
-
-    def __init__(self, label: str, *, quiet: bool) -> None:
-        self._label = label
-        self._shown = not quiet and sys.stderr.isatty()
-
-    def __enter__(self) -> _Progress:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._shown:
-            print("\r" + " " * (len(self._label) + 40) + "\r", end="", file=sys.stderr)
-
-    def __call__(self, share: float) -> None:
-        if self._shown:
-            filled = round(30 * share)
-            print(f"\r{self._label} [{'#' * filled}{' ' * (30 - filled)}] {share:4.0%}", end="", file=sys.stderr)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -10,7 +11,16 @@ from activesteer.config import Range
 
 @dataclass(frozen=True)
 class DriverParameters:
-    """How a driver, or a cruise control in his place, holds speed."""
+    """One driver for all manoeuvres, cars and steering systems; how he steers along a path and holds speed."""
+
+    preview_s: Annotated[float, Range(0.2, 5.0)] = 1.3
+    """How far ahead the driver looks [s]: 1.3 s in MacAdam (1981), who fitted lane changes of test drivers."""
+    reaction_delay_s: Annotated[float, Range(0.0, 1.0)] = 0.2
+    """From seeing to acting [s]: 0.2 s in MacAdam (1981)."""
+    neuromuscular_lag_s: Annotated[float, Range(0.0, 0.5)] = 0.1
+    """First-order lag of arms and hands [s]: about 0.1 s in McRuer's crossover model (1967)."""
+    steering_rate_limit_radps: Annotated[float, Range(0.1, 50.0)] = math.radians(900.0)
+    """How fast the steering wheel is turned at most [rad/s]; test drivers reach 800 to 1200 deg/s."""
 
     speed_gain_Nmspm: Annotated[float, Range(0.0)] = 1500.0
     """Drive torque per speed error [N m s/m]: 1 km/h off asks for about 0.9 m/s2 of a 1.4 t car."""

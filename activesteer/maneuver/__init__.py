@@ -1,21 +1,35 @@
 """Manoeuvres: TOML files that say what is asked of the driver, on which road, and for how long."""
 
 from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.constant_radius import ConstantRadius
+from activesteer.maneuver.course import Course, Lane
+from activesteer.maneuver.follow_path import FollowPath, with_csv
 from activesteer.maneuver.kinds import KINDS, build_maneuver, maneuver_class
+from activesteer.maneuver.lane_change import LaneChange
 from activesteer.maneuver.open_loop import OpenLoop
 from activesteer.maneuver.sine_sweep import SineSweep
+from activesteer.maneuver.sine_with_dwell import SineWithDwell
+from activesteer.maneuver.slalom import Slalom
 from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
 from activesteer.maneuver.step_steer import StepSteer
 
 __all__ = [
     "KINDS",
+    "BrakeInTurn",
     "ConstantRadius",
+    "Course",
+    "FollowPath",
+    "Lane",
+    "LaneChange",
     "Maneuver",
     "OpenLoop",
     "SineSweep",
+    "SineWithDwell",
+    "Slalom",
     "SlowlyIncreasingSteer",
     "StepSteer",
     "build_maneuver",
     "maneuver_class",
+    "with_csv",
 ]

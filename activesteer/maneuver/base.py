@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from activesteer.config import Range
+from activesteer.maneuver.course import Course
+from activesteer.maneuver.search import Search
 from activesteer.road import Road
 from activesteer.signals import Reference
 
@@ -42,6 +44,16 @@ class Maneuver(ABC):
         Returns:
             The reference at that time.
         """
+
+    @property
+    def course(self) -> Course | None:
+        """Path, lanes and cones; None where the manoeuvre says what to do with the steering wheel instead."""
+        return None
+
+    @property
+    def search(self) -> Search | None:
+        """What must be found by driving before the manoeuvre can be run; None where everything is known."""
+        return None
 
     def settling_reference(self) -> Reference:
         """What is asked of the driver while the car settles before the recording."""

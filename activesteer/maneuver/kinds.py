@@ -8,9 +8,14 @@ from typing import Any, Final
 from activesteer.config import Source, build
 from activesteer.errors import nearest_names
 from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.constant_radius import ConstantRadius
+from activesteer.maneuver.follow_path import FollowPath
+from activesteer.maneuver.lane_change import LaneChange
 from activesteer.maneuver.open_loop import OpenLoop
 from activesteer.maneuver.sine_sweep import SineSweep
+from activesteer.maneuver.sine_with_dwell import SineWithDwell
+from activesteer.maneuver.slalom import Slalom
 from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
 from activesteer.maneuver.step_steer import StepSteer
 
@@ -20,6 +25,11 @@ KINDS: Final[dict[str, type[Maneuver]]] = {
     "slowly_increasing_steer": SlowlyIncreasingSteer,
     "constant_radius": ConstantRadius,
     "sine_sweep": SineSweep,
+    "sine_with_dwell": SineWithDwell,
+    "brake_in_turn": BrakeInTurn,
+    "lane_change": LaneChange,
+    "slalom": Slalom,
+    "follow_path": FollowPath,
 }
 """Value of `kind` in a file -> class."""
 

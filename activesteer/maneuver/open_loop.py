@@ -10,6 +10,7 @@ from typing import Annotated
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.choices import DRIVES, check_choice
 from activesteer.signals import Reference
 
 
@@ -62,9 +63,7 @@ class OpenLoop(Maneuver):
         Raises:
             ManeuverError: a table's columns differ in length, or its times do not increase.
         """
-        if self.drive not in {"hold_speed", "coast"}:
-            msg = f"drive: is {self.drive!r}; allowed are 'hold_speed' and 'coast'"
-            raise ManeuverError(msg)
+        check_choice("drive", self.drive, DRIVES)
         for key, table, column in (
             ("steering", self.steering, "steering_wheel_rad"),
             ("speed", self.speed, "speed_mps"),

@@ -5,12 +5,16 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Final
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.search import SteadyTurn
 from activesteer.signals import Reference
+
+_SEARCH_S: Final = 4.5
+"""Time after the beginning of the step that a run of the search for the amplitude takes [s]."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,16 @@ class StepSteer(Maneuver):
     def settling_reference(self) -> Reference:
         """Straight ahead at the speed of the manoeuvre."""
         return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
+
+    @property
+    def search(self) -> SteadyTurn | None:
+        """For the amplitude, where only the lateral acceleration is known."""
+        wanted = self.steer.lateral_acceleration_mps2
+        if self.steer.steering_wheel_rad is not None or wanted is None:
+            return None
+        # Always as long, so that the amplitude does not depend on how long the manoeuvre is.
+        probe = dataclasses.replace(self, duration_s=self.steer.start_s + _SEARCH_S)
+        return SteadyTurn(probe, wanted, self.with_amplitude)
 
     def with_amplitude(self, steering_wheel_rad: float) -> StepSteer:
         """The same step with its amplitude known [rad]; the aim that led to it stays on record."""

@@ -3,7 +3,7 @@
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.reader import Poses
 from activesteer.recording.recording import Recording
-from activesteer.recording.scene import Primitive
+from activesteer.recording.scene import Link, Primitive, ScenePart
 from activesteer.recording.writer import McapWriter
 
-__all__ = ["ChannelTable", "McapWriter", "Poses", "Primitive", "Recording"]
+__all__ = ["ChannelTable", "Link", "McapWriter", "Poses", "Primitive", "Recording", "ScenePart"]

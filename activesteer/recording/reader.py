@@ -33,7 +33,7 @@ from activesteer.recording.format import (
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
 )
-from activesteer.recording.scene import Primitive, decode_scene
+from activesteer.recording.scene import ScenePart, decode_scene
 from activesteer.recording.schemas import state_fields, transforms_layout
 from activesteer.signals import Channel as SignalChannel
 
@@ -82,7 +82,7 @@ class Contents(NamedTuple):
         metadata: Metadata without metrics; `complete` tells whether the file was ended properly.
         metrics: Metrics by name.
         attachments: Attachments by name.
-        scene: What the bodies look like.
+        scene: What the car looks like: solids in body frames, and links between bodies.
         damage: What is broken, and where; empty for a sound file. All above is then what comes before it.
     """
 
@@ -93,7 +93,7 @@ class Contents(NamedTuple):
     metadata: dict[str, Any]
     metrics: dict[str, float]
     attachments: dict[str, bytes]
-    scene: tuple[Primitive, ...]
+    scene: tuple[ScenePart, ...]
     damage: str
 
 
@@ -304,7 +304,7 @@ def _poses(raw: _Raw, topic: Channel | None) -> Poses:
     return Poses(time_ns / 1e9, names, positions, quaternions)
 
 
-def _scene(raw: _Raw, topic: Channel | None) -> tuple[Primitive, ...]:
+def _scene(raw: _Raw, topic: Channel | None) -> tuple[ScenePart, ...]:
     _, messages = raw.messages.get(topic.id, ([], [])) if topic else ([], [])
     return tuple(primitive for message in messages for primitive in decode_scene(message))
 

@@ -13,7 +13,7 @@ from activesteer.errors import RecordingError
 from activesteer.recording.arrays import nanoseconds, shaped
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.reader import Poses, read_mcap
-from activesteer.recording.scene import Primitive
+from activesteer.recording.scene import ScenePart
 from activesteer.recording.writer import McapWriter
 from activesteer.signals import Channel
 
@@ -29,7 +29,7 @@ class Recording:
         metrics: Metrics by name, in the unit that ends their names.
         attachments: Files kept with the run, by name.
         poses: Poses of all bodies.
-        scene: What the bodies look like.
+        scene: What the car looks like: solids in body frames, and links between bodies.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class Recording:
         metadata: Mapping[str, Any] | None = None,
         metrics: Mapping[str, float] | None = None,
         attachments: Mapping[str, bytes] | None = None,
-        scene: Iterable[Primitive] = (),
+        scene: Iterable[ScenePart] = (),
     ) -> None:
         """Take the arrays of a run. They are not copied where they are already floats, and must not change any more.
 
@@ -54,7 +54,7 @@ class Recording:
             metadata: Metadata; a key `metrics` in it is taken as the metrics.
             metrics: Metrics by name.
             attachments: Files to keep, by name.
-            scene: What the bodies look like.
+            scene: What the car looks like: solids in body frames, and links between bodies.
 
         Raises:
             RecordingError: a shape or a time is wrong, or a channel occurs twice.
@@ -69,7 +69,7 @@ class Recording:
             raise RecordingError(message)
         self.metrics: dict[str, float] = {**found, **(metrics or {})}
         self.attachments: dict[str, bytes] = dict(attachments or {})
-        self.scene: tuple[Primitive, ...] = tuple(scene)
+        self.scene: tuple[ScenePart, ...] = tuple(scene)
         given = Poses(np.empty(0), (), np.empty((0, 0, 3)), np.empty((0, 0, 4))) if poses is None else poses
         count, bodies = len(np.asarray(given.time_s)), len(given.names)
         self.poses = Poses(

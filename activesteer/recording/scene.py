@@ -1,10 +1,11 @@
-"""What the bodies look like: simple solids in body frames, kept in a recording as one foxglove.SceneUpdate."""
+"""What a car looks like: solids in body frames, links between bodies; kept in a recording as one foxglove.SceneUpdate."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.descriptor_pool import DescriptorPool
@@ -14,6 +15,10 @@ from activesteer.errors import RecordingError
 from activesteer.recording.schemas import SCENE_SCHEMA, foxglove_schema
 
 _FIELDS = {"box": "cubes", "cylinder": "cylinders", "sphere": "spheres"}
+LINK_KINDS: Final = ("link", "spring", "damper")
+"""What a `Link` can be."""
+_LINK_KEY: Final = "activesteer.link"
+"""Key of an entity's metadata that makes it a link."""
 
 
 class Primitive(NamedTuple):
@@ -36,6 +41,30 @@ class Primitive(NamedTuple):
     rgba: tuple[float, float, float, float] = (0.5, 0.5, 0.5, 1.0)
 
 
+class Link(NamedTuple):
+    """A part that spans bodies, such as a suspension link: straight from one point that is fixed in a body to the next.
+
+    It has no frame of its own, so where it is at an instant follows from the poses of its bodies.
+
+    Attributes:
+        name: Its name.
+        kind: `link`, `spring` or `damper`.
+        points: Name of the body, and the point in its frame [m]; two or more.
+        radius_m: Radius to draw it with [m].
+        rgba: Colour and opacity, 0 to 1.
+    """
+
+    name: str
+    kind: str
+    points: tuple[tuple[str, tuple[float, float, float]], ...]
+    radius_m: float = 0.01
+    rgba: tuple[float, float, float, float] = (0.5, 0.5, 0.5, 1.0)
+
+
+ScenePart = Primitive | Link
+"""What a scene is made of."""
+
+
 @cache
 def _scene_class() -> Any:
     """Return the message class, which protobuf makes at run time."""
@@ -45,18 +74,24 @@ def _scene_class() -> Any:
     return GetMessageClass(pool.FindMessageTypeByName(SCENE_SCHEMA))
 
 
-def encode_scene(primitives: Iterable[Primitive]) -> bytes:
-    """Serialise primitives as a foxglove.SceneUpdate, one entity for each body.
+def encode_scene(parts: Iterable[ScenePart]) -> bytes:
+    """Serialise a scene as a foxglove.SceneUpdate.
+
+    Every body with solids becomes an entity that is locked to its frame. A link becomes an entity without a solid, its
+    ends in the entity's metadata: a message of Foxglove has no solid that spans two frames.
 
     Args:
-        primitives: The solids.
+        parts: Solids and links.
 
     Raises:
         RecordingError: a kind is unknown, or a number is missing or no number.
     """
     update = _scene_class()()
     entities: dict[str, Any] = {}
-    for primitive in primitives:
+    parts = tuple(parts)
+    for primitive in parts:
+        if isinstance(primitive, Link):
+            continue
         if primitive.kind not in _FIELDS:
             message = f"{primitive.body}: primitive of kind {primitive.kind!r}, known are: {', '.join(_FIELDS)}"
             raise RecordingError(message)
@@ -82,21 +117,59 @@ def encode_scene(primitives: Iterable[Primitive]) -> bytes:
         except (TypeError, ValueError) as error:
             message = f"{primitive.body}: a number of the {primitive.kind} is missing or wrong: {primitive} ({error})"
             raise RecordingError(message) from None
+    for part in parts:
+        if isinstance(part, Link):
+            _add_link(update, part)
     return update.SerializeToString()
 
 
-def decode_scene(data: bytes) -> tuple[Primitive, ...]:
-    """Read primitives back, those of each body in the order box, cylinder, sphere.
+def _add_link(update: Any, link: Link) -> None:
+    if link.kind not in LINK_KINDS:
+        message = f"{link.name}: link of kind {link.kind!r}, known are: {', '.join(LINK_KINDS)}"
+        raise RecordingError(message)
+    try:
+        text = json.dumps(_link_table(link))
+        _link_of(json.loads(text))
+    except (TypeError, ValueError) as error:
+        message = f"{link.name}: a number of the {link.kind} is missing or wrong: {link} ({error})"
+        raise RecordingError(message) from None
+    entity = update.entities.add(frame_id=link.points[0][0], id=link.name, frame_locked=True)
+    entity.timestamp.SetInParent()
+    entity.lifetime.SetInParent()
+    entity.metadata.add(key=_LINK_KEY, value=text)
+
+
+def _link_table(link: Link) -> dict[str, Any]:
+    points = [[body, [float(value) for value in point]] for body, point in link.points]
+    if len(points) < 2:
+        message = "two points at least"
+        raise ValueError(message)
+    colour = [float(value) for value in link.rgba]
+    return {"name": link.name, "kind": link.kind, "points": points, "radius_m": float(link.radius_m), "rgba": colour}
+
+
+def _link_of(table: dict[str, Any]) -> Link:
+    points = []
+    for body, (x_m, y_m, z_m) in table["points"]:
+        points.append((str(body), (float(x_m), float(y_m), float(z_m))))
+    r, g, b, a = (float(value) for value in table["rgba"])
+    return Link(str(table["name"]), str(table["kind"]), tuple(points), float(table["radius_m"]), (r, g, b, a))
+
+
+def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
+    """Read a scene back: primitives, those of each body in the order box, cylinder, sphere, and then the links.
 
     Args:
         data: A serialised foxglove.SceneUpdate.
 
     Raises:
         google.protobuf.message.DecodeError: it is none.
+        ValueError, TypeError, KeyError: a link in it is broken.
     """
     update = _scene_class().FromString(data)
-    primitives: list[Primitive] = []
+    primitives: list[ScenePart] = []
     for entity in update.entities:
+        primitives += [_link_of(json.loads(pair.value)) for pair in entity.metadata if pair.key == _LINK_KEY]
         for kind, field in _FIELDS.items():
             for solid in getattr(entity, field):
                 at, turn, size, color = solid.pose.position, solid.pose.orientation, solid.size, solid.color

@@ -29,7 +29,7 @@ from activesteer.recording.format import (
     TRANSFORMS_TOPIC,
     metadata_texts,
 )
-from activesteer.recording.scene import Primitive, encode_scene
+from activesteer.recording.scene import ScenePart, encode_scene
 from activesteer.recording.schemas import (
     SCENE_SCHEMA,
     TRANSFORMS_SCHEMA,
@@ -63,7 +63,7 @@ class McapWriter:
         body_names: Sequence[str] = (),
         metadata: Mapping[str, object] | None = None,
         attachments: Mapping[str, bytes] | None = None,
-        scene: Iterable[Primitive] = (),
+        scene: Iterable[ScenePart] = (),
         *,
         overwrite: bool = True,
     ) -> None:
@@ -75,7 +75,7 @@ class McapWriter:
             body_names: Names of the bodies whose poses are recorded.
             metadata: What is needed to run it again; values must be representable in JSON.
             attachments: Files to keep with the recording, by name.
-            scene: What the bodies look like.
+            scene: What the car looks like: solids in body frames, and links between bodies.
             overwrite: Whether a file that exists may be replaced.
 
         Raises:

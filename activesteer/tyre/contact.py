@@ -33,7 +33,7 @@ from numba import njit
 
 from activesteer.tyre import parameters as prm
 from activesteer.tyre.limits import limit_flags
-from activesteer.tyre.magic_formula import magic_formula, slip_stiffnesses, steady_state
+from activesteer.tyre.magic_formula import slip_stiffnesses, steady_state
 from activesteer.tyre.relaxation import relaxation_lengths
 from activesteer.tyre.vertical import (
     bottoming_force,
@@ -84,6 +84,7 @@ class WheelForces(NamedTuple):
     arm_y_m: float
     arm_z_m: float
     limited: float
+    friction_use: float
 
 
 @njit(cache=True, error_model="numpy")
@@ -102,7 +103,7 @@ def _low_speed_slip_limit(file_limit, sliding_slip, share):
 def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn, gamma, u, v, w
 ):
-    """Forces, slips, rates of the relaxation states and whether a limit is exceeded, at a load above zero.
+    """Forces, slips, rates of the relaxation states, whether a limit is exceeded, friction used, at a load above zero.
 
     The arguments are those of `tyre_on_road`, with the load [N], the velocities of the contact point along and across
     the heading [m/s], the spin and the yaw rate of the wheel plane [rad/s], the camber [rad] and the relaxation states.
@@ -152,7 +153,7 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
         limited = 1.0
     # Camber works by the path that the tread takes through the patch of a rolling tyre: at rest there is none.
     gamma *= 1.0 - share
-    fx, fy, mx, my, mz = magic_formula(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu)
+    fx, fy, mx, my, mz, mu_x, mu_y = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, 0.0)[:7]
     if share > 0.0:
         # The formula with turn slip treats camber differently, even without any: the two are blended, never switched.
         turn_slip = (w + timestep_s * rate_z) / half_length
@@ -164,7 +165,10 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
         mx += share * (twisted[2] - mx)
         my += share * (twisted[3] - my)
         mz += share * (twisted[4] - mz)
-    return fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited
+    # Beyond the range of the file the formula gives the forces of its greatest load.
+    load = min(fz, p[prm.FZMAX])
+    use = math.hypot(fx / (mu_x * load), fy / (mu_y * load))
+    return fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use
 
 
 @njit(cache=True, error_model="numpy")
@@ -224,7 +228,10 @@ def tyre_on_road(
     Returns:
         The members of `WheelForces` in their order. `heading_x`, `heading_y` is the unit vector of the wheel's heading
         in the road plane; `arm_..._m` leads from the wheel centre to the contact point, world frame;
-        `limited` is 1.0 where a limit of validity of the tyre file is exceeded.
+        `limited` is 1.0 where a limit of validity of the tyre file is exceeded; `friction_use` is the share of the
+        available friction that the forces take, sqrt((F_x / mu_x F_z)^2 + (F_y / mu_y F_z)^2) with the peak
+        coefficients of the file at this load, camber and pressure on this road. It exceeds 1 by as much as the file's
+        shifts and its weights of combined slip let the forces do so.
     """
     horizontal = math.sqrt(axis_x * axis_x + axis_y * axis_y)
     heading_x = axis_y / horizontal
@@ -255,10 +262,10 @@ def tyre_on_road(
         decay = -_LIFTED_DECAY_PER_S
         return (
             0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gamma, decay * deflection_x_m, decay * deflection_y_m,
-            decay * deflection_z_rad, loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, 0.0,
+            decay * deflection_z_rad, loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, 0.0, 0.0,
         )  # fmt: skip
 
-    fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited = _rolling_tyre(
+    fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use = _rolling_tyre(
         p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn_z, gamma,
         deflection_x_m, deflection_y_m, deflection_z_rad,
     )  # fmt: skip
@@ -268,7 +275,7 @@ def tyre_on_road(
         step = _load(p, deflection, spin, pressure_Pa, damping, fx, fy, gamma) - fz
         fz = fz + step if fz + step > 0.0 else _CAUTIOUS * fz
         for _ in range(_MOST_LOAD_STEPS):
-            fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited = _rolling_tyre(
+            fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use = _rolling_tyre(
                 p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn_z, gamma,
                 deflection_x_m, deflection_y_m, deflection_z_rad,
             )  # fmt: skip
@@ -281,5 +288,5 @@ def tyre_on_road(
             fz = fz_next if fz_next > 0.0 else _CAUTIOUS * fz
     return (
         fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, rate_z,
-        loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, limited,
+        loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, limited, use,
     )  # fmt: skip

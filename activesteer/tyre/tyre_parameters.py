@@ -62,6 +62,12 @@ class TyreParameters(Mapping[str, float]):
         values = _resolve(self.given, str(self.source or "tyre"))
         object.__setattr__(self, "_values", MappingProxyType(values))
 
+    def __reduce__(self) -> tuple[type[TyreParameters], tuple[object, ...]]:
+        """Travels between processes by what it was made from: read-only views cannot be copied."""
+        texts, unused, tables = dict(self.texts), dict(self.unused), dict(self.tables)
+        made_from = (dict(self.given), self.source, self.side, self.mounted, self.slip_tangent, texts, unused, tables)
+        return TyreParameters, made_from
+
     @property
     def version(self) -> int:
         """Version of the formula: 52, 60, 61 or 62."""

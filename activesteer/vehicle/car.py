@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.errors import ModelError, SimulationDiverged
 from activesteer.road import Road
-from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from activesteer.signals import DriverCommand, Measurement, Motion, SteerCommand
 from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels import ChannelMap, RawRows
 from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.loading import find, load_model
@@ -77,6 +78,7 @@ class Vehicle:
         install_native_forces()
         self.parameters = parameters
         self.timestep_s = timestep_s
+        self._tyre_widths_m = tuple(tyre["WIDTH"] for tyre in tyres)
         try:
             self.model = load_model(mjcf, parameters, tyres, road, timestep_s)
             self.data = mujoco.MjData(self.model)
@@ -108,8 +110,14 @@ class Vehicle:
             sensor(name) for name in ("steering_wheel_angle", "superposition_angle", "rl_steer_angle", "rr_steer_angle")
         )
         self._wheel_speed = sensor("fl_wheel_speed")
+        position, velocity, turned = (sensor(name) for name in ("cg_position", "cg_velocity", "chassis_orientation"))
+        self._position = data.sensordata[position : position + 2]
+        self._velocity = data.sensordata[velocity : velocity + 2]
+        self._orientation = data.sensordata[turned : turned + 4]
         last = max(self._wheel_speed + 3, *self._angles, self._velocimeter, self._accelerometer + 1)
         self._sensed = data.sensordata[: last + 1]
+        block = int(model.numeric_data[-fb.TRAILER_SIZE])
+        self._areas_felt = model.numeric_data[block + fb.AREAS_FELT : block + fb.AREAS_FELT + 1]
         self._root = int(model.jnt_qposadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
         self._root_dof = int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
         self._yaw_dof = self._root_dof + 5
@@ -145,6 +153,7 @@ class Vehicle:
             The first measurement.
         """
         data = self.data
+        self._areas_felt[0] = 0.0
         self._place()
         data.qvel[self._root_dof] = speed_mps
         for index, dof in enumerate(self._spins):
@@ -158,7 +167,10 @@ class Vehicle:
         return float(self.data.xpos[self.model.body(f"{CORNERS[corner]}_wheel").id, 2])
 
     def rebase(self) -> None:
-        """Makes where the car is the origin of road and time, its heading along x; its motion goes on unchanged."""
+        """Makes where the car is the origin of road and time, its heading along x; its motion goes on unchanged.
+
+        From here on the wheels feel the areas of the road; before, there is only the road's `mu`.
+        """
         data, root = self.data, self._root
         # The step leaves positions of its beginning beside the state of its end.
         mujoco.mj_kinematics(self.model, data)
@@ -177,6 +189,7 @@ class Vehicle:
         data.qvel[self._root_dof] = cos * vx + sin * vy
         data.qvel[self._root_dof + 1] = -sin * vx + cos * vy
         data.time = 0.0
+        self._areas_felt[0] = 1.0
         mujoco.mj_forward(self.model, data)
 
     def _cg_offset(self) -> tuple[float, float]:
@@ -233,6 +246,15 @@ class Vehicle:
             (values[spin], values[spin + 1], values[spin + 2], values[spin + 3]),
         )
 
+    def motion(self) -> Motion:
+        """Where the car is and how it moves, at the instant at which the last step began; the yaw rate at its end."""
+        x, y = self._position.tolist()
+        east, north = self._velocity.tolist()
+        w, qx, qy, qz = self._orientation.tolist()
+        yaw = math.atan2(2.0 * (w * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return Motion(x, y, yaw, cos * east + sin * north, cos * north - sin * east, float(self._qvel[self._yaw_dof]))
+
     def check(self) -> None:
         """Looks for warnings of the engine and for a state that is not finite.
 
@@ -277,6 +299,19 @@ class Vehicle:
         mujoco.mj_setState(self.model, self.data, state, _STATE)
         # The step writes drive and brake only where they change; these values never occur, so it writes them now.
         self._drive_torque_Nm = self._brake = math.nan
+
+    def dimensions(self) -> dict[str, float | list[float]]:
+        """What an evaluation needs of the car's outline [m]: width, wheelbase, tracks and tyre widths, as designed."""
+        at_rest = mujoco.MjData(self.model)
+        mujoco.mj_kinematics(self.model, at_rest)
+        fl, fr, rl, rr = (at_rest.xpos[self.model.body(f"{corner}_wheel").id] for corner in CORNERS)
+        return {
+            "width_m": self.parameters.width_m,
+            "wheelbase_m": float(0.5 * (fl[0] + fr[0] - rl[0] - rr[0])),
+            "front_track_m": float(fl[1] - fr[1]),
+            "rear_track_m": float(rl[1] - rr[1]),
+            "tyre_width_m": list(self._tyre_widths_m),
+        }
 
     @property
     def body_names(self) -> tuple[str, ...]:

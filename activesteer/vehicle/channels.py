@@ -191,6 +191,12 @@ class ChannelMap:
                 user(fb.U_INCLINATION, "inclination_rad", "rad", "inclination of the wheel against the road about +x"),
                 user(fb.U_LOADED_RADIUS, "loaded_radius_m", "m", "distance of wheel centre and contact point"),
                 user(fb.U_LIMITED, "tyre_limited", "", "1 where the tyre is outside its file's range of validity"),
+                user(fb.U_CONTACT_X, "contact_x_m", "m", "contact point with the road, world x"),
+                user(fb.U_CONTACT_Y, "contact_y_m", "m", "contact point with the road, world y"),
+                user(fb.U_MU, "mu", "", "friction of the road at the contact point"),
+                user(
+                    fb.U_FRICTION_USE, "friction_use", "", "share of the tyre's peak friction at its load that is used"
+                ),
             ]
             signals += self._wheel(corner, words, index)
         return signals
@@ -270,6 +276,15 @@ class ChannelMap:
                 signals.append(
                     Signal(
                         Channel(f"{name}_torque_Nm", "Nm", f"torque of {name} on the wheel", "vehicle"),
+                        lambda rows, index=index: rows.actuator_force[:, index],
+                    )
+                )
+            elif name.endswith("_friction"):
+                part = name.removesuffix("_friction")
+                sign = "positive resists compression" if part.endswith("damper") else "positive pushes to the left"
+                signals.append(
+                    Signal(
+                        Channel(f"{name}_N", "N", f"dry friction of {part}, {sign}", "links"),
                         lambda rows, index=index: rows.actuator_force[:, index],
                     )
                 )

@@ -1,9 +1,9 @@
 """The parameters of the native forces, as they lie in a model's custom numeric data.
 
-One block of numbers per model holds everything the callbacks need: sizes, indices, tyres, dampers, drag and the
-dynamics of the actuators. So the compiled code is the same for every car and can be cached on disk, and models of one
-process may differ. The block is the last custom numeric of the model and ends with its own start and a marker, by
-which the callbacks recognise a model of ours.
+One block of numbers per model holds everything the callbacks need: sizes, indices, tyres, dampers, drag, the areas of
+the road and the dynamics of the actuators. So the compiled code is the same for every car and can be cached on disk,
+and models of one process may differ. The block is the last custom numeric of the model and ends with its own start and
+a marker, by which the callbacks recognise a model of ours.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ TRAILER_SIZE: Final = 2
 (
     N_WHEELS, N_DAMPERS, N_DOFS, N_BODIES, N_USERDATA, N_ACTIVATIONS, N_CONTROLS, N_TENDONS, N_TENDON_JACOBIAN,
     CHASSIS_BODY, CHASSIS_ROOT, CHASSIS_N_DOFS, DRAG_Ns2pm2, AERO_X_m, AERO_Y_m, AERO_Z_m,
-    WHEELS_START, DAMPERS_START, ACTUATORS_START, CHASSIS_DOFS, HEADER_SIZE,
-) = range(21)  # fmt: skip
+    WHEELS_START, DAMPERS_START, ACTUATORS_START, N_AREAS, AREAS_START, AREAS_FELT, CHASSIS_DOFS, HEADER_SIZE,
+) = range(24)  # fmt: skip
 
 MAX_CHAIN: Final = 32
 """Most degrees of freedom between the world and a wheel."""
@@ -45,16 +45,23 @@ D_FORCE: Final = D_VELOCITY + MAX_CURVE_POINTS
 DAMPER_SIZE: Final = D_FORCE + MAX_CURVE_POINTS
 
 # One record per actuator with user dynamics (all actuators have one; KIND_NONE where the engine does the dynamics).
+# A_FIRST to A_HIGH hold what its kind needs; `loading._actuator` fills them.
 A_KIND, A_ACT, A_FIRST, A_SECOND, A_LOW, A_HIGH = range(6)
 ACTUATOR_SIZE: Final = 6
-KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE = 0.0, 1.0, 2.0, 3.0
+KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE, KIND_FRICTION = 0.0, 1.0, 2.0, 3.0, 4.0
+ALONG_JOINT, ALONG_TENDON = 0.0, 1.0
+
+# One record per area of the road with a friction of its own: a rectangle in world axes [m]. They count while
+# AREAS_FELT is 1, which `Vehicle.rebase` sets: before, the road has no origin yet.
+R_START_m, R_END_m, R_RIGHT_m, R_LEFT_m, R_MU = range(5)
+AREA_SIZE: Final = 5
 
 # What the callback writes into mjData.userdata: one record per wheel, then the force of each damper.
 (
     U_FX, U_FY, U_FZ, U_MX, U_MY, U_MZ, U_SLIP_RATIO, U_SLIP_ANGLE, U_INCLINATION, U_RATE_X, U_RATE_Y,
-    U_RATE_Z, U_LOADED_RADIUS, U_LIMITED,
-) = range(14)  # fmt: skip
-USERDATA_PER_WHEEL: Final = 14
+    U_RATE_Z, U_LOADED_RADIUS, U_LIMITED, U_FRICTION_USE, U_MU, U_CONTACT_X, U_CONTACT_Y,
+) = range(18)  # fmt: skip
+USERDATA_PER_WHEEL: Final = 18
 
 
 @dataclass
@@ -98,6 +105,7 @@ class ForceBlock:
         wheels: The wheels.
         dampers: The dampers.
         actuators: One record per actuator, in the model's order.
+        areas: Areas of the road, as in their records; the later one counts where they overlap.
     """
 
     model: mujoco.MjModel
@@ -108,6 +116,7 @@ class ForceBlock:
     wheels: list[WheelEntry] = field(default_factory=list)
     dampers: list[DamperEntry] = field(default_factory=list)
     actuators: list[tuple[float, float, float, float, float, float]] = field(default_factory=list)
+    areas: list[tuple[float, float, float, float, float]] = field(default_factory=list)
 
     def wheel_start(self, index: int) -> int:
         """Where the record of a wheel begins, counted from the start of the block."""
@@ -118,7 +127,8 @@ class ForceBlock:
         wheels_start = self.wheel_start(0)
         dampers_start = self.wheel_start(len(self.wheels))
         actuators_start = dampers_start + len(self.dampers) * DAMPER_SIZE
-        tyres_start = actuators_start + len(self.actuators) * ACTUATOR_SIZE
+        areas_start = actuators_start + len(self.actuators) * ACTUATOR_SIZE
+        tyres_start = areas_start + len(self.areas) * AREA_SIZE
         tyres = [wheel.tyre for wheel in self.wheels]
         block = np.zeros(tyres_start + sum(tyre.size for tyre in tyres))
         model = self.model
@@ -126,6 +136,7 @@ class ForceBlock:
             len(self.wheels), len(self.dampers), model.nv, model.nbody, model.nuserdata, model.na, model.nu,
             model.ntendon, model.nJten, self.chassis_body, model.body_rootid[self.chassis_body],
             len(self.chassis_chain), self.drag_Ns2pm2, *self.aero_point_m, wheels_start, dampers_start, actuators_start,
+            len(self.areas), areas_start, 0.0,
         )  # fmt: skip
         block[CHASSIS_DOFS] = HEADER_SIZE
         block[HEADER_SIZE : HEADER_SIZE + len(self.chassis_chain)] = self.chassis_chain
@@ -148,7 +159,9 @@ class ForceBlock:
             record[D_VELOCITY : D_VELOCITY + points] = damper.velocity_mps
             record[D_FORCE : D_FORCE + points] = damper.force_N
         if self.actuators:
-            block[actuators_start:tyres_start] = np.asarray(self.actuators, float).ravel()
+            block[actuators_start:areas_start] = np.asarray(self.actuators, float).ravel()
+        if self.areas:
+            block[areas_start:tyres_start] = np.asarray(self.areas, float).ravel()
         return block
 
 

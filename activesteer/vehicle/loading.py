@@ -15,7 +15,7 @@ from activesteer.road import Road
 from activesteer.tyre import parameters as tyre_index
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.parameters import DamperCurve, VehicleParameters
+from activesteer.vehicle.parameters import VIBRATION_AT_MPS, DamperCurve, VehicleParameters
 
 _USER_DYNAMICS: Final = int(mujoco.mjtDyn.mjDYN_USER)
 _RATES: Final = {"slip_x": fb.U_RATE_X, "slip_y": fb.U_RATE_Y, "slip_z": fb.U_RATE_Z}
@@ -63,7 +63,7 @@ def load_model(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Gives the drive its lag and the brakes their stiffness; forces follow the activation that a step reaches."""
+    """Gives the drive its lag, brakes and friction their stiffness; forces follow the activation that a step reaches."""
     for actuator in spec.actuators:
         if actuator.name.endswith("_drive"):
             actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
@@ -71,6 +71,19 @@ def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
         actuator.actearly = int(actuator.dyntype) == _USER_DYNAMICS
         if actuator.name.endswith("_brake"):
             actuator.gainprm[0] = -parameters.brakes.stiffness_Nmprad
+        if actuator.name.endswith("_friction"):
+            force, stiffness = _friction(actuator.name, parameters)
+            actuator.gainprm[0] = -stiffness if force > 0.0 else 0.0
+
+
+def _friction(actuator: str, parameters: VehicleParameters) -> tuple[float, float]:
+    """Force [N] and stiffness [N/m] of the dry friction that an actuator stands for."""
+    friction = parameters.friction
+    if actuator == "rack_friction":
+        return friction.rack_N, friction.rack_stiffness_Npm
+    return friction.front_damper_N if actuator.startswith(
+        "f"
+    ) else friction.rear_damper_N, friction.damper_stiffness_Npm
 
 
 def _load_chassis(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
@@ -140,6 +153,11 @@ def _force_block(
         front = corner.startswith("f")
         block.wheels.append(_wheel(model, corner, parameters, tyres[0 if front else 1], road))
         block.dampers.append(_damper(model, corner, parameters.dampers.front if front else parameters.dampers.rear))
+    for name in ("rack_friction", *(f"{corner}_damper_friction" for corner in CORNERS)):
+        if _friction(name, parameters)[0] > 0.0:
+            # Friction in the vehicle file is not to be lost because the model has no place for it.
+            find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+    block.areas.extend(road.areas())
     block.actuators.extend(_actuator(model, index, parameters) for index in range(model.nu))
     return block
 
@@ -210,6 +228,14 @@ def _actuator(
         most = brakes.front_torque_Nm if name.startswith("f") else brakes.rear_torque_Nm
         spin = float(model.jnt_dofadr[int(model.actuator_trnid[index, 0])])
         return (fb.KIND_BRAKE, address, brakes.stiffness_Nmprad, spin, brakes.drag_torque_Nm, most)
+    if name.endswith("_friction"):
+        force, stiffness = _friction(name, parameters)
+        part = int(model.actuator_trnid[index, 0])
+        if int(model.actuator_trntype[index]) == mujoco.mjtTrn.mjTRN_TENDON:
+            vibration = parameters.friction.vibration_mps / math.sqrt(VIBRATION_AT_MPS)
+            return (fb.KIND_FRICTION, address, vibration, float(part), force / stiffness, fb.ALONG_TENDON)
+        # The rack: what shakes the wheels up and down hardly moves it.
+        return (fb.KIND_FRICTION, address, 0.0, float(model.jnt_dofadr[part]), force / stiffness, fb.ALONG_JOINT)
     lag, rate = (float(value) for value in model.actuator_dynprm[index, :2])
     if lag <= 0.0 or rate <= 0.0:
         msg = f"actuator {name!r}: dynprm is {lag:g} {rate:g}; a lag [s] and a rate limit [rad/s] above 0 are needed"

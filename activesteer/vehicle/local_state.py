@@ -25,13 +25,19 @@ _JOINT_DOFS: Final = {0: _AXES, 1: ("_x", "_y", "_z"), 2: ("",), 3: ("",)}
 """MuJoCo's kinds of joints (free, ball, slide, hinge) -> what is added to the joint's name for each of its dofs."""
 
 
+_WIND_UP: Final = ("_brake", "rack_friction")
+"""Ends of the names of actuators whose activation is a wind-up before slipping."""
+
+
 class LocalState:
     """Reads and writes the state of a vehicle as one vector of differences from a reference state.
 
     The vector holds: coordinates (roll and pitch as rotations about the chassis' axes), velocities (those of the
     chassis' origin along heading, left, up; rotations about the chassis' axes), activations (servos, carcass
     deflections of the tyres). Left out are position on the road, heading, rotation angles of the wheels, and the
-    wind-up of the brake pads, which slip in a rolling wheel and have no motion of their own.
+    wind-up of what either holds or slips, brake pads and rack: pads slip in a rolling wheel and have no motion of their
+    own, of the rack see `linearisation`. Seals of dampers, if they rub at all, are shaken loose by the road, which makes
+    them smooth.
 
     Attributes:
         names: Names of the elements: a coordinate has its joint's name, its velocity `d_` in front.
@@ -60,7 +66,13 @@ class LocalState:
             for index in range(model.nu)
             if model.actuator_actadr[index] >= 0
         }
-        self._activations = np.array([adr for adr, name in sorted(actuators.items()) if not name.endswith("_brake")])
+        self._activations = np.array(
+            [
+                address
+                for address, name in sorted(actuators.items())
+                if not (name.endswith(_WIND_UP) or (name.endswith("_friction") and not model.actuator(name).gainprm[0]))
+            ]
+        )
         self.names = (
             *(dof_names[dof] for dof in self._coordinates),
             *(f"d_{name}" for name in dof_names),

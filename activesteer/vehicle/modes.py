@@ -39,6 +39,8 @@ _PARTS: Final = (
     ("rear tyre lateral", r"act_r[lr]_slip_y"),
     ("front tyre turn slip", r"act_f[lr]_slip_z"),
     ("rear tyre turn slip", r"act_r[lr]_slip_z"),
+    ("front damper seals", r"act_f[lr]_damper_friction"),
+    ("rear damper seals", r"act_r[lr]_damper_friction"),
     ("drive", r"act_[fr][lr]_drive"),
     ("rear steering servo", r"act_r[lr]_steer"),
     ("superposition servo", r"act_superposition"),

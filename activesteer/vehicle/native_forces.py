@@ -23,6 +23,7 @@ from activesteer.errors import ModelError
 from activesteer.tyre.contact import tyre_on_road
 from activesteer.tyre.parameters import PARAMETER_COUNT as TYRE_PARAMETERS
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.dry_friction import friction_rate
 from activesteer.vehicle.engine_layout import EngineLayout, measure_engine_layout
 from activesteer.vehicle.native_memory import array_at, f64_pointer, word
 
@@ -61,6 +62,19 @@ def _interpolate(x, xs, ys, count):
 
 
 @njit(inline="always", error_model="numpy")
+def _friction(block, mu, x, y):
+    """Friction of the road at a place [m], world axes; `mu` where no area says otherwise."""
+    if block[fb.AREAS_FELT] == 0.0:
+        return mu
+    start = int(block[fb.AREAS_START])
+    for index in range(int(block[fb.N_AREAS]) - 1, -1, -1):
+        area = block[start + index * fb.AREA_SIZE :]
+        if area[fb.R_START_m] <= x < area[fb.R_END_m] and area[fb.R_RIGHT_m] < y <= area[fb.R_LEFT_m]:
+            return area[fb.R_MU]
+    return mu
+
+
+@njit(inline="always", error_model="numpy")
 def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc):
     for index in range(int(block[fb.N_WHEELS])):
         wheel = block[int(block[fb.WHEELS_START]) + index * fb.WHEEL_SIZE :]
@@ -71,20 +85,26 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
         to_z = xpos[3 * body + 2] - com[3 * root + 2]
         wx, wy, wz = cvel[6 * body], cvel[6 * body + 1], cvel[6 * body + 2]
         tyre_start = int(wheel[fb.W_TYRE_START])
+        ax, ay, az = xmat[9 * body + 1], xmat[9 * body + 4], xmat[9 * body + 7]
+        # Down in the wheel plane to the road, as in `tyre_on_road`.
+        reach = xpos[3 * body + 2] * az / (ax * ax + ay * ay)
+        contact_x = xpos[3 * body] + reach * ax
+        contact_y = xpos[3 * body + 1] + reach * ay
+        mu = _friction(block, wheel[fb.W_MU], contact_x, contact_y)
         (
             fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, rate_z, radius, hx, hy, arm_x, arm_y, arm_z,
-            limited,
+            limited, use,
         ) = tyre_on_road(
             block[tyre_start : tyre_start + TYRE_PARAMETERS],
-            wheel[fb.W_MU],
+            mu,
             wheel[fb.W_PRESSURE_Pa],
             wheel[fb.W_LOW_SPEED_mps],
             wheel[fb.W_LOW_SPEED_DAMPING_Nspm],
             timestep_s,
             xpos[3 * body + 2],
-            xmat[9 * body + 1],
-            xmat[9 * body + 4],
-            xmat[9 * body + 7],
+            ax,
+            ay,
+            az,
             cvel[6 * body + 3] + wy * to_z - wz * to_y,
             cvel[6 * body + 4] + wz * to_x - wx * to_z,
             cvel[6 * body + 5] + wx * to_y - wy * to_x,
@@ -110,6 +130,10 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
         out[fb.U_RATE_Z] = rate_z
         out[fb.U_LOADED_RADIUS] = radius
         out[fb.U_LIMITED] = limited
+        out[fb.U_FRICTION_USE] = use
+        out[fb.U_MU] = mu
+        out[fb.U_CONTACT_X] = contact_x
+        out[fb.U_CONTACT_Y] = contact_y
         gx = fx * hx - fy * hy
         gy = fx * hy + fy * hx
         px, py, pz = to_x + arm_x, to_y + arm_y, to_z + arm_z
@@ -214,9 +238,19 @@ def _make_callbacks(layout: EngineLayout, fingerprint: str) -> tuple[Any, Any]:
             command = min(max(command, entry[fb.A_LOW]), entry[fb.A_HIGH])
             rate = (command - state) / entry[fb.A_FIRST]
             return min(max(rate, -entry[fb.A_SECOND]), entry[fb.A_SECOND])
+        timestep_s = carray(f64_pointer(model + m_timestep), (1,))[0]
+        if kind == fb.KIND_FRICTION:
+            qvel = array_at(data, d_qvel, int(block[fb.N_DOFS]))
+            index = int(entry[fb.A_SECOND])
+            if entry[fb.A_HIGH] == fb.ALONG_TENDON:
+                speed = array_at(data, d_ten_velocity, int(block[fb.N_TENDONS]))[index]
+            else:
+                speed = qvel[index]
+            # The free joint of the chassis is the first (`Vehicle` sees to it): its velocity in the world.
+            vibration = entry[fb.A_FIRST] * (qvel[0] * qvel[0] + qvel[1] * qvel[1]) ** 0.25
+            return friction_rate(state, speed, vibration, entry[fb.A_LOW], timestep_s)
         if kind == fb.KIND_BRAKE:
             # Elasto-plastic friction: the pads wind up with the wheel and slip where the torque reaches the demand.
-            timestep_s = carray(f64_pointer(model + m_timestep), (1,))[0]
             speed = array_at(data, d_qvel, int(block[fb.N_DOFS]))[int(entry[fb.A_SECOND])]
             # The drag of pads, bearings and seals is always there; it is also what keeps a car from creeping at rest.
             limit = min(max(command, entry[fb.A_LOW]), entry[fb.A_HIGH]) / entry[fb.A_FIRST]
@@ -231,7 +265,8 @@ def _source_fingerprint() -> str:
     """Changes with any source that is compiled into the callbacks, and with numba's and MuJoCo's version."""
     digest = hashlib.sha256(f"{numba.__version__} {mujoco.__version__}".encode())
     here = Path(__file__).parent
-    sources = [here / "force_block.py", here / "native_memory.py", *Path(activesteer.tyre.__file__).parent.glob("*.py")]
+    own = (here / name for name in ("force_block.py", "native_memory.py", "dry_friction.py"))
+    sources = [*own, *Path(activesteer.tyre.__file__).parent.glob("*.py")]
     for source in sorted(sources):
         digest.update(source.read_bytes())
     return digest.hexdigest()

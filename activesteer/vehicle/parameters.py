@@ -1,10 +1,10 @@
-"""What a vehicle file says beside its MJCF: tyres, dampers, brakes, powertrain, steering ratio, drag."""
+"""What a vehicle file says beside its MJCF: tyres, dampers, dry friction, brakes, powertrain, steering ratio, drag, width."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Final
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
@@ -67,6 +67,28 @@ class Dampers:
 
     front: DamperCurve
     rear: DamperCurve
+
+
+VIBRATION_AT_MPS: Final = 80.0 / 3.6
+"""Speed of the car to which `Friction.vibration_mps` belongs [m/s]."""
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Dry friction, which opposes motion whatever its speed: elastic until it slips; see `dry_friction`."""
+
+    front_damper_N: NotNegative = 0.0
+    """Seal, piston and rod guide of a front damper or strut, along it [N]."""
+    rear_damper_N: NotNegative = 0.0
+    """The same at the rear [N]."""
+    rack_N: NotNegative = 0.0
+    """Rack in its guide and seals, pinion, assist motor, along the rack [N]."""
+    damper_stiffness_Npm: Annotated[float, Range(1.0, 1e6)] = 1e5
+    """Force over travel before a damper slips [N/m]: a seal's lip gives way by some tenths of a millimetre."""
+    vibration_mps: Annotated[float, Range(0.0, 1.0)] = 0.0
+    """RMS of the damper speed that the roughness of a road causes at 80 km/h [m/s], grows with the root of the speed."""
+    rack_stiffness_Npm: Annotated[float, Range(1.0, 1e7)] = 2e6
+    """The same of the rack [N/m]."""
 
 
 @dataclass(frozen=True)
@@ -134,10 +156,14 @@ class VehicleParameters:
     name: str
     mjcf: str
     """The model, relative to models/mjcf or a path."""
+    width_m: Annotated[float, Range(0.5, 4.0)]
+    """Width of the body without mirrors [m]: lanes are made for it, and cones touched by it."""
     tyres: TyreFitment
     dampers: Dampers
     brakes: Brakes
     powertrain: Powertrain
     steering: Steering
     aerodynamics: Aerodynamics
+    friction: Friction = Friction()
+    """None where not given."""
     load: Load = Load()

@@ -42,7 +42,6 @@ def refused(told, *texts: str) -> None:
         (["step_steer", "--set", "steer.start_s=9"], ["steer.start_s: is 9 s, but the run ends at 5 s"]),
         (["step_steer", "-c", "ars", "-c", "ars"], ["-c ars -c ars", "same name"]),
         (["step_steer", "-c", "ars", "-c", "afs", "-o", "a.mcap"], ["-o a.mcap: 2 controllers", "give a folder"]),
-        (["straight_line", "--plot"], ["--plot: there is a figure for step_steer, none yet for open_loop"]),
     ],
 )
 def test_wrong_input_is_answered_before_anything_runs(call, tmp_path, words, texts):

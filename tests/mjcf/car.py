@@ -40,6 +40,8 @@ TENDONS = (
 ACTUATORS = (
     ["steering_wheel", "superposition", "rl_steer", "rr_steer"]
     + [f"{c}_{part}" for part in ("drive", "brake") for c in CORNERS]
+    + [f"{c}_damper_friction" for c in CORNERS]
+    + ["rack_friction"]
     + [f"{c}_slip_{axis}" for c in CORNERS for axis in "xyz"]
 )
 SENSORS = (

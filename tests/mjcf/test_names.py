@@ -78,11 +78,12 @@ def test_joint_axes(model: mujoco.MjModel) -> None:
 
 
 def test_states_of_the_callback_are_user_dynamics_without_force(model: mujoco.MjModel) -> None:
-    user = {"superposition", "rl_steer", "rr_steer"} | {a for a in ACTUATORS if "brake" in a or "slip" in a}
+    states = {name for name in ACTUATORS if name.endswith(("_brake", "_friction")) or "_slip_" in name}
+    user = {"superposition", "rl_steer", "rr_steer"} | states
     for name in ACTUATORS:
         actuator = model.actuator(name)
         assert (actuator.dyntype == mujoco.mjtDyn.mjDYN_USER) == (name in user), name
-        if "brake" in name or "slip" in name:
+        if name in states:
             np.testing.assert_array_equal(actuator.gainprm, 0.0, err_msg=name)
             assert actuator.biastype == mujoco.mjtBias.mjBIAS_NONE
     for name in ("superposition", "rl_steer", "rr_steer"):

@@ -43,7 +43,7 @@ def system() -> control.StateSpace:
 
 @pytest.mark.parametrize("row", range(len(OUTPUTS)), ids=OUTPUTS)
 def test_frequency_response_is_that_of_a_sine_sweep_of_the_full_car(row):
-    """ISO 7401, 0.2 to 4 Hz, about 0.1 g: 5 % and 5 deg."""
+    """ISO 7401, 0.2 to 4 Hz, about 0.1 g: 5 % and 5 deg, with all its dry friction."""
     sweep = run("sine_sweep")
     assert np.abs(sweep["ay_mps2"]).max() == pytest.approx(TENTH_G_MPS2, rel=0.1)
     found = frequency_response(sweep, OUTPUTS[row], np.geomspace(0.2, 4.0, 40))
@@ -55,7 +55,8 @@ def test_frequency_response_is_that_of_a_sine_sweep_of_the_full_car(row):
 @pytest.mark.parametrize(("name", "amplitude_rad"), [("rear_steer_rad", 5e-4), ("superposition_rad", 1e-3)])
 def test_step_of_an_active_steering_gives_the_response_of_the_full_car(name, amplitude_rad):
     straight = {"kind": "open_loop", "speed_mps": SPEED_MPS, "duration_s": 1.0}
-    vehicle_run = Simulation(resolve(straight))
+    # So small a superposition winds the column up by no more than the friction of the rack holds; the linear car has none.
+    vehicle_run = Simulation(resolve(straight, overrides={"vehicle.friction.rack_N": 0.0}))
     command = SteerCommand(**{name: amplitude_rad})
     vehicle_run.controller = type("Constant", (), {"step": lambda *_: command})()  # type: ignore[assignment]
     values = go_on(vehicle_run, 1000)
@@ -77,8 +78,9 @@ def test_step_steer_of_a_tenth_of_g_is_followed():
     found = linear_response(recording, system())
     for output in OUTPUTS:
         most = np.abs(recording[output]).max()
-        # The first 10 ms of the lateral acceleration belong to modes above the cut-off, which answer at once here.
-        allowed = 0.1 if output == "ay_mps2" else 0.05
+        # The first 10 ms of the lateral acceleration belong to modes above the cut-off, which answer at once here; after
+        # them the rack, which the linear car has without friction, starts a little late.
+        allowed = 0.12 if output == "ay_mps2" else 0.05
         assert found[output] == pytest.approx(recording[output], abs=allowed * most)
 
 

@@ -21,6 +21,13 @@ class Wheel:
 
 
 @dataclass(frozen=True)
+class Axle:
+    track_m: Annotated[float, Range(0.5, 3.0)]
+    steer_rad: float = 0.0
+    hubs: tuple[Wheel, ...] = ()
+
+
+@dataclass(frozen=True)
 class Car:
     speed_mps: Annotated[float, Range(0.0, 100.0)]
     steer_rad: Annotated[float, Range(-0.5, 0.5)] = 0.0
@@ -33,6 +40,7 @@ class Car:
     spare: Wheel | None = None
     wheels: dict[str, Wheel] = field(default_factory=dict)
     limit_rad: Annotated[float, Range(0.0)] | None = None
+    axles: tuple[Axle, ...] = ()
 
     def __post_init__(self) -> None:
         if self.doors == 13:
@@ -130,6 +138,11 @@ def test_both_ends_of_a_range_are_allowed():
         ({"spare": 3}, r"spare: 3 is no table; a table \[spare\] is needed"),
         ({"spare": {"radius_m": 0.3, "name": 7}}, r"spare\.name: 7 is not a text"),
         ({"wheels": 3}, r"wheels: 3 is no table"),
+        ({"axles": 3}, r"axles: 3 is no list; tables \[\[axles\]\] are needed"),
+        ({"axles": {"track_m": 1.5}}, r"axles: \{'track_m': 1\.5\} is no list; tables \[\[axles\]\] are needed"),
+        ({"axles": [1.5]}, r"axles\.0: 1\.5 is no table"),
+        ({"axles": [{"track_m": 1.5}, {"track_m": 5}]}, r"axles\.1\.track_m: 5 is out of range; allowed is 0\.5 to 3$"),
+        ({"axles": [{}]}, r"axles\.0: the key track_m is missing"),
         ({"wheels": {"rear": {}}}, r"wheels\.rear: the key radius_m is missing"),
     ],
 )
@@ -164,6 +177,53 @@ def test_unknown_key_is_answered_with_the_nearest_its_file_and_line(read):
 def test_error_names_the_line(read, text, line, key):
     with pytest.raises(ParameterError, match=rf"^car\.toml, line {line}: {key}: "):
         read(text)
+
+
+AXLES = """\
+speed_kmh = 90
+
+[[axles]]
+track_m = 1.5
+steer_deg = 1
+
+[[axles]]  # the rear one
+track_m = 1.4
+
+[[axles.hubs]]
+radius_m = 0.3
+
+[[axles.hubs]]
+radius_m = 0.32
+"""
+
+
+def test_tables_in_a_list_become_a_tuple_of_dataclasses(read):
+    front, rear = read(AXLES).axles
+    assert front == Axle(1.5, math.radians(1.0))
+    assert rear == Axle(1.4, hubs=(Wheel(0.3), Wheel(0.32)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "key"),
+    [
+        ("1.5", "15", 4, r"axles\.0\.track_m"),
+        ("steer_deg", "stear_deg", 5, r"axles\.0\.stear_deg"),
+        ("1.4", "14", 8, r"axles\.1\.track_m"),
+        ("0.3\n", "30\n", 11, r"axles\.1\.hubs\.0\.radius_m"),
+        ("0.32", "32", 14, r"axles\.1\.hubs\.1\.radius_m"),
+        ("track_m = 1.4\n", "\n", 7, r"axles\.1"),
+    ],
+)
+def test_error_in_a_list_names_the_element_and_the_line(read, old, new, line, key):
+    with pytest.raises(ParameterError, match=rf"^car\.toml, line {line}: {key}: "):
+        read(AXLES.replace(old, new))
+
+
+def test_error_in_an_inline_table_names_the_line_of_its_key(read):
+    with pytest.raises(ParameterError, match=r"^car\.toml, line 2: spare\.radius_m: 30 is out of range"):
+        read("speed_kmh = 90\nspare = { radius_m = 30 }\n")
+    with pytest.raises(ParameterError, match=r"^car\.toml, line 2: axles\.1\.track_m: 9 is out of range"):
+        read("speed_kmh = 90\naxles = [{ track_m = 1 }, { track_m = 9 }]\n")
 
 
 def test_missing_key_is_answered_with_its_spellings():
@@ -228,10 +288,18 @@ def test_override_reaches_nested_keys_and_leaves_the_rest():
     assert replaced("wheels.front.name", "x")["wheels"] == {"front": {"radius_m": 0.31, "name": "x"}}
 
 
+def test_override_reaches_one_element_of_a_list():
+    table = {"speed_kmh": 90, "axles": [{"track_m": 1.5, "steer_deg": 1.0}, {"track_m": 1.4}]}
+    assert replaced("axles.0.steer_rad", 0.1, table)["axles"] == [{"track_m": 1.5, "steer_rad": 0.1}, {"track_m": 1.4}]
+    assert replaced("axles.1", {"track_m": 2.0}, table)["axles"][1] == {"track_m": 2.0}
+    assert replaced("axles", [], table)["axles"] == []
+
+
 def test_override_does_not_change_the_table_it_is_given():
-    table = {"speed_kmh": 90, "wheels": {"front": {"radius_m": 0.31}}}
+    table = {"speed_kmh": 90, "wheels": {"front": {"radius_m": 0.31}}, "axles": [{"track_m": 1.5}]}
     before = json.dumps(table)
     replaced("wheels.front.radius_m", 0.4, table)
+    replaced("axles.0.track_m", 1.4, table)
     replaced("speed_mps", 1.0, table)
     assert json.dumps(table) == before
 
@@ -242,16 +310,28 @@ def test_override_does_not_change_the_table_it_is_given():
         ("sped_kmh", r"^override sped_kmh: sped_kmh: there is no such key; did you mean 'speed_kmh'"),
         ("spare.radus_m", r"radus_m: there is no such key; did you mean 'radius_m'\?"),
         ("speed_mps.x", r"speed_mps is a value, not a table"),
+        ("axles.2.track_m", r"axles\.2\.track_m: there is no element '2' of axles; there are 0 to 1$"),
+        ("axles.x.track_m", r"axles\.x\.track_m: there is no element 'x' of axles; there are 0 to 1$"),
+        ("axles.0.trak_m", r"trak_m: there is no such key; did you mean 'track_m'\?"),
         ("wheels.frnt.radius_m", r"wheels\.frnt\.radius_m: there is no such key; did you mean 'front'\?"),
     ],
 )
 def test_override_of_a_key_that_does_not_exist_is_answered(path, told):
+    table = {"wheels": {"front": {"radius_m": 0.31}}, "axles": [{"track_m": 1.5}, {"track_m": 1.4}]}
     with pytest.raises(ParameterError, match=told):
-        replaced(path, 1.0)
+        replaced(path, 1.0, table)
+
+
+def test_override_of_an_element_of_an_empty_list_is_answered():
+    with pytest.raises(ParameterError, match=r"axles\.0: there is no element '0' of axles; there are none"):
+        replaced("axles.0", {})
 
 
 def test_tables_come_back_as_they_went():
-    given = Car(12.5, 0.1, curve=(1.0, 2.0), spare=Wheel(0.3), wheels={"a": Wheel(0.2, "b")}, limit_rad=0.1)
+    given = Car(
+        12.5, 0.1, curve=(1.0, 2.0), spare=Wheel(0.3), wheels={"a": Wheel(0.2, "b")}, limit_rad=0.1,
+        axles=(Axle(1.5), Axle(1.4, hubs=(Wheel(0.3),))),
+    )  # fmt: skip
     table = to_table(given)
     assert json.loads(json.dumps(table)) == table
     assert build(Car, table, source()) == given
@@ -266,5 +346,5 @@ def test_values_that_are_not_given_are_left_out_of_the_table():
 
 def test_all_keys_are_known_in_all_their_units():
     paths = key_paths(Car)
-    for path in ("speed_mps", "speed_kmh", "yaw_rate_degps", "ay_g", "spare.radius_m", "spare.name", "doors"):
+    for path in ("speed_mps", "speed_kmh", "yaw_rate_degps", "ay_g", "spare.radius_m", "spare.name", "doors", "axles"):
         assert path in paths

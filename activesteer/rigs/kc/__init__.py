@@ -1,8 +1,8 @@
 """Kinematics and compliance: a car with its chassis held, its wheels on pads, measured as on a bench."""
 
-from activesteer.rigs.kc.figures import draw
+from activesteer.rigs.kc.figures import draw, rear_camber_figure
 from activesteer.rigs.kc.result import KcMetric, KcResult
 from activesteer.rigs.kc.rig import kinematics_compliance
 from activesteer.rigs.kc.sweep import Sweep
 
-__all__ = ["KcMetric", "KcResult", "Sweep", "draw", "kinematics_compliance"]
+__all__ = ["KcMetric", "KcResult", "Sweep", "draw", "kinematics_compliance", "rear_camber_figure"]

@@ -70,7 +70,7 @@ def draw(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
         ParameterError: matplotlib is not installed, or a file cannot be written.
     """
     pictures: dict[str, Callable[[KcResult], Figure]] = {
-        "rear_camber": _rear_camber,
+        "rear_camber": rear_camber_figure,
         "parallel_travel": _parallel_travel,
         "opposite_travel": _opposite_travel,
         "side_force": _side_force,
@@ -143,7 +143,7 @@ def _grid(
     return figure
 
 
-def _rear_camber(result: KcResult) -> Figure:
+def rear_camber_figure(result: KcResult) -> Figure:
     """Figure 1 of the paper: rear camber against wheel travel and against side force.
 
     Source: V. Dorsch, Mecatronics-REM 2012, figure 1.

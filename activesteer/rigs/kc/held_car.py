@@ -6,7 +6,7 @@ take their place: each pad holds the height of its wheel, pushes straight up at 
 horizontal force or moment it is told to. A wheel is fastened to its pad, which can pull as well.
 
 The wheel is rigid and has the loaded radius that it has in the standing car: what the rig measures is the suspension.
-Dry friction and joint limits are constraints of the engine and take no part.
+Joint limits are constraints of the engine and take no part; the rig takes dry friction out of the car (see `rig`).
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Mapping
 from typing import Any
@@ -16,6 +17,7 @@ from activesteer.rigs.kc.targets import load_targets
 from activesteer.road import Road
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.vehicle import Vehicle
+from activesteer.vehicle.parameters import Friction
 
 
 def kinematics_compliance(
@@ -31,7 +33,7 @@ def kinematics_compliance(
         targets: File with target bands; the one of the vehicle's name in `models/targets` where not given.
 
     Returns:
-        Metrics with their bands, and all curves.
+        Metrics with their bands, and all curves, of the car without the dry friction of its dampers and rack.
 
     Raises:
         ParameterError: the vehicle or the targets are not found or wrong.
@@ -44,7 +46,9 @@ def kinematics_compliance(
     # A scenario needs a manoeuvre; the rig uses the car alone.
     scenario = resolve("step_steer", vehicle, changes)
     bands = load_targets(scenario.car.name, targets)
-    car = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, Road())
+    # Dry friction pushes as far one way as the other: without it the rig finds the mean of both directions of a sweep.
+    smooth = dataclasses.replace(scenario.car, friction=Friction())
+    car = Vehicle(scenario.mjcf, smooth, scenario.tyres, Road())
     try:
         measured = measure(car, scenario.tyres)
     except KeyError as reason:

@@ -6,9 +6,9 @@ import control
 import numpy as np
 import pytest
 
+from activesteer.analysis.figures import figure_2
 from activesteer.analysis.frequency_response import OUTPUTS
 from activesteer.analysis.linear_plots import draw_bode, draw_root_locus
-from activesteer.analysis.plots import figure_2
 from activesteer.errors import ParameterError
 from tests.unit.analysis.made_up import step_steer
 from tests.unit.analysis.test_frequency_response import sweep

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from activesteer.analysis.series import crossing_time, largest_rate, smooth, step_response, timestep
+from activesteer.analysis.series import crossing_time, lag, largest_rate, rate_rms, rms, smooth, step_response, timestep
 from activesteer.errors import RecordingError
 from tests.unit.analysis.made_up import first_order, second_order
 
@@ -128,3 +128,31 @@ def test_largest_rate_of_a_ramp_is_its_slope():
 
 def test_largest_rate_is_that_of_a_step_between_coarse_samples():
     assert largest_rate(np.array([0.0, 0.0, 3.0, 3.0]), 0.5) == pytest.approx(6.0)
+
+
+def test_rms_of_values_and_of_their_rate():
+    time_s = np.arange(2000) * 0.001
+    assert rms(np.array([3.0, -4.0])) == pytest.approx(math.sqrt(12.5))
+    assert math.isnan(rms(np.empty(0)))
+    assert rate_rms(3.0 * time_s, 0.001) == pytest.approx(3.0)
+    assert math.isnan(rate_rms(time_s[:5], 0.001))
+
+
+@pytest.mark.parametrize("shift_s", [0.01, 0.0874, 0.25])
+def test_lag_of_a_shifted_signal_is_the_shift(shift_s):
+    time_s = np.arange(6000) * 0.001
+
+    def pulses(t):
+        return np.exp(-((t - 2.0) ** 2) / 0.1) - np.exp(-((t - 4.0) ** 2) / 0.2)
+
+    assert lag(pulses(time_s), 3.0 * pulses(time_s - shift_s), 0.001, 0.6) == pytest.approx(shift_s, abs=5e-4)
+
+
+def test_lag_outside_the_range_or_of_nothing_does_not_exist():
+    time_s = np.arange(6000) * 0.001
+    sine = np.exp(-((time_s - 3.0) ** 2) / 0.1)
+    later = np.exp(-((time_s - 3.8) ** 2) / 0.1)
+    assert math.isnan(lag(later, sine, 0.001, 0.6))
+    assert math.isnan(lag(sine, later, 0.001, 0.6))
+    assert math.isnan(lag(sine, np.zeros_like(sine), 0.001, 0.6))
+    assert math.isnan(lag(sine[:1000], later[:1000], 0.001, 0.6))

@@ -20,7 +20,7 @@ from tests.unit.vehicle.cars import changed_model, scenario, vehicle_of
         ("compact.xml", 'name="chassis_orientation"', 'name="attitude"', "no sensor 'chassis_orientation'"),
         ("compact.xml", 'name="rl_wheel_speed"', 'name="rl_wheel_spin"', "no sensor 'rl_wheel_speed'"),
         ("compact.xml", 'name="steering_wheel_angle"', 'name="handwheel"', "no sensor 'steering_wheel_angle'"),
-        ("compact.xml", 'name="fr_damper"', 'name="fr_shock"', "no tendon 'fr_damper'"),
+        ("compact.xml", '"fr_damper"', '"fr_shock"', "no tendon 'fr_damper'"),
         ("compact.xml", '<position name="steering_wheel"', '<position name="wheel"', "no actuator 'steering_wheel'"),
         ("compact.xml", '<general name="rr_steer"', '<general name="rr_hinge"', "no actuator 'rr_steer'"),
         ("compact.xml", '<general name="fl_slip_x"', '<general name="fl_kappa"', "no actuator 'fl_slip_x'"),

@@ -10,15 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
 
 from activesteer.analysis import step_response
+from activesteer.analysis.claims.claim import Claim, Runs, all_metrics, pick
 from activesteer.analysis.source import RecordingLike
-from activesteer.errors import ParameterError
-
-SYSTEMS: Final = ("none", "ars", "afs")
-"""The runs that are compared: no control, active rear steering, active front superposition."""
 
 DELAY_TOLERANCE_S: Final = 0.005
 """A response time counts as longer when it is longer by more than this [s]: five steps of the controller."""
@@ -27,26 +23,7 @@ LEAST_ANGLE_RAD: Final = math.radians(0.01)
 """A settled angle smaller than this has no sign [rad]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """One statement of the paper, checked.
-
-    Attributes:
-        id: Its number.
-        text: What is claimed.
-        criterion: What must hold for it to pass.
-        passed: Whether it does.
-        values: The numbers it was decided on, named `<system>_<metric>`.
-    """
-
-    id: str
-    text: str
-    criterion: str
-    passed: bool
-    values: dict[str, float]
-
-
-def step_steer_claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
+def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
     """Check claims S1 to S5.
 
     Args:
@@ -59,20 +36,12 @@ def step_steer_claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
         ParameterError: one of the three runs is missing.
         RecordingError: a run is no step steer.
     """
-    missing = [system for system in SYSTEMS if system not in recordings]
-    if missing:
-        raise ParameterError(
-            f"the claims about the step steer need the runs {', '.join(SYSTEMS)}; missing: {', '.join(missing)}"
-        )
-    runs = {system: step_response.metrics(recordings[system]) for system in SYSTEMS}
+    runs = all_metrics(recordings, step_response.metrics, "step steer")
     return [_peak(runs), _delay(runs), _rear_angle(runs), _front_angle(runs), _sideslip(runs)]
 
 
-_Runs = dict[str, dict[str, float]]
-
-
-def _peak(runs: _Runs) -> Claim:
-    values = _pick(runs, "yaw_rate_peak_radps")
+def _peak(runs: Runs) -> Claim:
+    values = pick(runs, "yaw_rate_peak_radps")
     none, ars, afs = (abs(value) for value in values.values())
     return Claim(
         "S1",
@@ -83,8 +52,8 @@ def _peak(runs: _Runs) -> Claim:
     )
 
 
-def _delay(runs: _Runs) -> Claim:
-    values = _pick(runs, "yaw_rate_response_time_s")
+def _delay(runs: Runs) -> Claim:
+    values = pick(runs, "yaw_rate_response_time_s")
     none, ars, afs = values.values()
     return Claim(
         "S2",
@@ -96,7 +65,7 @@ def _delay(runs: _Runs) -> Claim:
     )
 
 
-def _rear_angle(runs: _Runs) -> Claim:
+def _rear_angle(runs: Runs) -> Claim:
     rear_rad = _added(runs, "ars", "rear_steer_steady_state_rad")
     front_rad = runs["ars"]["front_steer_steady_state_rad"]
     return Claim(
@@ -109,7 +78,7 @@ def _rear_angle(runs: _Runs) -> Claim:
     )
 
 
-def _front_angle(runs: _Runs) -> Claim:
+def _front_angle(runs: Runs) -> Claim:
     added_rad = _added(runs, "afs", "superposition_steady_state_rad")
     wheel_rad = runs["afs"]["steering_wheel_steady_state_rad"]
     return Claim(
@@ -122,8 +91,8 @@ def _front_angle(runs: _Runs) -> Claim:
     )
 
 
-def _sideslip(runs: _Runs) -> Claim:
-    values = _pick(runs, "sideslip_steady_state_rad")
+def _sideslip(runs: Runs) -> Claim:
+    values = pick(runs, "sideslip_steady_state_rad")
     return Claim(
         "S5",
         "Rear steering makes the sideslip angle larger.",
@@ -133,10 +102,6 @@ def _sideslip(runs: _Runs) -> Claim:
     )
 
 
-def _added(runs: _Runs, system: str, metric: str) -> float:
+def _added(runs: Runs, system: str, metric: str) -> float:
     """What a system adds to an angle that the control-free car has too, since its hinges give under load."""
     return runs[system][metric] - runs["none"][metric]
-
-
-def _pick(runs: _Runs, metric: str) -> dict[str, float]:
-    return {f"{system}_{metric}": runs[system][metric] for system in SYSTEMS}

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from activesteer.analysis.plots import step_steer_figure
+from activesteer.analysis.figures import step_steer_figure
 from activesteer.errors import ParameterError, RecordingError
 from tests.unit.analysis.made_up import step_steer
 

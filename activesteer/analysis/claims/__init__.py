@@ -1,0 +1,62 @@
+"""What the paper says about the three systems, as checks on recordings; one file for each manoeuvre.
+
+Every criterion was written down before parameters were chosen. `not_reproduced.toml` lists the claims that are known
+not to come out, with the reason; `scorecard` puts the two together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from activesteer.analysis.claims import double_lane_change, sine_with_dwell, slalom, slippery, step_steer
+from activesteer.analysis.claims.claim import SYSTEMS, Claim
+from activesteer.analysis.claims.scorecard import Scorecard, Verdict, not_reproduced, scorecard
+from activesteer.analysis.source import RecordingLike
+
+Claims = Callable[[Mapping[str, RecordingLike]], list[Claim]]
+"""Recordings by system -> claims."""
+
+SCENARIOS: Final[dict[str, Claims]] = {
+    "step_steer": step_steer.claims,
+    "sine_with_dwell": sine_with_dwell.claims,
+    "double_lane_change": double_lane_change.claims,
+    "slalom": slalom.claims,
+    "double_lane_change_low_mu": slippery.claims,
+}
+"""Name of the manoeuvre -> its claims, in the order of the paper's sections."""
+
+step_steer_claims = step_steer.claims
+
+
+def claims_for(recording: RecordingLike) -> Claims | None:
+    """The claims that the paper makes about the manoeuvre of a run.
+
+    Args:
+        recording: The run. The name of its manoeuvre counts, and, for the two open-loop ones, its kind: a step steer of
+            one's own is a step steer.
+
+    Returns:
+        What checks them; None where the paper says nothing about the manoeuvre.
+    """
+    maneuver = recording.metadata.get("maneuver")
+    if not isinstance(maneuver, Mapping):
+        return None
+    name, kind = maneuver.get("name"), maneuver.get("kind")
+    if name in SCENARIOS:
+        return SCENARIOS[name]
+    return SCENARIOS[kind] if kind in {"step_steer", "sine_with_dwell"} else None
+
+
+__all__ = [
+    "SCENARIOS",
+    "SYSTEMS",
+    "Claim",
+    "Claims",
+    "Scorecard",
+    "Verdict",
+    "claims_for",
+    "not_reproduced",
+    "scorecard",
+    "step_steer_claims",
+]

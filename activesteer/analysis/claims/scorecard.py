@@ -1,0 +1,172 @@
+"""All claims together: what passed, what failed, and what was known beforehand not to come out."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib.resources import files
+from typing import Any, Final, NamedTuple
+
+from activesteer.analysis.claims.claim import SYSTEMS, Claim
+from activesteer.analysis.tables import label_and_unit
+from activesteer.errors import ParameterError, nearest_names
+
+CLAIM_IDS: Final = (
+    "S1", "S2", "S3", "S4", "S5", "D1", "D2", "D3", "D4", "D5",
+    "L1", "L2", "L3", "Z1", "Z2", "Z3", "Z4", "W1", "W2", "W3",
+)  # fmt: skip
+"""The numbers of all claims, in the order of the paper's sections."""
+
+FILE: Final = "not_reproduced.toml"
+
+
+class Verdict(StrEnum):
+    """What became of a claim."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    NOT_REPRODUCED = "not reproduced"
+    """It fails, and is listed as known to."""
+    UNEXPECTED = "passed, though listed as not reproduced"
+    """The list is to be cleaned."""
+
+
+class Judged(NamedTuple):
+    """A claim with its verdict.
+
+    Attributes:
+        claim: The claim.
+        verdict: What became of it.
+        reason: Why it is known not to come out; empty where it is not listed.
+    """
+
+    claim: Claim
+    verdict: Verdict
+    reason: str
+
+
+@dataclass(frozen=True)
+class Scorecard:
+    """Claims with their verdicts.
+
+    Attributes:
+        judged: All of them, in the order given.
+    """
+
+    judged: tuple[Judged, ...]
+
+    @property
+    def exit_status(self) -> int:
+        """1 where a claim fails that is not known to, else 0."""
+        return int(any(item.verdict is Verdict.FAILED for item in self.judged))
+
+    def to_json(self) -> dict[str, Any]:
+        """The scorecard as JSON values; a number that does not exist (nan) is None."""
+        return {
+            "claims": [
+                {
+                    "id": item.claim.id,
+                    "text": item.claim.text,
+                    "passed": item.claim.passed,
+                    "verdict": item.verdict.value,
+                    "reason": item.reason,
+                    "values": {k: v if math.isfinite(v) else None for k, v in item.claim.values.items()},
+                    "criterion": item.claim.criterion,
+                }
+                for item in self.judged
+            ],
+            "verdicts": {verdict.value: self._count(verdict) for verdict in Verdict},
+        }
+
+    def to_text(self) -> str:
+        """The scorecard for a terminal: number, verdict, text, then the numbers, in degrees and km/h."""
+        lines = []
+        for claim, verdict, reason in self.judged:
+            short = {Verdict.FAILED: "FAILED", Verdict.UNEXPECTED: "passed!"}.get(verdict, verdict.value)
+            lines.append(f"{claim.id}  {short:<14}  {claim.text}")
+            lines += [f"{'':20}{line}" for line in _numbers(claim.values)]
+            if verdict is Verdict.UNEXPECTED:
+                lines.append(f"{'':20}listed in {FILE}, from where it can be taken out")
+            elif reason:
+                lines.append(f"{'':20}because: {reason}")
+        counts = [f"{self._count(verdict)} {verdict.value}" for verdict in Verdict if self._count(verdict)]
+        return "\n".join([*lines, f"{len(self.judged)} claims: {', '.join(counts)}"])
+
+    def _count(self, verdict: Verdict) -> int:
+        return sum(item.verdict is verdict for item in self.judged)
+
+
+def scorecard(claims: Iterable[Claim], vehicle: str = "", *, known: Mapping[str, str] | None = None) -> Scorecard:
+    """Put claims and what is known of them together.
+
+    Args:
+        claims: Checked claims.
+        vehicle: Name of the vehicle; what is known not to come out with it is looked up, see `not_reproduced`.
+        known: In place of that, number -> reason of the claims known not to come out.
+
+    Returns:
+        The scorecard.
+
+    Raises:
+        ParameterError: the list of what is known is wrong.
+    """
+    reasons = not_reproduced(vehicle) if known is None else known
+    return Scorecard(tuple(Judged(claim, _verdict(claim, reasons), reasons.get(claim.id, "")) for claim in claims))
+
+
+def not_reproduced(vehicle: str, text: str | None = None) -> dict[str, str]:
+    """Which claims are known not to come out with a vehicle.
+
+    Args:
+        vehicle: Name of the vehicle.
+        text: TOML text in place of the package's file.
+
+    Returns:
+        Number of the claim -> reason; empty for a vehicle that is not listed.
+
+    Raises:
+        ParameterError: the text is no TOML, names a claim that does not exist, or gives no reason.
+    """
+    if text is None:
+        text = files("activesteer.analysis.claims").joinpath(FILE).read_text(encoding="utf-8")
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ParameterError(f"{FILE}: {error}") from error
+    for name, entries in table.items():
+        if not isinstance(entries, dict):
+            raise ParameterError(f"{FILE}: {name} is {entries!r}, expected a table [<vehicle>] of claims with reasons")
+        for number, reason in entries.items():
+            if number not in CLAIM_IDS:
+                raise ParameterError(f"{FILE}: {name}.{number}: no such claim; {nearest_names(number, CLAIM_IDS)}")
+            if not isinstance(reason, str) or not reason.strip():
+                raise ParameterError(f"{FILE}: {name}.{number}: is {reason!r}, expected the reason in words")
+    return dict(table.get(vehicle, {}))
+
+
+def _verdict(claim: Claim, known: Mapping[str, str]) -> Verdict:
+    if claim.passed:
+        return Verdict.UNEXPECTED if claim.id in known else Verdict.PASSED
+    return Verdict.NOT_REPRODUCED if claim.id in known else Verdict.FAILED
+
+
+def _numbers(values: Mapping[str, float]) -> list[str]:
+    """A line for each metric, the systems beside each other."""
+    by_metric: dict[str, list[tuple[str, float]]] = {}
+    for name, value in values.items():
+        system, _, metric = name.partition("_")
+        known = system in SYSTEMS
+        by_metric.setdefault(metric if known else name, []).append((system if known else "", value))
+    lines = []
+    for metric, pairs in by_metric.items():
+        words, unit, factor = label_and_unit(metric)
+        numbers = "  ".join(f"{system} {_number(value * factor)}".strip() for system, value in pairs)
+        lines.append(f"{words}: {numbers}" + ("" if unit == "-" else f" {unit}"))
+    return lines
+
+
+def _number(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.3g}"

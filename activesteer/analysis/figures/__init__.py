@@ -1,0 +1,123 @@
+"""The paper's figures again, from recordings: same numbers, same curves 1, 2, 3, units at every axis.
+
+`draw_all` makes the figures of whole reproductions, `figure_for` the one that suits a manoeuvre. matplotlib is an extra
+of the package and imported when a picture is made. Figures 1, 2 and 3 need more than recordings and are made elsewhere.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from activesteer.analysis.figures import theory, time_histories, tracks
+from activesteer.analysis.figures.step_steer import figure_2, figure_11, step_steer_figure
+from activesteer.analysis.source import RecordingLike
+from activesteer.errors import ParameterError, RecordingError
+from activesteer.pictures import save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Draw = Callable[[Mapping[str, RecordingLike]], "Figure"]
+"""Recordings by system -> figure."""
+
+FORMATS: Final = (".png", ".svg")
+
+BY_SCENARIO: Final[dict[str, dict[str, Draw]]] = {
+    "step_steer": {"figure_11_step_steer": figure_11},
+    "sine_with_dwell": {
+        "figure_12_sine_with_dwell_input": time_histories.figure_12,
+        "figure_13_sine_with_dwell": time_histories.figure_13,
+    },
+    "double_lane_change": {
+        "figure_14_double_lane_change_course": tracks.course_figure,
+        "figure_15_double_lane_change_tracks": tracks.track_figure,
+        "figure_16_double_lane_change_steering": time_histories.steering_and_yaw_rate,
+        "figure_17_double_lane_change_response": time_histories.lateral_response,
+    },
+    "slalom": {
+        "figure_18_slalom_course": tracks.course_figure,
+        "figure_19_slalom_tracks": tracks.track_figure,
+        "figure_20_slalom_steering": time_histories.steering_and_yaw_rate,
+        "figure_21_slalom_response": time_histories.lateral_response,
+    },
+    "double_lane_change_low_mu": {
+        "figure_22_slippery_tracks": tracks.track_figure,
+        "figure_23_slippery_response": time_histories.figure_23,
+        "figure_24_slippery_sideslip": time_histories.figure_24,
+    },
+}
+"""Scenario -> file name without its ending -> what draws the figure."""
+
+OF_ANY_RUN: Final = {
+    "figure_07_predicted_rear_angle": theory.figure_7,
+    "figure_09_tolerance_function": theory.figure_9,
+}
+"""Figures that show parameters: the same from every run with a vehicle."""
+
+BY_KIND: Final[dict[str, Draw]] = {
+    "step_steer": figure_11,
+    "sine_with_dwell": time_histories.sine_with_dwell_figure,
+    "lane_change": tracks.overview,
+    "slalom": tracks.overview,
+    "follow_path": tracks.overview,
+}
+"""Kind of manoeuvre -> what shows it at a glance; every other kind gets `time_histories.general`."""
+
+
+def draw_all(recordings: Mapping[str, Mapping[str, RecordingLike]], folder: str | os.PathLike[str]) -> list[Path]:
+    """Draw the paper's figures of all scenarios that there are runs of, as PNG and SVG.
+
+    Args:
+        recordings: Scenario -> system -> run. Scenarios that the paper does not have are left out.
+        folder: Where the files go; made where it does not exist.
+
+    Returns:
+        The files written, in the order of their numbers.
+
+    Raises:
+        ParameterError: matplotlib is not installed, there is nothing to draw, or the folder cannot be made.
+        RecordingError: a channel or the course is missing, or a file cannot be written.
+    """
+    scenarios = {name: recordings[name] for name in BY_SCENARIO if recordings.get(name)}
+    if not scenarios:
+        raise ParameterError(f"there is no recording to draw; figures are made of {', '.join(BY_SCENARIO)}")
+    directory = Path(folder)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise ParameterError(f"cannot make the folder {directory}: {reason.strerror}") from reason
+    any_run = next(iter(next(iter(scenarios.values())).values()))
+    paths = []
+    for name, show in OF_ANY_RUN.items():
+        paths += _write(show(any_run), directory, name)
+    for scenario, runs in scenarios.items():
+        for name, draw in BY_SCENARIO[scenario].items():
+            paths += _write(draw(runs), directory, name)
+    return paths
+
+
+def figure_for(kind: str) -> Callable[[Mapping[str, RecordingLike], str | os.PathLike[str]], Path]:
+    """The figure that shows a kind of manoeuvre at a glance.
+
+    Args:
+        kind: Kind of the manoeuvre.
+
+    Returns:
+        What draws runs of it, by system, and saves them under a path; it raises as `step_steer_figure` does.
+    """
+    draw = BY_KIND.get(kind, time_histories.general)
+
+    def draw_and_save(recordings: Mapping[str, RecordingLike], path: str | os.PathLike[str]) -> Path:
+        return save(draw(recordings), Path(path), RecordingError)
+
+    return draw_and_save
+
+
+def _write(figure: Figure, folder: Path, name: str) -> list[Path]:
+    return [save(figure, folder / f"{name}{ending}", RecordingError) for ending in FORMATS]
+
+
+__all__ = ["draw_all", "figure_2", "figure_for", "step_steer_figure"]

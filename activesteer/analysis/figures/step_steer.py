@@ -1,0 +1,114 @@
+"""The figures of the step steer: 2 (the car beside its linear models) and 11 (the three systems)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.analysis.figures import style
+from activesteer.analysis.figures.style import COLOURS, DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, Curve, Panel
+from activesteer.analysis.source import RecordingLike
+from activesteer.errors import RecordingError
+from activesteer.pictures import new_figure, save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FRONT = Panel("steering angles\n[deg]", "front_steer_rad", YAW_RATE.factor)
+
+
+def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
+    """Response to a step steer.
+
+    From the top: yaw rate (dashed: desired, of the runs with a controller), steering angles (front wheels thin, added
+    angles thick: those of the rear wheels, or the superposition at the front ones), lateral acceleration, sideslip and
+    roll, over one time axis.
+
+    Args:
+        recordings: Runs by label; `none`, `ars` and `afs` get the paper's names and numbers, others keep their own.
+
+    Raises:
+        ParameterError: matplotlib is not installed, or there is no run to draw.
+        RecordingError: a channel is missing.
+
+    Source: V. Dorsch, Mecatronics-REM 2012, figure 11.
+    """
+    curves = style.curves(recordings)
+    figure = new_figure(width_in=7.5, height_in=9.5)
+    axes: list[Axes] = list(figure.subplots(5, 1, sharex=True))
+    for curve in curves:
+        style.draw(axes[0], curve, YAW_RATE, label=curve.label)
+        if np.any(curve.recording[DESIRED.channel]):
+            style.draw(axes[0], curve, DESIRED, width=1.0, style="--")
+        style.draw(axes[1], curve, FRONT, width=0.8)
+        style.draw_added(axes[1], curve, width=2.2)
+    style.plain(axes[0], YAW_RATE.title)
+    style.plain(axes[1], FRONT.title)
+    style.fill_panels(axes[2:], curves, (LATERAL, SIDESLIP, ROLL))
+    style.explain(axes[0], [("desired", 1.0, "--")])
+    style.explain(axes[1], [("front wheels", 0.8, "-"), ("added: rear wheels (2), superposition (3)", 2.2, "-")])
+    figure.align_ylabels(axes)
+    style.name_curves(figure, axes[0])
+    return figure
+
+
+def step_steer_figure(recordings: Mapping[str, RecordingLike], path: str | os.PathLike[str]) -> Path:
+    """Draw `figure_11` and save it.
+
+    Args:
+        recordings: As there.
+        path: File to write; its ending says the format (.png, .pdf, .svg).
+
+    Returns:
+        The path written.
+
+    Raises:
+        ParameterError: matplotlib is not installed, or there is no run to draw.
+        RecordingError: a channel is missing, or the file cannot be written.
+    """
+    return save(figure_11(recordings), Path(path), RecordingError)
+
+
+def figure_2(
+    recording: RecordingLike,
+    path: str | os.PathLike[str],
+    models: Mapping[str, Mapping[str, NDArray[np.float64]]] | None = None,
+) -> Path:
+    """Draw yaw rate and roll angle after a step of the steering, in the form of the paper's figure 2, and save it.
+
+    Args:
+        recording: A step steer.
+        path: File to write; its ending says the format (.png, .pdf, .svg).
+        models: Label -> channel -> values over the time of the recording, to stand beside it: the single-track model
+            (`identification.single_track_response`), which has no roll, the linear car
+            (`linearisation.linear_response`).
+
+    Returns:
+        The path written.
+
+    Raises:
+        ParameterError: matplotlib is not installed.
+        RecordingError: a channel is missing, or the file cannot be written.
+
+    Source: V. Dorsch, Mecatronics-REM 2012, figure 2.
+    """
+    figure = new_figure(width_in=7.5, height_in=5.5)
+    axes: list[Axes] = list(figure.subplots(2, 1, sharex=True))
+    for axis, panel in zip(axes, (YAW_RATE, ROLL), strict=True):
+        style.draw(axis, Curve(recording, "", COLOURS[0]), panel, label="multibody car", width=2.0)
+        for (label, channels), colour in zip((models or {}).items(), COLOURS[1:], strict=False):
+            if panel.channel in channels:
+                values = channels[panel.channel] * panel.factor
+                axis.plot(recording.time_s, values, "--", color=colour, linewidth=1.4, label=label)
+        style.plain(axis, panel.title)
+        axis.legend(loc="lower right", frameon=False)
+    axes[-1].set_xlabel("time [s]")
+    axes[-1].set_xlim(0.0, float(recording.time_s[-1]))
+    figure.align_ylabels(axes)
+    return save(figure, Path(path), RecordingError)

@@ -1,0 +1,172 @@
+"""One style for all figures: colours and numbers of the three systems, panels over time. Degrees, as in the paper."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.analysis.source import RecordingLike
+from activesteer.errors import ParameterError
+from activesteer.pictures import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering", "afs": "3 active front steering"}
+"""What the curves of the three systems are called, numbered as in the paper's figures."""
+
+COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
+"""Colours that colour-blind readers can tell apart (Okabe and Ito, 2008)."""
+
+MOST_POINTS: Final = 5000
+"""A curve with more samples than this is drawn with fewer: a picture cannot show them, and its file would hold them."""
+
+
+class Panel(NamedTuple):
+    """One channel of every run over time.
+
+    Attributes:
+        title: What stands at the vertical axis, with the unit.
+        channel: Channel name.
+        factor: From the SI value to the unit of the axis.
+    """
+
+    title: str
+    channel: str
+    factor: float
+
+
+YAW_RATE: Final = Panel("yaw rate\n[deg/s]", "yaw_rate_radps", math.degrees(1.0))
+DESIRED: Final = Panel("", "yaw_rate_desired_radps", math.degrees(1.0))
+STEERING_WHEEL: Final = Panel("steering wheel\nangle [deg]", "steering_wheel_rad", math.degrees(1.0))
+LATERAL: Final = Panel("lateral acc.\n[m/s²]", "ay_mps2", 1.0)
+SIDESLIP: Final = Panel("sideslip angle\n[deg]", "sideslip_rad", math.degrees(1.0))
+ROLL: Final = Panel("roll angle\n[deg]", "roll_rad", math.degrees(1.0))
+SPEED: Final = Panel("speed\n[km/h]", "speed_mps", 3.6)
+ADDED: Final = Panel("added angle\n[deg]", "", math.degrees(1.0))
+"""The angles that the systems add: not one channel, but `ADDED_CHANNELS` of those that ask for any."""
+ADDED_CHANNELS: Final = ("rear_steer_rad", "superposition_rad")
+
+
+class Curve(NamedTuple):
+    """A run as it is drawn.
+
+    Attributes:
+        recording: The run.
+        label: Its name in the legend.
+        colour: Its colour.
+    """
+
+    recording: RecordingLike
+    label: str
+    colour: str
+
+
+def curves(recordings: Mapping[str, RecordingLike]) -> list[Curve]:
+    """The runs in the paper's order, the three systems always in the same colours.
+
+    Raises:
+        ParameterError: there is no run to draw.
+    """
+    if not recordings:
+        raise ParameterError("there is no recording to draw, at least one is needed")
+    known = [label for label in LABELS if label in recordings]
+    others = [label for label in recordings if label not in LABELS]
+    colours = dict(zip(LABELS, COLOURS, strict=False))
+    spare = COLOURS[len(LABELS) :]
+    colours |= {label: spare[i % len(spare)] for i, label in enumerate(others)}
+    return [Curve(recordings[label], LABELS.get(label, label), colours[label]) for label in known + others]
+
+
+def draw(axis: Axes, curve: Curve, panel: Panel, label: str = "", width: float = 1.4, style: str = "-") -> None:
+    """One channel of one run over time; without a label it stays out of the legend."""
+    values = thinned(curve.recording[panel.channel]) * panel.factor
+    # A leading underscore keeps a line out of the legend.
+    line = label or "_hidden"
+    axis.plot(thinned(curve.recording.time_s), values, style, color=curve.colour, linewidth=width, label=line)
+
+
+def added_channels(curve: Curve) -> list[str]:
+    """Which angles a system adds: what no controller asks for is the give of a hinge, not an added angle."""
+    return [name for name in ADDED_CHANNELS if np.any(curve.recording[name.replace("_rad", "_demand_rad")])]
+
+
+def draw_added(axis: Axes, curve: Curve, width: float = 1.4) -> None:
+    """The angles that a system adds."""
+    for channel in added_channels(curve):
+        draw(axis, curve, ADDED._replace(channel=channel), width=width)
+
+
+def present(panels: Sequence[Panel], drawn: Sequence[Curve]) -> list[Panel]:
+    """The panels without that of the added angles where no run has any."""
+    return [panel for panel in panels if panel is not ADDED or any(added_channels(curve) for curve in drawn)]
+
+
+def thinned(values: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Every n-th sample, n so that a picture has enough of them and not many more."""
+    return np.asarray(values[:: -(-len(values) // MOST_POINTS) or 1], dtype=np.float64)
+
+
+def plain(axis: Axes, title: str = "") -> None:
+    """Grid and spines of every axis here."""
+    if title:
+        axis.set_ylabel(title)
+    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def explain(axis: Axes, lines: Sequence[tuple[str, float, str]]) -> None:
+    """What the kinds of line mean: text, width, style."""
+    handles = [axis.plot([], [], style, color="#777777", linewidth=width)[0] for _, width, style in lines]
+    axis.legend(handles, [text for text, _, _ in lines], loc="best", fontsize="small", frameon=False)
+
+
+def name_curves(figure: Figure, axis: Axes) -> None:
+    """The legend of the runs, above all axes."""
+    handles, labels = axis.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 3), frameon=False)
+
+
+def fill_panels(axes: Sequence[Axes], drawn: Sequence[Curve], panels: Sequence[Panel]) -> None:
+    """Draws panels over one time axis.
+
+    Args:
+        axes: As many as panels, from the top.
+        drawn: The runs.
+        panels: What each axis shows; the first one's curves carry the labels.
+    """
+    for row, (axis, panel) in enumerate(zip(axes, panels, strict=True)):
+        for curve in drawn:
+            label = curve.label if row == 0 else ""
+            if panel is ADDED:
+                draw_added(axis, curve)
+            else:
+                draw(axis, curve, panel, label=label)
+        plain(axis, panel.title)
+        if panel is ADDED:
+            explain(axis, [("rear wheels (2), superposition (3)", 1.4, "-")])
+    axes[-1].set_xlabel("time [s]")
+    axes[-1].set_xlim(0.0, max(float(curve.recording.time_s[-1]) for curve in drawn))
+
+
+def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Panel]) -> Figure:
+    """A figure of panels over one time axis.
+
+    Raises:
+        ParameterError: matplotlib is not installed, or there is no run to draw.
+        RecordingError: a channel is missing.
+    """
+    drawn = curves(recordings)
+    shown = present(panels, drawn)
+    figure = new_figure(width_in=7.5, height_in=1.2 + 1.75 * len(shown))
+    axes: list[Axes] = list(figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0])
+    fill_panels(axes, drawn, shown)
+    figure.align_ylabels(axes)
+    name_curves(figure, axes[0])
+    return figure

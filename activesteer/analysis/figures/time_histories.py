@@ -1,0 +1,84 @@
+"""The paper's figures over time: 12 and 13 (sine with dwell), 16, 17, 20, 21, 23, 24 (along a path)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from activesteer.analysis import sine_with_dwell
+from activesteer.analysis.figures import style
+from activesteer.analysis.figures.style import ADDED, LATERAL, ROLL, SIDESLIP, SPEED, STEERING_WHEEL, YAW_RATE
+from activesteer.analysis.source import RecordingLike
+from activesteer.errors import RecordingError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Recordings = Mapping[str, RecordingLike]
+
+
+def figure_12(recordings: Recordings) -> Figure:
+    """Steering wheel angle of the sine with dwell: open loop, so that the curves lie over each other."""
+    figure = style.time_figure(recordings, (STEERING_WHEEL,))
+    for index, line in enumerate(reversed(figure.get_axes()[0].get_lines())):
+        # The ones below are wider, to be seen.
+        line.set_linewidth(1.2 + 1.8 * index)
+    _mark_instants(figure, recordings)
+    return figure
+
+
+def figure_13(recordings: Recordings) -> Figure:
+    """Response to the sine with dwell, with the instants at which the yaw rate is judged."""
+    figure = style.time_figure(recordings, (YAW_RATE, ADDED, LATERAL, SIDESLIP))
+    _mark_instants(figure, recordings)
+    return figure
+
+
+def sine_with_dwell_figure(recordings: Recordings) -> Figure:
+    """Figures 12 and 13 in one."""
+    figure = style.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, ADDED, LATERAL, SIDESLIP))
+    _mark_instants(figure, recordings)
+    return figure
+
+
+def steering_and_yaw_rate(recordings: Recordings) -> Figure:
+    """Figures 16 and 20: what the driver does, and how the car turns."""
+    return style.time_figure(recordings, (STEERING_WHEEL, YAW_RATE))
+
+
+def lateral_response(recordings: Recordings) -> Figure:
+    """Figures 17 and 21: lateral acceleration, added angles, sideslip."""
+    return style.time_figure(recordings, (LATERAL, ADDED, SIDESLIP))
+
+
+def figure_23(recordings: Recordings) -> Figure:
+    """All but the sideslip on a slippery road."""
+    return style.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, LATERAL, ADDED))
+
+
+def figure_24(recordings: Recordings) -> Figure:
+    """Sideslip on a slippery road."""
+    return style.time_figure(recordings, (SIDESLIP,))
+
+
+def general(recordings: Recordings) -> Figure:
+    """What makes sense for any manoeuvre."""
+    return style.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, LATERAL, SIDESLIP, ROLL, SPEED))
+
+
+def _mark_instants(figure: Figure, recordings: Recordings) -> None:
+    """Upright lines at the completion of steer and at the two instants after it."""
+    try:
+        completion_s = sine_with_dwell.steering(next(iter(recordings.values()))).completion_s
+    except RecordingError:
+        # A run that was cut short can still be looked at.
+        return
+    axes = figure.get_axes()
+    instants = (("completion of steer", 0.0), *((f"+{s:.2f} s", s) for s in sine_with_dwell.INSTANTS_S))
+    for text, later_s in instants:
+        for axis in axes:
+            axis.axvline(completion_s + later_s, color="#999999", linewidth=0.9, linestyle=":", zorder=1)
+        axes[0].annotate(
+            text, (completion_s + later_s, 1.0), (2, -1), xycoords=("data", "axes fraction"),
+            textcoords="offset points", va="top", fontsize="x-small", color="#666666",
+        )  # fmt: skip

@@ -1,0 +1,139 @@
+"""Figures seen from above: courses with lanes and cones (14, 18), tracks of the front axle centre (15, 19, 22)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from activesteer.analysis import track
+from activesteer.analysis.course import Course, read_course
+from activesteer.analysis.figures import style
+from activesteer.analysis.source import RecordingLike
+from activesteer.pictures import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LANE_COLOUR: Final = "#f0e6c8"
+CONE_COLOUR: Final = "#e69f00"
+WIDTH_IN: Final = 8.5
+COURSE_SHARE: Final = 0.2
+TRACK_SHARE: Final = 0.35
+"""Height over width of the axes of courses and of tracks, about."""
+BEFORE_M: Final = 20.0
+AFTER_M: Final = 50.0
+"""How much of the road is shown before the first gate and after the last [m]."""
+BESIDE_M: Final = 2.0
+"""How much of it beside the course [m]; who leaves the track leaves the picture."""
+
+
+def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
+    """The course: path, lanes with their sizes, cones. It says by how much lateral positions are stretched."""
+    course = read_course(style.curves(recordings)[0].recording)
+    figure = new_figure(width_in=WIDTH_IN, height_in=0.65 + (WIDTH_IN - 0.9) * _height_share(course, COURSE_SHARE))
+    axis: Axes = figure.subplots()
+    _draw_course(axis, course, COURSE_SHARE)
+    for lane in course.lanes:
+        text = f"{lane.name}\n" if lane.name else ""
+        axis.annotate(
+            f"{text}{lane.end_x_m - lane.start_x_m:.1f} m x {lane.left_y_m - lane.right_y_m:.2f} m",
+            (0.5 * (lane.start_x_m + lane.end_x_m), lane.left_y_m), (0, 5), textcoords="offset points",
+            ha="center", va="bottom", fontsize="x-small", color="#555555",
+        )  # fmt: skip
+    return figure
+
+
+def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
+    """Tracks of the front axle centre along the course. It says by how much lateral positions are stretched."""
+    course = read_course(style.curves(recordings)[0].recording)
+    figure = new_figure(width_in=WIDTH_IN, height_in=1.05 + (WIDTH_IN - 0.9) * _height_share(course, TRACK_SHARE))
+    axis: Axes = figure.subplots()
+    _draw_tracks(axis, recordings)
+    style.name_curves(figure, axis)
+    return figure
+
+
+def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
+    """Tracks, and below them what driver, car and systems do over time."""
+    drawn = style.curves(recordings)
+    wanted = (style.STEERING_WHEEL, style.YAW_RATE, style.ADDED, style.LATERAL, style.SIDESLIP)
+    panels = style.present(wanted, drawn)
+    figure = new_figure(width_in=WIDTH_IN, height_in=4.6 + 1.5 * len(panels))
+    grid = figure.add_gridspec(1 + len(panels), 1, height_ratios=[2.6, *(1.0 for _ in panels)])
+    above = figure.add_subplot(grid[0])
+    _draw_tracks(above, recordings)
+    axes: list[Axes] = [figure.add_subplot(grid[1])]
+    axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(2, 1 + len(panels))]
+    style.fill_panels(axes, drawn, panels)
+    for axis in axes[:-1]:
+        axis.tick_params(labelbottom=False)
+    figure.align_ylabels(axes)
+    style.name_curves(figure, above)
+    return figure
+
+
+def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
+    """Course and tracks."""
+    drawn = style.curves(recordings)
+    for curve in drawn:
+        x, y = (style.thinned(values) for values in track.front_axle(curve.recording))
+        axis.plot(x, y, color=curve.colour, linewidth=1.4, label=curve.label)
+    _draw_course(axis, read_course(drawn[0].recording), TRACK_SHARE)
+
+
+def _draw_course(axis: Axes, course: Course, share: float) -> None:
+    """Lanes, path and cones, with a legend of their own, and the limits of the axis."""
+    from matplotlib.patches import Rectangle  # noqa: PLC0415 - an extra, and slow to import
+
+    shown: list[Artist] = []
+    for lane in course.lanes:
+        corner = lane.start_x_m, lane.right_y_m
+        length_m, width_m = lane.end_x_m - lane.start_x_m, lane.left_y_m - lane.right_y_m
+        patch = axis.add_patch(Rectangle(corner, length_m, width_m, color=LANE_COLOUR, linewidth=0.0, zorder=0))
+        shown = [patch]
+    (left, right), (low, high) = _view(course)
+    # Beyond its last point the path goes on straight.
+    dx, dy = (float(values[-1] - values[-2]) for values in (course.path_x_m, course.path_y_m))
+    far = (right - left) / math.hypot(dx, dy)
+    path_x = np.append(course.path_x_m, course.path_x_m[-1] + far * dx)
+    path_y = np.append(course.path_y_m, course.path_y_m[-1] + far * dy)
+    shown += axis.plot(path_x, path_y, ":", color="#888888", linewidth=1.2, zorder=1)
+    if len(course.cones_m):
+        x, y = course.cones_m.T
+        shown += axis.plot(x, y, "^", color=CONE_COLOUR, markersize=4.5, markeredgewidth=0.0, zorder=3)
+    names = [*(["lane"] if course.lanes else []), "path asked for", "cone"]
+    axis.legend(shown, names[: len(shown)], loc="upper right", fontsize="small", frameon=False)
+    style.plain(axis)
+    axis.set_xlim(left, right)
+    axis.set_ylim(low, high)
+    axis.set_xlabel("x [m]")
+    stretch = _stretch(course, share)
+    axis.set_aspect(stretch)
+    axis.set_ylabel("y [m]" + (f"\n(stretched {stretch} times)" if stretch > 1 else ""))
+
+
+def _stretch(course: Course, share: float) -> int:
+    """By how much lateral positions are stretched for an axis about `share` as high as it is wide."""
+    (left, right), (low, high) = _view(course)
+    return max(1, round(share * (right - left) / (high - low)))
+
+
+def _height_share(course: Course, share: float) -> float:
+    (left, right), (low, high) = _view(course)
+    return _stretch(course, share) * (high - low) / (right - left)
+
+
+def _view(course: Course) -> tuple[tuple[float, float], tuple[float, float]]:
+    """What of the road is shown: limits of x and of y [m]."""
+    ys = [course.path_y_m, course.cones_m[:, 1], np.array([y for lane in course.lanes for y in lane[3:]])]
+    every = np.concatenate(ys)
+    low, high = float(every.min()) - BESIDE_M, float(every.max()) + BESIDE_M
+    if course.last_gate_x_m is None:
+        xs = course.path_x_m
+        return (float(xs.min()) - BESIDE_M, float(xs.max()) + BESIDE_M), (low, high)
+    return (course.first_gate_x_m - BEFORE_M, course.last_gate_x_m + AFTER_M), (low, high)

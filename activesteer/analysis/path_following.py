@@ -1,0 +1,183 @@
+"""Metrics of a run along a path: lane change, slalom, a path of one's own.
+
+"The gates" is from where the front axle centre reaches the first lane (the first cone, where there are no lanes) to
+where it reaches the end of the last gate; "after the gates" is the 3 s from then on. A car that never gets to the last
+gate, or a recording that ends within the 3 s, has no values for it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from activesteer.analysis import lanes, track
+from activesteer.analysis.course import Course, read_car, read_course
+from activesteer.analysis.series import Array, lag, largest_rate, rate_rms, rms, timestep
+from activesteer.analysis.source import RecordingLike, maneuver_kind
+from activesteer.conventions import CORNERS
+
+AFTER_S: Final = 3.0
+"""Time after the last gate in which the car should come to rest [s]."""
+LONGEST_LAG_S: Final = 0.6
+"""Longest lag looked for [s]: a quarter of the period of a slalom of 36 m at 100 km/h."""
+
+SIGNALS: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2"), ("roll", "rad"))
+"""Channels that are evaluated: name and unit suffix."""
+OSCILLATING: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2"), ("steering_wheel", "rad"))
+"""Channels of which the root mean square within and after the gates is given."""
+
+
+class PathFollowing(NamedTuple):
+    """Metrics of one run along a path.
+
+    Attributes:
+        values: Metric name, ending in its unit, to value.
+        notes: Why values are nan, one sentence each.
+    """
+
+    values: dict[str, float]
+    notes: tuple[str, ...]
+
+
+class Windows(NamedTuple):
+    """Samples of a run.
+
+    Attributes:
+        approach: From the beginning of the run to the last gate.
+        gates: From the first gate to the last.
+        after: The 3 s after the last gate.
+        notes: Why one of them is empty.
+    """
+
+    approach: slice
+    gates: slice
+    after: slice
+    notes: tuple[str, ...]
+
+
+def evaluate(recording: RecordingLike) -> PathFollowing:
+    """Metrics of a run along a path, with the reasons for what could not be evaluated.
+
+    For each of yaw rate, sideslip, lateral acceleration (`ay`) and roll `<name>_peak_abs_<unit>` and
+    `<name>_rms_<unit>` of the whole run; for all but roll and for the steering wheel `<name>_gates_rms_<unit>` and
+    `<name>_after_gates_rms_<unit>`. `yaw_rate_lag_s`, `ay_lag_s`: by how much they come after the steering wheel, up to
+    the last gate. Steering effort: `steering_wheel_peak_abs_rad`, `steering_wheel_rms_rad`, and the same of its rate.
+    Track: `track_deviation_max_m`, `track_deviation_rms_m`, distance of the front axle centre from the path over the
+    whole run. Lanes: `lane_overstep_m`, by how much a wheel gets beyond a lane at most (below 0: smallest distance to a
+    side), `all_wheels_in_lanes` (1 or 0); `cones_hit`, `cone_distance_min_m`. Tyres: `tyre_use_max`, `tyre_use_mean`,
+    share of the available friction that is used, over all wheels and the whole run. `speed_loss_mps`: speed at the
+    beginning less the lowest; `speed_end_mps`.
+
+    A slalom also has `track_amplitude_m` (half of the distance between the leftmost and the rightmost place of the
+    front axle centre between first and last cone), `cone_distance_mean_m`, and `cones_missed`, the number of cones
+    passed on another side than the path passes them, or not at all.
+
+    Args:
+        recording: A run along a path.
+
+    Returns:
+        Values and notes.
+
+    Raises:
+        RecordingError: a channel is missing, or the metadata hold no course or no sizes of the car.
+    """
+    course = read_course(recording)
+    step_s = timestep(recording.time_s)
+    windows = find_windows(recording, course)
+    values: dict[str, float] = {}
+    for name, unit in SIGNALS:
+        channel = recording[f"{name}_{unit}"]
+        values[f"{name}_peak_abs_{unit}"] = float(np.abs(channel).max())
+        values[f"{name}_rms_{unit}"] = rms(channel)
+    if course.last_gate_x_m is not None:
+        for name, unit in OSCILLATING:
+            channel = recording[f"{name}_{unit}"]
+            values[f"{name}_gates_rms_{unit}"] = rms(channel[windows.gates])
+            values[f"{name}_after_gates_rms_{unit}"] = rms(channel[windows.after])
+    wheel = recording["steering_wheel_rad"]
+    for name, unit in (("yaw_rate", "radps"), ("ay", "mps2")):
+        follower = recording[f"{name}_{unit}"][windows.approach]
+        values[f"{name}_lag_s"] = lag(wheel[windows.approach], follower, step_s, LONGEST_LAG_S)
+    values |= _steering_effort(wheel, step_s)
+    values |= _places(recording, course)
+    if maneuver_kind(recording) == "slalom":
+        values |= _slalom(recording, course)
+    use = np.array([recording[f"{corner}_friction_use"] for corner in CORNERS], dtype=np.float64)
+    values["tyre_use_max"], values["tyre_use_mean"] = float(use.max()), float(use.mean())
+    speed = recording["speed_mps"]
+    values["speed_loss_mps"] = float(speed[0] - speed.min())
+    values["speed_end_mps"] = float(speed[-1])
+    return PathFollowing(values, windows.notes)
+
+
+def metrics(recording: RecordingLike) -> dict[str, float]:
+    """The values of `evaluate` alone."""
+    return evaluate(recording).values
+
+
+def find_windows(recording: RecordingLike, course: Course) -> Windows:
+    """Which samples belong to the gates and to the time after them.
+
+    A path without gates counts as approach as a whole.
+    """
+    nothing = slice(0, 0)
+    if course.last_gate_x_m is None:
+        return Windows(slice(None), nothing, nothing, ())
+    first, last = (track.first_at(recording, x) for x in (course.first_gate_x_m, course.last_gate_x_m))
+    if first is None or last is None:
+        furthest_m = float(track.front_axle(recording)[0].max())
+        note = f"the car gets to x = {furthest_m:.1f} m, the last gate ends at {course.last_gate_x_m:.1f} m"
+        return Windows(nothing, nothing, nothing, (note,))
+    time_s = recording.time_s
+    rest_s = float(time_s[-1] - time_s[last])
+    # Half a step of tolerance: the last sample lies one step before the end of the run.
+    if rest_s < AFTER_S - 1.5 * timestep(time_s):
+        note = f"the recording ends {rest_s:.2f} s after the last gate, {AFTER_S:g} s are needed"
+        return Windows(slice(0, last), slice(first, last), nothing, (note,))
+    end = int(np.searchsorted(time_s, time_s[last] + AFTER_S))
+    return Windows(slice(0, last), slice(first, last), slice(last, end), ())
+
+
+def _steering_effort(wheel: Array, step_s: float) -> dict[str, float]:
+    return {
+        "steering_wheel_peak_abs_rad": float(np.abs(wheel).max()),
+        "steering_wheel_rms_rad": rms(wheel),
+        "steering_wheel_rate_peak_radps": largest_rate(wheel, step_s),
+        "steering_wheel_rate_rms_radps": rate_rms(wheel, step_s),
+    }
+
+
+def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
+    """Where the car is, against path, lanes and cones."""
+    deviation = track.path_distance(*track.front_axle(recording), course.path_x_m, course.path_y_m)
+    values = {"track_deviation_max_m": float(np.abs(deviation).max()), "track_deviation_rms_m": rms(deviation)}
+    if not course.lanes and not len(course.cones_m):
+        return values
+    car = read_car(recording)
+    if course.lanes:
+        values["lane_overstep_m"] = lanes.lane_overstep(recording, course, car)
+        values["all_wheels_in_lanes"] = float(lanes.all_wheels_in_lanes(recording, course, car))
+    if len(course.cones_m):
+        distances = lanes.cone_distances(recording, course, car)
+        values["cones_hit"] = float(np.count_nonzero(distances <= 0.0))
+        values["cone_distance_min_m"] = float(distances.min())
+    return values
+
+
+def _slalom(recording: RecordingLike, course: Course) -> dict[str, float]:
+    row = course.cones_m[~course.on_lane_side()]
+    if not len(row):
+        return {"track_amplitude_m": math.nan, "cone_distance_mean_m": math.nan, "cones_missed": math.nan}
+    x = np.linspace(row[:, 0].min(), row[:, 0].max(), 1000)
+    y = track.track_over_x(recording, x)
+    sides = np.sign(track.track_over_x(recording, row[:, 0]) - row[:, 1])
+    asked = np.sign(np.interp(row[:, 0], course.path_x_m, course.path_y_m) - row[:, 1])
+    distances = lanes.cone_distances(recording, course._replace(cones_m=row), read_car(recording))
+    return {
+        "track_amplitude_m": 0.5 * float(y.max() - y.min()),
+        "cone_distance_mean_m": float(distances.mean()),
+        # A cone that is not reached has side nan, which is no side either.
+        "cones_missed": float(np.count_nonzero(sides != asked)),
+    }

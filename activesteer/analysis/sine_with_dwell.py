@@ -1,0 +1,189 @@
+"""Metrics of a sine with dwell by FMVSS 126 and UN Regulation 140.
+
+The two yaw rate ratios count from the *completion* of steer, the end of the sine; the lateral displacement counts from
+its *beginning*. Steering wheel angle and yaw rate are filtered as the standards say (10 and 6 Hz, twelve poles, no
+phase); the filter rounds the corner at the end of the sine, which puts the completion some 0.015 s off, here as in a
+measured test. Three differences to a measured test, all because a simulation needs less:
+
+- Nothing is zeroed: simulated signals have no offset.
+- The displacement comes from the recorded position, which is exact. The standards integrate the lateral acceleration
+  twice, since a test car has no position.
+- Sideslip is recorded; peaks of it are taken unfiltered.
+
+Source: 49 CFR 571.126 (FMVSS 126), S5.2 and S7.11; UN Regulation 140.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.analysis.filters import low_pass
+from activesteer.analysis.series import crossing_time, timestep
+from activesteer.analysis.source import RecordingLike
+from activesteer.errors import RecordingError
+
+Array = NDArray[np.float64]
+
+STEERING_CUT_OFF_Hz: Final = 10.0
+"""Filter of the steering wheel angle [Hz]."""
+YAW_RATE_CUT_OFF_Hz: Final = 6.0
+"""Filter of the yaw rate [Hz]."""
+THRESHOLD_RAD: Final = math.radians(5.0)
+"""Steering wheel angle whose first passing is the beginning of steer [rad]."""
+LONGEST_CREEP_S: Final = 0.1
+"""A wheel that takes longer than this from the threshold to the centre creeps; its line is then drawn on [s]."""
+PEAK_PROMINENCE: Final = 0.02
+"""A local maximum of the yaw rate counts as a peak when it stands out by this share of the largest one."""
+INSTANTS_S: Final = (1.0, 1.75)
+"""Times after the completion of steer at which the yaw rate is compared with its peak [s]."""
+DISPLACEMENT_TIME_S: Final = 1.07
+"""Time after the beginning of steer at which the lateral displacement is taken [s]."""
+RATIO_LIMITS: Final = (0.35, 0.20)
+"""Largest ratios allowed at `INSTANTS_S`."""
+LEAST_DISPLACEMENT_M: Final = 1.83
+"""Least lateral displacement of a car up to 3500 kg, for amplitudes from 5 A on [m]."""
+
+PEAKS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("roll", "rad"), ("steering_wheel", "rad"))
+"""Channels whose largest magnitude is given: name and unit suffix."""
+
+
+class Steering(NamedTuple):
+    """The times of a sine with dwell, and its side.
+
+    Attributes:
+        side: 1 where it begins to the left, -1 to the right.
+        begin_s: The wheel first passes 5 deg.
+        reversal_s: It passes the centre between the two halves.
+        completion_s: It is back at the centre after the second half.
+    """
+
+    side: float
+    begin_s: float
+    reversal_s: float
+    completion_s: float
+
+
+def steering(recording: RecordingLike) -> Steering:
+    """When a sine with dwell begins, reverses and is completed, interpolated between samples.
+
+    Raises:
+        RecordingError: the run holds no sine with dwell: the wheel does not turn to both sides and come back.
+    """
+    time_s = np.asarray(recording.time_s, dtype=np.float64)
+    angle = low_pass(np.asarray(recording["steering_wheel_rad"]), timestep(time_s), STEERING_CUT_OFF_Hz)
+    turned = np.flatnonzero(np.abs(angle) > THRESHOLD_RAD)
+    if turned.size == 0:
+        raise RecordingError(
+            f"the recording holds no sine with dwell: the steering wheel turns by "
+            f"{math.degrees(float(np.abs(angle).max())):.3g} deg at most, more than "
+            f"{math.degrees(THRESHOLD_RAD):.3g} deg are needed"
+        )
+    if turned[0] == 0:
+        raise RecordingError("the sine with dwell has no beginning: the steering wheel is turned in the first sample")
+    side = math.copysign(1.0, angle[turned[0]])
+    begin_s = crossing_time(time_s, side * angle, THRESHOLD_RAD)
+    other = np.flatnonzero(-side * angle > THRESHOLD_RAD)
+    if other.size == 0:
+        raise RecordingError("the recording holds no sine with dwell: the steering wheel turns to one side only")
+    reversal_s = _crossing_before(time_s, -side * angle, int(other[0]))
+    completion_s = _completion(time_s, -side * angle, int(other[0]))
+    return Steering(side, begin_s, reversal_s, completion_s)
+
+
+def metrics(recording: RecordingLike) -> dict[str, float]:
+    """Metrics of a sine with dwell.
+
+    Returns:
+        `steer_begin_time_s`, `steer_reversal_time_s` and `steer_completion_time_s` from the beginning of the run [s].
+        `yaw_rate_reversal_peak_radps`: the first peak of the yaw rate that the reversal causes, with its sign [rad/s],
+        and its time. `yaw_rate_after_1000ms_share` and `yaw_rate_after_1750ms_share`: yaw rate so long after the
+        completion of steer over this peak [-]; below zero where the car turns the other way by then.
+        `lateral_displacement_m`: of the centre of gravity, across the heading at the beginning of steer, 1.07 s after
+        it; positive to the side that is steered to first [m]. `<name>_peak_abs_<unit>` over the whole run. nan where
+        the run ends before a value is reached.
+
+    Raises:
+        RecordingError: a channel is missing, or the run holds no sine with dwell.
+    """
+    times = steering(recording)
+    time_s = np.asarray(recording.time_s, dtype=np.float64)
+    yaw_rate = low_pass(np.asarray(recording["yaw_rate_radps"]), timestep(time_s), YAW_RATE_CUT_OFF_Hz)
+    peak_s, peak = _first_peak(time_s, -times.side * yaw_rate, times.reversal_s)
+    values = {
+        "steer_begin_time_s": times.begin_s,
+        "steer_reversal_time_s": times.reversal_s,
+        "steer_completion_time_s": times.completion_s,
+        "yaw_rate_reversal_peak_radps": -times.side * peak,
+        "yaw_rate_reversal_peak_time_s": peak_s,
+    }
+    for instant_s in INSTANTS_S:
+        later = -times.side * _at(time_s, yaw_rate, times.completion_s + instant_s)
+        values[f"yaw_rate_after_{1000.0 * instant_s:.0f}ms_share"] = later / peak
+    values["lateral_displacement_m"] = _displacement(recording, times)
+    for name, unit in PEAKS:
+        values[f"{name}_peak_abs_{unit}"] = float(np.abs(recording[f"{name}_{unit}"]).max())
+    values["speed_end_mps"] = float(recording["speed_mps"][-1])
+    return values
+
+
+def _crossing_before(time_s: Array, values: Array, index: int) -> float:
+    """Last time before a sample at which a signal rises through zero."""
+    rising = np.flatnonzero((values[:index] < 0.0) & (values[1 : index + 1] >= 0.0))
+    i = int(rising[-1])
+    return float(time_s[i] - values[i] * (time_s[i + 1] - time_s[i]) / (values[i + 1] - values[i]))
+
+
+def _completion(time_s: Array, angle: Array, start: int) -> float:
+    """When the second half, here positive, has come back to the centre.
+
+    A steering system that gives may let the wheel creep over the last degrees or stop short of the centre. The line
+    through 10 and 5 deg is then drawn on to it: a creeping wheel does not put the completion off.
+    """
+    below = np.flatnonzero(angle[start:] < THRESHOLD_RAD)
+    if below.size == 0:
+        raise RecordingError(
+            f"the sine with dwell is not completed: the steering wheel still stands at "
+            f"{math.degrees(abs(float(angle[-1]))):.3g} deg when the run ends"
+        )
+    end = start + int(below[0])
+    share = (angle[end - 1] - THRESHOLD_RAD) / (angle[end - 1] - angle[end])
+    near_s = float(time_s[end - 1] + share * (time_s[end] - time_s[end - 1]))
+    centre_s = crossing_time(time_s[end - 1 :], -angle[end - 1 :], 0.0)
+    if centre_s - near_s <= LONGEST_CREEP_S:
+        return centre_s
+    above = start + np.flatnonzero(angle[start : end + 1] >= 2.0 * THRESHOLD_RAD)
+    if above.size == 0:
+        raise RecordingError(
+            f"the second half of the sine with dwell stays below {math.degrees(2.0 * THRESHOLD_RAD):.3g} deg: "
+            "its completion cannot be told"
+        )
+    return near_s + (near_s - float(time_s[above[-1]]))
+
+
+def _first_peak(time_s: Array, values: Array, begin_s: float) -> tuple[float, float]:
+    """First local maximum after a time that stands out; the largest value where there is none (time, value)."""
+    from scipy.signal import find_peaks  # noqa: PLC0415 - takes half a second to import
+
+    after = np.flatnonzero(time_s >= begin_s)
+    moving = values[after]
+    peaks, _ = find_peaks(moving, height=0.0, prominence=PEAK_PROMINENCE * float(np.abs(moving).max()))
+    top = int(after[int(peaks[0]) if peaks.size else int(moving.argmax())])
+    if not values[top] > 0.0:
+        return math.nan, math.nan
+    return float(time_s[top]), float(values[top])
+
+
+def _displacement(recording: RecordingLike, times: Steering) -> float:
+    time_s = np.asarray(recording.time_s, dtype=np.float64)
+    x0, y0, yaw = (_at(time_s, recording[name], times.begin_s) for name in ("x_m", "y_m", "yaw_rad"))
+    x1, y1 = (_at(time_s, recording[name], times.begin_s + DISPLACEMENT_TIME_S) for name in ("x_m", "y_m"))
+    return times.side * ((y1 - y0) * math.cos(yaw) - (x1 - x0) * math.sin(yaw))
+
+
+def _at(time_s: Array, values: NDArray[np.floating], instant_s: float) -> float:
+    """Value at a time, interpolated; nan after the end of the run."""
+    return float(np.interp(instant_s, time_s, values)) if instant_s <= time_s[-1] else math.nan

@@ -1,0 +1,91 @@
+"""Where the front axle centre goes: distance from a path, and from other tracks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.analysis.source import RecordingLike
+
+Array = NDArray[np.float64]
+
+
+def front_axle(recording: RecordingLike) -> tuple[Array, Array]:
+    """World x and y of the front axle centre over time [m], shape (n,) each."""
+    x, y = (np.asarray(recording[f"front_axle_{axis}_m"], dtype=np.float64) for axis in "xy")
+    return x, y
+
+
+def first_at(recording: RecordingLike, x_m: float) -> int | None:
+    """Index of the first sample at which the front axle centre has reached an x; None where it never does."""
+    reached = np.flatnonzero(front_axle(recording)[0] >= x_m)
+    return int(reached[0]) if reached.size else None
+
+
+def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> Array:
+    """Distance of points from a path of straight pieces, which goes on straight beyond both of its ends.
+
+    The nearest point of the path is looked for on the pieces at both sides of the nearest corner point.
+
+    Args:
+        x_m: World x of the points [m], shape (n,).
+        y_m: World y of the points [m], shape (n,).
+        path_x_m: World x of the path [m], shape (m,), m >= 2.
+        path_y_m: World y of the path [m], shape (m,).
+
+    Returns:
+        Distance [m], shape (n,), positive where the point is to the left of the path.
+    """
+    from scipy.spatial import KDTree  # noqa: PLC0415 - takes a while to import
+
+    points = np.column_stack([x_m, y_m])
+    corners = np.column_stack([path_x_m, path_y_m])
+    _, nearest = KDTree(corners).query(points)
+    pieces = np.diff(corners, axis=0)
+    lengths = np.linalg.norm(pieces, axis=1)
+    last = len(pieces) - 1
+    best = np.full(len(points), math.inf)
+    signed = np.empty(len(points))
+    for piece in (np.maximum(nearest - 1, 0), np.minimum(nearest, last)):
+        along, start = pieces[piece] / lengths[piece, None], points - corners[piece]
+        share = np.einsum("ij,ij->i", start, along)
+        low = np.where(piece == 0, -math.inf, 0.0)
+        high = np.where(piece == last, math.inf, lengths[piece])
+        offset = start - np.clip(share, low, high)[:, None] * along
+        distance = np.linalg.norm(offset, axis=1)
+        left = along[:, 0] * start[:, 1] - along[:, 1] * start[:, 0]
+        closer = distance < best
+        best = np.where(closer, distance, best)
+        signed = np.where(closer, np.copysign(distance, left), signed)
+    return signed
+
+
+def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
+    """World y of the front axle centre where it first gets to each x, interpolated.
+
+    Args:
+        recording: The run.
+        x_m: World x, ascending [m], shape (n,).
+
+    Returns:
+        World y [m], shape (n,); nan where the run never gets there.
+    """
+    x, y = front_axle(recording)
+    # A car that spins may go back: only what is ahead of all before it counts.
+    ahead = np.concatenate([[True], x[1:] > np.maximum.accumulate(x)[:-1]])
+    return np.interp(x_m, x[ahead], y[ahead], left=math.nan, right=math.nan)
+
+
+def largest_difference(first: RecordingLike, second: RecordingLike, from_x_m: float, to_x_m: float) -> float:
+    """Largest lateral distance of two tracks at the same x [m]; nan where one of them does not reach from end to end.
+
+    Args:
+        first: A run.
+        second: Another.
+        from_x_m: Where the comparison begins, world x [m].
+        to_x_m: Where it ends [m].
+    """
+    x = np.linspace(from_x_m, to_x_m, max(2, math.ceil((to_x_m - from_x_m) / 0.1) + 1))
+    return float(np.abs(track_over_x(first, x) - track_over_x(second, x)).max())

@@ -1,0 +1,105 @@
+"""`activesteer figures DIR`: the paper's figures from our own runs."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from activesteer.commands.progress import ProgressBar
+from activesteer.errors import ParameterError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from activesteer.recording import Recording
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("figures", help="the paper's figures from our own runs, as PNG and SVG")
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder for the figures")
+    parser.add_argument(
+        "--recordings", type=Path, metavar="DIR",
+        help="recordings that `activesteer reproduce -o DIR` has made; where not given they are made now, in DIR/runs",
+    )  # fmt: skip
+    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one per processor)")
+    parser.set_defaults(action=_figures)
+
+
+def _figures(options: argparse.Namespace) -> int:
+    from activesteer.reproduction import recordings_in, reproduce
+
+    if options.recordings is not None:
+        recordings = recordings_in(options.recordings)
+    else:
+        with ProgressBar("runs", quiet=False) as bar:
+            result = reproduce(
+                options.folder / "runs",
+                options.vehicle,
+                jobs=options.jobs,
+                progress=lambda what, done, total: bar(done / total, what),
+            )
+        if result.failures:
+            first = next(iter(result.failures))
+            msg = f"{' '.join(first)} failed: {result.failures[first]}"
+            raise ParameterError(msg)
+        recordings = result.recordings()
+    for path in draw_all(recordings, options.folder, options.vehicle):
+        print(path)
+    return 0
+
+
+def draw_all(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle: str) -> list[Path]:
+    """All figures that can be drawn from these runs, and the suspension's, which needs none.
+
+    Args:
+        recordings: Scenario -> system -> recording.
+        folder: Where they go.
+        vehicle: Name or path of the vehicle, for what the rig measures and for the linear models.
+
+    Returns:
+        The files written, PNG and SVG of each.
+
+    Raises:
+        ActiveSteerError: matplotlib is not installed, a file cannot be written, or the rig fails.
+    """
+    from activesteer.analysis.figures import FORMATS, figure_2
+    from activesteer.analysis.figures import draw_all as draw_runs
+    from activesteer.pictures import save
+    from activesteer.rigs import kinematics_compliance
+    from activesteer.rigs.kc import rear_camber_figure
+
+    files = draw_runs(recordings, folder)
+    camber = rear_camber_figure(kinematics_compliance(vehicle))
+    files += [save(camber, folder / f"figure_01_rear_camber{ending}") for ending in FORMATS]
+    if step_steers := recordings.get("step_steer"):
+        run = step_steers["none"]
+        models = models_beside(run)
+        files += [figure_2(run, folder / f"figure_02_step_steer_models{ending}", models) for ending in FORMATS]
+    return sorted(files)
+
+
+def models_beside(run: Recording) -> dict[str, dict[str, NDArray[np.float64]]]:
+    """What the single-track model and, on a level road, the linearised car make of the steering of a run.
+
+    Args:
+        run: A run without control; what it was made from is taken from its metadata.
+
+    Returns:
+        Name of the model -> channel -> values over the time of the run.
+    """
+    from activesteer.controllers import SingleTrackParameters
+    from activesteer.identification import single_track_response
+    from activesteer.linearisation import linear_response, linearise
+
+    maneuver, vehicle = run.metadata["maneuver"], run.metadata["vehicle"]
+    single_track = SingleTrackParameters(**vehicle["single_track"])
+    models = {"single-track model": single_track_response(run, single_track, vehicle["steering"]["ratio"])}
+    if maneuver["road"]["grade"] == 0.0:
+        linear = linearise(vehicle, maneuver["speed_mps"], {"road.mu": maneuver["road"]["mu"]})
+        models["linear car"] = linear_response(run, linear)
+    return models

@@ -1,0 +1,80 @@
+"""`activesteer reproduce`: the paper's five scenarios with its three systems, and the scorecard of its claims."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+from activesteer.commands.output import print_json
+from activesteer.commands.progress import ProgressBar
+
+_DEFAULT_FOLDER: Final = Path("runs")
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("reproduce", help="drive the paper's scenarios and check what it claims")
+    parser.add_argument(
+        "-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="DIR", help="folder (default: runs)"
+    )
+    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one per processor)")
+    parser.add_argument("--figures", action="store_true", help="also draw the paper's figures")
+    parser.add_argument(
+        "--robustness", action="store_true",
+        help="instead: check the claims with another mass, centre of gravity, friction and speed; no files",
+    )  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    parser.set_defaults(action=_reproduce)
+
+
+def _reproduce(options: argparse.Namespace) -> int:
+    if options.robustness:
+        return _robustness(options)
+    from activesteer.reproduction import reproduce
+
+    with ProgressBar("reproduce", quiet=options.json) as bar:
+
+        def tell(what: str, done: int, total: int) -> None:
+            bar(done / total, what)
+            if not options.json and not sys.stderr.isatty():
+                print(f"{done}/{total} {what}", file=sys.stderr)
+
+        result = reproduce(options.output, options.vehicle, jobs=options.jobs, progress=tell)
+    for (scenario, system), problem in result.failures.items():
+        print(f"{scenario} {system} failed: {problem}", file=sys.stderr)
+    files = [str(path) for systems in result.paths.values() for path in systems.values()]
+    figures: list[Path] = []
+    if options.figures:
+        from activesteer.commands.figures import draw_all
+
+        figures = draw_all(result.recordings(), options.output / "figures", options.vehicle)
+    if options.json:
+        failures = {f"{scenario} {system}": problem for (scenario, system), problem in result.failures.items()}
+        table = {**result.scorecard.to_json(), "files": files, "figures": [str(path) for path in figures]}
+        print_json({**table, "failures": failures, "exit_status": result.exit_status})
+        return result.exit_status
+    print(result.scorecard.to_text())
+    print(f"recordings: {len(files)} MCAP files in {options.output}")
+    if figures:
+        print(f"figures: {len(figures)} files in {options.output / 'figures'}")
+    return result.exit_status
+
+
+def _robustness(options: argparse.Namespace) -> int:
+    from activesteer.reproduction import robustness
+
+    with ProgressBar("robustness", quiet=options.json) as bar:
+        table = robustness(
+            options.vehicle, jobs=options.jobs, progress=lambda what, done, total: bar(done / total, what)
+        )
+    if options.json:
+        print_json({"robustness": table})
+        return 0
+    labels = list(next(iter(table.values())))
+    print("     " + "  ".join(labels))
+    for claim, held in table.items():
+        print(f"{claim:4} " + "  ".join(("holds" if held[label] else "-").ljust(len(label)) for label in labels))
+    return 0

@@ -1,0 +1,168 @@
+"""The driver on a path: looks ahead and steers so that the car will be where the path is.
+
+An optimal preview controller: with a single-track model of his car in mind, the driver finds the one steering angle
+that, held over the preview time, leaves the least mean square distance between the path and where the car will be. It
+is found anew whenever he looks, and reaches the steering wheel after a reaction delay, a neuromuscular lag, and within
+limits of rate and angle.
+
+Source: C. C. MacAdam, Application of an optimal preview control for simulation of closed-loop automobile driving,
+IEEE Transactions on Systems, Man, and Cybernetics 11 (1981), 393-399.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from activesteer.driver.open_loop import OpenLoopDriver
+from activesteer.driver.parameters import DriverParameters
+from activesteer.path import Path
+from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+
+Array = NDArray[np.float64]
+LateralModel = Callable[[float], tuple[Array, Array]]
+"""Speed [m/s] -> system matrix (2, 2) and input matrix (2, k) of a model with the states yaw rate [rad/s] and sideslip
+angle [rad], whose first input is the front steer angle [rad]."""
+
+LOOK_INTERVAL_S: Final = 0.01
+"""Time between two looks at the road [s]; short beside the delay and the lag that follow."""
+_POINTS: Final = 12
+"""Points on the path ahead at which the distance counts."""
+_WINDOW_M: Final = 5.0
+"""How far along the path the car can have come between two looks, with a margin [m]."""
+_LEAST_SPEED_MPS: Final = 3.0
+"""Slower than this, the driver holds the steering wheel [m/s]."""
+_SPEED_STEP_MPS: Final = 0.5
+"""The driver's picture of his car is that of a speed rounded to this [m/s]."""
+
+
+class _Preview(NamedTuple):
+    """What the driver's model says of the points ahead.
+
+    Attributes:
+        times_s: When the car will pass them [s], shape (n,).
+        by_yaw_rate_m: Lateral position then, of a yaw rate of 1 rad/s now, shape (n,).
+        by_sideslip_m: The same of a sideslip angle of 1 rad now.
+        by_steering_m: The same of a steer angle of 1 rad held from now on.
+    """
+
+    times_s: Array
+    by_yaw_rate_m: Array
+    by_sideslip_m: Array
+    by_steering_m: Array
+
+
+class PathPreviewDriver:
+    """Follows a path.
+
+    Attributes:
+        robot: Limits the steering wheel angle and holds the speed.
+    """
+
+    def __init__(
+        self, robot: OpenLoopDriver, path: Path, model: LateralModel, parameters: DriverParameters, timestep_s: float
+    ) -> None:
+        """Takes its parts.
+
+        Args:
+            robot: Limits the steering wheel angle and holds the speed.
+            path: Path of the centre of gravity.
+            model: The car as the driver knows it.
+            parameters: The driver.
+            timestep_s: Time between two steps [s].
+        """
+        self.robot = robot
+        self._path = path
+        self._model = model
+        self._preview_s = parameters.preview_s
+        self._previews: dict[int, _Preview] = {}
+        lag_s = parameters.neuromuscular_lag_s
+        self._share = 1.0 - math.exp(-timestep_s / lag_s) if lag_s > 0.0 else 1.0
+        self._most_change_rad = parameters.steering_rate_limit_radps * timestep_s
+        self._decided_rad = deque([0.0] * (round(parameters.reaction_delay_s / LOOK_INTERVAL_S) + 1))
+        self._wheel_rad = 0.0
+        self._along_m = 0.0
+
+    def look(self, motion: Motion) -> None:
+        """Looks at the road ahead and decides on a steering wheel angle; to be called every `LOOK_INTERVAL_S`.
+
+        Args:
+            motion: Where the car is and how it moves.
+        """
+        path, speed = self._path, motion.speed_mps
+        along = self._along_m = path.nearest(motion.x_m, motion.y_m, self._along_m, _WINDOW_M)
+        if speed < _LEAST_SPEED_MPS:
+            self._decide(self._decided_rad[-1])
+            return
+        preview = self._preview(speed)
+        x, y = path.at(along + speed * preview.times_s)
+        ahead_y = math.cos(motion.yaw_rad) * (y - motion.y_m) - math.sin(motion.yaw_rad) * (x - motion.x_m)
+        free_y = (
+            motion.yaw_rate_radps * preview.by_yaw_rate_m
+            + math.atan2(motion.lateral_speed_mps, speed) * preview.by_sideslip_m
+        )
+        steering = preview.by_steering_m
+        self._decide(self.robot.steering_ratio * float((ahead_y - free_y) @ steering / (steering @ steering)))
+
+    def _decide(self, steering_wheel_rad: float) -> None:
+        """Puts an angle into the line; what stands at its head is what the hands now begin to do."""
+        self._decided_rad.append(steering_wheel_rad)
+        self._decided_rad.popleft()
+
+    def step(self, reference: Reference, measurement: Measurement) -> DriverCommand:
+        """What the driver does now.
+
+        Args:
+            reference: The speed that is asked for; its steering is not looked at.
+            measurement: What the car's sensors say.
+
+        Returns:
+            The command.
+        """
+        change = self._share * (self._decided_rad[0] - self._wheel_rad)
+        most = self._most_change_rad
+        limited = True
+        if change > most:
+            change = most
+        elif change < -most:
+            change = -most
+        else:
+            limited = False
+        wheel = self._wheel_rad + change
+        command = self.robot.step(reference._replace(steering_wheel_rad=wheel), measurement)
+        self._wheel_rad = command.steering_wheel_rad
+        return command._replace(limited=True) if limited else command
+
+    def _preview(self, speed_mps: float) -> _Preview:
+        """The model's answers at a speed; kept, because a run has few speeds."""
+        rounded = round(speed_mps / _SPEED_STEP_MPS)
+        found = self._previews.get(rounded)
+        if found is None:
+            found = self._previews[rounded] = _look_ahead(rounded * _SPEED_STEP_MPS, self._model, self._preview_s)
+        return found
+
+
+def _look_ahead(speed_mps: float, model: LateralModel, preview_s: float) -> _Preview:
+    """Solves the model over the preview time, exactly for a steering angle that is held."""
+    a, b = model(speed_mps)
+    # States: yaw rate, sideslip angle, heading, lateral position; then the steering angle, which stays as it is.
+    system = np.zeros((5, 5))
+    system[:2, :2] = a
+    system[:2, 4] = b[:, 0]
+    system[2, 0] = 1.0
+    system[3, 1:3] = speed_mps
+    step_s = preview_s / _POINTS
+    one_step = expm(system * step_s)
+    transition = np.eye(5)
+    lateral = np.empty((_POINTS, 5))
+    for row in lateral:
+        transition = one_step @ transition
+        row[:] = transition[3]
+    times_s = step_s * np.arange(1.0, _POINTS + 1.0, dtype=np.float64)
+    return _Preview(times_s, lateral[:, 0].copy(), lateral[:, 1].copy(), lateral[:, 4].copy())

@@ -1,0 +1,76 @@
+"""What all manoeuvres along a course have in common: the driver looks at a path and holds the speed."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Final
+
+from activesteer.config import Range
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.course import Course
+from activesteer.signals import Reference
+
+Width = Annotated[float, Range(0.5, 4.0)]
+
+_LEAST_SPEED_MPS: Final = 5.0 / 3.6
+"""Slower than this, a preview of a second or two does not look beyond the car's own length [m/s]."""
+_AFTER_S: Final = 3.5
+"""How long after the last gate a run should go on, so that it can be seen whether the car settles [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AlongCourse(Maneuver):
+    """Base of the kinds that are driven along a course at constant speed."""
+
+    def __post_init__(self) -> None:
+        """The car must drive forwards and come to the last gate within the run.
+
+        Raises:
+            ManeuverError: it does not, or the course cannot be made.
+        """
+        if self.speed_mps < _LEAST_SPEED_MPS:
+            msg = (
+                f"speed_kmh: is {3.6 * self.speed_mps:g} km/h; a course is driven forwards, with at least "
+                f"{3.6 * _LEAST_SPEED_MPS:g} km/h"
+            )
+            raise ManeuverError(msg)
+        last = self.course.last_gate_x_m
+        if last is not None and self.duration_s * self.speed_mps < last:
+            least = last / self.speed_mps
+            msg = (
+                f"duration_s: is {self.duration_s:g} s, but at {3.6 * self.speed_mps:g} km/h the last gate, {last:g} m "
+                f"from the start, is reached after {least:.1f} s; {least + _AFTER_S:.1f} s show how the car settles"
+            )
+            raise ManeuverError(msg)
+
+    @property
+    def course(self) -> Course:
+        """Path, lanes and cones."""
+        return self._course
+
+    @cached_property
+    def _course(self) -> Course:
+        return self._make_course()
+
+    @abstractmethod
+    def _make_course(self) -> Course:
+        """Lays out the course; done once."""
+
+    def reference(self, time_s: float) -> Reference:
+        """The speed; where to go the driver sees on the path."""
+        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
+
+
+def known_width(vehicle_width_m: float | None) -> float:
+    """The vehicle's width, which a course is laid out for [m].
+
+    Raises:
+        ManeuverError: it is not known.
+    """
+    if vehicle_width_m is None:
+        msg = "vehicle_width_m: is missing; it comes from the vehicle file (width_m) unless it is given here"
+        raise ManeuverError(msg)
+    return vehicle_width_m

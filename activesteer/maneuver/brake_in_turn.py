@@ -1,0 +1,115 @@
+"""Braking in a turn (ISO 7975): steady-state cornering, then the brake, the steering wheel held."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from activesteer.config import Range
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.search import LEAST_SEARCH_SPEED_MPS, SteadyTurn
+from activesteer.maneuver.step_steer import StepInput, StepSteer
+from activesteer.signals import Reference
+
+
+@dataclass(frozen=True)
+class TurnInput:
+    """The steering wheel on the way into the turn."""
+
+    start_s: Annotated[float, Range(0.0)] = 0.5
+    """When it begins to turn [s]."""
+    rate_radps: Annotated[float, Range(0.1, 50.0)] = math.radians(60.0)
+    """How fast it turns [rad/s]."""
+    steering_wheel_rad: Annotated[float, Range(-15.0, 15.0)] | None = None
+    """Angle that is then held, left positive [rad]; found by a search where not given."""
+    lateral_acceleration_mps2: Annotated[float, Range(-12.0, 12.0)] | None = None
+    """Steady-state lateral acceleration of the control-free car that the search aims at, left positive [m/s2]."""
+
+    def __post_init__(self) -> None:
+        """Angle or aim must be known; where both are, the angle is what the aim once led to.
+
+        Raises:
+            ManeuverError: neither of them is given.
+        """
+        if self.steering_wheel_rad is None and self.lateral_acceleration_mps2 is None:
+            msg = (
+                "steering_wheel_deg (the angle to hold) or lateral_acceleration_mps2 (what the control-free car shall "
+                "reach) is needed"
+            )
+            raise ManeuverError(msg)
+
+
+@dataclass(frozen=True)
+class BrakeInput:
+    """The brake in the turn."""
+
+    pedal: Annotated[float, Range(0.0, 1.0)]
+    """Pedal position [-]."""
+    start_s: Annotated[float, Range(0.0)] = 6.0
+    """When it begins to be pressed [s]; the throttle is released then."""
+    rise_s: Annotated[float, Range(0.01, 5.0)] = 0.2
+    """Time in which it is pressed [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BrakeInTurn(Maneuver):
+    """A turn at constant speed and steering wheel angle, braked."""
+
+    turn: TurnInput
+    """The way into the turn."""
+    brake: BrakeInput
+    """The brake."""
+
+    def __post_init__(self) -> None:
+        """One thing after the other, within the run.
+
+        Raises:
+            ManeuverError: the brake comes before the turn, or after the end, or the car is too slow for the search.
+        """
+        turn, brake = self.turn, self.brake
+        if brake.start_s <= turn.start_s:
+            msg = f"brake.start_s: is {brake.start_s:g} s; it must be above turn.start_s, {turn.start_s:g} s"
+            raise ManeuverError(msg)
+        if brake.start_s + brake.rise_s >= self.duration_s:
+            end = brake.start_s + brake.rise_s
+            msg = f"brake.start_s: the brake is pressed down at {end:g} s, but the run ends at {self.duration_s:g} s"
+            raise ManeuverError(msg)
+        if turn.steering_wheel_rad is None and self.speed_mps < LEAST_SEARCH_SPEED_MPS:
+            msg = (
+                f"speed_kmh: is {3.6 * self.speed_mps:g} km/h; turn.lateral_acceleration_mps2 needs at least "
+                f"{3.6 * LEAST_SEARCH_SPEED_MPS:g} km/h, or give turn.steering_wheel_deg"
+            )
+            raise ManeuverError(msg)
+
+    @property
+    def search(self) -> SteadyTurn | None:
+        """For the steering wheel angle, where only the lateral acceleration is known: that of a step steer."""
+        wanted = self.turn.lateral_acceleration_mps2
+        if self.turn.steering_wheel_rad is not None or wanted is None:
+            return None
+        step = StepSteer(
+            kind="step_steer", name=self.name, speed_mps=self.speed_mps, duration_s=self.duration_s,
+            settle_s=self.settle_s, road=self.road, steer=StepInput(lateral_acceleration_mps2=wanted),
+        )  # fmt: skip
+        found = step.search
+        return None if found is None else found._replace(accept=self.with_amplitude)
+
+    def with_amplitude(self, steering_wheel_rad: float) -> BrakeInTurn:
+        """The same with its steering wheel angle known [rad]; the aim that led to it stays on record."""
+        return dataclasses.replace(self, turn=dataclasses.replace(self.turn, steering_wheel_rad=steering_wheel_rad))
+
+    def reference(self, time_s: float) -> Reference:
+        """Ramp of the steering wheel, ramp of the brake; see the base class."""
+        turn, brake = self.turn, self.brake
+        amplitude = turn.steering_wheel_rad or 0.0
+        turned = min(max(time_s - turn.start_s, 0.0) * turn.rate_radps, abs(amplitude))
+        pressed = min(max((time_s - brake.start_s) / brake.rise_s, 0.0), 1.0)
+        hold = time_s < brake.start_s
+        return Reference(math.copysign(turned, amplitude), self.speed_mps, pressed * brake.pedal, hold_speed=hold)
+
+    def settling_reference(self) -> Reference:
+        """Straight ahead at the speed of the manoeuvre."""
+        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)

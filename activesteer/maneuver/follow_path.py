@@ -1,0 +1,91 @@
+"""A path of the user's own, from a CSV or from the manoeuvre file, at constant speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+from activesteer.config import Source
+from activesteer.errors import ManeuverError, nearest_names
+from activesteer.maneuver.along_course import AlongCourse
+from activesteer.maneuver.course import Course
+from activesteer.maneuver.path_points import check_points, read_csv
+from activesteer.path import Path
+
+
+@dataclass(frozen=True)
+class PathTable:
+    """Points in the order of travel; the car starts at (0, 0), heading along x."""
+
+    csv: str | None = None
+    """File with the columns x_m and y_m, beside the manoeuvre file or a path of its own."""
+    x_m: tuple[float, ...] | None = None
+    """World x of the points [m]; those of the CSV, where that is given."""
+    y_m: tuple[float, ...] | None = None
+    """World y, left positive [m]."""
+
+    def __post_init__(self) -> None:
+        """The points must make a path.
+
+        Raises:
+            ManeuverError: there are none, or they do not.
+        """
+        if self.x_m is None or self.y_m is None:
+            msg = "csv (a file with the columns x_m and y_m) or both lists x_m and y_m are needed"
+            raise ManeuverError(msg)
+        check_points(self.x_m, self.y_m, lambda index: f"point {index + 1}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FollowPath(AlongCourse):
+    """A path through given points."""
+
+    path: PathTable
+    """The points."""
+
+    def _make_course(self) -> Course:
+        return Course(Path.through(self.path.x_m or (), self.path.y_m or ()))
+
+
+def with_csv(table: Mapping[str, Any], own: FilePath | None, source: Source) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """A table of this kind with the points of its CSV filled in.
+
+    Args:
+        table: The table.
+        own: Folder of the manoeuvre file; None for a table that has no file.
+        source: For error messages.
+
+    Returns:
+        The table, and the CSV by its name, to be kept with the recording; as it was where it names no CSV. A table
+        without a file may have both CSV and points: it comes from a recording, and the points are what was read then,
+        unless an override names another CSV.
+
+    Raises:
+        ManeuverError: the CSV is not found or wrong, or points are given beside it in a file.
+    """
+    points = table.get("path")
+    if not isinstance(points, Mapping) or not isinstance(points.get("csv"), str):
+        return dict(table), {}
+    if ("x_m" in points or "y_m" in points) and "path.csv" not in source.overridden:
+        if own is None:
+            return dict(table), {}
+        raise source.fail(("path", "csv"), "csv and the lists x_m, y_m are two ways to give the points; leave one out")
+    file = _find(points["csv"], own, source)
+    try:
+        x_m, y_m, places = read_csv(file)
+        check_points(x_m, y_m, places.__getitem__)
+    except ManeuverError as reason:
+        raise source.fail(("path", "csv"), str(reason)) from reason
+    return {**table, "path": {**points, "x_m": x_m, "y_m": y_m}}, {f"path/{file.name}": file.read_bytes()}
+
+
+def _find(name: str, own: FilePath | None, source: Source) -> FilePath:
+    beside = () if own is None else (own / name,)
+    for candidate in (*beside, FilePath(name).expanduser()):
+        if candidate.is_file():
+            return candidate
+    folder = own or FilePath.cwd()
+    present = [path.name for path in folder.glob("*.csv")]
+    raise source.fail(("path", "csv"), f"there is no file {name!r} in {folder}; {nearest_names(name, present)}")

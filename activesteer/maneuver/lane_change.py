@@ -1,0 +1,124 @@
+"""Double lane change (ISO 3888): into a lane beside one's own and back, at constant speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Final
+
+import numpy as np
+
+from activesteer.config import Range
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.along_course import AlongCourse, Width, known_width
+from activesteer.maneuver.choices import SIDES, check_choice
+from activesteer.maneuver.course import Course, Lane
+from activesteer.maneuver.iso_3888 import STANDARDS, cones, lanes
+from activesteer.maneuver.least_jerk import Bound, least_jerk
+from activesteer.path import Path
+
+_AXLES_M: Final = (1.3, -1.3)
+"""Where a car of 2.6 m wheelbase has its axles, ahead of its centre [m]: there its sides keep the margin."""
+_BOUND_SPACING_M: Final = 0.5
+_BEYOND_M: Final = 0.1
+"""The bounds reach so far beyond both ends of a lane [m]: a front wheel is ahead of its axle while the car turns."""
+_SAMPLE_M: Final = 0.5
+_SLACK_M: Final = 0.01
+"""What a margin must leave in the narrowest lane [m]."""
+
+
+PATHS: Final = ("middle", "least_jerk")
+"""What a driver may aim at."""
+
+
+@dataclass(frozen=True)
+class LaneLayout:
+    """The lanes and how they are driven."""
+
+    standard: str = "iso_3888_1"
+    """Whose lanes: `iso_3888_1` (double lane change) or `iso_3888_2` (obstacle avoidance)."""
+    side: str = "left"
+    """To which side the first change goes: `left` or `right`."""
+    entry_m: Annotated[float, Range(0.0, 1000.0)] = 30.0
+    """Distance from the start to the entry lane, straight ahead [m]."""
+    path: str = "middle"
+    """The path to follow: `middle` of the lanes, changing between them in the sections between, or the one of
+    `least_jerk` that keeps the margin."""
+    margin_m: Annotated[float, Range(0.0, 1.0)] = 0.1
+    """Path of least jerk: least distance between the car's sides, at its axles, and the edges of the lanes [m]."""
+
+    def __post_init__(self) -> None:
+        """Checks the words.
+
+        Raises:
+            ManeuverError: standard or side is unknown.
+        """
+        check_choice("standard", self.standard, STANDARDS)
+        check_choice("side", self.side, SIDES)
+        check_choice("path", self.path, PATHS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LaneChange(AlongCourse):
+    """A double lane change."""
+
+    lane: LaneLayout = LaneLayout()
+    """The lanes."""
+    vehicle_width_m: Width | None = None
+    """Width of the vehicle, which the lanes are made for [m]; that of the vehicle file where not given."""
+
+    def _make_course(self) -> Course:
+        layout, width = self.lane, known_width(self.vehicle_width_m)
+        # Laid out to the left and then mirrored, so that left and right are the same to the last digit.
+        left = lanes(layout.standard, width, layout.entry_m, 1.0)
+        if layout.path == "middle":
+            path_x, path_y = _middle(left)
+        else:
+            self._check_margin(left, width)
+            path_x, path_y = _way_through(left, 0.5 * width + layout.margin_m)
+        side = SIDES[layout.side]
+        course = lanes(layout.standard, width, layout.entry_m, side)
+        return Course(Path.through(path_x, side * path_y), course, cones(course), course[-1].end_x_m)
+
+    def _check_margin(self, course: Sequence[Lane], width: float) -> None:
+        narrowest = min(course, key=lambda lane: lane.left_y_m - lane.right_y_m)
+        lane_width = narrowest.left_y_m - narrowest.right_y_m
+        most = 0.5 * (lane_width - width) - _SLACK_M
+        if self.lane.margin_m > most:
+            msg = (
+                f"lane.margin_m: is {self.lane.margin_m:g} m, but the {narrowest.name} is {lane_width:.3g} m wide and "
+                f"the car {width:g} m; allowed is 0 to {most:.3f} m"
+            )
+            raise ManeuverError(msg)
+
+
+def _middle(course: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
+    """The middle of the lanes, and between them quintic polynomials, which join without heading and curvature."""
+    end = course[-1].end_x_m
+    x = np.linspace(0.0, end, math.ceil(end / _SAMPLE_M) + 1)
+    middles = [0.5 * (lane.right_y_m + lane.left_y_m) for lane in course]
+    y = np.zeros_like(x)
+    for (before, after), (low, high) in zip(pairwise(course), pairwise(middles), strict=True):
+        share = np.clip((x - before.end_x_m) / (after.start_x_m - before.end_x_m), 0.0, 1.0)
+        y += (high - low) * share**3 * (10.0 + share * (6.0 * share - 15.0))
+    return x, y
+
+
+def _way_through(course: Sequence[Lane], half_width_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Straight to the first lane, then the path of least jerk to the middle of the last one at its end."""
+    start, end = course[0].start_x_m, course[-1].end_x_m
+    end_y = 0.5 * (course[-1].right_y_m + course[-1].left_y_m)
+    way = least_jerk(start, end, end_y, list(_bounds(course, half_width_m)))
+    before = np.linspace(0.0, start, math.ceil(start / _SAMPLE_M), endpoint=False)
+    along = np.linspace(start, end, math.ceil((end - start) / _SAMPLE_M) + 1)
+    return np.concatenate([before, along]), np.concatenate([np.zeros(len(before)), way(along)])
+
+
+def _bounds(course: Sequence[Lane], half_width_m: float) -> Iterator[Bound]:
+    for lane in course:
+        first, last = lane.start_x_m - _BEYOND_M, lane.end_x_m + _BEYOND_M
+        for x in np.linspace(first, last, math.ceil((last - first) / _BOUND_SPACING_M) + 1).tolist():
+            for ahead in _AXLES_M:
+                yield Bound(x - ahead, ahead, lane.right_y_m + half_width_m, lane.left_y_m - half_width_m)

@@ -1,0 +1,124 @@
+"""Points of a path that a user gives: read from a CSV, and checked before a car is sent along them."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final, NoReturn
+
+from activesteer.errors import ManeuverError, nearest_names
+
+COLUMNS: Final = ("x_m", "y_m")
+"""Columns that a CSV must have, others may stand beside them."""
+
+LEAST_POINTS: Final = 4
+_MOST_GAP_M: Final = 20.0
+"""Points further apart than this count as a jump [m]."""
+_LEAST_GAP_M: Final = 1e-3
+_MOST_TURN_RAD: Final = math.radians(90.0)
+"""Turning by more than this at a point counts as going back [rad]."""
+_LEAST_RADIUS_M: Final = 6.0
+"""A car of the compact class turns on 5.2 m; a tighter bend counts as a kink [m]."""
+_MOST_START_M: Final = 1.0
+"""How far from the car the first point may be [m]."""
+_MOST_START_RAD: Final = math.radians(15.0)
+"""By how much the first stretch may point off the car's heading [rad]."""
+
+
+def read_csv(path: Path) -> tuple[list[float], list[float], list[str]]:
+    """The points in a CSV with the header x_m,y_m.
+
+    Args:
+        path: The file.
+
+    Returns:
+        x, y [m], and where each point stands, as `track.csv, line 7`.
+
+    Raises:
+        ManeuverError: the file cannot be read, a column is missing, or a value is no number.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as reason:
+        msg = f"cannot read {path}: {reason}"
+        raise ManeuverError(msg) from reason
+    reader = csv.DictReader(lines, skipinitialspace=True)
+    header = [name.strip() for name in reader.fieldnames or []]
+    for column in COLUMNS:
+        if column not in header:
+            known = nearest_names(column, header)
+            msg = f"{path.name}, line 1: must name the columns x_m and y_m; {column} is missing: {known}"
+            raise ManeuverError(msg)
+    reader.fieldnames = header
+    x, y, places = [], [], []
+    for row in reader:
+        place = f"{path.name}, line {reader.line_num}"
+        for column, values in zip(COLUMNS, (x, y), strict=True):
+            values.append(_number(row[column], f"{place}: {column}"))
+        places.append(place)
+    return x, y, places
+
+
+def _number(text: str | None, where: str) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        msg = f"{where}: {text!r} is not a number"
+        raise ManeuverError(msg)
+    return value
+
+
+def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[int], str]) -> None:
+    """A car must be able to start on the path and to follow it.
+
+    Args:
+        x_m: World x of the points [m].
+        y_m: World y of the points [m].
+        place: Index of a point -> where it stands, for error messages.
+
+    Raises:
+        ManeuverError: there are too few points, or the path jumps, goes back, has a kink, or does not begin at the car.
+    """
+    count = len(x_m)
+    if count != len(y_m) or count < LEAST_POINTS:
+        msg = f"the path has {count} x_m and {len(y_m)} y_m; as many of each are needed, at least {LEAST_POINTS}"
+        raise ManeuverError(msg)
+
+    def fail(index: int, problem: str) -> NoReturn:
+        msg = f"{place(index)}: the point ({x_m[index]:g}, {y_m[index]:g}) m {problem}"
+        raise ManeuverError(msg)
+
+    gaps = [math.hypot(x_m[i + 1] - x_m[i], y_m[i + 1] - y_m[i]) for i in range(count - 1)]
+    for i, gap in enumerate(gaps, 1):
+        if gap < _LEAST_GAP_M:
+            fail(i, "is the same as the one before; leave one of them out")
+        if gap > _MOST_GAP_M:
+            fail(i, f"is a jump of {gap:.3g} m from the one before; at most {_MOST_GAP_M:g} m are allowed, add points")
+    for i in range(1, count - 1):
+        ahead = math.atan2(y_m[i + 1] - y_m[i], x_m[i + 1] - x_m[i])
+        behind = math.atan2(y_m[i] - y_m[i - 1], x_m[i] - x_m[i - 1])
+        turn = abs(math.remainder(ahead - behind, math.tau))
+        if turn > _MOST_TURN_RAD:
+            fail(i, f"turns the path back, by {math.degrees(turn):.0f} deg; are the points in the order of travel?")
+        # Radius of the circle through this point and its neighbours: chord over twice the sine of the angle between.
+        chord = math.hypot(x_m[i + 1] - x_m[i - 1], y_m[i + 1] - y_m[i - 1])
+        if 2.0 * math.sin(turn) * _LEAST_RADIUS_M > chord:
+            radius = chord / (2.0 * math.sin(turn))
+            fail(i, f"is a kink of {radius:.2g} m radius; at least {_LEAST_RADIUS_M:g} m are needed, round it off")
+    if math.hypot(x_m[0], y_m[0]) > _MOST_START_M:
+        fail(
+            0,
+            f"is {math.hypot(x_m[0], y_m[0]):.3g} m from the car: the path must begin at the car, at (0, 0), at most "
+            f"{_MOST_START_M:g} m off; shift it by ({-x_m[0]:g}, {-y_m[0]:g}) m",
+        )
+    heading = math.atan2(y_m[1] - y_m[0], x_m[1] - x_m[0])
+    if abs(heading) > _MOST_START_RAD:
+        fail(
+            0,
+            f"begins with a heading of {math.degrees(heading):.0f} deg: the car starts along x, the path may be at "
+            f"most {math.degrees(_MOST_START_RAD):g} deg off; turn it by {-math.degrees(heading):.0f} deg about (0, 0)",
+        )

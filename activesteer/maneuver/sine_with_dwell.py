@@ -1,0 +1,123 @@
+"""Sine with dwell (FMVSS 126, UN R140): a sine at the steering wheel that waits at its second peak."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+from activesteer.config import Range
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.choices import DRIVES, SIDES, check_choice
+from activesteer.maneuver.search import LEAST_SEARCH_SPEED_MPS, RampAngle
+from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer, SlowRamp
+from activesteer.signals import Reference
+
+_REFERENCE_MPS2: Final = 0.3 * GRAVITY_MPS2
+"""Lateral acceleration whose steering wheel angle in a slow ramp is A [m/s2]: 0.3 g, FMVSS 126, S7.6."""
+_RAMP: Final = SlowRamp(start_s=0.5, rate_radps=math.radians(13.5), end_rad=math.radians(270.0))
+"""The slow ramp of FMVSS 126, S7.6: 13.5 deg/s."""
+_RAMP_S: Final = 20.5
+
+
+@dataclass(frozen=True)
+class DwellInput:
+    """The sine with dwell at the steering wheel."""
+
+    start_s: Annotated[float, Range(0.0)] = 0.5
+    """When it begins [s]."""
+    frequency_Hz: Annotated[float, Range(0.1, 5.0)] = 0.7
+    """Frequency of the sine [Hz]."""
+    dwell_s: Annotated[float, Range(0.0, 5.0)] = 0.5
+    """How long it waits at the second peak, after three quarters of the period [s]."""
+    direction: str = "left"
+    """Direction of the first half-wave: `left` or `right`."""
+    steering_wheel_rad: Annotated[float, Range(0.0, 15.0)] | None = None
+    """Amplitude [rad]; `amplitude_factor` times A where not given."""
+    amplitude_factor: Annotated[float, Range(0.1, 15.0)] | None = None
+    """Amplitude as a multiple of A, the steering wheel angle at 0.3 g in a slow ramp of the control-free car [-]."""
+
+    def __post_init__(self) -> None:
+        """Amplitude or factor must be known; where both are, the amplitude is what the factor once led to.
+
+        Raises:
+            ManeuverError: neither of them is given, or the direction is unknown.
+        """
+        check_choice("direction", self.direction, SIDES)
+        if self.steering_wheel_rad is None and self.amplitude_factor is None:
+            msg = (
+                "steering_wheel_deg (the amplitude) or amplitude_factor (the same as a multiple of the steering wheel "
+                "angle at 0.3 g) is needed"
+            )
+            raise ManeuverError(msg)
+
+    @property
+    def completion_s(self) -> float:
+        """When the steering wheel is straight again [s]."""
+        return self.start_s + 1.0 / self.frequency_Hz + self.dwell_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class SineWithDwell(Maneuver):
+    """A sine with dwell; the drive holds the speed until it begins, and then as well or not at all."""
+
+    steer: DwellInput
+    """The sine."""
+    drive: str = "coast"
+    """From the beginning of the sine on: `coast`, as FMVSS 126 asks for, or `hold_speed`."""
+
+    def __post_init__(self) -> None:
+        """The sine must end within the run, and A must be one of a car that drives forwards.
+
+        Raises:
+            ManeuverError: it does not, or the drive is unknown.
+        """
+        check_choice("drive", self.drive, DRIVES)
+        steer = self.steer
+        if steer.completion_s > self.duration_s:
+            msg = (
+                f"duration_s: is {self.duration_s:g} s, but the sine ends at {steer.completion_s:.3g} s; its "
+                f"evaluation needs 1.75 s more, {steer.completion_s + 1.75:.3g} s"
+            )
+            raise ManeuverError(msg)
+        if steer.steering_wheel_rad is None and self.speed_mps < LEAST_SEARCH_SPEED_MPS:
+            msg = (
+                f"speed_kmh: is {3.6 * self.speed_mps:g} km/h; steer.amplitude_factor needs at least "
+                f"{3.6 * LEAST_SEARCH_SPEED_MPS:g} km/h to reach 0.3 g, or give steer.steering_wheel_deg"
+            )
+            raise ManeuverError(msg)
+
+    @property
+    def search(self) -> RampAngle | None:
+        """For A, where the amplitude is a multiple of it."""
+        factor = self.steer.amplitude_factor
+        if self.steer.steering_wheel_rad is not None or factor is None:
+            return None
+        probe = SlowlyIncreasingSteer(
+            kind="slowly_increasing_steer", name=f"{self.name} (slow ramp to 0.3 g)", speed_mps=self.speed_mps,
+            duration_s=_RAMP_S, settle_s=self.settle_s, road=self.road, steer=_RAMP,
+        )  # fmt: skip
+        return RampAngle(probe, _REFERENCE_MPS2, lambda angle: self.with_amplitude(factor * angle))
+
+    def with_amplitude(self, steering_wheel_rad: float) -> SineWithDwell:
+        """The same with its amplitude known [rad]; the factor that led to it stays on record."""
+        return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
+
+    def reference(self, time_s: float) -> Reference:
+        """Steering wheel angle of the sine; see the base class."""
+        steer = self.steer
+        period, t = 1.0 / steer.frequency_Hz, time_s - steer.start_s
+        angle = 0.0
+        if 0.0 < t < period + steer.dwell_s:
+            # Time stands still for the sine while it dwells.
+            phase = min(t, max(0.75 * period, t - steer.dwell_s))
+            amplitude = SIDES[steer.direction] * (steer.steering_wheel_rad or 0.0)
+            angle = amplitude * math.sin(2.0 * math.pi * phase / period)
+        return Reference(angle, self.speed_mps, 0.0, hold_speed=self.drive == "hold_speed" or t < 0.0)
+
+    def settling_reference(self) -> Reference:
+        """Straight ahead at the speed of the manoeuvre."""
+        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)

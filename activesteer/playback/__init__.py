@@ -1,0 +1,6 @@
+"""Playback: recordings in the rerun viewer, from recordings alone."""
+
+from activesteer.playback.runs import Run, runs_of
+from activesteer.playback.viewer import save, serve, show
+
+__all__ = ["Run", "runs_of", "save", "serve", "show"]

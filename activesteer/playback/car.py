@@ -1,0 +1,109 @@
+"""The car in the world: solids in the frames of its bodies, which move, and the camera's frame behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+import rerun as rr
+
+from activesteer.playback.geometry import about_vertical, heading, xyzw
+from activesteer.playback.runs import CHASSIS, Run
+from activesteer.playback.timeline import times
+from activesteer.recording import Primitive
+
+_GHOST_OPACITY: Final = 0.35
+"""Of another run's car in the view of a run."""
+_SEE_THROUGH: Final = 0.5
+"""Solids with less opacity are the shell of the body, which takes the colour of the run where there are several."""
+
+
+def send_car(stream: rr.RecordingStream, run: Run, *, tinted: bool) -> None:
+    """Sends bodies, their solids, and the frame `NAME/chase` that follows the car and turns with it, but stays level.
+
+    Args:
+        stream: Where to.
+        run: The run.
+        tinted: Whether the shell of the body is to have the run's colour.
+    """
+    poses = run.recording.poses
+    when = times(poses.time_s[run.poses])
+    for index, body in enumerate(poses.names):
+        moved = rr.Transform3D.columns(
+            translation=poses.positions_m[run.poses, index].astype(np.float32),
+            quaternion=xyzw(poses.quaternions[run.poses, index]).astype(np.float32),
+        )
+        stream.send_columns(body_path(run, body), when, moved)
+    chassis = poses.names.index(CHASSIS)
+    place = poses.positions_m[run.poses, chassis] * (1.0, 1.0, 0.0)
+    turn = about_vertical(heading(poses.quaternions[run.poses, chassis]))
+    stream.send_columns(
+        f"{run.name}/chase",
+        when,
+        rr.Transform3D.columns(translation=place.astype(np.float32), quaternion=turn.astype(np.float32)),
+    )
+    bodies = _bodies(run)
+    for body, solids in bodies.items():
+        colours = [_colour(solid, run.colour if tinted else None) for solid in solids]
+        _send_solids(stream, f"{body_path(run, body)}/solid", solids, colours)
+    for path, body in zip(ghost_paths(run), ghost_bodies(run), strict=True):
+        solids = bodies[body]
+        tint = (*rgb(run.colour), round(255 * _GHOST_OPACITY))
+        _send_solids(stream, path, solids, [tint] * len(solids))
+
+
+def body_path(run: Run, body: str) -> str:
+    """Entity of a body; what stands below it moves with it."""
+    return f"{run.scene}/car/{body}"
+
+
+def ghost_bodies(run: Run) -> list[str]:
+    """Bodies that are drawn of a car that is not the one looked at: chassis and wheels."""
+    return [body for body in _bodies(run) if body == CHASSIS or body.endswith("_wheel")]
+
+
+def ghost_paths(run: Run) -> list[str]:
+    """Entities of the ghost; they are left out where the car itself is shown."""
+    return [f"{body_path(run, body)}/ghost" for body in ghost_bodies(run)]
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """The three numbers of `#rrggbb`."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+def _bodies(run: Run) -> dict[str, list[Primitive]]:
+    bodies: dict[str, list[Primitive]] = {}
+    for part in run.recording.scene:
+        if isinstance(part, Primitive) and part.body in run.recording.poses.names:
+            bodies.setdefault(part.body, []).append(part)
+    return bodies
+
+
+def _colour(solid: Primitive, tint: str | None) -> tuple[int, int, int, int]:
+    r, g, b, a = (round(255 * value) for value in solid.rgba)
+    return (*rgb(tint), a) if tint and solid.rgba[3] < _SEE_THROUGH else (r, g, b, a)
+
+
+def _send_solids(
+    stream: rr.RecordingStream, path: str, solids: Sequence[Primitive], colours: Sequence[tuple[int, int, int, int]]
+) -> None:
+    for kind in ("box", "cylinder", "sphere"):
+        members = [index for index, solid in enumerate(solids) if solid.kind == kind]
+        if not members:
+            continue
+        size = np.array([solids[index].size_m for index in members])
+        at = np.array([solids[index].position_m for index in members])
+        turn = xyzw([solids[index].quaternion for index in members])
+        colour = [colours[index] for index in members]
+        # A fill mode has to be given: lines only are the default.
+        if kind == "box":
+            drawn = rr.Boxes3D(half_sizes=size / 2, centers=at, quaternions=turn, colors=colour, fill_mode="solid")
+        elif kind == "cylinder":
+            drawn = rr.Cylinders3D(
+                lengths=size[:, 2], radii=size[:, 0] / 2, centers=at, quaternions=turn, colors=colour, fill_mode="solid"
+            )
+        else:
+            drawn = rr.Ellipsoids3D(half_sizes=size / 2, centers=at, quaternions=turn, colors=colour, fill_mode="solid")
+        stream.log(f"{path}/{kind}", drawn, static=True)

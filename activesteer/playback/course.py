@@ -1,0 +1,217 @@
+"""The road, and what the driver follows on it: lanes, cones, path; in the world and on a flat map."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from activesteer.playback.car import rgb
+from activesteer.playback.geometry import heading, rotated
+from activesteer.playback.runs import CHASSIS, Run
+from activesteer.playback.timeline import times
+
+Array = NDArray[np.float64]
+
+ROAD, COURSE, MAP = "road", "course", "map"
+"""Entities below which road and course stand in the world, and below which all of the map lies."""
+
+_BESIDE_M: Final = 15.0
+_BEYOND_M: Final = 60.0
+"""How much road there is beside and beyond everything that happens on it [m]."""
+_MAP_MARGIN_M: Final = 8.0
+_TILE_M: Final = 10.0
+
+_ASPHALT: Final = (58, 60, 64)
+_MARKING: Final = (92, 95, 100)
+_LANE: Final = (0, 158, 115)
+_CONE: Final = (255, 120, 20)
+_PATH: Final = (240, 228, 66)
+_SLIPPERY: Final = (110, 150, 190)
+_GRIPPY: Final = (44, 44, 46)
+_CONE_HEIGHT_M: Final = 0.5
+_CONE_RADIUS_M: Final = 0.14
+_CONE_SIDES: Final = 12
+
+
+class Extent(NamedTuple):
+    """A rectangle of the road [m]."""
+
+    low_x_m: float
+    high_x_m: float
+    low_y_m: float
+    high_y_m: float
+
+
+def extent(runs: Sequence[Run]) -> Extent:
+    """What cars and course take up together."""
+    points = [_track(run) for run in runs]
+    course = _course(runs)
+    if course:
+        points.append(_path(course))
+        points += [np.array([[lane["start_x_m"], lane["right_y_m"]]]) for lane in course["lanes"]]
+        points += [np.array([[lane["end_x_m"], lane["left_y_m"]]]) for lane in course["lanes"]]
+        points += [np.reshape(course["cones"], (-1, 2))]
+    # The path goes on for a while where the car has long stopped; what is of interest is where the cars are.
+    reach = np.concatenate([_track(run) for run in runs])
+    every = np.concatenate(points)
+    low, high = reach.min(axis=0) - 20.0, reach.max(axis=0) + 20.0
+    inside = every[((every >= low) & (every <= high)).all(axis=1)]
+    (low_x, low_y), (high_x, high_y) = inside.min(axis=0), inside.max(axis=0)
+    return Extent(float(low_x), float(high_x), float(low_y), float(high_y))
+
+
+def send_road(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
+    """Sends the road with its grid, and its patches of other friction, as far as they reach."""
+    around = extent(runs)
+    low_x = np.floor((around.low_x_m - _BEYOND_M / 2) / _TILE_M) * _TILE_M
+    high_x = np.ceil((around.high_x_m + _BEYOND_M) / _TILE_M) * _TILE_M
+    low_y = np.floor((around.low_y_m - _BESIDE_M) / _TILE_M) * _TILE_M
+    high_y = np.ceil((around.high_y_m + _BESIDE_M) / _TILE_M) * _TILE_M
+    stream.log(f"{ROAD}/surface", _plane(low_x, high_x, low_y, high_y, 0.0, _ASPHALT), static=True)
+    across = [[(x, low_y, 0.005), (x, high_y, 0.005)] for x in np.arange(low_x, high_x + 1.0, _TILE_M)]
+    along = [[(low_x, y, 0.005), (high_x, y, 0.005)] for y in np.arange(low_y, high_y + 1.0, _TILE_M)]
+    stream.log(f"{ROAD}/grid", rr.LineStrips3D(across + along, colors=[_MARKING], radii=[0.03]), static=True)
+    road = runs[0].recording.metadata.get("maneuver", {}).get("road", {})
+    usual = float(road.get("mu", 1.0))
+    sides = [("left", road.get("mu_left"), 0.0, high_y), ("right", road.get("mu_right"), low_y, 0.0)]
+    areas = [(side, mu, low_x, high_x, low, high) for side, mu, low, high in sides if mu is not None]
+    for patch in road.get("patches", ()):
+        low, high = {"left": (0.0, high_y), "right": (low_y, 0.0)}.get(patch["side"], (low_y, high_y))
+        start, end = max(low_x, patch["start_m"]), min(high_x, patch["end_m"])
+        areas.append(("patch", patch["mu"], start, end, low, high))
+    for number, (name, mu, start, end, low, high) in enumerate(areas):
+        if start < end and mu != usual:
+            colour = _SLIPPERY if mu < usual else _GRIPPY
+            surface = _plane(start, end, low, high, 0.002 + 0.0005 * number, colour)
+            stream.log(f"{ROAD}/{name}_{number}_mu_{round(100 * mu)}_percent", surface, static=True)
+
+
+def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
+    """Sends lanes, cones and path, where the manoeuvre has them."""
+    course = _course(runs)
+    if not course:
+        return
+    path = _path(course)
+    line = np.column_stack([path, np.full(len(path), 0.02)])
+    stream.log(f"{COURSE}/path", rr.LineStrips3D([line], colors=[_PATH], radii=[0.03]), static=True)
+    edges = _lane_outlines(course)
+    stream.log(f"{MAP}/path", rr.LineStrips2D([_flat(path)], colors=[_PATH], radii=_points(1.0)), static=True)
+    if edges:
+        strips = [np.column_stack([edge, np.full(len(edge), 0.015)]) for edge in edges]
+        stream.log(f"{COURSE}/lanes", rr.LineStrips3D(strips, colors=[_LANE], radii=[0.05]), static=True)
+        flat = [_flat(edge) for edge in edges]
+        stream.log(f"{MAP}/lanes", rr.LineStrips2D(flat, colors=[_LANE], radii=_points(1.0)), static=True)
+    cones = np.reshape(course["cones"], (-1, 2))
+    if len(cones):
+        stream.log(f"{COURSE}/cones", _cones(cones), static=True)
+        stream.log(f"{MAP}/cones", rr.Points2D(_flat(cones), colors=[_CONE], radii=_points(2.0)), static=True)
+
+
+def send_track(stream: rr.RecordingStream, run: Run) -> None:
+    """Sends where a car went, and its outline on the map, wheels with their angles, as it moves."""
+    track = _track(run)
+    line = np.column_stack([track, np.full(len(track), 0.03)])
+    colour = rgb(run.colour)
+    stream.log(f"{run.scene}/driven", rr.LineStrips3D([line], colors=[colour], radii=[0.035]), static=True)
+    stream.log(f"{MAP}/{run.name}/driven", rr.LineStrips2D([_flat(track)], colors=[colour], radii=_points(1.2)), static=True)
+    strips = _outline(run)
+    path, count = f"{MAP}/{run.name}/car", len(strips)
+    stream.log(path, rr.LineStrips2D.from_fields(colors=[colour], radii=_points(1.5)), static=True)
+    when = times(run.recording.poses.time_s[run.poses])
+    # As list of strips, each of shape (points, 2): the strips differ in length.
+    flat = [strip[row] for row in range(len(run.poses)) for strip in strips]
+    stream.send_columns(path, when, rr.LineStrips2D.columns(strips=flat).partition(lengths=[count] * len(run.poses)))
+
+
+def _outline(run: Run) -> list[Array]:
+    """Rectangle of the car and a stroke for each wheel, on the map, each of shape (poses, points, 2)."""
+    poses, car = run.recording.poses, run.recording.metadata.get("car", {})
+    half, wheelbase = 0.5 * float(car.get("width_m", 1.8)), float(car.get("wheelbase_m", 2.7))
+    nose, tail = 0.85, -wheelbase - 0.75  # typical overhangs; nothing but this drawing depends on them
+    chassis = poses.names.index(CHASSIS)
+
+    def placed(body: int, points: Sequence[tuple[float, float]], *, level: bool) -> Array:
+        turn, at = poses.quaternions[run.poses, body], poses.positions_m[run.poses, body]
+        if level:  # a wheel spins: only its heading counts
+            axis = rotated(turn, (0.0, 1.0, 0.0))
+            angle = np.arctan2(-axis[:, 0], axis[:, 1])
+        else:
+            angle = heading(turn)
+        cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        x, y = np.array(points).T
+        return _flat(np.stack([at[:, :1] + cos * x - sin * y, at[:, 1:2] + sin * x + cos * y], axis=-1))
+
+    corners = [(nose, half), (nose, -half), (tail, -half), (tail, half), (nose, half)]
+    strips = [placed(chassis, corners, level=False)]
+    wheels = [index for index, name in enumerate(poses.names) if name.endswith("_wheel")]
+    return strips + [placed(wheel, [(-0.32, 0.0), (0.32, 0.0)], level=True) for wheel in wheels]
+
+
+def _track(run: Run) -> Array:
+    """Where the centre of gravity went; the origin of the chassis where it was not recorded."""
+    if run.has("x_m", "y_m"):
+        track = np.stack([run.channel("x_m"), run.channel("y_m")], axis=1)
+    else:
+        poses = run.recording.poses
+        track = poses.positions_m[run.poses, poses.names.index(CHASSIS), :2]
+    return track[np.isfinite(track).all(axis=1)]
+
+
+def _course(runs: Sequence[Run]) -> Mapping[str, Any] | None:
+    courses = [run.recording.metadata.get("course") for run in runs]
+    return next((course for course in courses if course), None)
+
+
+def _path(course: Mapping[str, Any]) -> Array:
+    return np.column_stack([course["path"]["x_m"], course["path"]["y_m"]])
+
+
+def _lane_outlines(course: Mapping[str, Any]) -> list[Array]:
+    outlines = []
+    for lane in course["lanes"]:
+        x, y = (lane["start_x_m"], lane["end_x_m"]), (lane["right_y_m"], lane["left_y_m"])
+        outlines.append(np.array([(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]), (x[0], y[0])]))
+    return outlines
+
+
+def _flat(points: Array) -> Array:
+    """World to map: there the second axis points down, and left is to be up."""
+    return points * (1.0, -1.0)
+
+
+def map_bounds(runs: Sequence[Run]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Ranges of both axes of the map that show everything [m]."""
+    around = extent(runs)
+    x = (around.low_x_m - _MAP_MARGIN_M, around.high_x_m + _MAP_MARGIN_M)
+    return x, (-around.high_y_m - _MAP_MARGIN_M, -around.low_y_m + _MAP_MARGIN_M)
+
+
+def _points(radius: float) -> Any:
+    """A radius in points of the screen, so that lines are seen however far the map is zoomed out."""
+    return rr.Radius.ui_points(radius)
+
+
+def _plane(low_x: float, high_x: float, low_y: float, high_y: float, z: float, colour: tuple[int, int, int]) -> Any:
+    corners = [(low_x, low_y, z), (high_x, low_y, z), (high_x, high_y, z), (low_x, high_y, z)]
+    return rr.Mesh3D(vertex_positions=corners, triangle_indices=[(0, 1, 2), (0, 2, 3)], albedo_factor=[*colour, 255])
+
+
+def _cones(places: Array) -> Any:
+    """All cones as one mesh."""
+    angle = np.linspace(0.0, 2.0 * np.pi, _CONE_SIDES, endpoint=False)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_CONE_SIDES)])
+    corners = np.vstack([ring * _CONE_RADIUS_M, [[0.0, 0.0, _CONE_HEIGHT_M]]])
+    outward = np.vstack([ring + (0.0, 0.0, 0.3), [[0.0, 0.0, 1.0]]])
+    sides = np.arange(_CONE_SIDES)
+    faces = np.column_stack([sides, (sides + 1) % _CONE_SIDES, np.full(_CONE_SIDES, _CONE_SIDES)])
+    at = np.column_stack([places, np.zeros(len(places))])
+    return rr.Mesh3D(
+        vertex_positions=(at[:, None] + corners).reshape(-1, 3),
+        vertex_normals=np.tile(outward / np.linalg.norm(outward, axis=1, keepdims=True), (len(places), 1)),
+        triangle_indices=(np.arange(len(places))[:, None, None] * len(corners) + faces).reshape(-1, 3),
+        albedo_factor=[*_CONE, 255],
+    )

@@ -1,0 +1,126 @@
+"""How the viewer is divided: the car from behind, the map, the car from above, plots, and what came out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import rerun.blueprint as rrb
+
+from activesteer.playback import plots
+from activesteer.playback.car import ghost_paths
+from activesteer.playback.course import COURSE, MAP, ROAD, map_bounds
+from activesteer.playback.runs import Run
+from activesteer.playback.timeline import TIMELINE
+
+SUMMARY: Final = "summary"
+"""Entity of the text."""
+
+_SKY: Final = (176, 196, 214)
+_BEHIND: Final = rrb.EyeControls3D(position=(-8.6, -2.6, 2.7), look_target=(-0.6, 0.0, 0.45), eye_up=(0.0, 0.0, 1.0))
+_ABOVE: Final = rrb.EyeControls3D(position=(-1.31, 0.0, 8.5), look_target=(-1.3, 0.0, 0.0), eye_up=(0.0, 0.0, 1.0))
+"""Eyes in the frame that follows the car, whose origin is on the road below its front axle."""
+
+
+def blueprint(runs: Sequence[Run], *, compare: bool) -> rrb.Blueprint:
+    """The layout.
+
+    Args:
+        runs: The runs; of several, the first page shows all of them.
+        compare: Whether to leave out the pages of the single runs.
+    """
+    if len(runs) == 1:
+        content = _page(runs[0], runs)
+    elif compare:
+        content = _comparison(runs)
+    else:
+        content = rrb.Tabs(_comparison(runs), *(_page(run, runs) for run in runs), active_tab=0)
+    return rrb.Blueprint(
+        content,
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _page(run: Run, runs: Sequence[Run]) -> rrb.Horizontal:
+    """One run, with everything there is to see of it."""
+    return rrb.Horizontal(
+        rrb.Vertical(
+            _chase(run, runs),
+            _map(runs),
+            rrb.Horizontal(_above(run, runs), _text()),
+            row_shares=[5, 2, 4],
+        ),
+        rrb.Tabs(
+            rrb.Vertical(*plots.views(plots.MOTION, [run]), name="Motion"),
+            rrb.Vertical(*plots.views(plots.WHEELS, [run]), name="Wheels"),
+            rrb.Vertical(*plots.views(plots.links(run), [run]), name="Links"),
+            active_tab=0,
+        ),
+        column_shares=[3, 2],
+        name=run.label,
+    )
+
+
+def _comparison(runs: Sequence[Run]) -> rrb.Horizontal:
+    """All runs: one view for each car with the others as ghosts, plots over each other."""
+    loads, use = plots.WHEELS[:2]
+    return rrb.Horizontal(
+        rrb.Vertical(
+            rrb.Horizontal(*(_chase(run, runs) for run in runs)),
+            _map(runs),
+            rrb.Horizontal(_above(runs[0], runs), _text(), column_shares=[2, 3]),
+            row_shares=[5, 2, 4],
+        ),
+        rrb.Tabs(
+            rrb.Vertical(*plots.views(plots.MOTION, runs), name="Motion"),
+            rrb.Vertical(*plots.views_by_corner(loads, runs), name="Wheel loads"),
+            rrb.Vertical(*plots.views_by_corner(use, runs), name="Friction use"),
+            active_tab=0,
+        ),
+        column_shares=[3, 2],
+        name="Comparison",
+    )
+
+
+def _chase(run: Run, runs: Sequence[Run]) -> rrb.Spatial3DView:
+    return _car_view(run, runs, f"{run.label}: from behind", _BEHIND)
+
+
+def _above(run: Run, runs: Sequence[Run]) -> rrb.Spatial3DView:
+    return _car_view(run, runs, f"{run.label}: from above", _ABOVE)
+
+
+def _car_view(run: Run, runs: Sequence[Run], name: str, eye: rrb.EyeControls3D) -> rrb.Spatial3DView:
+    others = [other for other in runs if other is not run]
+    return rrb.Spatial3DView(
+        origin=f"/{run.name}/chase",
+        contents=[
+            f"+ /{ROAD}/**",
+            f"+ /{COURSE}/**",
+            f"+ /{run.scene}/**",
+            *(f"- /{path}/**" for path in ghost_paths(run)),
+            *(f"+ /{path}/**" for other in others for path in ghost_paths(other)),
+            *(f"+ /{other.scene}/driven" for other in others),
+        ],
+        name=name,
+        background=rrb.Background(color=_SKY, kind=rrb.BackgroundKind.SolidColor),
+        line_grid=rrb.LineGrid3D(visible=False),
+        eye_controls=eye,
+    )
+
+
+def _map(runs: Sequence[Run]) -> rrb.Spatial2DView:
+    across, down = map_bounds(runs)
+    return rrb.Spatial2DView(
+        origin=f"/{MAP}",
+        name="Course [m]",
+        visual_bounds=rrb.VisualBounds2D(x_range=across, y_range=down),
+    )
+
+
+def _text() -> rrb.TextDocumentView:
+    return rrb.TextDocumentView(origin=f"/{SUMMARY}", name="Summary")

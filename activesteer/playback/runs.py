@@ -1,0 +1,98 @@
+"""The recordings that are played back together: their names, labels and colours."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
+from activesteer.errors import RecordingError
+from activesteer.recording import Recording
+
+COLOURS: Final = ("#a6a6a6", *RUN_COLOURS[1:])
+"""Those of the plots, but for the first: its near-black cannot be seen on the viewer's dark background."""
+
+PLOT_RATE_HZ: Final = 100.0
+"""Most samples of a signal that are shown in a second; a screen cannot show more of a run."""
+
+CHASSIS: Final = "chassis"
+"""Body that the camera follows."""
+
+
+class Run(NamedTuple):
+    """A recording as it is shown.
+
+    Attributes:
+        recording: The recording.
+        name: What it is called in entity paths.
+        label: What it is called in legends and titles.
+        colour: Its colour, `#rrggbb`.
+        rows: Rows of the recording that are shown, about `PLOT_RATE_HZ` of them in a second.
+        poses: Sets of poses that are finite; a run that diverged ends with some that are not.
+    """
+
+    recording: Recording
+    name: str
+    label: str
+    colour: str
+    rows: NDArray[np.intp]
+    poses: NDArray[np.intp]
+
+    @property
+    def scene(self) -> str:
+        """Path below which the car stands in the world."""
+        return f"{self.name}/scene"
+
+    def channel(self, name: str) -> NDArray[np.float64]:
+        """A channel at the rows that are shown."""
+        return self.recording[name][self.rows]
+
+    def has(self, *names: str) -> bool:
+        """Whether the recording has all these channels."""
+        return all(name in self.recording for name in names)
+
+
+def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
+    """The runs in the paper's order, the three systems always in the same colours.
+
+    Args:
+        recordings: By name, such as that of the controller.
+
+    Raises:
+        RecordingError: there is none, or one has no rows or no poses.
+    """
+    if not recordings:
+        raise RecordingError("there is no recording to play back, at least one is needed")
+    ordered = [name for name in SYSTEM_LABELS if name in recordings]
+    ordered += [name for name in recordings if name not in SYSTEM_LABELS]
+    spare = iter(range(len(SYSTEM_LABELS), len(SYSTEM_LABELS) + len(ordered)))
+    colours = dict(zip(SYSTEM_LABELS, COLOURS, strict=False))
+    taken: set[str] = set()
+    runs = []
+    for name in ordered:
+        recording = recordings[name]
+        poses = np.flatnonzero(
+            np.isfinite(recording.poses.positions_m).all(axis=(1, 2))
+            & np.isfinite(recording.poses.quaternions).all(axis=(1, 2))
+        )
+        if len(recording) == 0 or CHASSIS not in recording.poses.names or len(poses) == 0:
+            raise RecordingError(f"{name}: {recording!r} has nothing to play back: rows and poses of a car are needed")
+        path = re.sub(r"\W", "_", name, flags=re.ASCII) or "run"
+        while path in taken:
+            path += "_"
+        taken.add(path)
+        colour = colours.get(name) or COLOURS[next(spare) % len(COLOURS)]
+        runs.append(Run(recording, path, SYSTEM_LABELS.get(name, name), colour, _shown(recording.time_s), poses))
+    return runs
+
+
+def _shown(time_s: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Every n-th row, n so that a second has `PLOT_RATE_HZ` of them, and the last one."""
+    span_s = float(time_s[-1] - time_s[0])
+    step = max(1, round((len(time_s) - 1) / (span_s * PLOT_RATE_HZ))) if span_s > 0.0 else 1
+    rows = np.arange(0, len(time_s), step)
+    return rows if rows[-1] == len(time_s) - 1 else np.append(rows, len(time_s) - 1)

@@ -1,0 +1,53 @@
+"""Recordings into a rerun stream: all that there is to see, column by column, with the layout."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import rerun as rr
+
+from activesteer.playback.car import send_car
+from activesteer.playback.course import send_course, send_road, send_track
+from activesteer.playback.layout import SUMMARY
+from activesteer.playback.links import send_links
+from activesteer.playback.plots import send_plots
+from activesteer.playback.runs import Run
+from activesteer.playback.summary import MetricLabel, plain_label, summary
+from activesteer.playback.tyres import send_tyre_forces
+
+
+def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
+    """A stream without a target yet.
+
+    The viewer keeps one layout for each application id, changed by its user as may be, so each set of runs has its own.
+    """
+    names = " ".join(run.name for run in runs)
+    stream = rr.RecordingStream(f"activesteer {names}{' compared' if compare else ''}")
+    title = runs[0].recording.metadata.get("maneuver", {}).get("title") or "activesteer"
+    stream.send_recording_name(str(title))
+    return stream
+
+
+def fill(stream: rr.RecordingStream, runs: Sequence[Run], label: MetricLabel = plain_label) -> None:
+    """Sends everything.
+
+    Args:
+        stream: Where to; its target must be chosen before.
+        runs: The runs.
+        label: How metrics are shown.
+    """
+    several = len(runs) > 1
+    stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    send_road(stream, runs)
+    send_course(stream, runs)
+    for run in runs:
+        send_car(stream, run, tinted=several)
+        send_links(stream, run)
+        send_tyre_forces(stream, run)
+        send_track(stream, run)
+        send_plots(stream, run, alone=not several)
+    text = rr.TextDocument(summary(runs, label), media_type=rr.MediaType.MARKDOWN)
+    stream.log(SUMMARY, text, static=True)
+    stream.flush()
+
+

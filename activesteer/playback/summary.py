@@ -1,0 +1,62 @@
+"""What was driven and what came out, as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from activesteer.playback.runs import Run
+
+MetricLabel = Callable[[str], tuple[str, str, float]]
+"""From the name of a metric to words, unit, and factor from the SI value to that unit."""
+
+
+def plain_label(name: str) -> tuple[str, str, float]:
+    """The name itself, which ends in its SI unit."""
+    return name, "", 1.0
+
+
+def summary(runs: Sequence[Run], label: MetricLabel = plain_label) -> str:
+    """A page in Markdown: scenario, systems, metrics side by side.
+
+    Args:
+        runs: The runs.
+        label: How metrics are shown.
+    """
+    lines: list[str] = []
+    for text in dict.fromkeys(_scenario(run.recording.metadata) for run in runs):
+        lines += [f"## {text}", ""]
+    for run in runs:
+        metadata = run.recording.metadata
+        versions = metadata.get("versions", {})
+        text = f"- **{run.label}**: controller {metadata.get('controller', '?')}, "
+        text += f"vehicle {_named(metadata, 'vehicle', 'name')}, activesteer {versions.get('activesteer', '?')}"
+        if metadata.get("overrides"):
+            text += ", " + ", ".join(f"{key} = {value}" for key, value in metadata["overrides"].items())
+        if not metadata.get("complete", True):
+            text += f". **Incomplete**: {metadata.get('error', 'the run did not end properly')}"
+        lines.append(text)
+    names = list(dict.fromkeys(name for run in runs for name in run.recording.metrics))
+    if names:
+        lines += ["", f"| metric | unit | {' | '.join(run.label for run in runs)} |", "|---" * (2 + len(runs)) + "|"]
+    for name in names:
+        words, unit, factor = label(name)
+        values = (_number(run.recording.metrics.get(name), factor) for run in runs)
+        lines.append(f"| {words} | {unit} | {' | '.join(values)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _scenario(metadata: Mapping[str, Any]) -> str:
+    return _named(metadata, "maneuver", "title") or _named(metadata, "maneuver", "name") or "a run"
+
+
+def _named(metadata: Mapping[str, Any], table: str, key: str) -> str:
+    entry = metadata.get(table, {})
+    return str(entry.get(key, "")) if isinstance(entry, Mapping) else ""
+
+
+def _number(value: float | None, factor: float) -> str:
+    if value is None:
+        return ""
+    return "-" if math.isnan(value) else f"{value * factor:.3f}"

@@ -1,0 +1,93 @@
+"""Five scenarios, three systems: every run is there, and every claim has the verdict that is published."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from activesteer.analysis.claims import SCENARIOS, SYSTEMS, not_reproduced
+from activesteer.analysis.claims.scorecard import CLAIM_IDS
+from activesteer.cli import main
+from activesteer.errors import ParameterError
+from activesteer.recording import Recording
+from activesteer.reproduction import Reproduction, reproduce
+
+Runs = dict[str, dict[str, Recording]]
+
+
+def test_every_run_is_complete_and_in_a_file_of_its_own(reproduced: Reproduction, runs: Runs) -> None:
+    assert reproduced.failures == {}
+    paths = [path for systems in reproduced.paths.values() for path in systems.values()]
+    assert len(set(paths)) == len(SCENARIOS) * len(SYSTEMS)
+    for scenario, systems in runs.items():
+        for system, recording in systems.items():
+            assert recording.metadata["complete"], (scenario, system)
+            assert recording.metadata["controller"] == system
+            assert recording.metadata["maneuver"]["name"] == scenario
+
+
+@pytest.mark.parametrize("number", CLAIM_IDS)
+def test_a_claim_passes_unless_it_is_known_not_to(reproduced: Reproduction, number: str) -> None:
+    judged = next(item for item in reproduced.scorecard.judged if item.claim.id == number)
+    known = number in not_reproduced("compact")
+    assert judged.claim.passed is not known, f"{judged.verdict}: {judged.claim}"
+
+
+def test_all_systems_are_driven_the_same_way(runs: Runs) -> None:
+    """The same driver, road and lanes; in the open-loop manoeuvres, the same steering wheel angle."""
+    for systems in runs.values():
+        first = systems["none"].metadata
+        for recording in systems.values():
+            assert recording.metadata["maneuver"] == first["maneuver"]
+            assert recording.metadata["vehicle"] == first["vehicle"]
+    for scenario in ("step_steer", "sine_with_dwell"):
+        demands = [recording["steering_wheel_demand_rad"] for recording in runs[scenario].values()]
+        assert np.ptp(demands, axis=0).max() == 0.0
+
+
+def test_the_limits_of_the_actuators_are_kept(runs: Runs) -> None:
+    most = np.radians(3.0) + 1e-9
+    for systems in runs.values():
+        for recording in systems.values():
+            assert np.abs(recording["rear_steer_demand_rad"]).max() <= most
+            assert np.abs(recording["superposition_demand_rad"]).max() <= most
+
+
+def test_the_steering_wheel_angle_is_not_wrapped(runs: Runs) -> None:
+    """The paper's tool jumped at half a turn."""
+    for systems in runs.values():
+        for recording in systems.values():
+            assert np.abs(np.diff(recording["steering_wheel_rad"])).max() < np.radians(3.0)
+
+
+def test_the_figures_are_drawn_from_the_files(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["figures", str(tmp_path / "figures"), "--recordings", str(folder)]) == 0
+    names = {Path(line).name for line in capsys.readouterr().out.splitlines()}
+    for number in (1, 2, 7, 9, *range(11, 25)):
+        assert {".png", ".svg"} == {Path(name).suffix for name in names if name.startswith(f"figure_{number:02}_")}
+    assert all((tmp_path / "figures" / name).stat().st_size > 5000 for name in names)
+
+
+def test_a_folder_without_runs_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["figures", str(tmp_path / "figures"), "--recordings", str(tmp_path)]) == 1
+    assert "activesteer reproduce -o" in capsys.readouterr().err
+
+
+def test_the_number_of_processes_is_checked(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="--jobs 0: at least 1"):
+        reproduce(tmp_path, jobs=0)
+
+
+def test_a_run_that_fails_ends_no_other(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
+    """The first block of a failed run is a folder in the way of its file."""
+    (tmp_path / "slalom-ars.mcap").mkdir()
+    monkeypatch.setattr("activesteer.reproduction.SCENARIOS", {name: SCENARIOS[name] for name in ("slalom",)})
+    assert main(["reproduce", "-o", str(tmp_path), "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert list(told["failures"]) == ["slalom ars"]
+    assert told["claims"] == []
+    assert (tmp_path / "slalom-none.mcap").is_file()
+    assert (tmp_path / "slalom-afs.mcap").is_file()

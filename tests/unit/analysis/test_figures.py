@@ -1,0 +1,160 @@
+"""The paper's figures: which there are, what they show, and that they can be written."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from activesteer.analysis.figures import BY_SCENARIO, draw_all, figure_for, theory, time_histories, tracks
+from activesteer.controllers.corrector import tolerance
+from activesteer.controllers.single_track import SingleTrack, SingleTrackParameters
+from activesteer.errors import ParameterError, RecordingError
+from tests.unit.analysis.made_up import (
+    COMPLETION_S,
+    LANES,
+    VEHICLE,
+    along_path,
+    offset_track,
+    sine_with_dwell,
+    slalom,
+    step_steer,
+)
+
+pytest.importorskip("matplotlib")
+
+CONES = tuple((x, y) for _, start, end, right, left in LANES for x in (start, end) for y in (right, left))
+
+
+def lane_changes(**words):
+    return {
+        "none": along_path(lambda x: 1.2 * offset_track(x), path=offset_track, cones=CONES, **words),
+        "ars": along_path(cones=CONES, **words),
+        "afs": along_path(lambda x: 0.9 * offset_track(x), path=offset_track, cones=CONES, **words),
+    }
+
+
+def sines():
+    return {"none": sine_with_dwell(), "ars": sine_with_dwell(rear_rad=0.02), "afs": sine_with_dwell()}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    scenarios = {
+        "step_steer": {"none": step_steer(), "ars": step_steer(rear_rad=-0.01)},
+        "sine_with_dwell": sines(),
+        "double_lane_change": lane_changes(),
+        "slalom": {"none": slalom(1.6), "ars": slalom(1.4), "afs": slalom(1.5)},
+        "double_lane_change_low_mu": lane_changes(),
+    }
+    return draw_all(scenarios, tmp_path_factory.mktemp("figures") / "new")
+
+
+def test_every_figure_of_the_result_part_is_there_as_png_and_svg(files):
+    numbers = [int(path.name.split("_")[1]) for path in files]
+    assert numbers == sorted(2 * [7, 9, *range(11, 25)])
+    assert {path.suffix for path in files} == {".png", ".svg"}
+    assert all(path.stat().st_size > 5000 for path in files)
+    assert len({path.name for path in files}) == len(files) == 2 * (2 + sum(map(len, BY_SCENARIO.values())))
+
+
+def test_only_the_figures_that_there_are_runs_for_are_drawn(tmp_path):
+    paths = draw_all({"step_steer": {"ars": step_steer()}, "parking": {"none": step_steer()}}, tmp_path)
+    assert [path.name[:9] for path in paths[::2]] == ["figure_07", "figure_09", "figure_11"]
+
+
+@pytest.mark.parametrize("recordings", [{}, {"parking": {"none": step_steer()}}, {"slalom": {}}])
+def test_nothing_to_draw_is_an_error(recordings, tmp_path):
+    with pytest.raises(ParameterError, match="no recording to draw"):
+        draw_all(recordings, tmp_path)
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ParameterError, match="cannot make the folder"):
+        draw_all({"step_steer": {"none": step_steer()}}, tmp_path / "file")
+
+
+def test_tracks_are_those_of_the_front_axle_with_cones_lanes_and_a_stated_scale():
+    runs = lane_changes()
+    axis = tracks.track_figure(runs).get_axes()[0]
+    lines = {line.get_label(): line for line in axis.get_lines()}
+    for label, system in (("1 no control", "none"), ("3 active front steering", "afs")):
+        drawn = np.asarray(lines[label].get_xydata())
+        assert drawn[:, 1].max() == pytest.approx(runs[system]["front_axle_y_m"].max())
+    assert len(axis.patches) == len(LANES)
+    cones = [line for line in axis.get_lines() if line.get_marker() == "^"]
+    assert sorted(map(tuple, np.asarray(cones[0].get_xydata()).tolist())) == sorted(CONES)
+    assert f"stretched {axis.get_aspect():.0f} times" in axis.get_ylabel()
+
+
+def test_panels_over_time_are_in_degrees_with_units_at_the_axes():
+    figure = time_histories.steering_and_yaw_rate(lane_changes(yaw_rate=0.2))
+    steering, yaw_rate = figure.get_axes()
+    assert "[deg]" in steering.get_ylabel()
+    assert "[deg/s]" in yaw_rate.get_ylabel()
+    assert "[s]" in yaw_rate.get_xlabel()
+    assert np.max(np.asarray(yaw_rate.get_lines()[0].get_ydata())) == pytest.approx(np.degrees(0.2), rel=1e-3)
+    assert [text.get_text()[0] for text in figure.legends[0].get_texts()] == ["1", "2", "3"]
+
+
+def test_added_angles_are_drawn_of_systems_that_add_any_and_not_at_all_where_none_does():
+    assert len(time_histories.figure_13(sines()).get_axes()) == 4
+    alone = time_histories.figure_13({"none": sine_with_dwell()})
+    assert [axis.get_ylabel() for axis in alone.get_axes() if "added" in axis.get_ylabel()] == []
+
+
+def test_the_instants_of_the_standard_are_marked_from_the_completion_of_steer():
+    axis = time_histories.figure_13(sines()).get_axes()[0]
+    lines = [np.asarray(line.get_xdata(), dtype=float) for line in axis.get_lines()]
+    marks = sorted(float(x[0]) for x in lines if x.size == 2)
+    assert marks == pytest.approx([COMPLETION_S, COMPLETION_S + 1.0, COMPLETION_S + 1.75], abs=0.02)
+
+
+def test_curves_of_long_runs_are_thinned():
+    run = along_path(duration_s=30.0)
+    figure = time_histories.figure_24({"none": run})
+    assert 2000 < np.size(figure.get_axes()[0].get_lines()[0].get_xdata()) <= 5000
+
+
+@pytest.mark.parametrize("kind", ["step_steer", "sine_with_dwell", "lane_change", "slalom", "follow_path", "parking"])
+def test_every_kind_has_a_figure(kind, tmp_path):
+    runs = {"none": sine_with_dwell()} if kind in {"sine_with_dwell", "parking"} else lane_changes()
+    if kind == "step_steer":
+        runs = {"none": step_steer()}
+    path = figure_for(kind)(runs, tmp_path / "figure.png")
+    assert path.stat().st_size > 5000
+
+
+def test_a_path_without_gates_can_be_drawn(tmp_path):
+    run = along_path(kind="follow_path", lanes=(), last_gate_m=None)
+    assert figure_for("follow_path")({"none": run}, tmp_path / "figure.png").exists()
+
+
+def test_predicted_angle_is_that_of_the_controllers():
+    parameters = VEHICLE["single_track"]
+    single_track = SingleTrack(SingleTrackParameters(**parameters))
+    speeds = np.array([5.0, 20.0, 40.0])
+    expected = [single_track.rear_prediction(v)[0] for v in speeds]
+    np.testing.assert_allclose(theory.predicted_rear_angle(parameters, speeds), expected)
+
+
+def test_tolerance_function_is_that_of_the_controllers():
+    errors = np.linspace(-0.01, 0.01, 41)
+    expected = [tolerance(float(error), 0.002, 0.005) for error in errors]
+    np.testing.assert_allclose(theory.tolerance(errors, 0.002, 0.005), expected, atol=1e-12)
+    np.testing.assert_allclose(theory.tolerance(np.array([-0.2, 0.1, 0.3]), 0.1, 0.1), [1.0, 0.0, 1.0])
+
+
+def test_figure_7_shows_what_is_predicted_and_what_share_of_it_is_used():
+    axis = theory.figure_7(step_steer()).get_axes()[0]
+    predicted, used = (np.asarray(line.get_ydata()) for line in axis.get_lines()[1:3])
+    np.testing.assert_allclose(used, 0.1 * predicted)
+    assert predicted[0] < 0.0 < predicted[-1]
+
+
+@pytest.mark.parametrize(("draw", "key"), [(theory.figure_7, "single_track"), (theory.figure_9, "controllers")])
+def test_missing_parameters_are_named(draw, key):
+    run = step_steer()
+    run.metadata["vehicle"] = {name: table for name, table in VEHICLE.items() if name != key}
+    with pytest.raises(RecordingError, match=key):
+        draw(run)

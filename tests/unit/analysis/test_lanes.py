@@ -1,0 +1,117 @@
+"""Lanes and cones, with a car 1.8 m wide on tyres 0.2 m wide, its wheels 1.5 m apart."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from activesteer.analysis.course import read_car, read_course
+from activesteer.analysis.lanes import (
+    CONE_RADIUS_M,
+    FRONT_OVERHANG_M,
+    REAR_OVERHANG_M,
+    all_wheels_in_lanes,
+    cone_distances,
+    lane_overstep,
+)
+from tests.unit.analysis.made_up import LANES, WHEELBASE_M, WIDTH_M, MadeUp, along_path, offset_track
+
+HALF_M = 0.75 + 0.1
+"""From the middle of the car to the outer side of a tyre [m]."""
+
+
+def straight(y_m: float, **words) -> MadeUp:
+    return along_path(lambda x: np.full_like(x, y_m), **words)
+
+
+def overstep(run: MadeUp) -> float:
+    return lane_overstep(run, read_course(run), read_car(run))
+
+
+def kept(run: MadeUp) -> bool:
+    return all_wheels_in_lanes(run, read_course(run), read_car(run))
+
+
+def distances(run: MadeUp) -> np.ndarray:
+    return cone_distances(run, read_course(run), read_car(run))
+
+
+@pytest.mark.parametrize("y_m", [-0.5, 0.0, 0.3])
+def test_overstep_is_the_distance_of_the_outer_tyre_side_from_the_nearer_side_of_the_lane(y_m):
+    run = straight(y_m, lanes=(("lane", 30.0, 45.0, -1.2, 1.2),))
+    assert overstep(run) == pytest.approx(abs(y_m) + HALF_M - 1.2)
+
+
+@pytest.mark.parametrize(("margin_m", "inside"), [(0.002, True), (-0.002, False)])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_wheel_just_inside_is_inside_and_just_outside_is_not(margin_m, inside, side):
+    run = straight(side * (1.2 - HALF_M - margin_m), lanes=(("lane", 30.0, 45.0, -1.2, 1.2),))
+    assert overstep(run) == pytest.approx(-margin_m)
+    assert kept(run) is inside
+
+
+@pytest.mark.parametrize("corner", ["fl", "fr", "rl", "rr"])
+def test_every_wheel_counts(corner):
+    run = along_path()
+    assert kept(run)
+    run.channels[f"{corner}_contact_y_m"] = run[f"{corner}_contact_y_m"] + (2.0 if corner.endswith("l") else -2.0)
+    assert not kept(run)
+    assert overstep(run) > 1.0
+
+
+def test_between_the_lanes_a_wheel_may_go_where_it_likes():
+    def track(x_m):
+        return offset_track(x_m) + 6.0 * np.exp(-((x_m - 60.0) ** 2) / 4.0)
+
+    assert kept(along_path(track))
+
+
+def test_a_wheel_that_is_still_in_the_lane_counts_though_the_front_axle_has_left_it():
+    # The front axle moves over 1 m behind the end of the lane, 1.6 m before the rear wheels get there.
+    def track(x_m):
+        return np.interp(x_m, (45.5, 45.6), (0.0, 3.0))
+
+    run = along_path(track, lanes=LANES[:1])
+    x = run["rl_contact_x_m"]
+    assert x[int(np.argmax(run["front_axle_x_m"] > 45.6))] < 45.0
+    assert not kept(run)
+
+
+def test_a_car_that_stops_before_the_last_lane_has_not_kept_to_the_lanes():
+    run = along_path(stops_m=110.0)
+    assert overstep(run) <= 0.0
+    assert not kept(run)
+    assert not kept(along_path(stops_m=150.0))
+
+
+def test_a_car_that_never_gets_to_a_lane_has_no_overstep():
+    assert math.isnan(overstep(along_path(stops_m=20.0)))
+
+
+@pytest.mark.parametrize("gap_m", [0.05, -0.05])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_cone_beside_the_car_is_hit_when_the_body_reaches_its_disc(gap_m, side):
+    y_m = side * (0.5 * WIDTH_M + CONE_RADIUS_M + gap_m)
+    run = straight(0.0, lanes=(), cones=((60.0, y_m),))
+    assert distances(run) == pytest.approx([gap_m], abs=1e-6)
+
+
+def test_a_cone_in_front_of_a_car_that_stops_is_hit_by_the_front_end():
+    nose_m = 50.0 + FRONT_OVERHANG_M
+    run = straight(0.0, lanes=(), cones=((nose_m + CONE_RADIUS_M + 0.1, 0.0), (nose_m - 0.2, 0.0)), stops_m=50.0)
+    assert distances(run) == pytest.approx([0.1, -0.2 - CONE_RADIUS_M], abs=0.02)
+
+
+def test_the_tail_of_a_turned_car_hits_what_its_front_axle_is_far_from():
+    run = straight(0.0, lanes=(), cones=((50.0, -WHEELBASE_M - REAR_OVERHANG_M - 0.1),), stops_m=50.0)
+    run.channels["yaw_rad"] = np.full_like(run.time_s, math.pi / 2.0)
+    assert distances(run)[0] == pytest.approx(0.1 - CONE_RADIUS_M, abs=1e-6)
+
+
+def test_a_cone_that_marks_a_lane_is_measured_from_the_side_of_the_lane():
+    cones = ((35.0, 1.2), (35.0, -1.3))
+    run = straight(0.0, lanes=(("lane", 30.0, 45.0, -1.2, 1.2),), cones=cones)
+    assert read_course(run).on_lane_side().tolist() == [True, False]
+    assert distances(run) == pytest.approx([0.3, 0.4 - CONE_RADIUS_M])

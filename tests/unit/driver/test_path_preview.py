@@ -1,0 +1,127 @@
+"""The preview driver on a linear single-track car of the test's own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from activesteer.driver import LOOK_INTERVAL_S, DriverParameters, OpenLoopDriver, PathPreviewDriver, SpeedHold
+from activesteer.path import Path
+from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+
+RATIO, LOCK_RAD, TIMESTEP_S = 16.0, 8.0, 0.001
+STRAIGHT = Path.through([0.0, 300.0], [0.0, 0.0])
+
+
+def matrices(speed_mps: float) -> tuple[np.ndarray, np.ndarray]:
+    """A mildly understeering car; states yaw rate and sideslip angle."""
+    m, jz, cv, ch, lv, lh = 1430.0, 2200.0, 98e3, 149e3, 1.08, 1.56
+    d = ch * lh - cv * lv
+    a = [[-(cv * lv**2 + ch * lh**2) / (jz * speed_mps), d / jz],
+         [d / (m * speed_mps**2) - 1.0, -(cv + ch) / (m * speed_mps)]]  # fmt: skip
+    return np.array(a), np.array([[cv * lv / jz], [cv / (m * speed_mps)]])
+
+
+def driver(path: Path = STRAIGHT, parameters: DriverParameters | None = None) -> PathPreviewDriver:
+    known = parameters or DriverParameters()
+    robot = OpenLoopDriver(SpeedHold(known, 1900.0, 350.0, TIMESTEP_S), RATIO, LOCK_RAD)
+    return PathPreviewDriver(robot, path, matrices, known, TIMESTEP_S)
+
+
+def seen(y_m: float = 0.0, yaw_rad: float = 0.0, speed_mps: float = 22.0, x_m: float = 0.0) -> Motion:
+    return Motion(x_m, y_m, yaw_rad, speed_mps, 0.0, 0.0)
+
+
+def command_of(block: PathPreviewDriver, speed_mps: float = 22.0) -> DriverCommand:
+    sensed = Measurement(0.0, speed_mps, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+    return block.step(Reference(0.0, speed_mps, 0.0, hold_speed=True), sensed)
+
+
+def answer_to(block: PathPreviewDriver, motion: Motion, seconds: float) -> list[float]:
+    """Steering wheel angles while the driver sees the same all the time."""
+    angles = []
+    for step in range(round(seconds / TIMESTEP_S)):
+        if step % round(LOOK_INTERVAL_S / TIMESTEP_S) == 0:
+            block.look(motion)
+        angles.append(command_of(block).steering_wheel_rad)
+    return angles
+
+
+def drive(path: Path, speed_mps: float, seconds: float, parameters: DriverParameters | None = None) -> np.ndarray:
+    """Driver and car in a loop; rows of x, y, steering wheel angle."""
+    block = driver(path, parameters)
+    a, b = matrices(speed_mps)
+    state, x, y, yaw, rows = np.zeros(2), 0.0, 0.0, 0.0, []
+    for step in range(round(seconds / TIMESTEP_S)):
+        lateral = speed_mps * math.tan(state[1])
+        if step % round(LOOK_INTERVAL_S / TIMESTEP_S) == 0:
+            block.look(Motion(x, y, yaw, speed_mps, lateral, state[0]))
+        wheel = command_of(block, speed_mps).steering_wheel_rad
+        x += TIMESTEP_S * (speed_mps * math.cos(yaw) - lateral * math.sin(yaw))
+        y += TIMESTEP_S * (speed_mps * math.sin(yaw) + lateral * math.cos(yaw))
+        yaw += TIMESTEP_S * state[0]
+        state = state + TIMESTEP_S * (a @ state + b[:, 0] * wheel / RATIO)
+        rows.append((x, y, wheel))
+    return np.array(rows)
+
+
+def test_on_the_path_he_does_not_steer() -> None:
+    assert answer_to(driver(), seen(), 1.0)[-1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_he_steers_back_to_the_path() -> None:
+    assert answer_to(driver(), seen(y_m=1.0), 1.0)[-1] < -0.01
+    assert answer_to(driver(), seen(yaw_rad=0.05), 1.0)[-1] < -0.01
+
+
+def test_he_is_the_same_to_both_sides() -> None:
+    left, right = answer_to(driver(), seen(y_m=-1.0), 0.5), answer_to(driver(), seen(y_m=1.0), 0.5)
+    assert np.array(left) == pytest.approx(-np.array(right), abs=1e-12)
+
+
+def test_nothing_happens_within_the_reaction_delay() -> None:
+    known = DriverParameters(reaction_delay_s=0.2, neuromuscular_lag_s=0.1)
+    angles = np.array(answer_to(driver(parameters=known), seen(y_m=1.0), 0.6))
+    assert not angles[:200].any()
+    assert angles[200] != 0.0
+    # Behind the delay, a first-order lag: 63 % after its time constant.
+    assert angles[299] / angles[200:].min() == pytest.approx(1.0 - math.exp(-1.0), abs=0.02)
+
+
+def test_the_rate_limit_is_kept_and_told() -> None:
+    known = DriverParameters(steering_rate_limit_radps=2.0)
+    block = driver(parameters=known)
+    angles = answer_to(block, seen(y_m=5.0), 0.5)
+    assert np.abs(np.diff(angles)).max() == pytest.approx(2.0 * TIMESTEP_S)
+    assert command_of(block).limited
+
+
+def test_the_lock_is_kept() -> None:
+    assert answer_to(driver(), seen(y_m=500.0), 3.0)[-1] == pytest.approx(-LOCK_RAD)
+
+
+@pytest.mark.parametrize("speed_mps", [8.0, 22.0, 33.0])
+def test_an_offset_is_steered_away_without_end_oscillation(speed_mps: float) -> None:
+    x = np.arange(0.0, 500.0, 5.0)
+    beside = Path.through(x, 3.0 * np.clip((x - 20.0) / 40.0, 0.0, 1.0))
+    rows = drive(beside, speed_mps, 200.0 / speed_mps)
+    assert rows[-1, 1] == pytest.approx(3.0, abs=0.05)
+    assert np.abs(rows[-1000:, 2]).max() < 0.02
+
+
+def test_a_circle_is_followed() -> None:
+    angle = np.linspace(0.0, 2.0, 100)
+    circle = Path.through(100.0 * np.sin(angle), 100.0 * (1.0 - np.cos(angle)))
+    x, y, _ = drive(circle, 15.0, 10.0)[-1]
+    assert math.hypot(x, y - 100.0) == pytest.approx(100.0, abs=0.3)
+
+
+def test_almost_at_rest_he_holds_the_wheel() -> None:
+    block = driver()
+    answer_to(block, seen(y_m=1.0), 1.0)
+    held = command_of(block).steering_wheel_rad
+    for _ in range(50):
+        block.look(seen(y_m=-3.0, speed_mps=1.0))
+    assert command_of(block).steering_wheel_rad == pytest.approx(held, rel=1e-3)

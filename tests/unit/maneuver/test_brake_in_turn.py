@@ -1,0 +1,79 @@
+"""Braking in a turn as it is asked of the driver."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from activesteer.config import Source
+from activesteer.errors import ManeuverError
+from activesteer.maneuver import BrakeInTurn, build_maneuver
+from activesteer.maneuver.search import SteadyTurn
+
+SOURCE = Source("my_turn.toml", error=ManeuverError)
+
+
+def maneuver(**keys: Any) -> BrakeInTurn:
+    table = {
+        "kind": "brake_in_turn",
+        "speed_kmh": 80,
+        "duration_s": 9.5,
+        "turn": {"start_s": 0.5, "rate_degps": 60, "steering_wheel_deg": 48},
+        "brake": {"start_s": 6.0, "rise_s": 0.2, "pedal": 0.4},
+    }
+    built = build_maneuver(table | keys, SOURCE)
+    assert isinstance(built, BrakeInTurn)
+    return built
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_wheel_is_turned_and_held_and_then_the_brake_is_pressed(side):
+    asked = maneuver(turn={"rate_degps": 60, "steering_wheel_deg": side * 48})
+    wheel = [math.degrees(asked.reference(t).steering_wheel_rad) for t in (0.0, 0.5, 0.9, 1.3, 6.5, 9.5)]
+    assert wheel == pytest.approx([0.0, 0.0, side * 24.0, side * 48.0, side * 48.0, side * 48.0], abs=1e-9)
+    pedal = [asked.reference(t).brake for t in (0.0, 5.999, 6.1, 6.2, 9.5)]
+    assert pedal == pytest.approx([0.0, 0.0, 0.2, 0.4, 0.4])
+
+
+def test_throttle_is_released_with_the_brake():
+    assert maneuver().reference(5.999).hold_speed
+    assert not maneuver().reference(6.0).hold_speed
+    assert maneuver().settling_reference().steering_wheel_rad == 0.0
+
+
+def test_aim_asks_for_the_search_of_the_step_steer():
+    assert maneuver().search is None
+    asked = maneuver(turn={"lateral_acceleration_mps2": 5.0}, road={"mu": 0.8})
+    search = asked.search
+    assert isinstance(search, SteadyTurn)
+    assert search.lateral_acceleration_mps2 == 5.0
+    assert search.probe.road == asked.road
+    assert search.probe.speed_mps == asked.speed_mps
+    found = search.accept(0.8)
+    assert isinstance(found, BrakeInTurn)
+    assert found.search is None
+    assert found.reference(5.0).steering_wheel_rad == pytest.approx(0.8)
+    assert found.turn.lateral_acceleration_mps2 == 5.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"turn": {}}, r"turn: steering_wheel_deg .* or lateral_acceleration_mps2 .* is needed"),
+        ({"brake": {"pedal": 1.5}}, r"brake\.pedal: 1\.5 is out of range; allowed is 0 to 1"),
+        (
+            {"brake": {"pedal": 0.5, "start_s": 0.2}},
+            r"brake\.start_s: is 0\.2 s; it must be above turn\.start_s, 0\.5 s",
+        ),
+        ({"brake": {"pedal": 0.5, "start_s": 9.4}}, r"brake\.start_s: the brake is pressed down at 9\.6 s, .* 9\.5 s"),
+        (
+            {"speed_kmh": -20, "turn": {"lateral_acceleration_mps2": 5.0}},
+            r"speed_kmh: is -20 km/h; turn\.lateral_acceleration_mps2 needs at least 30 km/h, or give",
+        ),
+    ],
+)
+def test_wrong_values_are_answered_with_what_is_allowed(keys, told):
+    with pytest.raises(ManeuverError, match=r"^my_turn\.toml: " + told):
+        maneuver(**keys)

@@ -1,0 +1,164 @@
+"""The double lane change: the path through the lanes, and what is said of wrong ones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from activesteer.config import Source
+from activesteer.errors import ManeuverError, ParameterError
+from activesteer.maneuver import Course, LaneChange, build_maneuver
+from activesteer.scenario import resolve
+
+SOURCE = Source("my_lanes.toml", error=ManeuverError)
+STANDARDS = ("iso_3888_1", "iso_3888_2")
+
+
+def change(lane: dict[str, Any] | None = None, **keys: Any) -> LaneChange:
+    table = {"kind": "lane_change", "speed_kmh": 80, "duration_s": 11.0, "vehicle_width_m": 1.8, "lane": lane or {}}
+    built = build_maneuver(table | keys, SOURCE)
+    assert isinstance(built, LaneChange)
+    return built
+
+
+def course(lane: dict[str, Any]) -> Course:
+    return change(lane).course
+
+
+def least_distance_m(course: Course, width_m: float) -> float:
+    """Least distance between the car's sides, at axles 1.3 m from its centre, and the edges of the lanes."""
+    path = course.path
+    s = np.arange(0.0, path.length_m, 0.02)
+    x, y = path.at(s)
+    heading = np.interp(s, path.s_m, path.heading_rad)
+    distances = []
+    for ahead in (1.3, -1.3):
+        for aside in (0.5 * width_m, -0.5 * width_m):
+            side_x = x + ahead * np.cos(heading) - aside * np.sin(heading)
+            side_y = y + ahead * np.sin(heading) + aside * np.cos(heading)
+            for lane in course.lanes:
+                there = (side_x >= lane.start_x_m) & (side_x <= lane.end_x_m)
+                distances += [(side_y[there] - lane.right_y_m).min(), (lane.left_y_m - side_y[there]).min()]
+    return min(distances)
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+@pytest.mark.parametrize("margin", [0.0, 0.1, 0.15])
+def test_sides_of_the_car_keep_the_margin(standard, margin):
+    reached = least_distance_m(course({"standard": standard, "path": "least_jerk", "margin_m": margin}), 1.8)
+    # To 1 cm: the path of the sides is that of small headings.
+    assert margin - 0.01 < reached < margin + 0.03
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+@pytest.mark.parametrize("path", ["middle", "least_jerk"])
+def test_path_is_straight_before_the_first_lane_and_behind_the_last(standard, path):
+    laid = course({"standard": standard, "path": path, "entry_m": 40.0})
+    first, last = laid.lanes[0], laid.lanes[-1]
+    at = laid.path
+    before = at.x_m < first.start_x_m - 0.5
+    assert np.abs(at.y_m[before]).max() < 1e-3
+    assert (at.x_m[0], at.y_m[0]) == pytest.approx((0.0, 0.0), abs=1e-9)
+    assert at.x_m[-1] == pytest.approx(last.end_x_m)
+    assert at.y_m[-1] == pytest.approx(0.5 * (last.left_y_m + last.right_y_m))
+    assert at.heading_rad[-1] == pytest.approx(0.0, abs=2e-3)
+    assert laid.last_gate_x_m == last.end_x_m
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+@pytest.mark.parametrize("path", ["middle", "least_jerk"])
+def test_curvature_has_no_jump(standard, path):
+    at = course({"standard": standard, "path": path}).path
+    # From point to point, half a metre; a jump would be as large as the curvature itself.
+    assert np.abs(np.diff(at.curvature_1pm)).max() < 0.4 * np.abs(at.curvature_1pm).max()
+
+
+def test_path_of_least_jerk_asks_for_less_acceleration_than_the_middle():
+    peaks = [
+        float(np.abs(course(lane).path.curvature_1pm).max()) * (80.0 / 3.6) ** 2
+        for lane in ({"path": "least_jerk", "margin_m": 0.1}, {"path": "least_jerk", "margin_m": 0.2}, {})
+    ]
+    # Not below the 3.07 m/s2 that any path with 0.1 m margin needs (a linear programme for the least peak says so).
+    assert 3.07 < peaks[0] < 4.5
+    assert peaks[0] < peaks[1]
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+@pytest.mark.parametrize("path", ["middle", "least_jerk"])
+def test_change_to_the_right_is_the_mirror_image(standard, path):
+    left, right = (course({"standard": standard, "path": path, "side": side}) for side in ("left", "right"))
+    assert np.array_equal(right.path.y_m, -left.path.y_m)
+    assert np.array_equal(right.path.x_m, left.path.x_m)
+    assert {(x, -y) for x, y in right.cones} == set(left.cones)
+
+
+def test_course_is_the_same_every_time():
+    first, again = (course({"path": "least_jerk"}).path for _ in range(2))
+    assert np.array_equal(first.y_m, again.y_m)
+
+
+def test_driver_is_asked_for_the_speed_only():
+    reference = change().reference(3.0)
+    assert reference == change().settling_reference()
+    assert reference.speed_mps == pytest.approx(80.0 / 3.6)
+    assert reference.hold_speed
+    assert reference.steering_wheel_rad == 0.0
+    assert reference.curvature_1pm is None
+
+
+def test_lanes_are_made_for_the_car_unless_the_file_says_otherwise():
+    own = resolve("double_lane_change", overrides={"width_m": 1.9}).maneuver
+    given = resolve("double_lane_change", overrides={"vehicle_width_m": 1.7}).maneuver
+    assert isinstance(own, LaneChange)
+    assert isinstance(given, LaneChange)
+    assert own.vehicle_width_m == 1.9
+    assert given.vehicle_width_m == 1.7
+    entry = own.course.lanes[0]
+    assert entry.left_y_m - entry.right_y_m == pytest.approx(1.1 * 1.9 + 0.25)
+
+
+@pytest.mark.parametrize("standard", STANDARDS)
+def test_largest_margin_that_is_told_can_be_driven(standard):
+    with pytest.raises(ManeuverError) as told:
+        change({"standard": standard, "path": "least_jerk", "margin_m": 0.5})
+    most = float(str(told.value).rpartition("to ")[2].removesuffix(" m"))
+    laid = course({"standard": standard, "path": "least_jerk", "margin_m": most - 0.001})
+    assert least_distance_m(laid, 1.8) == pytest.approx(most, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        (
+            {"lane": {"standard": "iso_3888"}},
+            r"lane: standard: is 'iso_3888'; allowed are 'iso_3888_1' and 'iso_3888_2'",
+        ),
+        ({"lane": {"side": "up"}}, r"lane: side: is 'up'; allowed are 'left' and 'right'"),
+        (
+            {"lane": {"path": "least_jerk", "margin_m": 0.3}},
+            r"lane\.margin_m: is 0\.3 m, but the entry lane is 2\.23 m wide and the car 1\.8 m; .* 0 to 0\.205 m",
+        ),
+        ({"lane": {"margin_m": -0.1}}, r"lane\.margin_m: -0\.1 is out of range; allowed is 0 to 1"),
+        ({"speed_kmh": -20}, r"speed_kmh: is -20 km/h; a course is driven forwards, with at least 5 km/h"),
+        ({"speed_kmh": 0}, r"speed_kmh: is 0 km/h; .* at least 5 km/h"),
+        (
+            {"duration_s": 5.0},
+            r"duration_s: is 5 s, but at 80 km/h the last gate, 155 m from the start, is reached after 7\.0 s; 10\.5 s",
+        ),
+        ({"vehicle_width_m": None}, r"vehicle_width_m: is missing; .*\(width_m\)"),
+        ({"vehicle_width_m": 0.1}, r"vehicle_width_m: 0\.1 is out of range; allowed is 0\.5 to 4"),
+        ({"road": "ice"}, r"road: 'ice' is no table"),
+    ],
+)
+def test_wrong_values_are_answered_with_what_is_allowed(keys, told):
+    with pytest.raises(ManeuverError, match=r"^my_lanes\.toml: " + told):
+        change(**keys)
+
+
+def test_overridden_speed_is_answered_the_same_way():
+    with pytest.raises(ManeuverError, match="driven forwards"):
+        resolve("double_lane_change", overrides={"speed_kmh": -20})
+    with pytest.raises(ParameterError, match=r"did you mean 'lane\.margin_m'"):
+        resolve("double_lane_change", overrides={"lane.margim_m": 0.1})

@@ -1,0 +1,66 @@
+"""The manoeuvres that come with the package: those of the paper as it says, all long enough to be evaluated."""
+
+from __future__ import annotations
+
+import pytest
+
+from activesteer.maneuver import LaneChange, SineWithDwell, Slalom
+from activesteer.resources import list_maneuvers
+from activesteer.scenario import resolve
+
+
+def test_all_kinds_that_were_asked_for_are_there():
+    asked = {
+        "step_steer", "sine_with_dwell", "double_lane_change", "double_lane_change_low_mu", "slalom", "straight_line",
+        "sine_sweep", "slowly_increasing_steer", "ramp_steer", "constant_radius", "brake_in_turn", "severe_lane_change",
+        "split_mu_braking",
+    }  # fmt: skip
+    assert asked <= set(list_maneuvers())
+
+
+@pytest.mark.parametrize("name", list_maneuvers())
+def test_course_goes_on_long_enough_behind_the_last_gate(name):
+    maneuver = resolve(name).maneuver
+    if maneuver.course is None or maneuver.course.last_gate_x_m is None:
+        return
+    slow = maneuver.speed_mps - 3.0 / 3.6
+    assert maneuver.duration_s - maneuver.course.last_gate_x_m / slow > 3.5
+
+
+@pytest.mark.parametrize(
+    ("name", "kmh", "mu"),
+    [
+        ("step_steer", 80.0, 0.9),
+        ("sine_with_dwell", 80.0, 0.9),
+        ("double_lane_change", 80.0, 0.9),
+        ("slalom", 100.0, 0.9),
+        ("double_lane_change_low_mu", 80.0, 0.4),
+    ],
+)
+def test_speed_and_road_are_those_of_the_paper(name, kmh, mu):
+    maneuver = resolve(name).maneuver
+    assert maneuver.speed_mps == pytest.approx(kmh / 3.6)
+    assert maneuver.road.mu == mu
+
+
+def test_sine_with_dwell_is_that_of_the_paper():
+    maneuver = resolve("sine_with_dwell").maneuver
+    assert isinstance(maneuver, SineWithDwell)
+    assert maneuver.steer.frequency_Hz == 0.7
+    assert maneuver.steer.dwell_s == 0.5
+    assert maneuver.duration_s - maneuver.steer.completion_s > 2.5
+
+
+def test_both_lane_changes_differ_by_the_road_alone():
+    dry, slippery = (resolve(name).maneuver for name in ("double_lane_change", "double_lane_change_low_mu"))
+    assert isinstance(dry, LaneChange)
+    assert isinstance(slippery, LaneChange)
+    assert dry.lane == slippery.lane
+    assert dry.lane.standard == "iso_3888_1"
+    assert dry.speed_mps == slippery.speed_mps
+
+
+def test_slalom_has_the_spacing_that_suits_its_speed():
+    maneuver = resolve("slalom").maneuver
+    assert isinstance(maneuver, Slalom)
+    assert maneuver.cones.spacing_m == 36.0

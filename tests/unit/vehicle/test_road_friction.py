@@ -1,0 +1,125 @@
+"""Which friction a wheel feels, where it touches the road, and how much of the friction it uses."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer.conventions import CORNERS
+from activesteer.road import Road, RoadPatch
+from activesteer.tyre.magic_formula import steady_state
+from activesteer.tyre.parameters import FZMAX
+from activesteer.vehicle import Vehicle
+from activesteer.vehicle import force_block as fb
+from tests.unit.vehicle.cars import record, scenario, tilted_and_moving
+
+LEFT, RIGHT = (0, 2), (1, 3)
+
+
+def rolling(road: Road) -> Vehicle:
+    """The car at 20 m/s where a recording starts: its centre of gravity at the origin."""
+    given = scenario()
+    vehicle = Vehicle(given.mjcf, given.car, given.tyres, road)
+    vehicle.start(20.0)
+    return vehicle
+
+
+def frictions(vehicle: Vehicle) -> list[float]:
+    mujoco.mj_forward(vehicle.model, vehicle.data)
+    return [record(vehicle, corner, fb.U_MU) for corner in CORNERS]
+
+
+def move(vehicle: Vehicle, x_m: float, y_m: float = 0.0) -> None:
+    vehicle.data.qpos[0] += x_m
+    vehicle.data.qpos[1] += y_m
+
+
+def test_a_split_road_is_split_along_the_middle_of_the_car() -> None:
+    vehicle = rolling(Road(0.9, mu_left=0.3, mu_right=0.6))
+    vehicle.rebase()
+    assert frictions(vehicle) == [0.3, 0.6, 0.3, 0.6]
+    move(vehicle, 0.0, 1.0)
+    assert frictions(vehicle) == [0.3] * 4
+
+
+def test_one_side_alone_may_differ() -> None:
+    vehicle = rolling(Road(0.9, mu_right=0.6))
+    vehicle.rebase()
+    assert frictions(vehicle) == [0.9, 0.6, 0.9, 0.6]
+
+
+def test_patch_beats_split_and_the_later_patch_the_earlier() -> None:
+    patches = (RoadPatch(-10.0, 10.0, 0.3), RoadPatch(-10.0, 0.0, 0.5, "left"), RoadPatch(100.0, 101.0, 0.1))
+    vehicle = rolling(Road(0.9, mu_left=0.8, patches=patches))
+    vehicle.rebase()
+    # The origin is the centre of gravity: the front wheels are ahead of it, the rear ones behind.
+    assert frictions(vehicle) == [0.3, 0.3, 0.5, 0.3]
+    move(vehicle, 50.0)
+    assert frictions(vehicle) == [0.8, 0.9, 0.8, 0.9]
+
+
+def test_the_beginning_belongs_to_a_patch_and_the_end_does_not() -> None:
+    vehicle = rolling(Road(0.9))
+    vehicle.rebase()
+    assert frictions(vehicle) == [0.9] * 4
+    at = [record(vehicle, corner, fb.U_CONTACT_X) for corner in CORNERS]
+    for start, end, expected in (
+        (at[0], at[0] + 1.0, 0.3),
+        (np.nextafter(at[0], np.inf), at[0] + 1.0, 0.9),
+        (at[0] - 1.0, at[0], 0.9),
+    ):
+        patched = rolling(Road(0.9, patches=(RoadPatch(start, end, 0.3),)))
+        patched.rebase()
+        assert frictions(patched)[0] == expected
+
+
+def test_while_the_car_settles_there_is_one_friction_only() -> None:
+    vehicle = rolling(Road(0.9, mu_left=0.3, patches=(RoadPatch(-1e3, 1e3, 0.5),)))
+    assert frictions(vehicle) == [0.9] * 4
+    vehicle.rebase()
+    assert frictions(vehicle) == [0.5] * 4
+    vehicle.start(20.0)
+    assert frictions(vehicle) == [0.9] * 4
+
+
+def test_the_road_begins_where_the_recording_does() -> None:
+    vehicle = rolling(Road(0.9, patches=(RoadPatch(0.0, 1e3, 0.5),)))
+    move(vehicle, 40.0)
+    vehicle.rebase()
+    assert frictions(vehicle) == [0.5, 0.5, 0.9, 0.9]
+
+
+def test_the_contact_point_lies_in_the_wheel_plane_below_the_centre(rng: np.random.Generator) -> None:
+    vehicle = rolling(Road(0.9))
+    tilted_and_moving(vehicle, rng)
+    model, data = vehicle.model, vehicle.data
+    mujoco.mj_forward(model, data)
+    for corner in CORNERS:
+        body = model.body(f"{corner}_wheel").id
+        axis, centre = data.xmat[body].reshape(3, 3)[:, 1], data.xpos[body]
+        contact = np.array([record(vehicle, corner, fb.U_CONTACT_X), record(vehicle, corner, fb.U_CONTACT_Y), 0.0])
+        assert abs(axis[2]) > 1e-3
+        assert (contact - centre) @ axis == pytest.approx(0.0, abs=1e-12)
+        assert (contact - centre) @ np.cross(axis, [0.0, 0.0, 1.0]) == pytest.approx(0.0, abs=1e-12)
+        assert np.linalg.norm(contact - centre) == pytest.approx(record(vehicle, corner, fb.U_LOADED_RADIUS), rel=1e-12)
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.4])
+def test_friction_use_is_that_of_the_formula_s_own_peaks(mu: float, rng: np.random.Generator) -> None:
+    given = scenario()
+    vehicle = rolling(Road(mu))
+    tilted_and_moving(vehicle, rng)
+    mujoco.mj_forward(vehicle.model, vehicle.data)
+    for corner in CORNERS:
+        fx, fy, fz = (record(vehicle, corner, slot) for slot in (fb.U_FX, fb.U_FY, fb.U_FZ))
+        gamma = record(vehicle, corner, fb.U_INCLINATION)
+        tyre = given.tyres[0].mounted_on("LEFT" if corner.endswith("l") else "RIGHT").array
+        # The formula ends at the greatest load of the file.
+        load = min(fz, tyre[FZMAX])
+        assert load > 100.0
+        # Friction does not depend on the slips; the formula wants some all the same.
+        mu_x, mu_y = steady_state(tyre, load, 0.01, 0.02, gamma, 250e3, 15.0, mu, 0.0)[5:7]
+        use = record(vehicle, corner, fb.U_FRICTION_USE)
+        assert use > 0.02
+        assert use == pytest.approx(np.hypot(fx / (mu_x * load), fy / (mu_y * load)), rel=0.02)
