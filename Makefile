@@ -13,8 +13,8 @@ READY_DEV := $(VENV)/.ready-dev
 help:  ## what there is
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 24
 
-demo: $(READY)  ## step steer with the three steering systems: table, MCAP files and a plot in demo/
-	$(BIN)/activesteer run step_steer -c none -c ars -c afs --plot -o demo
+demo: $(READY)  ## the paper's scenarios with three steering systems: scorecard, MCAP files and figures in demo/
+	$(BIN)/activesteer reproduce --figures -o demo
 
 test: lint  ## lint, types, module borders, and every test that is not slow
 	$(BIN)/python -m pytest -m "not slow"

@@ -27,7 +27,7 @@ _CONTROLLER: Final = "ars"
 
 
 def bench(rounds: int = _ROUNDS) -> dict[str, float]:
-    """Measures one step at four stages, and the blocks of the loop one by one.
+    """Measures one step at five stages, and the blocks of the loop one by one.
 
     Args:
         rounds: How often everything is measured; the best counts.
@@ -35,20 +35,22 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
     Returns:
         Microseconds per step: `bare_step_us` (the engine with the same model, without tyres), `plant_step_us` (with
         tyres, dampers, actuators), `closed_loop_step_us` (and manoeuvre, driver, controller, every channel recorded in
-        memory), `with_file_step_us` (and written as MCAP); the ratios of the last two to the first; real-time
-        factors; and `*_us` for each block of the loop.
+        memory), `path_following_step_us` (the same in a slalom, with a driver who looks at a path), `with_file_step_us`
+        (the step steer written as MCAP); the ratios of the last three to the first; real-time factors; and `*_us` for each block of the loop.
     """
-    scenario = prepared(resolve("step_steer"))
+    scenario, along_path = prepared(resolve("step_steer")), resolve("slalom")
     with tempfile.TemporaryDirectory() as folder:
         stages: dict[str, Callable[[], float]] = {
             "bare_step_us": lambda: _bare(scenario),
             "plant_step_us": lambda: _plant(scenario),
             "closed_loop_step_us": lambda: _closed_loop(scenario),
+            "path_following_step_us": lambda: _closed_loop(along_path),
             "with_file_step_us": lambda: _with_file(scenario, Path(folder) / "bench.mcap"),
         }
         best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
     step_us = 1e6 * Simulation(scenario).vehicle.timestep_s
     best["closed_loop_to_bare_ratio"] = best["closed_loop_step_us"] / best["bare_step_us"]
+    best["path_following_to_bare_ratio"] = best["path_following_step_us"] / best["bare_step_us"]
     best["with_file_to_bare_ratio"] = best["with_file_step_us"] / best["bare_step_us"]
     best["real_time_factor"] = step_us / best["closed_loop_step_us"]
     best["real_time_factor_with_file"] = step_us / best["with_file_step_us"]

@@ -15,7 +15,8 @@ Method:
 
 Validity: small motions about straight driving on a level, even road. Dampers enter with the mean of the slopes of
 their curves on both sides of rest, friction of their seals as the road's vibration leaves it at small speeds. Friction
-of the rack is left out: about a point of rest it would hold the rack by its elasticity, while a steered car's rack slides.
+of the rack is left out: about a point of rest it would hold the rack by its elasticity, while the rack of a steered car
+slides.
 """
 
 from __future__ import annotations

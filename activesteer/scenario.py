@@ -145,7 +145,13 @@ def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
     if first in _PARTS and rest:
         return first, rest
     paths = {"maneuver": key_paths(kind), "vehicle": key_paths(CarFile)}
-    holders = [part for part in _PARTS if any(path == key or path.startswith(key + ".") for path in paths[part])]
+    # A key may name a whole table, a value, or, behind the number of a list's entry, a value in it.
+    dotted = key + "."
+    holders = [
+        part
+        for part in _PARTS
+        if any(f"{path}.".startswith(dotted) or dotted.startswith(f"{path}.") for path in paths[part])
+    ]
     if len(holders) == 1:
         return holders[0], [first, *rest]
     if holders:

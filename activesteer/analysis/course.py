@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,12 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
 
 Array = NDArray[np.float64]
+
+BEFORE_M: Final = 20.0
+AFTER_M: Final = 50.0
+"""How much of the road is shown before the first gate and after the last [m]."""
+BESIDE_M: Final = 2.0
+"""How much of it beside the course [m]; who leaves the track leaves the picture."""
 
 
 class Lane(NamedTuple):
@@ -55,6 +61,16 @@ class Course(NamedTuple):
         if self.lanes:
             return min(lane.start_x_m for lane in self.lanes)
         return float(self.cones_m[:, 0].min()) if len(self.cones_m) else 0.0
+
+    def shown(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """What of the road a picture shows: limits of x and of y [m]."""
+        ys = [self.path_y_m, self.cones_m[:, 1], np.array([y for lane in self.lanes for y in lane[3:]])]
+        every = np.concatenate(ys)
+        low, high = float(every.min()) - BESIDE_M, float(every.max()) + BESIDE_M
+        if self.last_gate_x_m is None:
+            xs = self.path_x_m
+            return (float(xs.min()) - BESIDE_M, float(xs.max()) + BESIDE_M), (low, high)
+        return (self.first_gate_x_m - BEFORE_M, self.last_gate_x_m + AFTER_M), (low, high)
 
     def on_lane_side(self) -> NDArray[np.bool_]:
         """Which cones stand on the side of a lane, so that they mark its width."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import rerun as rr
@@ -13,8 +13,8 @@ from activesteer.playback.runs import CHASSIS, Run
 from activesteer.playback.timeline import times
 from activesteer.recording import Primitive
 
-_GHOST_OPACITY: Final = 0.35
-"""Of another run's car in the view of a run."""
+_GHOST_LINE_M: Final = 0.012
+"""Radius of the lines that draw the car of another run: solids would hide what they share their place with [m]."""
 _SEE_THROUGH: Final = 0.5
 """Solids with less opacity are the shell of the body, which takes the colour of the run where there are several."""
 
@@ -48,9 +48,7 @@ def send_car(stream: rr.RecordingStream, run: Run, *, tinted: bool) -> None:
         colours = [_colour(solid, run.colour if tinted else None) for solid in solids]
         _send_solids(stream, f"{body_path(run, body)}/solid", solids, colours)
     for path, body in zip(ghost_paths(run), ghost_bodies(run), strict=True):
-        solids = bodies[body]
-        tint = (*rgb(run.colour), round(255 * _GHOST_OPACITY))
-        _send_solids(stream, path, solids, [tint] * len(solids))
+        _send_solids(stream, path, bodies[body], [(*rgb(run.colour), 255)] * len(bodies[body]), lines=True)
 
 
 def body_path(run: Run, body: str) -> str:
@@ -87,8 +85,14 @@ def _colour(solid: Primitive, tint: str | None) -> tuple[int, int, int, int]:
 
 
 def _send_solids(
-    stream: rr.RecordingStream, path: str, solids: Sequence[Primitive], colours: Sequence[tuple[int, int, int, int]]
+    stream: rr.RecordingStream,
+    path: str,
+    solids: Sequence[Primitive],
+    colours: Sequence[tuple[int, int, int, int]],
+    *,
+    lines: bool = False,
 ) -> None:
+    fill = rr.components.FillMode.MajorWireframe if lines else rr.components.FillMode.Solid
     for kind in ("box", "cylinder", "sphere"):
         members = [index for index, solid in enumerate(solids) if solid.kind == kind]
         if not members:
@@ -96,14 +100,13 @@ def _send_solids(
         size = np.array([solids[index].size_m for index in members])
         at = np.array([solids[index].position_m for index in members])
         turn = xyzw([solids[index].quaternion for index in members])
-        colour = [colours[index] for index in members]
-        # A fill mode has to be given: lines only are the default.
+        look: dict[str, Any] = {
+            "centers": at, "quaternions": turn, "colors": [colours[index] for index in members], "fill_mode": fill
+        }  # fmt: skip
         if kind == "box":
-            drawn = rr.Boxes3D(half_sizes=size / 2, centers=at, quaternions=turn, colors=colour, fill_mode="solid")
+            drawn = rr.Boxes3D(half_sizes=size / 2, radii=_GHOST_LINE_M, **look)
         elif kind == "cylinder":
-            drawn = rr.Cylinders3D(
-                lengths=size[:, 2], radii=size[:, 0] / 2, centers=at, quaternions=turn, colors=colour, fill_mode="solid"
-            )
+            drawn = rr.Cylinders3D(lengths=size[:, 2], radii=size[:, 0] / 2, line_radii=_GHOST_LINE_M, **look)
         else:
-            drawn = rr.Ellipsoids3D(half_sizes=size / 2, centers=at, quaternions=turn, colors=colour, fill_mode="solid")
+            drawn = rr.Ellipsoids3D(half_sizes=size / 2, line_radii=_GHOST_LINE_M, **look)
         stream.log(f"{path}/{kind}", drawn, static=True)

@@ -21,7 +21,9 @@ ROAD, COURSE, MAP = "road", "course", "map"
 
 _BESIDE_M: Final = 15.0
 _BEYOND_M: Final = 60.0
-"""How much road there is beside and beyond everything that happens on it [m]."""
+"""How far grid and patches reach beside and beyond everything that happens on the road [m]."""
+_HORIZON_M: Final = 2000.0
+"""How much further the road goes on [m]: what stands still in the picture of a camera that follows a car."""
 _MAP_MARGIN_M: Final = 8.0
 _TILE_M: Final = 10.0
 
@@ -30,6 +32,7 @@ _MARKING: Final = (92, 95, 100)
 _LANE: Final = (0, 158, 115)
 _CONE: Final = (255, 120, 20)
 _PATH: Final = (240, 228, 66)
+_MAP_PATH: Final = (140, 132, 40)
 _SLIPPERY: Final = (110, 150, 190)
 _GRIPPY: Final = (44, 44, 46)
 _CONE_HEIGHT_M: Final = 0.5
@@ -71,7 +74,8 @@ def send_road(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
     high_x = np.ceil((around.high_x_m + _BEYOND_M) / _TILE_M) * _TILE_M
     low_y = np.floor((around.low_y_m - _BESIDE_M) / _TILE_M) * _TILE_M
     high_y = np.ceil((around.high_y_m + _BESIDE_M) / _TILE_M) * _TILE_M
-    stream.log(f"{ROAD}/surface", _plane(low_x, high_x, low_y, high_y, 0.0, _ASPHALT), static=True)
+    far = (low_x - _HORIZON_M, high_x + _HORIZON_M, low_y - _HORIZON_M, high_y + _HORIZON_M)
+    stream.log(f"{ROAD}/surface", _plane(*far, 0.0, _ASPHALT), static=True)
     across = [[(x, low_y, 0.005), (x, high_y, 0.005)] for x in np.arange(low_x, high_x + 1.0, _TILE_M)]
     along = [[(low_x, y, 0.005), (high_x, y, 0.005)] for y in np.arange(low_y, high_y + 1.0, _TILE_M)]
     stream.log(f"{ROAD}/grid", rr.LineStrips3D(across + along, colors=[_MARKING], radii=[0.03]), static=True)
@@ -99,16 +103,16 @@ def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
     line = np.column_stack([path, np.full(len(path), 0.02)])
     stream.log(f"{COURSE}/path", rr.LineStrips3D([line], colors=[_PATH], radii=[0.03]), static=True)
     edges = _lane_outlines(course)
-    stream.log(f"{MAP}/path", rr.LineStrips2D([_flat(path)], colors=[_PATH], radii=_points(1.0)), static=True)
+    stream.log(f"{MAP}/path", rr.LineStrips2D([_flat(path)], colors=[_MAP_PATH], radii=_points(1.0), draw_order=1.0), static=True)
     if edges:
         strips = [np.column_stack([edge, np.full(len(edge), 0.015)]) for edge in edges]
         stream.log(f"{COURSE}/lanes", rr.LineStrips3D(strips, colors=[_LANE], radii=[0.05]), static=True)
         flat = [_flat(edge) for edge in edges]
-        stream.log(f"{MAP}/lanes", rr.LineStrips2D(flat, colors=[_LANE], radii=_points(1.0)), static=True)
+        stream.log(f"{MAP}/lanes", rr.LineStrips2D(flat, colors=[_LANE], radii=_points(1.0), draw_order=2.0), static=True)
     cones = np.reshape(course["cones"], (-1, 2))
     if len(cones):
         stream.log(f"{COURSE}/cones", _cones(cones), static=True)
-        stream.log(f"{MAP}/cones", rr.Points2D(_flat(cones), colors=[_CONE], radii=_points(2.0)), static=True)
+        stream.log(f"{MAP}/cones", rr.Points2D(_flat(cones), colors=[_CONE], radii=_points(1.8), draw_order=3.0), static=True)
 
 
 def send_track(stream: rr.RecordingStream, run: Run) -> None:
@@ -117,18 +121,21 @@ def send_track(stream: rr.RecordingStream, run: Run) -> None:
     line = np.column_stack([track, np.full(len(track), 0.03)])
     colour = rgb(run.colour)
     stream.log(f"{run.scene}/driven", rr.LineStrips3D([line], colors=[colour], radii=[0.035]), static=True)
-    stream.log(f"{MAP}/{run.name}/driven", rr.LineStrips2D([_flat(track)], colors=[colour], radii=_points(1.2)), static=True)
-    strips = _outline(run)
-    path, count = f"{MAP}/{run.name}/car", len(strips)
-    stream.log(path, rr.LineStrips2D.from_fields(colors=[colour], radii=_points(1.5)), static=True)
-    when = times(run.recording.poses.time_s[run.poses])
-    # As list of strips, each of shape (points, 2): the strips differ in length.
-    flat = [strip[row] for row in range(len(run.poses)) for strip in strips]
-    stream.send_columns(path, when, rr.LineStrips2D.columns(strips=flat).partition(lengths=[count] * len(run.poses)))
+    stream.log(f"{MAP}/{run.name}/driven", rr.LineStrips2D([_flat(track)], colors=[colour], radii=_points(0.8), draw_order=4.0), static=True)
+    strokes = _outline(run).astype(np.float32)
+    path = f"{MAP}/{run.name}/car"
+    stream.log(path, rr.LineStrips2D.from_fields(colors=[colour], radii=_points(1.8), draw_order=5.0), static=True)
+    # An array of strokes that all have two points is sent a hundred times as fast as a list of them.
+    columns = rr.LineStrips2D.columns(strips=strokes.reshape(-1, 2, 2))
+    stream.send_columns(
+        path,
+        times(run.recording.poses.time_s[run.poses]),
+        columns.partition(lengths=[strokes.shape[1]] * len(strokes)),
+    )
 
 
-def _outline(run: Run) -> list[Array]:
-    """Rectangle of the car and a stroke for each wheel, on the map, each of shape (poses, points, 2)."""
+def _outline(run: Run) -> Array:
+    """Sides of the car and a stroke for each wheel, on the map, shape (poses, strokes, 2 points, 2)."""
     poses, car = run.recording.poses, run.recording.metadata.get("car", {})
     half, wheelbase = 0.5 * float(car.get("width_m", 1.8)), float(car.get("wheelbase_m", 2.7))
     nose, tail = 0.85, -wheelbase - 0.75  # typical overhangs; nothing but this drawing depends on them
@@ -146,9 +153,10 @@ def _outline(run: Run) -> list[Array]:
         return _flat(np.stack([at[:, :1] + cos * x - sin * y, at[:, 1:2] + sin * x + cos * y], axis=-1))
 
     corners = [(nose, half), (nose, -half), (tail, -half), (tail, half), (nose, half)]
-    strips = [placed(chassis, corners, level=False)]
+    strips = [placed(chassis, corners[side : side + 2], level=False) for side in range(4)]
     wheels = [index for index, name in enumerate(poses.names) if name.endswith("_wheel")]
-    return strips + [placed(wheel, [(-0.32, 0.0), (0.32, 0.0)], level=True) for wheel in wheels]
+    strips += [placed(wheel, [(-0.32, 0.0), (0.32, 0.0)], level=True) for wheel in wheels]
+    return np.stack(strips, axis=1)
 
 
 def _track(run: Run) -> Array:

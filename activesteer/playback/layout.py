@@ -17,8 +17,8 @@ SUMMARY: Final = "summary"
 """Entity of the text."""
 
 _SKY: Final = (176, 196, 214)
-_BEHIND: Final = rrb.EyeControls3D(position=(-8.6, -2.6, 2.7), look_target=(-0.6, 0.0, 0.45), eye_up=(0.0, 0.0, 1.0))
-_ABOVE: Final = rrb.EyeControls3D(position=(-1.31, 0.0, 8.5), look_target=(-1.3, 0.0, 0.0), eye_up=(0.0, 0.0, 1.0))
+_BEHIND: Final = rrb.EyeControls3D(position=(-7.6, -2.0, 2.2), look_target=(-1.0, 0.0, 0.5), eye_up=(0.0, 0.0, 1.0))
+_ABOVE: Final = rrb.EyeControls3D(position=(-1.31, 0.0, 6.5), look_target=(-1.3, 0.0, 0.0), eye_up=(0.0, 0.0, 1.0))
 """Eyes in the frame that follows the car, whose origin is on the road below its front axle."""
 
 
@@ -87,11 +87,11 @@ def _comparison(runs: Sequence[Run]) -> rrb.Horizontal:
 
 
 def _chase(run: Run, runs: Sequence[Run]) -> rrb.Spatial3DView:
-    return _car_view(run, runs, f"{run.label}: from behind", _BEHIND)
+    return _car_view(run, runs, run.label, _BEHIND)
 
 
 def _above(run: Run, runs: Sequence[Run]) -> rrb.Spatial3DView:
-    return _car_view(run, runs, f"{run.label}: from above", _ABOVE)
+    return _car_view(run, runs, f"{run.label}, from above", _ABOVE)
 
 
 def _car_view(run: Run, runs: Sequence[Run], name: str, eye: rrb.EyeControls3D) -> rrb.Spatial3DView:

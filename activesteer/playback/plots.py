@@ -44,11 +44,14 @@ class Plot(NamedTuple):
         title: What is plotted, and its unit in brackets.
         series: The lines.
         factor: From the SI value to the unit of the title.
+        entity: Name of the entity that holds all lines together, which makes the file smaller; where empty, every line
+            is an entity of its own, and can stand in several plots.
     """
 
     title: str
     series: tuple[Series, ...]
     factor: float = 1.0
+    entity: str = ""
 
 
 MOTION: Final = (
@@ -71,20 +74,25 @@ MOTION: Final = (
 )
 """Plots of the car as a whole."""
 
-DESIRED: Final = "yaw_rate_desired_radps"
-"""Steered for by a controller only; without one it is zero and says nothing."""
+_ASKED_FOR_BY: Final = {
+    "yaw_rate_desired_radps": "yaw_rate_desired_radps",
+    "rear_steer_rad": "rear_steer_demand_rad",
+    "superposition_rad": "superposition_demand_rad",
+}
+"""Channel, and the one that is not always zero where a controller asks for it: else what it shows is the give of a hinge."""
 
 
-def _of_wheels(title: str, channel: str) -> Plot:
+def _of_wheels(title: str, channel: str, entity: str = "") -> Plot:
     lines = zip(CORNERS, _CORNER_COLOURS, strict=True)
-    return Plot(title, tuple(Series(f"{corner}_{channel}", _WORDS[corner], colour) for corner, colour in lines))
+    series = tuple(Series(f"{corner}_{channel}", _WORDS[corner], colour) for corner, colour in lines)
+    return Plot(title, series, entity=entity)
 
 
 WHEELS: Final = (
     _of_wheels("Wheel loads [N]", "tyre_fz_N"),
     _of_wheels("Friction use of the tyres [1]", "friction_use"),
-    _of_wheels("Lateral tyre forces [N]", "tyre_fy_N"),
-    _of_wheels("Longitudinal tyre forces [N]", "tyre_fx_N"),
+    _of_wheels("Lateral tyre forces [N]", "tyre_fy_N", "tyre_fy_N"),
+    _of_wheels("Longitudinal tyre forces [N]", "tyre_fx_N", "tyre_fx_N"),
 )
 """Plots of the four wheels."""
 
@@ -104,44 +112,62 @@ def links(run: Run) -> tuple[Plot, ...]:
             Series(name, name[3:].removesuffix("_force_N").replace("_", " "), _LINK_COLOURS[index % len(_LINK_COLOURS)])
             for index, name in enumerate(names)
         )
-        plots.append(Plot(f"Link forces {_WORDS[corner]}, tension positive [N]", tuple(series)))
+        title = f"Link forces {_WORDS[corner]}, tension positive [N]"
+        plots.append(Plot(title, tuple(series), entity=f"{corner}_link_forces_N"))
     return tuple(plots)
 
 
 def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
-    """Sends every signal of every plot, each an entity of its own.
+    """Sends the signals of every plot.
 
     Args:
         stream: Where to.
         run: The run.
-        alone: Whether it is the only run, so that the lines of one plot need not be told from those of others.
+        alone: Whether it is the only run: the lines of several are told apart by the colours of the runs.
     """
     when = times(run.recording.time_s[run.rows])
     for plot in (*MOTION, *WHEELS, *links(run)):
-        for line in _present(run, plot):
-            path = series_path(run, line)
-            colour = line.colour if alone or plot not in MOTION else ""
-            name = line.name or run.label
-            if not alone and plot in MOTION:
-                name = f"{run.label}, {line.name}" if line.name else run.label
-            look = rr.SeriesLines(names=[name], colors=[rgb(colour or run.colour)], widths=[line.width])
+        own_colours = alone or plot not in MOTION
+        for path, lines in _entities(run, plot):
+            look = rr.SeriesLines(
+                names=[_legend(run, line, alone=own_colours) for line in lines],
+                colors=[rgb(line.colour if line.colour and own_colours else run.colour) for line in lines],
+                widths=[line.width for line in lines],
+            )
             stream.log(path, look, static=True)
-            values = run.channel(line.channel) * plot.factor
-            stream.send_columns(path, when, rr.Scalars.columns(scalars=values))
+            values = np.stack([run.channel(line.channel) * plot.factor for line in lines], axis=1)
+            columns = rr.Scalars.columns(scalars=values.reshape(-1))
+            stream.send_columns(path, when, columns.partition(lengths=[len(lines)] * len(run.rows)))
 
 
-def series_path(run: Run, line: Series) -> str:
-    """Entity of a line."""
-    return f"{run.name}/plots/{line.channel}"
+def _legend(run: Run, line: Series, *, alone: bool) -> str:
+    if not line.name:
+        return run.label
+    return line.name if alone else f"{run.label}, {line.name}"
+
+
+def _entities(run: Run, plot: Plot) -> list[tuple[str, list[Series]]]:
+    """Paths, and the lines that each of them holds, of what a run has for a plot."""
+    lines = [line for line in plot.series if run.has(line.channel) and _asked_for(run, line.channel)]
+    if plot.entity:
+        return [(f"{run.name}/plots/{plot.entity}", lines)] if lines else []
+    return [(f"{run.name}/plots/{line.channel}", [line]) for line in lines]
+
+
+def _asked_for(run: Run, channel: str) -> bool:
+    demand = _ASKED_FOR_BY.get(channel)
+    return demand is None or not run.has(demand) or bool(np.any(run.recording[demand]))
 
 
 def views(plots: Sequence[Plot], runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
     """A view for each plot that has something to show, with the lines of all these runs."""
     shown = []
     for plot in plots:
-        contents = [f"/{series_path(run, line)}" for run in runs for line in _present(run, plot)]
+        contents = [f"/{path}" for run in runs for path, _ in _entities(run, plot)]
         if contents:
-            shown.append(_view(plot.title, contents))
+            # The colours of several runs are the same in all plots: one legend is enough, and the plots are small.
+            legend = plot is plots[0] if len(runs) > 1 else len(plot.series) > 1
+            shown.append(_view(plot.title, contents, legend=legend))
     return shown
 
 
@@ -149,17 +175,20 @@ def views_by_corner(plot: Plot, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]
     """A view for each wheel of a plot of the wheels, where the lines of the runs are told apart by their colours."""
     shown = []
     for line in plot.series:
-        present = [run for run in runs if line in _present(run, plot)]
+        present = [run for run in runs if run.has(line.channel)]
         looks = {
-            f"/{series_path(run, line)}": rr.SeriesLines(names=[run.label], colors=[rgb(run.colour)]) for run in present
+            f"/{run.name}/plots/{line.channel}": rr.SeriesLines(names=[run.label], colors=[rgb(run.colour)])
+            for run in present
         }
         if looks:
             head, _, unit = plot.title.rpartition(" [")
-            shown.append(_view(f"{head}, {line.name} [{unit}", list(looks), looks))
+            shown.append(_view(f"{head}, {line.name} [{unit}", list(looks), looks, legend=not shown))
     return shown
 
 
-def _view(title: str, contents: list[str], looks: dict[str, rr.SeriesLines] | None = None) -> rrb.TimeSeriesView:
+def _view(
+    title: str, contents: list[str], looks: dict[str, rr.SeriesLines] | None = None, *, legend: bool
+) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",
         contents=contents,
@@ -167,10 +196,6 @@ def _view(title: str, contents: list[str], looks: dict[str, rr.SeriesLines] | No
         overrides=looks,
         # Zooming or moving one plot moves all.
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=len(contents) > 1),
+        # At the left: a manoeuvre begins quietly.
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
     )
-
-
-def _present(run: Run, plot: Plot) -> list[Series]:
-    lines = [line for line in plot.series if run.has(line.channel)]
-    return [line for line in lines if line.channel != DESIRED or np.any(run.recording[DESIRED])]

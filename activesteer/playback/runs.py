@@ -28,7 +28,8 @@ class Run(NamedTuple):
 
     Attributes:
         recording: The recording.
-        name: What it is called in entity paths.
+        name: What it is called in entity paths; of several, numbered, since the viewer sorts by it.
+        short: What it was called by whoever asked for it, such as `ars`.
         label: What it is called in legends and titles.
         colour: Its colour, `#rrggbb`.
         rows: Rows of the recording that are shown, about `PLOT_RATE_HZ` of them in a second.
@@ -37,6 +38,7 @@ class Run(NamedTuple):
 
     recording: Recording
     name: str
+    short: str
     label: str
     colour: str
     rows: NDArray[np.intp]
@@ -71,9 +73,8 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
     ordered += [name for name in recordings if name not in SYSTEM_LABELS]
     spare = iter(range(len(SYSTEM_LABELS), len(SYSTEM_LABELS) + len(ordered)))
     colours = dict(zip(SYSTEM_LABELS, COLOURS, strict=False))
-    taken: set[str] = set()
     runs = []
-    for name in ordered:
+    for number, name in enumerate(ordered, start=1):
         recording = recordings[name]
         poses = np.flatnonzero(
             np.isfinite(recording.poses.positions_m).all(axis=(1, 2))
@@ -81,12 +82,10 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
         )
         if len(recording) == 0 or CHASSIS not in recording.poses.names or len(poses) == 0:
             raise RecordingError(f"{name}: {recording!r} has nothing to play back: rows and poses of a car are needed")
-        path = re.sub(r"\W", "_", name, flags=re.ASCII) or "run"
-        while path in taken:
-            path += "_"
-        taken.add(path)
+        path = re.sub(r"\W", "_", name, flags=re.ASCII)
+        path = f"{number}_{path}" if len(ordered) > 1 else path
         colour = colours.get(name) or COLOURS[next(spare) % len(COLOURS)]
-        runs.append(Run(recording, path, SYSTEM_LABELS.get(name, name), colour, _shown(recording.time_s), poses))
+        runs.append(Run(recording, path or "run", name, SYSTEM_LABELS.get(name, name), colour, _shown(recording.time_s), poses))
     return runs
 
 

@@ -39,7 +39,7 @@ def summary(runs: Sequence[Run], label: MetricLabel = plain_label) -> str:
         lines.append(text)
     names = list(dict.fromkeys(name for run in runs for name in run.recording.metrics))
     if names:
-        lines += ["", f"| metric | unit | {' | '.join(run.label for run in runs)} |", "|---" * (2 + len(runs)) + "|"]
+        lines += ["", f"| metric | unit | {' | '.join(run.short for run in runs)} |", "|---" * (2 + len(runs)) + "|"]
     for name in names:
         words, unit, factor = label(name)
         values = (_number(run.recording.metrics.get(name), factor) for run in runs)

@@ -1,4 +1,4 @@
-"""Tyre forces as arrows on the road, coloured by how much of the available friction each tyre uses."""
+"""Tyre forces as arrows on the road, and below each tyre a disc in the colour of how much friction it uses."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from activesteer.conventions import CORNERS
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
 
-FORCE_SCALE_NPM: Final = 4000.0
+FORCE_SCALE_NPM: Final = 2000.0
 """Force that an arrow of one metre stands for [N/m]."""
-_ABOVE_ROAD_M: Final = 0.04
-_PATCH_RADIUS_M: Final = 0.3
+_ABOVE_ROAD_M: Final = 0.08
+_ARROW_RADIUS_M: Final = 0.035
+_ARROW_COLOUR: Final = (255, 255, 255)
+_DISC_RADIUS_M: Final = 0.3
 
 _USE: Final = (0.0, 0.6, 0.9, 1.1)
 _USE_COLOURS: Final = ((0, 158, 115), (240, 228, 66), (230, 120, 0), (220, 20, 20))
@@ -39,16 +41,16 @@ def send_tyre_forces(stream: rr.RecordingStream, run: Run) -> None:
     when, four = times(run.recording.time_s[run.rows][good]), [len(CORNERS)] * int(good.sum())
     painted = colours[good].reshape(-1)
     arrows = f"{run.scene}/tyres/force"
-    stream.log(arrows, rr.Arrows3D.from_fields(radii=[0.045]), static=True)
+    stream.log(arrows, rr.Arrows3D.from_fields(radii=[_ARROW_RADIUS_M], colors=[_ARROW_COLOUR]), static=True)
     stream.send_columns(
         arrows,
         when,
-        rr.Arrows3D.columns(
-            origins=origins[good].reshape(-1, 3), vectors=vectors[good].reshape(-1, 3), colors=painted
-        ).partition(lengths=four),
+        rr.Arrows3D.columns(origins=origins[good].reshape(-1, 3), vectors=vectors[good].reshape(-1, 3)).partition(
+            lengths=four
+        ),
     )
     discs = f"{run.scene}/tyres/friction_use"
-    size = rr.Cylinders3D.from_fields(radii=[_PATCH_RADIUS_M], lengths=[0.02], fill_mode="solid")
+    size = rr.Cylinders3D.from_fields(radii=[_DISC_RADIUS_M], lengths=[0.02], fill_mode="solid")
     stream.log(discs, size, static=True)
     flat = origins[good] * np.float32((1.0, 1.0, 0.0))
     stream.send_columns(

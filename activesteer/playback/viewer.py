@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import importlib.util
+import os
+import re
+import socket
+import subprocess
+import tempfile
+import urllib.parse
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Final
 
 from activesteer.errors import PlaybackError
 from activesteer.playback.layout import blueprint
 from activesteer.playback.runs import Run
 from activesteer.playback.stream import fill, new_stream
 from activesteer.playback.summary import MetricLabel, plain_label
+
+_ELSEWHERE: Final = "--web shows it in a browser, --save out.rrd writes a file for a viewer elsewhere"
+_HOST: Final = "127.0.0.1"
+"""Where a browser's pages are served: to this machine alone."""
 
 
 def save(runs: Sequence[Run], path: Path, *, compare: bool = False, label: MetricLabel = plain_label) -> None:
@@ -35,5 +47,113 @@ def save(runs: Sequence[Run], path: Path, *, compare: bool = False, label: Metri
     stream.disconnect()
 
 
-def show(): ...
-def serve(): ...
+def show(runs: Sequence[Run], *, compare: bool = False, label: MetricLabel = plain_label) -> None:
+    """Opens the viewer's window, and returns when it is closed.
+
+    Args:
+        runs: The runs.
+        compare: Whether to leave out the pages of the single runs.
+        label: How metrics are shown.
+
+    Raises:
+        PlaybackError: there is no viewer, or it ended with an error, as it does without a display.
+    """
+    _run_viewer(["--port", "auto"], runs, compare=compare, label=label)
+
+
+def serve(
+    runs: Sequence[Run],
+    announce: Callable[[str], object],
+    *,
+    compare: bool = False,
+    label: MetricLabel = plain_label,
+) -> None:
+    """Serves the viewer to browsers of this machine, until it is interrupted.
+
+    Args:
+        runs: The runs.
+        announce: Called with the address to open as soon as it is served.
+        compare: Whether to leave out the pages of the single runs.
+        label: How metrics are shown.
+
+    Raises:
+        PlaybackError: there is no viewer, or it ended with an error.
+    """
+    data, page = _free_port(), _free_port()
+    proxy = urllib.parse.quote(f"rerun+http://{_HOST}:{data}/proxy", safe="")
+    arguments = ["--serve-web", "--bind", _HOST, "--port", str(data), "--web-viewer-port", str(page)]
+    url = f"http://{_HOST}:{page}/?url={proxy}"
+    _run_viewer(arguments, runs, compare=compare, label=label, ready=lambda: announce(url), port=page)
+
+
+def _run_viewer(
+    arguments: Sequence[str],
+    runs: Sequence[Run],
+    *,
+    compare: bool,
+    label: MetricLabel,
+    ready: Callable[[], object] | None = None,
+    port: int | None = None,
+) -> None:
+    """Runs the viewer on a file that lives as long as it does; `ready` is called once it answers at the port."""
+    binary = viewer_binary()
+    with tempfile.TemporaryDirectory(prefix="activesteer-") as folder:
+        file, log = Path(folder) / "runs.rrd", Path(folder) / "viewer.log"
+        save(runs, file, compare=compare, label=label)
+        try:
+            with log.open("w") as output:
+                process = subprocess.Popen([str(binary), *arguments, str(file)], stdout=output, stderr=output)
+        except OSError as error:
+            msg = f"the viewer {binary} does not start: {error.strerror or error}; {_ELSEWHERE}"
+            raise PlaybackError(msg) from None
+        try:
+            while ready is not None and port is not None and process.poll() is None:
+                if _answers(port):
+                    ready()
+                    break
+            status = process.wait()
+        finally:
+            if process.poll() is None:
+                process.terminate()
+                process.wait()
+        if status != 0:
+            msg = f"the viewer ended with an error: {_reason(log.read_text(errors='replace'))}; {_ELSEWHERE}"
+            raise PlaybackError(msg)
+
+
+def viewer_binary() -> Path:
+    """The viewer that comes with rerun-sdk; the command `rerun` may be another one, or not be on the path at all.
+
+    Raises:
+        PlaybackError: it is not there.
+    """
+    spec = importlib.util.find_spec("rerun_cli")
+    if spec is not None and spec.origin is not None:
+        binary = Path(spec.origin).with_name("rerun.exe" if os.name == "nt" else "rerun")
+        if binary.is_file():
+            return binary
+    msg = f"the rerun viewer is missing, which the package rerun-sdk brings: reinstall it, or use --save; {_ELSEWHERE}"
+    raise PlaybackError(msg)
+
+
+def _reason(log: str) -> str:
+    """The last thing that a viewer said about its failure, without colours."""
+    lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", log).splitlines() if line.strip()]
+    if any("DISPLAY is set" in line or "connection to X server" in line for line in lines):
+        return "there is no display"
+    told = [line for line in lines if "error" in line.lower() or "panic" in line.lower()] or lines
+    return told[-1] if told else "it said nothing"
+
+
+def _free_port() -> int:
+    with socket.socket() as free:
+        free.bind((_HOST, 0))
+        return free.getsockname()[1]
+
+
+def _answers(port: int) -> bool:
+    try:
+        with socket.create_connection((_HOST, port), timeout=0.2):
+            return True
+    except OSError:
+        return False

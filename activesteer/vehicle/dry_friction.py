@@ -11,11 +11,12 @@ distribution with the standard deviation s, and a slow motion of speed v,
 
     mean of sign(v + vibration) = erf(v / (sqrt(2) s))
 
-which at small speeds is a damper of sqrt(2/pi) F / s. (Control engineers know it as dither.) The road of this package is
-perfectly even; without this mean its cars would ride on stuck dampers up to 0.1 g. So w_slip is multiplied by it:
+which at small speeds is a damper of sqrt(2/pi) F / s. (Control engineers know it as dither.) The road of this package
+is perfectly even; without this mean its cars would ride on stuck dampers up to 0.1 g. So w_slip is multiplied by it:
 friction is dry at rest and wherever the damper moves faster than the road shakes it, and smooth below.
 
-Roughness: the velocity spectrum of a road is white and grows with the speed driven (ISO 8608), so s grows with its root.
+Roughness: the velocity spectrum of a road is white and grows with the speed driven (ISO 8608), so s grows with the root
+of that speed.
 
 Source: Dahl, A solid friction model, Aerospace Corp. TOR-0158 (1968); Pervozvanski and Canudas de Wit, Asymptotic
 analysis of the dither effect in systems with friction, Automatica 38 (2002).

@@ -63,7 +63,7 @@ def load_model(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Gives the drive its lag, brakes and friction their stiffness; forces follow the activation that a step reaches."""
+    """Gives the drive its lag, brakes and friction their stiffness; forces follow the activation reached in a step."""
     for actuator in spec.actuators:
         if actuator.name.endswith("_drive"):
             actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT

@@ -36,8 +36,8 @@ class LocalState:
     chassis' origin along heading, left, up; rotations about the chassis' axes), activations (servos, carcass
     deflections of the tyres). Left out are position on the road, heading, rotation angles of the wheels, and the
     wind-up of what either holds or slips, brake pads and rack: pads slip in a rolling wheel and have no motion of their
-    own, of the rack see `linearisation`. Seals of dampers, if they rub at all, are shaken loose by the road, which makes
-    them smooth.
+    own, of the rack see `linearisation`. Seals of dampers, if they rub at all, are shaken loose by the road, which
+    makes them smooth.
 
     Attributes:
         names: Names of the elements: a coordinate has its joint's name, its velocity `d_` in front.

@@ -1,4 +1,4 @@
-"""What a vehicle file says beside its MJCF: tyres, dampers, dry friction, brakes, powertrain, steering ratio, drag, width."""
+"""What a vehicle file says beside its MJCF: width, tyres, dampers, friction, brakes, powertrain, steering, drag."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class Friction:
     damper_stiffness_Npm: Annotated[float, Range(1.0, 1e6)] = 1e5
     """Force over travel before a damper slips [N/m]: a seal's lip gives way by some tenths of a millimetre."""
     vibration_mps: Annotated[float, Range(0.0, 1.0)] = 0.0
-    """RMS of the damper speed that the roughness of a road causes at 80 km/h [m/s], grows with the root of the speed."""
+    """RMS of the damper speed that a road's roughness causes at 80 km/h [m/s]; it grows with the root of the speed."""
     rack_stiffness_Npm: Annotated[float, Range(1.0, 1e7)] = 2e6
     """The same of the rack [N/m]."""
 

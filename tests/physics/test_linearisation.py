@@ -55,7 +55,7 @@ def test_frequency_response_is_that_of_a_sine_sweep_of_the_full_car(row):
 @pytest.mark.parametrize(("name", "amplitude_rad"), [("rear_steer_rad", 5e-4), ("superposition_rad", 1e-3)])
 def test_step_of_an_active_steering_gives_the_response_of_the_full_car(name, amplitude_rad):
     straight = {"kind": "open_loop", "speed_mps": SPEED_MPS, "duration_s": 1.0}
-    # So small a superposition winds the column up by no more than the friction of the rack holds; the linear car has none.
+    # So small a superposition winds the column up by little more than the friction of the rack holds.
     vehicle_run = Simulation(resolve(straight, overrides={"vehicle.friction.rack_N": 0.0}))
     command = SteerCommand(**{name: amplitude_rad})
     vehicle_run.controller = type("Constant", (), {"step": lambda *_: command})()  # type: ignore[assignment]
@@ -78,8 +78,8 @@ def test_step_steer_of_a_tenth_of_g_is_followed():
     found = linear_response(recording, system())
     for output in OUTPUTS:
         most = np.abs(recording[output]).max()
-        # The first 10 ms of the lateral acceleration belong to modes above the cut-off, which answer at once here; after
-        # them the rack, which the linear car has without friction, starts a little late.
+        # The first 10 ms of the lateral acceleration belong to modes above the cut-off, which answer at once here; then
+        # the rack, which the linear car has without friction, starts a little late.
         allowed = 0.12 if output == "ay_mps2" else 0.05
         assert found[output] == pytest.approx(recording[output], abs=allowed * most)
 

@@ -10,6 +10,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,6 +49,10 @@ def skip_reason() -> str:
         if "adapter" in text or "vulkan" in text.lower() or "graphics" in text.lower():
             return "no Vulkan driver: apt-get install mesa-vulkan-drivers"
         raise
+
+
+class HiddenView(Exception):  # noqa: N818 - what it is
+    """The view stands on a page that is not shown."""
 
 
 class ViewerDied(Exception):  # noqa: N818 - what happened, not a kind of error
@@ -102,10 +107,8 @@ class Headless:
         client.set_time(TIMELINE, duration=time_s, play_state="paused")
         shown = {}
         for view in client.get_state().views:
-            if not view.visible:
-                continue
-            pixels = self._settled(view.view_id)
-            shown[view.name] = pixels
+            with suppress(HiddenView):
+                shown[view.name] = self._settled(view.view_id)
         # Reports are those of the last time a view was drawn.
         reports = {v.name: [f"{r.severity}: {r.summary} {r.details or ''}" for r in v.reports] for v in client.get_state().views}
         return {name: Picture(pixels, reports.get(name, [])) for name, pixels in shown.items()}
@@ -115,7 +118,12 @@ class Headless:
 
         last = None
         while True:
-            data = self._client.take_screenshot(view_id)
+            try:
+                data = self._client.take_screenshot(view_id)
+            except ConnectionError as error:
+                if "not found" in str(error):
+                    raise HiddenView from None
+                raise
             pixels = np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(np.int16)
             if last is not None and np.array_equal(pixels, last):
                 return pixels

@@ -87,7 +87,7 @@ class Scorecard:
         for claim, verdict, reason in self.judged:
             short = {Verdict.FAILED: "FAILED", Verdict.UNEXPECTED: "passed!"}.get(verdict, verdict.value)
             lines.append(f"{claim.id}  {short:<14}  {claim.text}")
-            lines += [f"{'':20}{line}" for line in _numbers(claim.values)]
+            lines += [f"{'':20}{line}" for line in number_lines(claim.values)]
             if verdict is Verdict.UNEXPECTED:
                 lines.append(f"{'':20}listed in {FILE}, from where it can be taken out")
             elif reason:
@@ -153,8 +153,8 @@ def _verdict(claim: Claim, known: Mapping[str, str]) -> Verdict:
     return Verdict.NOT_REPRODUCED if claim.id in known else Verdict.FAILED
 
 
-def _numbers(values: Mapping[str, float]) -> list[str]:
-    """A line for each metric, the systems beside each other."""
+def number_lines(values: Mapping[str, float]) -> list[str]:
+    """The numbers of a claim for reading, in degrees and km/h: a line for each metric, the systems beside each other."""
     by_metric: dict[str, list[tuple[str, float]]] = {}
     for name, value in values.items():
         system, _, metric = name.partition("_")

@@ -25,11 +25,6 @@ WIDTH_IN: Final = 8.5
 COURSE_SHARE: Final = 0.2
 TRACK_SHARE: Final = 0.35
 """Height over width of the axes of courses and of tracks, about."""
-BEFORE_M: Final = 20.0
-AFTER_M: Final = 50.0
-"""How much of the road is shown before the first gate and after the last [m]."""
-BESIDE_M: Final = 2.0
-"""How much of it beside the course [m]; who leaves the track leaves the picture."""
 
 
 def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
@@ -96,7 +91,7 @@ def _draw_course(axis: Axes, course: Course, share: float) -> None:
         length_m, width_m = lane.end_x_m - lane.start_x_m, lane.left_y_m - lane.right_y_m
         patch = axis.add_patch(Rectangle(corner, length_m, width_m, color=LANE_COLOUR, linewidth=0.0, zorder=0))
         shown = [patch]
-    (left, right), (low, high) = _view(course)
+    (left, right), (low, high) = course.shown()
     # Beyond its last point the path goes on straight.
     dx, dy = (float(values[-1] - values[-2]) for values in (course.path_x_m, course.path_y_m))
     far = (right - left) / math.hypot(dx, dy)
@@ -119,21 +114,10 @@ def _draw_course(axis: Axes, course: Course, share: float) -> None:
 
 def _stretch(course: Course, share: float) -> int:
     """By how much lateral positions are stretched for an axis about `share` as high as it is wide."""
-    (left, right), (low, high) = _view(course)
+    (left, right), (low, high) = course.shown()
     return max(1, round(share * (right - left) / (high - low)))
 
 
 def _height_share(course: Course, share: float) -> float:
-    (left, right), (low, high) = _view(course)
+    (left, right), (low, high) = course.shown()
     return _stretch(course, share) * (high - low) / (right - left)
-
-
-def _view(course: Course) -> tuple[tuple[float, float], tuple[float, float]]:
-    """What of the road is shown: limits of x and of y [m]."""
-    ys = [course.path_y_m, course.cones_m[:, 1], np.array([y for lane in course.lanes for y in lane[3:]])]
-    every = np.concatenate(ys)
-    low, high = float(every.min()) - BESIDE_M, float(every.max()) + BESIDE_M
-    if course.last_gate_x_m is None:
-        xs = course.path_x_m
-        return (float(xs.min()) - BESIDE_M, float(xs.max()) + BESIDE_M), (low, high)
-    return (course.first_gate_x_m - BEFORE_M, course.last_gate_x_m + AFTER_M), (low, high)

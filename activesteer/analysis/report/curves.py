@@ -1,0 +1,199 @@
+"""What the plots of a report show: the signals of runs over one time axis, thinned, in degrees and km/h."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.analysis import sine_with_dwell
+from activesteer.analysis.course import Course, read_course
+from activesteer.analysis.report.runs import Group, Run
+from activesteer.analysis.track import front_axle, path_distance
+from activesteer.conventions import CORNERS
+from activesteer.errors import RecordingError
+from activesteer.recording import Recording
+
+Array = NDArray[np.float64]
+
+RATE_HZ: Final = 200.0
+"""Most samples of a signal in a second; the car's own motion ends below 20 Hz."""
+MOST_SAMPLES: Final = 4000
+"""Most samples of a signal in all: twice what the widest screen shows, until one zooms in."""
+DIGITS: Final = 4
+"""Digits after the first of a signal's range; more cannot be seen."""
+_DEG: Final = math.degrees(1.0)
+
+
+class Panel(NamedTuple):
+    """A plot over time.
+
+    Attributes:
+        title: What it shows.
+        unit: In which unit.
+        signals: From a recording to what is drawn of it, in that unit; the first is a full line, others are dashed.
+            One that a recording does not have raises `RecordingError`, one that says nothing is None.
+        note: What a dashed line is.
+    """
+
+    title: str
+    unit: str
+    signals: tuple[Callable[[Recording], Array | None], ...]
+    note: str = ""
+
+
+def _channel(name: str, factor: float) -> Callable[[Recording], Array]:
+    return lambda recording: recording[name] * factor
+
+
+def _desired(recording: Recording) -> Array | None:
+    values = recording["yaw_rate_desired_radps"] * _DEG
+    return values if np.any(values) else None
+
+
+def _added(name: str) -> Callable[[Recording], Array | None]:
+    def values(recording: Recording) -> Array | None:
+        # What no controller asks for is the give of a hinge, not an added angle.
+        asked = np.any(recording[f"{name}_demand_rad"])
+        return recording[f"{name}_rad"] * _DEG if asked else None
+
+    return values
+
+
+def _over_corners(channel: str, choose: np.ufunc, factor: float = 1.0) -> Callable[[Recording], Array]:
+    return lambda run: choose.reduce([run[f"{corner}_{channel}"] for corner in CORNERS]) * factor
+
+
+def _from_path(recording: Recording) -> Array:
+    course = read_course(recording)
+    return path_distance(*front_axle(recording), course.path_x_m, course.path_y_m)
+
+
+PANELS: Final = (
+    Panel("Steering wheel angle", "deg", (_channel("steering_wheel_rad", _DEG),)),
+    Panel("Yaw rate", "deg/s", (_channel("yaw_rate_radps", _DEG), _desired), "dashed: desired by the controller"),
+    Panel("Sideslip angle", "deg", (_channel("sideslip_rad", _DEG),)),
+    Panel("Lateral acceleration", "m/s²", (_channel("ay_mps2", 1.0),)),
+    Panel("Added steering angle at the wheels", "deg", (_added("rear_steer"), _added("superposition")),
+          "full: rear wheels, dashed: front superposition"),
+    Panel("Distance from the path", "m", (_from_path,)),
+    Panel("Roll angle", "deg", (_channel("roll_rad", _DEG),)),
+    Panel("Speed", "km/h", (_channel("speed_mps", 3.6),)),
+    Panel("Use of the friction, most of four wheels", "%", (_over_corners("friction_use", np.maximum, 100.0),)),
+    Panel("Wheel load, least of four wheels", "kN", (_over_corners("tyre_fz_N", np.minimum, 1e-3),)),
+)  # fmt: skip
+
+
+def plots(group: Group) -> dict[str, Any]:
+    """The plots of a group, as JSON values.
+
+    Returns:
+        Time step and number of samples, runs, panels, marks, and the track where positions were recorded.
+    """
+    grid = time_grid([run.recording.time_s for run in group.runs])
+    panels = [shown for panel in PANELS if (shown := _panel(panel, group.runs, grid))["series"]]
+    return {
+        "name": group.name,
+        "step_s": float(grid[1] - grid[0]) if len(grid) > 1 else 0.0,
+        "start_s": float(grid[0]),
+        "samples": len(grid),
+        "runs": [{"name": run.name, "label": run.label, "colour": run.colour} for run in group.runs],
+        "panels": panels,
+        "marks": _marks(group),
+        "track": _track(group, grid),
+    }
+
+
+def time_grid(times_s: Sequence[Array]) -> Array:
+    """Instants that all runs are shown at: samples of the first, thinned, as far as the longest goes [s]."""
+    first = times_s[0]
+    start = min(float(time_s[0]) for time_s in times_s)
+    end = max(float(time_s[-1]) for time_s in times_s)
+    step = float(np.median(np.diff(first))) if len(first) > 1 else 1.0 / RATE_HZ
+    # A hair less than a whole number is rounding.
+    every = max(1, math.ceil(1.0 / (RATE_HZ * step) - 1e-6), math.ceil((end - start) / (step * (MOST_SAMPLES - 1)) - 1e-6))
+    return start + np.arange(math.floor((end - start) / (every * step) + 1e-6) + 1) * (every * step)
+
+
+def _panel(panel: Panel, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
+    series = []
+    for number, run in enumerate(runs):
+        for line, signal in enumerate(panel.signals):
+            try:
+                values = signal(run.recording)
+            except RecordingError:
+                # A run of an older version, or of another program, may lack it; the others are shown.
+                continue
+            if values is not None:
+                sampled = _sampled(run.recording.time_s, values, grid)
+                series.append({"run": number, "dashed": line > 0, "values": _rounded(sampled)})
+    note = panel.note if any(item["dashed"] for item in series) else ""
+    return {"title": panel.title, "unit": panel.unit, "note": note, "series": series}
+
+
+def _sampled(time_s: Array, values: Array, grid: Array) -> Array:
+    """Values at the instants of the grid; nan before and after the run."""
+    return np.interp(grid, time_s, values, left=math.nan, right=math.nan)
+
+
+def _rounded(values: Array, decimals: int | None = None) -> list[float | None]:
+    """Numbers for JSON, which has no nan, with as many digits as can be seen."""
+    finite = np.isfinite(values)
+    if decimals is None:
+        largest = float(np.abs(values[finite]).max(initial=0.0))
+        decimals = max(0, DIGITS - math.floor(math.log10(largest)) - 1) if largest > 0.0 else 0
+    numbers = np.round(np.where(finite, values, 0.0), decimals) + 0.0  # no -0.0
+    listed = [int(number) if number == int(number) else number for number in numbers.tolist()]
+    return [number if known else None for number, known in zip(listed, finite.tolist(), strict=True)]
+
+
+def _marks(group: Group) -> list[dict[str, Any]]:
+    """Instants that a standard judges by."""
+    recording = group.runs[0].recording
+    if not isinstance(maneuver := recording.metadata.get("maneuver"), dict) or maneuver.get("kind") != "sine_with_dwell":
+        return []
+    try:
+        completion_s = sine_with_dwell.steering(recording).completion_s
+    except RecordingError:
+        # A run that was cut short can still be looked at.
+        return []
+    later = [{"time_s": completion_s + s, "text": f"+{s:.2f} s"} for s in sine_with_dwell.INSTANTS_S]
+    return [{"time_s": completion_s, "text": "end of steer"}, *later]
+
+
+def _track(group: Group, grid: Array) -> dict[str, Any] | None:
+    """Course and tracks of the front axle centre [m]."""
+    tracks = []
+    for number, run in enumerate(group.runs):
+        try:
+            x, y = (_sampled(run.recording.time_s, values, grid) for values in front_axle(run.recording))
+        except RecordingError:
+            continue
+        tracks.append({"run": number, "x": _rounded(x, 2), "y": _rounded(y, 3)})
+    if not tracks:
+        return None
+    course = next(_courses(group), None)
+    table = {"lanes": [], "cones": [], "path": None, "view": None} if course is None else _course(course)
+    return {"tracks": tracks, **table}
+
+
+def _courses(group: Group) -> Iterator[Course]:
+    for run in group.runs:
+        try:
+            yield read_course(run.recording)
+        except RecordingError:
+            # An open-loop manoeuvre has none.
+            continue
+
+
+def _course(course: Course) -> dict[str, Any]:
+    (left, right), (low, high) = course.shown()
+    return {
+        "lanes": [{"name": name, "x": [start, end], "y": [below, above]} for name, start, end, below, above in course.lanes],
+        "cones": [[round(x, 3), round(y, 3)] for x, y in course.cones_m.tolist()],
+        "path": {"x": _rounded(course.path_x_m, 2), "y": _rounded(course.path_y_m, 3)},
+        "view": {"x": [left, right], "y": [low, high]},
+    }

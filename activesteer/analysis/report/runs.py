@@ -1,0 +1,116 @@
+"""The runs of a report: opened, named, and put together by the manoeuvre that they drive."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
+from activesteer.errors import ParameterError, RecordingError
+from activesteer.recording import Recording
+
+MOST_RUNS: Final = 60
+"""More runs than this make a page that nobody can read, and that a browser is slow to open."""
+
+
+class Run(NamedTuple):
+    """A recording as it is shown.
+
+    Attributes:
+        source: Where it comes from, such as the name of its file.
+        recording: The recording.
+        name: What its column is called, short (`ars`).
+        label: What its curve is called.
+        colour: Its colour, `#rrggbb`.
+    """
+
+    source: str
+    recording: Recording
+    name: str
+    label: str
+    colour: str
+
+
+class Group(NamedTuple):
+    """Runs of one manoeuvre, in the paper's order.
+
+    Attributes:
+        name: Name of the manoeuvre.
+        title: The same in words.
+        runs: At least one.
+    """
+
+    name: str
+    title: str
+    runs: tuple[Run, ...]
+
+    def by_name(self) -> dict[str, Recording]:
+        """Recordings by name of the run."""
+        return {run.name: run.recording for run in self.runs}
+
+
+def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
+    """Recordings by path; of a file that was cut short or damaged, what can be read.
+
+    Raises:
+        ParameterError: a file is named twice.
+        RecordingError: a file cannot be read.
+    """
+    recordings: dict[str, Recording] = {}
+    for path in paths:
+        if str(path) in recordings:
+            raise ParameterError(f"{path} is named twice")
+        recordings[str(path)] = Recording.open(Path(path), recover=True)
+    return recordings
+
+
+def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
+    """The runs by manoeuvre, in the order in which the manoeuvres first come.
+
+    Args:
+        recordings: By where they come from.
+
+    Raises:
+        ParameterError: there is none, or there are more than `MOST_RUNS`.
+        RecordingError: a recording has no rows.
+    """
+    if not 1 <= len(recordings) <= MOST_RUNS:
+        raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MOST_RUNS}")
+    by_maneuver: dict[str, dict[str, Recording]] = {}
+    for source, recording in recordings.items():
+        if len(recording) == 0:
+            raise RecordingError(f"{source} has no rows: nothing was recorded before the run ended")
+        by_maneuver.setdefault(entry(recording, "maneuver", "name") or "run", {})[source] = recording
+    return [_group(name, members) for name, members in by_maneuver.items()]
+
+
+def entry(recording: Recording, table: str, key: str) -> str:
+    """An entry of a table of the metadata as text; empty where it does not exist."""
+    values: Any = recording.metadata.get(table)
+    return str(values.get(key, "")) if isinstance(values, Mapping) else ""
+
+
+def _group(name: str, recordings: Mapping[str, Recording]) -> Group:
+    named = dict(zip(_names(recordings), recordings.items(), strict=True))
+    ordered = [system for system in SYSTEM_LABELS if system in named]
+    ordered += [other for other in named if other not in SYSTEM_LABELS]
+    colours = dict(zip(SYSTEM_LABELS, RUN_COLOURS, strict=False))
+    # The colours of the three systems stay theirs as long as there are others.
+    spare = [*RUN_COLOURS[len(SYSTEM_LABELS) :], *(colours[system] for system in SYSTEM_LABELS if system not in named)]
+    others = [run for run in ordered if run not in SYSTEM_LABELS]
+    colours |= {run: spare[number % len(spare)] for number, run in enumerate(others)}
+    runs = tuple(Run(*named[run], run, SYSTEM_LABELS.get(run, run), colours[run]) for run in ordered)
+    return Group(name, entry(runs[0].recording, "maneuver", "title") or name, runs)
+
+
+def _names(recordings: Mapping[str, Recording]) -> Sequence[str]:
+    """A name for each run: its controller, where that tells them apart, else its file, else all of its source."""
+    # A user's controller is given as file and class; the class is enough.
+    controllers = [str(run.metadata.get("controller", "run")).rpartition(":")[2] for run in recordings.values()]
+    stems = [Path(source).name.removesuffix(".mcap") for source in recordings]
+    return next(
+        (names for names in (controllers, stems) if max(Counter(names).values()) == 1), [str(name) for name in recordings]
+    )

@@ -1,0 +1,69 @@
+"""`activesteer replay FILE.mcap...`: recordings in the rerun viewer."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from activesteer.errors import ParameterError
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser(
+        "replay",
+        help="look at recordings: the car in 3D, its signals, its metrics",
+        description="Opens recordings in the rerun viewer; several are shown together.",
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE.mcap")
+    parser.add_argument("--save", type=Path, metavar="OUT.rrd", help="write a file for the viewer, open no window")
+    parser.add_argument("--web", action="store_true", help="serve it to a browser, until Ctrl-C")
+    parser.add_argument(
+        "--compare", action="store_true", help="of several files, only the page that shows them side by side"
+    )
+    parser.set_defaults(action=_replay)
+
+
+def _replay(options: argparse.Namespace) -> int:
+    from activesteer.analysis.tables import label_and_unit
+    from activesteer.playback import runs_of, save, serve, show
+    from activesteer.recording import Recording
+
+    if options.compare and len(options.files) < 2:
+        msg = f"--compare needs at least two files, and {options.files[0]} is one"
+        raise ParameterError(msg)
+    if len(set(options.files)) != len(options.files):
+        msg = f"a file is named twice: {', '.join(str(file) for file in options.files)}"
+        raise ParameterError(msg)
+    recordings = [Recording.open(file, recover=True) for file in options.files]
+    names = _names(options.files, recordings)
+    runs = runs_of(dict(zip(names, recordings, strict=True)))
+    if options.save is not None:
+        save(runs, options.save, compare=options.compare, label=label_and_unit)
+        print(f"{options.save}: open it with `rerun {options.save}`", file=sys.stderr)
+    with suppress(KeyboardInterrupt):  # the way to end it
+        if options.web:
+            serve(runs, _announce, compare=options.compare, label=label_and_unit)
+        elif options.save is None:
+            show(runs, compare=options.compare, label=label_and_unit)
+    return 0
+
+
+def _names(files: list[Path], recordings: list[Any]) -> list[str]:
+    """The controllers where they tell the recordings apart, else the files."""
+    controllers = [str(recording.metadata.get("controller", "run")).rpartition(":")[2] for recording in recordings]
+    if len(set(controllers)) == len(controllers):
+        return controllers
+    stems = Counter(file.stem for file in files)
+    return [file.stem if stems[file.stem] == 1 else str(file.with_suffix("")) for file in files]
+
+
+def _announce(url: str) -> None:
+    import webbrowser
+
+    print(f"serving at {url}; Ctrl-C ends it", flush=True)
+    webbrowser.open(url)

@@ -1,0 +1,240 @@
+"""What a .rrd file holds, read back with rerun's reader."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from activesteer.errors import PlaybackError
+from activesteer.playback import runs_of, save
+from activesteer.playback.course import extent, map_bounds
+from activesteer.playback.tyres import FORCE_SCALE_NPM, force_arrows, use_colours
+from activesteer.recording import Recording
+from tests.unit.playback import made_up
+from tests.unit.playback.made_up import COURSE, circle
+from tests.unit.playback.rrd import Rrd
+
+
+def saved(folder: Path, recordings: Mapping[str, Recording], **options: Any) -> Rrd:
+    path = folder / "out.rrd"
+    save(runs_of(recordings), path, **options)
+    return Rrd(path)
+
+
+def test_every_body_moves_as_it_was_recorded(tmp_path: Path) -> None:
+    recording = circle()
+    rrd = saved(tmp_path, {"ars": recording})
+    for index, body in enumerate(recording.poses.names):
+        entity = f"/ars/scene/car/{body}"
+        assert np.allclose(rrd.time_s(entity), recording.poses.time_s)
+        at = rrd.numbers(entity, "Transform3D:translation")[:, 0]
+        assert np.allclose(at, recording.poses.positions_m[:, index], atol=1e-5)
+        turn = rrd.numbers(entity, "Transform3D:quaternion")[:, 0]
+        assert np.allclose(turn[:, [3, 0, 1, 2]], recording.poses.quaternions[:, index], atol=1e-6)
+        assert any(name.startswith(f"{entity}/solid/") for name in rrd.entities)
+
+
+def test_the_wheels_spin_and_steer(tmp_path: Path) -> None:
+    rrd = saved(tmp_path, {"ars": circle()})
+    wheel, chassis = (
+        Rotation.from_quat(rrd.numbers(f"/ars/scene/car/{body}", "Transform3D:quaternion")[:, 0])
+        for body in ("fl_wheel", "chassis")
+    )
+    step = (wheel[1:] * wheel[:-1].inv()).magnitude()
+    assert np.allclose(step, 0.01 * made_up.SPEED_MPS / made_up.WHEEL_RADIUS_M, rtol=0.01)
+    axis = chassis.inv().apply(wheel.apply((0.0, 1.0, 0.0)))
+    assert np.allclose(np.arctan2(-axis[:, 0], axis[:, 1]), made_up.STEER_RAD, atol=1e-5)
+
+
+def test_the_camera_follows_and_stays_level(tmp_path: Path) -> None:
+    recording = circle()
+    rrd = saved(tmp_path, {"ars": recording})
+    at = rrd.numbers("/ars/chase", "Transform3D:translation")[:, 0]
+    assert np.allclose(at[:, :2], recording.poses.positions_m[:, 0, :2], atol=1e-5)
+    assert not at[:, 2].any()
+    turn = Rotation.from_quat(rrd.numbers("/ars/chase", "Transform3D:quaternion")[:, 0]).as_rotvec()
+    assert np.allclose(turn[:, :2], 0.0, atol=1e-7)
+    assert np.allclose(turn[:, 2], recording["yaw_rad"][::10], atol=1e-6)
+
+
+def test_links_reach_from_body_to_body_and_springs_are_as_long_as_their_ends_are_apart(tmp_path: Path) -> None:
+    recording = circle()
+    rrd = saved(tmp_path, {"ars": recording})
+    centres = rrd.numbers("/ars/scene/links", "Cylinders3D:centers")
+    lengths = rrd.numbers("/ars/scene/links", "Cylinders3D:lengths")
+    turns = rrd.numbers("/ars/scene/links", "Cylinders3D:quaternions")
+    chassis = Rotation.from_quat(recording.poses.quaternions[:, 0], scalar_first=True)
+    for number, (x, y) in enumerate(made_up.WHEELS.values()):
+        inner = recording.poses.positions_m[:, 0] + chassis.apply((x, 0.5 * y, 0.25))
+        outer = recording.poses.positions_m[:, number + 1]
+        assert np.allclose(centres[:, number], 0.5 * (inner + outer), atol=1e-5)
+        along = Rotation.from_quat(turns[:, number]).apply((0.0, 0.0, 1.0)) * lengths[:, number, None]
+        assert np.allclose(np.abs(along), np.abs(outer - inner), atol=1e-5)
+        top = recording.poses.positions_m[:, 0] + chassis.apply((x, 0.8 * y, 0.8))
+        corner = list(made_up.WHEELS)[number]
+        scale = rrd.numbers(f"/ars/scene/springs/{corner}_spring", "Transform3D:scale")[:, 0]
+        assert np.allclose(scale[:, 2], np.linalg.norm(top - outer, axis=1), atol=1e-5)
+        assert (scale[:, :2] == 1.0).all()
+
+
+def test_force_arrows_stand_at_the_contact_points_and_turn_with_the_wheels() -> None:
+    recording = circle()
+    (run,) = runs_of({"ars": recording})
+    origins, vectors = force_arrows(run)
+    assert np.allclose(origins[:, 1, 0], recording["fr_contact_x_m"][run.rows], atol=1e-5)
+    assert np.allclose(np.linalg.norm(vectors, axis=-1), made_up.FY_N / FORCE_SCALE_NPM, rtol=1e-5)
+    # A side force points a quarter turn to the left of where the wheel points.
+    for wheel, steer in ((0, made_up.STEER_RAD), (3, 0.0)):
+        angle = np.unwrap(np.arctan2(vectors[:, wheel, 1], vectors[:, wheel, 0]))
+        assert np.allclose(angle, recording["yaw_rad"][run.rows] + steer + 0.5 * math.pi, atol=1e-5)
+
+
+def test_friction_use_goes_from_green_to_red() -> None:
+    red, green = (use_colours(np.linspace(0.0, 1.2, 13)) >> shift & 255 for shift in (24, 16))
+    assert red[0] < 20
+    assert green[0] > 150
+    assert red[-1] > 200
+    assert green[-1] < 40
+    assert use_colours(np.array([np.nan]))[0] == use_colours(np.array([0.0]))[0]
+
+
+def test_plots_are_in_degrees_and_hold_the_recorded_values(tmp_path: Path) -> None:
+    recording = circle()
+    (run,) = runs_of({"ars": recording})
+    rrd = saved(tmp_path, {"ars": recording})
+    for channel, factor in (("yaw_rate_radps", math.degrees(1.0)), ("ay_mps2", 1.0), ("rear_steer_rad", 180 / math.pi)):
+        values = rrd.numbers(f"/ars/plots/{channel}", "Scalars:scalars")[:, 0]
+        assert np.allclose(values, recording[channel][run.rows] * factor)
+        assert np.allclose(rrd.time_s(f"/ars/plots/{channel}"), recording.time_s[run.rows])
+    together = rrd.numbers("/ars/plots/tyre_fy_N", "Scalars:scalars")
+    assert together.shape == (len(run.rows), 4)
+    assert (together == made_up.FY_N).all()
+
+
+def test_an_angle_that_nobody_asked_for_is_not_plotted(tmp_path: Path) -> None:
+    """What the superposition hinge gives way under load is no added angle."""
+    rrd = saved(tmp_path, {"ars": circle()})
+    assert "/ars/plots/rear_steer_rad" in rrd.entities
+    assert "/ars/plots/superposition_rad" not in rrd.entities
+
+
+def test_several_runs_share_a_file_each_with_a_ghost(tmp_path: Path) -> None:
+    rrd = saved(tmp_path, {"none": circle(0.5), "ars": circle(0.7)})
+    for name in ("1_none", "2_ars"):
+        assert f"/{name}/scene/car/chassis/ghost/box" in rrd.entities
+        assert f"/{name}/plots/yaw_rate_radps" in rrd.entities
+        assert f"/map/{name}/car" in rrd.entities
+    assert len(rrd.blueprints) == 1
+
+
+def test_course_and_patches_of_other_friction_are_drawn(tmp_path: Path) -> None:
+    road = {"mu": 0.9, "patches": [{"start_m": 5.0, "end_m": 20.0, "mu": 0.3, "side": "right"}]}
+    metadata = {"course": COURSE, "maneuver": {"title": "A circle", "road": road}}
+    recording = circle(metadata=metadata)
+    rrd = saved(tmp_path, {"ars": recording})
+    path = rrd.numbers("/map/path", "LineStrips2D:strips")[0, 0]
+    assert np.allclose(path[:, 1], [-value for value in COURSE["path"]["y_m"]])  # left is up on the map
+    assert {"/course/path", "/course/lanes", "/course/cones", "/map/cones", "/road/surface"} <= rrd.entities
+    (patch,) = rrd.numbers("/road/patch_0_mu_30_percent", "Mesh3D:vertex_positions")
+    assert patch[:, 0].min() == 5.0
+    assert patch[:, 0].max() == 20.0
+    assert patch[:, 1].max() == 0.0
+    plain = saved(tmp_path, {"ars": circle()})
+    assert not any(entity.startswith(("/course", "/road/patch")) for entity in plain.entities)
+
+
+def test_the_map_is_framed_on_cars_and_course_not_on_a_path_that_goes_on_for_ever() -> None:
+    runs = runs_of({"ars": circle(metadata={"course": COURSE})})
+    around = extent(runs)
+    assert around.low_x_m == 0.0
+    assert 28.0 < around.high_x_m < 50.0
+    assert around.low_y_m == -1.0  # a cone
+    (low_x, high_x), (low_y, high_y) = map_bounds(runs)
+    assert low_x < around.low_x_m < around.high_x_m < high_x
+    assert low_y < -around.high_y_m < -around.low_y_m < high_y
+
+
+def test_the_car_on_the_map_is_where_it_was_with_its_wheels_steered(tmp_path: Path) -> None:
+    recording = circle()
+    rrd = saved(tmp_path, {"ars": recording})
+    strokes = rrd.numbers("/map/ars/car", "LineStrips2D:strips")
+    assert strokes.shape[1:] == (8, 2, 2)
+    wheel = strokes[:, 4] * (1.0, -1.0)  # front left, back in the axes of the world
+    assert np.allclose(wheel.mean(axis=1), recording.poses.positions_m[:, 1, :2], atol=1e-4)
+    along = wheel[:, 1] - wheel[:, 0]
+    angle = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+    assert np.allclose(angle, recording["yaw_rad"][::10] + made_up.STEER_RAD, atol=1e-4)
+
+
+def test_a_recording_without_some_channels_or_links_shows_the_rest(tmp_path: Path) -> None:
+    whole = circle()
+    kept = [channel for channel in whole.channels if channel.name in ("yaw_rate_radps", "fl_tyre_fz_N")]
+    values = np.column_stack([whole[channel.name] for channel in kept])
+    rrd = saved(tmp_path, {"ars": Recording(kept, whole.time_s, values, poses=whole.poses)})
+    assert "/ars/plots/yaw_rate_radps" in rrd.entities
+    assert "/ars/scene/car/chassis" in rrd.entities
+    assert not any("tyres" in entity or "links" in entity for entity in rrd.entities)
+
+
+def test_a_run_that_diverged_is_shown_up_to_its_end(tmp_path: Path) -> None:
+    whole = circle()
+    values = whole.values.copy()
+    values[-200:] = np.nan
+    positions = whole.poses.positions_m.copy()
+    positions[-20:] = np.nan
+    metadata = {"complete": False, "error": "SimulationDiverged: boom"}
+    broken = Recording(
+        whole.channels, whole.time_s, values, poses=whole.poses._replace(positions_m=positions), metadata=metadata,
+        scene=whole.scene,
+    )  # fmt: skip
+    rrd = saved(tmp_path, {"ars": broken})
+    for entity, component in (
+        ("/ars/scene/car/chassis", "Transform3D:translation"),
+        ("/ars/scene/tyres/force", "Arrows3D:vectors"),
+        ("/ars/scene/links", "Cylinders3D:centers"),
+    ):
+        assert np.isfinite(rrd.numbers(entity, component)).all()
+    assert "boom" in rrd.column("/summary", "TextDocument:text")[0][0]
+
+
+@pytest.mark.parametrize("kind", ["folder is missing", "is a folder"])
+def test_a_file_that_cannot_be_written_is_named(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "missing" / "out.rrd" if kind == "folder is missing" else tmp_path
+    with pytest.raises(PlaybackError, match=f"cannot write {path}: "):
+        save(runs_of({"ars": circle(0.1)}), path)
+
+
+def test_twenty_seconds_convert_in_two_and_take_less_than_15_MB(driven: Path, tmp_path: Path) -> None:
+    """The real car, its two seconds ten times over."""
+    once = Recording.open(driven)
+    times = 10
+    rows, sets = len(once), len(once.poses.time_s)
+    poses = once.poses._replace(
+        time_s=np.arange(times * sets) * 0.01,
+        positions_m=np.tile(once.poses.positions_m, (times, 1, 1)),
+        quaternions=np.tile(once.poses.quaternions, (times, 1, 1)),
+    )
+    recording = Recording(
+        once.channels,
+        np.arange(times * rows) * 1e-3,
+        np.tile(once.values, (times, 1)),
+        poses=poses,
+        metadata=once.metadata,
+        scene=once.scene,
+    )
+    assert recording.time_s[-1] > 19.9
+    path = tmp_path / "out.rrd"
+    took_s = []
+    for _ in range(2):  # the first one also imports
+        start = time.perf_counter()
+        save(runs_of({"ars": recording}), path)
+        took_s.append(time.perf_counter() - start)
+    assert min(took_s) < 2.0
+    assert path.stat().st_size < 15e6
