@@ -36,7 +36,8 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
         Microseconds per step: `bare_step_us` (the engine with the same model, without tyres), `plant_step_us` (with
         tyres, dampers, actuators), `closed_loop_step_us` (and manoeuvre, driver, controller, every channel recorded in
         memory), `path_following_step_us` (the same in a slalom, with a driver who looks at a path), `with_file_step_us`
-        (the step steer written as MCAP); the ratios of the last three to the first; real-time factors; and `*_us` for each block of the loop.
+        (the step steer written as MCAP); the ratios of the last three to the first; real-time factors; and `*_us` for
+        each block of the loop.
     """
     scenario, along_path = prepared(resolve("step_steer")), resolve("slalom")
     with tempfile.TemporaryDirectory() as folder:

@@ -7,7 +7,20 @@ import os
 import sys
 from collections.abc import Sequence
 
-from activesteer.commands import bench, figures, identify, info, kc, linearise, listing, replay, reproduce, run, tyre
+from activesteer.commands import (
+    bench,
+    figures,
+    identify,
+    info,
+    kc,
+    linearise,
+    listing,
+    replay,
+    report,
+    reproduce,
+    run,
+    tyre,
+)
 from activesteer.errors import ActiveSteerError
 from activesteer.version import __version__
 
@@ -41,6 +54,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="activesteer", description="A multibody car with active steering, in MuJoCo.")
     parser.add_argument("--version", action="version", version=f"activesteer {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for command in (run, reproduce, figures, replay, listing, info, tyre, kc, identify, linearise, bench):
+    for command in (run, reproduce, figures, replay, report, listing, info, tyre, kc, identify, linearise, bench):
         command.add_to(commands)
     return parser

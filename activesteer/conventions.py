@@ -27,4 +27,4 @@ SYSTEM_LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering",
 """What the runs of the three systems are called, numbered as in the paper's figures."""
 
 RUN_COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
-"""Colours of the three systems, then of further runs; colour-blind readers can tell them apart (Okabe and Ito, 2008)."""
+"""Colours of the three systems, then of other runs; colour-blind readers can tell them apart (Okabe and Ito, 2008)."""

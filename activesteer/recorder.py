@@ -11,8 +11,11 @@ from activesteer.recording import McapWriter, Poses
 from activesteer.signals import Channel, DriverCommand, SteerCommand
 from activesteer.vehicle import Vehicle
 
-BLOCK_ROWS: Final = 1000
-"""Rows that are turned into channels and written at once: a second of a run, which is what a crash may cost."""
+BLOCK_INTERVAL_S: Final = 0.5
+"""How much of a run is turned into channels and written at once [s].
+
+A killed process loses less than two blocks, a second: the one that it fills, and the one that is being written.
+"""
 POSE_INTERVAL_S: Final = 0.01
 """Time between two recorded poses of all bodies [s]."""
 
@@ -53,7 +56,8 @@ class Recorder:
         # By column, because that is how it is filled and read.
         self._values = np.empty((steps, len(self.channels)), order="F")
         self._time_s = np.asarray(np.arange(steps) * vehicle.timestep_s, dtype=np.float64)
-        self._raw = vehicle.raw_rows(min(BLOCK_ROWS, steps))
+        self._block_rows = max(1, round(BLOCK_INTERVAL_S / vehicle.timestep_s))
+        self._raw = vehicle.raw_rows(min(self._block_rows, steps))
         self._control = np.empty((len(self._raw.sensordata), len(CONTROL_CHANNELS)))
         self._copies = tuple(zip(self._raw, vehicle.live_arrays(), strict=True))
         self._pose_every = max(1, round(POSE_INTERVAL_S / vehicle.timestep_s))
@@ -87,7 +91,7 @@ class Recorder:
             self._positions[pose] = self._xpos
             self._quaternions[pose] = self._xquat
         self._rows = count + 1
-        if row + 1 == BLOCK_ROWS:
+        if row + 1 == self._block_rows:
             self.flush()
 
     def flush(self) -> None:

@@ -69,8 +69,8 @@ def links_of(model: mujoco.MjModel) -> tuple[Link, ...]:
     """The tendons that run straight from site to site: suspension links, springs, dampers.
 
     Args:
-        model: The car. A fixed tendon has no shape of its own (the front springs and dampers lie along the strut); it is
-            drawn between the sites `NAME_inner` and `NAME_outer` where the model has them, and left out otherwise.
+        model: The car. A fixed tendon has no shape of its own (the front springs and dampers lie along the strut): it
+            is drawn between the sites `NAME_inner` and `NAME_outer` where the model has them, and left out otherwise.
 
     Returns:
         Them, in the order of the model. What is called `..._spring` or `..._damper` is one.
@@ -92,7 +92,9 @@ def links_of(model: mujoco.MjModel) -> tuple[Link, ...]:
             Link(
                 name,
                 kind if kind in ("spring", "damper") else "link",
-                tuple((model.body(model.site_bodyid[site]).name, tuple(model.site_pos[site].tolist())) for site in sites),
+                tuple(
+                    (model.body(model.site_bodyid[site]).name, tuple(model.site_pos[site].tolist())) for site in sites
+                ),
                 float(model.tendon_width[index]),
                 tuple(model.tendon_rgba[index].tolist()),
             )

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from activesteer.reproduction import Reproduction
 
 _DEFAULT_FOLDER: Final = Path("runs")
 
@@ -46,6 +50,7 @@ def _reproduce(options: argparse.Namespace) -> int:
     for (scenario, system), problem in result.failures.items():
         print(f"{scenario} {system} failed: {problem}", file=sys.stderr)
     files = [str(path) for systems in result.paths.values() for path in systems.values()]
+    report = _report(result, options.output)
     figures: list[Path] = []
     if options.figures:
         from activesteer.commands.figures import draw_all
@@ -54,13 +59,33 @@ def _reproduce(options: argparse.Namespace) -> int:
     if options.json:
         failures = {f"{scenario} {system}": problem for (scenario, system), problem in result.failures.items()}
         table = {**result.scorecard.to_json(), "files": files, "figures": [str(path) for path in figures]}
+        table["report"] = None if report is None else str(report)
         print_json({**table, "failures": failures, "exit_status": result.exit_status})
         return result.exit_status
     print(result.scorecard.to_text())
     print(f"recordings: {len(files)} MCAP files in {options.output}")
+    if report is not None:
+        print(f"report: {report}")
     if figures:
         print(f"figures: {len(figures)} files in {options.output / 'figures'}")
     return result.exit_status
+
+
+def _report(result: Reproduction, folder: Path) -> Path | None:
+    """The page with all runs, also those that ended early, as far as they got; None where none got anywhere."""
+    from activesteer.analysis.report import write_report
+    from activesteer.errors import RecordingError
+    from activesteer.recording import Recording
+
+    recordings: dict[str, Recording] = {}
+    for scenario, systems in result.paths.items():
+        for system, path in systems.items():
+            with suppress(RecordingError):
+                recording = Recording.open(path, recover=True)
+                # What an earlier call left of a run that now could not begin is complete, and not this one's.
+                if len(recording) and recording.metadata["complete"] is ((scenario, system) not in result.failures):
+                    recordings[str(path)] = recording
+    return write_report(recordings, folder / "report.html") if recordings else None
 
 
 def _robustness(options: argparse.Namespace) -> int:

@@ -103,16 +103,24 @@ def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
     line = np.column_stack([path, np.full(len(path), 0.02)])
     stream.log(f"{COURSE}/path", rr.LineStrips3D([line], colors=[_PATH], radii=[0.03]), static=True)
     edges = _lane_outlines(course)
-    stream.log(f"{MAP}/path", rr.LineStrips2D([_flat(path)], colors=[_MAP_PATH], radii=_points(1.0), draw_order=1.0), static=True)
+    stream.log(
+        f"{MAP}/path",
+        rr.LineStrips2D([_flat(path)], colors=[_MAP_PATH], radii=_points(1.0), draw_order=1.0),
+        static=True,
+    )
     if edges:
         strips = [np.column_stack([edge, np.full(len(edge), 0.015)]) for edge in edges]
         stream.log(f"{COURSE}/lanes", rr.LineStrips3D(strips, colors=[_LANE], radii=[0.05]), static=True)
         flat = [_flat(edge) for edge in edges]
-        stream.log(f"{MAP}/lanes", rr.LineStrips2D(flat, colors=[_LANE], radii=_points(1.0), draw_order=2.0), static=True)
+        stream.log(
+            f"{MAP}/lanes", rr.LineStrips2D(flat, colors=[_LANE], radii=_points(1.0), draw_order=2.0), static=True
+        )
     cones = np.reshape(course["cones"], (-1, 2))
     if len(cones):
         stream.log(f"{COURSE}/cones", _cones(cones), static=True)
-        stream.log(f"{MAP}/cones", rr.Points2D(_flat(cones), colors=[_CONE], radii=_points(1.8), draw_order=3.0), static=True)
+        stream.log(
+            f"{MAP}/cones", rr.Points2D(_flat(cones), colors=[_CONE], radii=_points(1.8), draw_order=3.0), static=True
+        )
 
 
 def send_track(stream: rr.RecordingStream, run: Run) -> None:
@@ -121,7 +129,11 @@ def send_track(stream: rr.RecordingStream, run: Run) -> None:
     line = np.column_stack([track, np.full(len(track), 0.03)])
     colour = rgb(run.colour)
     stream.log(f"{run.scene}/driven", rr.LineStrips3D([line], colors=[colour], radii=[0.035]), static=True)
-    stream.log(f"{MAP}/{run.name}/driven", rr.LineStrips2D([_flat(track)], colors=[colour], radii=_points(0.8), draw_order=4.0), static=True)
+    stream.log(
+        f"{MAP}/{run.name}/driven",
+        rr.LineStrips2D([_flat(track)], colors=[colour], radii=_points(0.8), draw_order=4.0),
+        static=True,
+    )
     strokes = _outline(run).astype(np.float32)
     path = f"{MAP}/{run.name}/car"
     stream.log(path, rr.LineStrips2D.from_fields(colors=[colour], radii=_points(1.8), draw_order=5.0), static=True)
@@ -213,7 +225,7 @@ def _cones(places: Array) -> Any:
     angle = np.linspace(0.0, 2.0 * np.pi, _CONE_SIDES, endpoint=False)
     ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_CONE_SIDES)])
     corners = np.vstack([ring * _CONE_RADIUS_M, [[0.0, 0.0, _CONE_HEIGHT_M]]])
-    outward = np.vstack([ring + (0.0, 0.0, 0.3), [[0.0, 0.0, 1.0]]])
+    outward = np.vstack([ring + np.array((0.0, 0.0, 0.3)), [[0.0, 0.0, 1.0]]])
     sides = np.arange(_CONE_SIDES)
     faces = np.column_stack([sides, (sides + 1) % _CONE_SIDES, np.full(_CONE_SIDES, _CONE_SIDES)])
     at = np.column_stack([places, np.zeros(len(places))])

@@ -18,34 +18,36 @@ SUMMARY: Final = "summary"
 
 _SKY: Final = (176, 196, 214)
 _BEHIND: Final = rrb.EyeControls3D(position=(-7.6, -2.0, 2.2), look_target=(-1.0, 0.0, 0.5), eye_up=(0.0, 0.0, 1.0))
-_ABOVE: Final = rrb.EyeControls3D(position=(-1.31, 0.0, 6.5), look_target=(-1.3, 0.0, 0.0), eye_up=(0.0, 0.0, 1.0))
+# Left is up in the picture, so the car drives to the right.
+_ABOVE: Final = rrb.EyeControls3D(position=(-1.3, 0.0, 6.5), look_target=(-1.3, 0.0, 0.0), eye_up=(0.0, 1.0, 0.0))
 """Eyes in the frame that follows the car, whose origin is on the road below its front axle."""
 
 
-def blueprint(runs: Sequence[Run], *, compare: bool) -> rrb.Blueprint:
+def blueprint(runs: Sequence[Run], *, compare: bool, page: int = 0) -> rrb.Blueprint:
     """The layout.
 
     Args:
         runs: The runs; of several, the first page shows all of them.
         compare: Whether to leave out the pages of the single runs.
+        page: Which page of plots is shown first.
     """
     if len(runs) == 1:
-        content = _page(runs[0], runs)
+        content = _page(runs[0], runs, page)
     elif compare:
-        content = _comparison(runs)
+        content = _comparison(runs, page)
     else:
-        content = rrb.Tabs(_comparison(runs), *(_page(run, runs) for run in runs), active_tab=0)
+        content = rrb.Tabs(_comparison(runs, page), *(_page(run, runs, page) for run in runs), active_tab=0)
     return rrb.Blueprint(
         content,
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, loop_mode="all"),
         auto_views=False,
         auto_layout=False,
     )
 
 
-def _page(run: Run, runs: Sequence[Run]) -> rrb.Horizontal:
+def _page(run: Run, runs: Sequence[Run], page: int) -> rrb.Horizontal:
     """One run, with everything there is to see of it."""
     return rrb.Horizontal(
         rrb.Vertical(
@@ -58,14 +60,14 @@ def _page(run: Run, runs: Sequence[Run]) -> rrb.Horizontal:
             rrb.Vertical(*plots.views(plots.MOTION, [run]), name="Motion"),
             rrb.Vertical(*plots.views(plots.WHEELS, [run]), name="Wheels"),
             rrb.Vertical(*plots.views(plots.links(run), [run]), name="Links"),
-            active_tab=0,
+            active_tab=page,
         ),
         column_shares=[3, 2],
         name=run.label,
     )
 
 
-def _comparison(runs: Sequence[Run]) -> rrb.Horizontal:
+def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
     """All runs: one view for each car with the others as ghosts, plots over each other."""
     loads, use = plots.WHEELS[:2]
     return rrb.Horizontal(
@@ -79,7 +81,7 @@ def _comparison(runs: Sequence[Run]) -> rrb.Horizontal:
             rrb.Vertical(*plots.views(plots.MOTION, runs), name="Motion"),
             rrb.Vertical(*plots.views_by_corner(loads, runs), name="Wheel loads"),
             rrb.Vertical(*plots.views_by_corner(use, runs), name="Friction use"),
-            active_tab=0,
+            active_tab=page,
         ),
         column_shares=[3, 2],
         name="Comparison",

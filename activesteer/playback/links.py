@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -25,9 +26,7 @@ def send_links(stream: rr.RecordingStream, run: Run) -> None:
     """
     names = run.recording.poses.names
     links = [
-        part
-        for part in run.recording.scene
-        if isinstance(part, Link) and all(body in names for body, _ in part.points)
+        part for part in run.recording.scene if isinstance(part, Link) and all(body in names for body, _ in part.points)
     ]
     springs = [link for link in links if link.kind == "spring"]
     _send_rods(stream, run, [link for link in links if link.kind != "spring"])
@@ -53,7 +52,7 @@ def _send_rods(stream: rr.RecordingStream, run: Run, links: list[Link]) -> None:
     colours: list[list[int]] = []
     for link in links:
         ends = link_ends(run, link)
-        for start_m, end_m in zip(ends, ends[1:], strict=False):
+        for start_m, end_m in pairwise(ends):
             parts.append(between(start_m, end_m))
             radii.append(link.radius_m)
             colours.append([round(255 * value) for value in link.rgba])

@@ -79,7 +79,7 @@ _ASKED_FOR_BY: Final = {
     "rear_steer_rad": "rear_steer_demand_rad",
     "superposition_rad": "superposition_demand_rad",
 }
-"""Channel, and the one that is not always zero where a controller asks for it: else what it shows is the give of a hinge."""
+"""Channel, and the one that is not all zero where a controller asks for it: else it shows the give of a hinge."""
 
 
 def _of_wheels(title: str, channel: str, entity: str = "") -> Plot:

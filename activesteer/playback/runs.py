@@ -85,7 +85,9 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
         path = re.sub(r"\W", "_", name, flags=re.ASCII)
         path = f"{number}_{path}" if len(ordered) > 1 else path
         colour = colours.get(name) or COLOURS[next(spare) % len(COLOURS)]
-        runs.append(Run(recording, path or "run", name, SYSTEM_LABELS.get(name, name), colour, _shown(recording.time_s), poses))
+        runs.append(
+            Run(recording, path or "run", name, SYSTEM_LABELS.get(name, name), colour, _shown(recording.time_s), poses)
+        )
     return runs
 
 

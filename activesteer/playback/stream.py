@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from activesteer.playback.car import send_car
 from activesteer.playback.course import send_course, send_road, send_track
@@ -19,23 +20,28 @@ from activesteer.playback.tyres import send_tyre_forces
 def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
     """A stream without a target yet.
 
-    The viewer keeps one layout for each application id, changed by its user as may be, so each set of runs has its own.
+    The viewer keeps one layout for each application id as long as it is open, so what needs another layout has another
+    id: another manoeuvre, other runs.
     """
-    names = " ".join(run.name for run in runs)
-    stream = rr.RecordingStream(f"activesteer {names}{' compared' if compare else ''}")
-    title = runs[0].recording.metadata.get("maneuver", {}).get("title") or "activesteer"
-    stream.send_recording_name(str(title))
+    maneuver = runs[0].recording.metadata.get("maneuver", {})
+    names = ", ".join(run.name for run in runs)
+    stream = rr.RecordingStream(f"activesteer {maneuver.get('name', '')}: {names}{', compared' if compare else ''}")
+    stream.send_recording_name(str(maneuver.get("title") or "activesteer"))
     return stream
 
 
-def fill(stream: rr.RecordingStream, runs: Sequence[Run], label: MetricLabel = plain_label) -> None:
+def fill(
+    stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint, label: MetricLabel = plain_label
+) -> None:
     """Sends everything.
 
     Args:
         stream: Where to; its target must be chosen before.
         runs: The runs.
+        layout: The layout; it takes the place of one that a viewer remembers.
         label: How metrics are shown.
     """
+    stream.send_blueprint(layout, make_active=True, make_default=True)
     several = len(runs) > 1
     stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     send_road(stream, runs)
@@ -49,5 +55,3 @@ def fill(stream: rr.RecordingStream, runs: Sequence[Run], label: MetricLabel = p
     text = rr.TextDocument(summary(runs, label), media_type=rr.MediaType.MARKDOWN)
     stream.log(SUMMARY, text, static=True)
     stream.flush()
-
-

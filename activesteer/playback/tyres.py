@@ -12,10 +12,10 @@ from activesteer.conventions import CORNERS
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
 
-FORCE_SCALE_NPM: Final = 2000.0
+FORCE_SCALE_NPM: Final = 1500.0
 """Force that an arrow of one metre stands for [N/m]."""
-_ABOVE_ROAD_M: Final = 0.08
-_ARROW_RADIUS_M: Final = 0.035
+_ABOVE_ROAD_M: Final = 0.1
+_ARROW_RADIUS_M: Final = 0.045
 _ARROW_COLOUR: Final = (255, 255, 255)
 _DISC_RADIUS_M: Final = 0.3
 

@@ -42,8 +42,8 @@ def save(runs: Sequence[Run], path: Path, *, compare: bool = False, label: Metri
         msg = f"cannot write {path}: {error.strerror or error}"
         raise PlaybackError(msg) from None
     stream = new_stream(runs, compare=compare)
-    stream.save(path, default_blueprint=blueprint(runs, compare=compare))
-    fill(stream, runs, label)
+    stream.save(path)
+    fill(stream, runs, blueprint(runs, compare=compare), label)
     stream.disconnect()
 
 
@@ -117,7 +117,8 @@ def _run_viewer(
                 process.terminate()
                 process.wait()
         if status != 0:
-            msg = f"the viewer ended with an error: {_reason(log.read_text(errors='replace'))}; {_ELSEWHERE}"
+            reason = f"signal {-status}" if status < 0 else _reason(log.read_text(errors="replace"))
+            msg = f"the viewer ended with an error: {reason}; {_ELSEWHERE}"
             raise PlaybackError(msg)
 
 

@@ -1,4 +1,4 @@
-"""What a car looks like: solids in body frames, links between bodies; kept in a recording as one foxglove.SceneUpdate."""
+"""What a car looks like: solids in body frames, links between bodies; kept as one foxglove.SceneUpdate."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ from activesteer.signals import Channel
 from activesteer.version import __version__
 
 _ROWS_PER_CHUNK = 1000
-_BLOCKS_IN_FLIGHT = 2  # Bounds the memory when the disk is slower than the simulation.
+_BLOCKS_IN_FLIGHT = 1  # More would be lost when the process is killed, and held when the disk is slow.
 
 
 class McapWriter:

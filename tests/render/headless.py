@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import functools
 import importlib.util
 import io
 import os
 import socket
 import subprocess
 import time
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 from rerun.experimental import ViewerClient
 
 TIMELINE = "time"
@@ -38,23 +37,6 @@ def viewer_binary() -> Path:
     return binary
 
 
-@functools.cache
-def skip_reason() -> str:
-    """Why no picture can be made here, empty where one can: the viewer is started once without data."""
-    try:
-        with Headless(Path(os.environ.get("TMPDIR", "/tmp"))):
-            return ""
-    except ViewerDied as error:
-        text = str(error)
-        if "adapter" in text or "vulkan" in text.lower() or "graphics" in text.lower():
-            return "no Vulkan driver: apt-get install mesa-vulkan-drivers"
-        raise
-
-
-class HiddenView(Exception):  # noqa: N818 - what it is
-    """The view stands on a page that is not shown."""
-
-
 class ViewerDied(Exception):  # noqa: N818 - what happened, not a kind of error
     """The viewer ended before it could be asked for anything."""
 
@@ -62,9 +44,10 @@ class ViewerDied(Exception):  # noqa: N818 - what happened, not a kind of error
 class Headless:
     """A running viewer without a window."""
 
-    def __init__(self, folder: Path, size: str = "1600x900", timeout_s: float = 90.0) -> None:
-        self._log = folder / f"viewer-{os.getpid()}.log"
-        self._deadline = time.monotonic() + timeout_s
+    def __init__(self, folder: Path, size: str = "1280x800", timeout_s: float = 60.0) -> None:
+        self._log = folder / "viewer.log"
+        self._timeout_s = timeout_s
+        self._started = time.monotonic()
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port = free.getsockname()[1]
@@ -88,42 +71,54 @@ class Headless:
                 client = ViewerClient.connect(url)
                 client.get_state()
             except Exception:
-                if time.monotonic() > self._deadline:
-                    raise
-                time.sleep(0.1)
+                self._wait("the viewer does not answer")
             else:
                 return client
 
-    def pictures(self, file: Path, time_s: float) -> dict[str, Picture]:
-        """What every visible view shows of a file at an instant, by the name of the view."""
-        client = self._client
-        client.open([str(file.resolve())])
+    def open(self, file: Path) -> None:
+        """Closes what is open and opens a file."""
+        if self._client.get_state().recordings:
+            self._client.close("all")
+        self._started = time.monotonic()
+        self._client.open([str(file.resolve())])
         while True:
-            state = client.get_state()
+            state = self._client.get_state()
             ready = [r for r in state.recordings if r.timelines and all(line.end is not None for line in r.timelines)]
             if ready and not state.loading and state.views:
                 break
             self._wait("the file is not loaded")
+        # The layout of the file before is shown until that of this one has been taken up.
+        views, since = None, time.monotonic()
+        while time.monotonic() < since + 1.0:
+            found = {view.view_id for view in self._client.get_state().views}
+            if found != views:
+                views, since = found, time.monotonic()
+            self._wait("the layout does not settle")
+
+    def pictures(self, time_s: float, names: Collection[str]) -> dict[str, Picture]:
+        """What views show at an instant, by their names.
+
+        They must stand on pages that are open: the viewer lists the others too, but asking for a picture of one of
+        them makes it put a complaint over everything else.
+        """
+        client = self._client
         client.set_time(TIMELINE, duration=time_s, play_state="paused")
         shown = {}
-        for view in client.get_state().views:
-            with suppress(HiddenView):
-                shown[view.name] = self._settled(view.view_id)
+        of = {view.name: view.view_id for view in client.get_state().views}
+        for name in names:
+            shown[name] = self._settled(of[name])
         # Reports are those of the last time a view was drawn.
-        reports = {v.name: [f"{r.severity}: {r.summary} {r.details or ''}" for r in v.reports] for v in client.get_state().views}
-        return {name: Picture(pixels, reports.get(name, [])) for name, pixels in shown.items()}
+        reports = {
+            view.name: [f"{report.severity}: {report.summary} {report.details or ''}" for report in view.reports]
+            for view in client.get_state().views
+        }
+        return {name: Picture(pixels, reports[name]) for name, pixels in shown.items()}
 
     def _settled(self, view_id: str) -> NDArray[np.int16]:
-        from PIL import Image
-
         last = None
+        self._started = time.monotonic()
         while True:
-            try:
-                data = self._client.take_screenshot(view_id)
-            except ConnectionError as error:
-                if "not found" in str(error):
-                    raise HiddenView from None
-                raise
+            data = self._client.take_screenshot(view_id)
             pixels = np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(np.int16)
             if last is not None and np.array_equal(pixels, last):
                 return pixels
@@ -131,9 +126,10 @@ class Headless:
             self._wait("the picture does not settle")
 
     def _wait(self, problem: str) -> None:
-        if time.monotonic() > self._deadline:
+        """A little; each picture or file that took too long is an error."""
+        if time.monotonic() > self._started + self._timeout_s:
             raise TimeoutError(f"{problem}: {self._log.read_text()[-500:]}")
-        time.sleep(0.15)
+        time.sleep(0.1)
 
     def close(self) -> None:
         self._process.terminate()
@@ -148,8 +144,6 @@ class Headless:
 
 def save_pictures(pictures: Mapping[str, Picture], folder: Path) -> None:
     """For a look at them."""
-    from PIL import Image
-
     for name, picture in pictures.items():
         file = "".join(letter if letter.isalnum() else "_" for letter in name)
         Image.fromarray(picture.pixels.astype(np.uint8)).save(folder / f"{file}.png")

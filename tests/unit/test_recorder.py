@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from activesteer.conventions import CORNERS
-from activesteer.recorder import BLOCK_ROWS, CONTROL_CHANNELS, POSE_INTERVAL_S, Recorder, channels_of
+from activesteer.recorder import BLOCK_INTERVAL_S, CONTROL_CHANNELS, POSE_INTERVAL_S, Recorder, channels_of
 from activesteer.recording import McapWriter, Recording
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, SteerCommand
 from activesteer.simulation import Simulation
 
+BLOCK_ROWS = round(BLOCK_INTERVAL_S / 0.001)
 KEYS = {"settle_s": 0.0, "duration_s": 5.0, "steer.start_s": 0.01, "steer.steering_wheel_deg": 40}
 PROMISED = """
     x_m y_m yaw_rad roll_rad pitch_rad vx_mps vy_mps speed_mps yaw_rate_radps ax_mps2 ay_mps2 sideslip_rad

@@ -154,7 +154,7 @@ def _verdict(claim: Claim, known: Mapping[str, str]) -> Verdict:
 
 
 def number_lines(values: Mapping[str, float]) -> list[str]:
-    """The numbers of a claim for reading, in degrees and km/h: a line for each metric, the systems beside each other."""
+    """The numbers of a claim, in degrees and km/h: a line for each metric, the systems beside each other."""
     by_metric: dict[str, list[tuple[str, float]]] = {}
     for name, value in values.items():
         system, _, metric = name.partition("_")

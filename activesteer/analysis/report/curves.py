@@ -36,12 +36,14 @@ class Panel(NamedTuple):
         unit: In which unit.
         signals: From a recording to what is drawn of it, in that unit; the first is a full line, others are dashed.
             One that a recording does not have raises `RecordingError`, one that says nothing is None.
+        least: Smallest height of the vertical axis, in that unit: a signal that hardly moves shall look like it.
         note: What a dashed line is.
     """
 
     title: str
     unit: str
     signals: tuple[Callable[[Recording], Array | None], ...]
+    least: float
     note: str = ""
 
 
@@ -73,18 +75,19 @@ def _from_path(recording: Recording) -> Array:
 
 
 PANELS: Final = (
-    Panel("Steering wheel angle", "deg", (_channel("steering_wheel_rad", _DEG),)),
-    Panel("Yaw rate", "deg/s", (_channel("yaw_rate_radps", _DEG), _desired), "dashed: desired by the controller"),
-    Panel("Sideslip angle", "deg", (_channel("sideslip_rad", _DEG),)),
-    Panel("Lateral acceleration", "m/s²", (_channel("ay_mps2", 1.0),)),
-    Panel("Added steering angle at the wheels", "deg", (_added("rear_steer"), _added("superposition")),
+    Panel("Steering wheel angle", "deg", (_channel("steering_wheel_rad", _DEG),), 2.0),
+    Panel("Yaw rate", "deg/s", (_channel("yaw_rate_radps", _DEG), _desired), 0.5, "dashed: desired by the controller"),
+    Panel("Sideslip angle", "deg", (_channel("sideslip_rad", _DEG),), 0.1),
+    Panel("Lateral acceleration", "m/s²", (_channel("ay_mps2", 1.0),), 0.2),
+    Panel("Added angle at the wheels", "deg", (_added("rear_steer"), _added("superposition")), 0.05,
           "full: rear wheels, dashed: front superposition"),
-    Panel("Distance from the path", "m", (_from_path,)),
-    Panel("Roll angle", "deg", (_channel("roll_rad", _DEG),)),
-    Panel("Speed", "km/h", (_channel("speed_mps", 3.6),)),
-    Panel("Use of the friction, most of four wheels", "%", (_over_corners("friction_use", np.maximum, 100.0),)),
-    Panel("Wheel load, least of four wheels", "kN", (_over_corners("tyre_fz_N", np.minimum, 1e-3),)),
+    Panel("Distance from the path", "m", (_from_path,), 0.1),
+    Panel("Roll angle", "deg", (_channel("roll_rad", _DEG),), 0.1),
+    Panel("Speed", "km/h", (_channel("speed_mps", 3.6),), 4.0),
+    Panel("Use of the friction, most of four wheels", "%", (_over_corners("friction_use", np.maximum, 100.0),), 10.0),
+    Panel("Wheel load, least of four wheels", "kN", (_over_corners("tyre_fz_N", np.minimum, 1e-3),), 0.5),
 )  # fmt: skip
+"""In pairs, as they stand beside each other."""
 
 
 def plots(group: Group) -> dict[str, Any]:
@@ -114,8 +117,12 @@ def time_grid(times_s: Sequence[Array]) -> Array:
     end = max(float(time_s[-1]) for time_s in times_s)
     step = float(np.median(np.diff(first))) if len(first) > 1 else 1.0 / RATE_HZ
     # A hair less than a whole number is rounding.
-    every = max(1, math.ceil(1.0 / (RATE_HZ * step) - 1e-6), math.ceil((end - start) / (step * (MOST_SAMPLES - 1)) - 1e-6))
-    return start + np.arange(math.floor((end - start) / (every * step) + 1e-6) + 1) * (every * step)
+    every = max(
+        1, math.ceil(1.0 / (RATE_HZ * step) - 1e-6), math.ceil((end - start) / (step * (MOST_SAMPLES - 1)) - 1e-6)
+    )
+    count = math.floor((end - start) / (every * step) + 1e-6) + 1
+    # Times are whole nanoseconds in a recording: rounded to them, the instants are those of samples.
+    return np.rint((start + np.arange(count) * (every * step)) * 1e9) / 1e9
 
 
 def _panel(panel: Panel, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
@@ -131,7 +138,7 @@ def _panel(panel: Panel, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
                 sampled = _sampled(run.recording.time_s, values, grid)
                 series.append({"run": number, "dashed": line > 0, "values": _rounded(sampled)})
     note = panel.note if any(item["dashed"] for item in series) else ""
-    return {"title": panel.title, "unit": panel.unit, "note": note, "series": series}
+    return {"title": panel.title, "unit": panel.unit, "note": note, "least": panel.least, "series": series}
 
 
 def _sampled(time_s: Array, values: Array, grid: Array) -> Array:
@@ -143,17 +150,23 @@ def _rounded(values: Array, decimals: int | None = None) -> list[float | None]:
     """Numbers for JSON, which has no nan, with as many digits as can be seen."""
     finite = np.isfinite(values)
     if decimals is None:
-        largest = float(np.abs(values[finite]).max(initial=0.0))
-        decimals = max(0, DIGITS - math.floor(math.log10(largest)) - 1) if largest > 0.0 else 0
+        known = values[finite]
+        span = float(np.ptp(known)) if known.size else 0.0
+        span = span or float(np.abs(known).max(initial=0.0))
+        # A signal that is constant but for rounding must not become a staircase of it, hence the upper limit.
+        decimals = min(9, max(0, DIGITS - math.floor(math.log10(span)))) if span > 0.0 else 0
     numbers = np.round(np.where(finite, values, 0.0), decimals) + 0.0  # no -0.0
     listed = [int(number) if number == int(number) else number for number in numbers.tolist()]
-    return [number if known else None for number, known in zip(listed, finite.tolist(), strict=True)]
+    return [number if exists else None for number, exists in zip(listed, finite.tolist(), strict=True)]
 
 
 def _marks(group: Group) -> list[dict[str, Any]]:
     """Instants that a standard judges by."""
     recording = group.runs[0].recording
-    if not isinstance(maneuver := recording.metadata.get("maneuver"), dict) or maneuver.get("kind") != "sine_with_dwell":
+    if (
+        not isinstance(maneuver := recording.metadata.get("maneuver"), dict)
+        or maneuver.get("kind") != "sine_with_dwell"
+    ):
         return []
     try:
         completion_s = sine_with_dwell.steering(recording).completion_s
@@ -192,7 +205,9 @@ def _courses(group: Group) -> Iterator[Course]:
 def _course(course: Course) -> dict[str, Any]:
     (left, right), (low, high) = course.shown()
     return {
-        "lanes": [{"name": name, "x": [start, end], "y": [below, above]} for name, start, end, below, above in course.lanes],
+        "lanes": [
+            {"name": name, "x": [start, end], "y": [below, above]} for name, start, end, below, above in course.lanes
+        ],
         "cones": [[round(x, 3), round(y, 3)] for x, y in course.cones_m.tolist()],
         "path": {"x": _rounded(course.path_x_m, 2), "y": _rounded(course.path_y_m, 3)},
         "view": {"x": [left, right], "y": [low, high]},

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from activesteer.analysis.claims import SCENARIOS
 from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
@@ -32,6 +33,12 @@ class Run(NamedTuple):
     name: str
     label: str
     colour: str
+
+    @property
+    def problem(self) -> str:
+        """Why the run did not end properly; empty where it did."""
+        metadata = self.recording.metadata
+        return "" if metadata.get("complete", True) else str(metadata.get("error", "the run did not end properly"))
 
 
 class Group(NamedTuple):
@@ -68,7 +75,7 @@ def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
 
 
 def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
-    """The runs by manoeuvre, in the order in which the manoeuvres first come.
+    """The runs by manoeuvre: those of the paper in its order, then the others as they come.
 
     Args:
         recordings: By where they come from.
@@ -84,7 +91,9 @@ def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
         if len(recording) == 0:
             raise RecordingError(f"{source} has no rows: nothing was recorded before the run ended")
         by_maneuver.setdefault(entry(recording, "maneuver", "name") or "run", {})[source] = recording
-    return [_group(name, members) for name, members in by_maneuver.items()]
+    ordered = [name for name in SCENARIOS if name in by_maneuver]
+    ordered += [name for name in by_maneuver if name not in SCENARIOS]
+    return [_group(name, by_maneuver[name]) for name in ordered]
 
 
 def entry(recording: Recording, table: str, key: str) -> str:
@@ -112,5 +121,6 @@ def _names(recordings: Mapping[str, Recording]) -> Sequence[str]:
     controllers = [str(run.metadata.get("controller", "run")).rpartition(":")[2] for run in recordings.values()]
     stems = [Path(source).name.removesuffix(".mcap") for source in recordings]
     return next(
-        (names for names in (controllers, stems) if max(Counter(names).values()) == 1), [str(name) for name in recordings]
+        (names for names in (controllers, stems) if max(Counter(names).values()) == 1),
+        [str(name) for name in recordings],
     )

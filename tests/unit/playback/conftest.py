@@ -12,8 +12,7 @@ from activesteer.scenario import resolve
 
 @pytest.fixture(scope="session")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two seconds of a lane change with active rear steering."""
+    """A double lane change with active rear steering."""
     path = tmp_path_factory.mktemp("driven") / "run.mcap"
-    scenario = resolve("double_lane_change", overrides={"duration_s": 2.0, "settle_s": 0.5, "lane.entry_m": 5.0})
-    run_scenario(scenario, "ars", path=path)
+    run_scenario(resolve("double_lane_change"), "ars", path=path)
     return path

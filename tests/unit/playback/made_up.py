@@ -66,10 +66,10 @@ def _poses(time_s: np.ndarray, x: np.ndarray, y: np.ndarray, yaw: np.ndarray) ->
     names = ("chassis", *(f"{corner}_wheel" for corner in CORNERS))
     at = np.zeros((len(time_s), len(names), 3))
     turn = np.zeros((len(time_s), len(names), 4))
-    heading = Rotation.from_euler("z", yaw)
+    heading = Rotation.from_euler("z", yaw[:, None])
     at[:, 0] = np.column_stack([x, y, np.zeros_like(x)])
     turn[:, 0] = heading.as_quat(scalar_first=True)
-    spin = Rotation.from_euler("y", SPEED_MPS / WHEEL_RADIUS_M * time_s)
+    spin = Rotation.from_euler("y", SPEED_MPS / WHEEL_RADIUS_M * time_s[:, None])
     for index, (corner, (ahead, left)) in enumerate(WHEELS.items(), start=1):
         at[:, index] = at[:, 0] + heading.apply((ahead, left, WHEEL_RADIUS_M))
         steer = Rotation.from_euler("z", STEER_RAD if corner[0] == "f" else 0.0)

@@ -212,9 +212,9 @@ def test_a_file_that_cannot_be_written_is_named(tmp_path: Path, kind: str) -> No
 
 
 def test_twenty_seconds_convert_in_two_and_take_less_than_15_MB(driven: Path, tmp_path: Path) -> None:
-    """The real car, its two seconds ten times over."""
+    """The real car, its drive twice over."""
     once = Recording.open(driven)
-    times = 10
+    times = 2
     rows, sets = len(once), len(once.poses.time_s)
     poses = once.poses._replace(
         time_s=np.arange(times * sets) * 0.01,
@@ -229,7 +229,7 @@ def test_twenty_seconds_convert_in_two_and_take_less_than_15_MB(driven: Path, tm
         metadata=once.metadata,
         scene=once.scene,
     )
-    assert recording.time_s[-1] > 19.9
+    assert recording.time_s[-1] > 20.0
     path = tmp_path / "out.rrd"
     took_s = []
     for _ in range(2):  # the first one also imports

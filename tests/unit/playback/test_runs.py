@@ -61,10 +61,12 @@ def test_what_cannot_be_played_back_is_refused() -> None:
     with pytest.raises(RecordingError, match="no recording to play back"):
         runs_of({})
     for poses in (None, recording.poses._replace(names=tuple(f"body{i}" for i in range(5)))):
-        with pytest.raises(RecordingError, match="ars: .*rows and poses of a car are needed"):
+        with pytest.raises(RecordingError, match=r"ars: .*rows and poses of a car are needed"):
             runs_of({"ars": _with_poses(recording, poses)})
     with pytest.raises(RecordingError, match="rows and poses"):
-        runs_of({"ars": Recording(recording.channels, [], np.empty((0, len(recording.channels))), poses=recording.poses)})
+        runs_of(
+            {"ars": Recording(recording.channels, [], np.empty((0, len(recording.channels))), poses=recording.poses)}
+        )
 
 
 def _with_poses(recording: Recording, poses: Poses | None) -> Recording:

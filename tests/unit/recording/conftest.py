@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from activesteer.recording import McapWriter, Poses, Primitive, Recording
+from activesteer.recording import Link, McapWriter, Poses, Primitive, Recording
 from activesteer.signals import Channel
 
 BLOCK_ROWS = 50
@@ -40,7 +40,11 @@ def recording(channels: list[Channel], rng: np.random.Generator) -> Recording:
         metadata={"maneuver": "step_steer", "controller": "ars", "parameters": {"mass_kg": 1400.0, "list": [1, None]}},
         metrics={"yaw_rate_overshoot": 0.125, "tb_s": float("nan")},
         attachments={"compact.xml": b"<mujoco/>", "empty.tir": b""},
-        scene=[Primitive("chassis", "box", (4.0, 1.7, 0.5)), Primitive("fl_wheel", "cylinder", (0.6, 0.6, 0.2))],
+        scene=[
+            Primitive("chassis", "box", (4.0, 1.7, 0.5)),
+            Primitive("fl_wheel", "cylinder", (0.6, 0.6, 0.2)),
+            Link("fl_rod", "link", (("chassis", (0.0, 0.3, 0.2)), ("fl_wheel", (0.0, 0.0, 0.1))), 0.012),
+        ],
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import RecordingError
-from activesteer.recording import McapWriter, Poses, Primitive, Recording
+from activesteer.recording import Link, McapWriter, Poses, Primitive, Recording
 from activesteer.signals import Channel
 from tests.unit.recording.conftest import assert_same
 
@@ -133,6 +133,12 @@ def test_unusable_primitives_and_bodies_are_refused(channels: list[Channel], tmp
         McapWriter(path, channels, scene=[Primitive("chassis", "cone", (1.0, 1.0, 1.0))])
     with pytest.raises(RecordingError, match="a number of the box is missing"):
         McapWriter(path, channels, scene=[Primitive("chassis", "box", (1.0, 1.0))])  # type: ignore[arg-type]
+    ends = (("chassis", (0.0, 0.0, 0.0)), ("fl_wheel", (0.0, 0.0, 1.0)))
+    with pytest.raises(RecordingError, match="kind 'rope', known are: link, spring, damper"):
+        McapWriter(path, channels, scene=[Link("arm", "rope", ends)])
+    for points in (ends[:1], (ends[0], ("fl_wheel", (0.0, 1.0))), (ends[0], ("fl_wheel", "abc"))):
+        with pytest.raises(RecordingError, match="arm: a number of the link is missing"):
+            McapWriter(path, channels, scene=[Link("arm", "link", points)])  # type: ignore[arg-type]
     for names in (("chassis", "chassis"), ("world", "chassis")):
         with pytest.raises(RecordingError, match="body names must differ"):
             McapWriter(path, channels, names)

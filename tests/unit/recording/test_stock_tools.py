@@ -61,13 +61,18 @@ def test_poses_decode_to_the_same_numbers(recording: Recording, mcap_file: Path)
 def test_the_scene_is_locked_to_the_bodies(mcap_file: Path) -> None:
     ((time_ns, scene),) = decoded(mcap_file)["/scene"]
     assert time_ns == 0
-    assert [entity.frame_id for entity in scene.entities] == ["chassis", "fl_wheel"]
+    assert [entity.frame_id for entity in scene.entities] == ["chassis", "fl_wheel", "chassis"]
     assert all(entity.frame_locked for entity in scene.entities)
     assert all(entity.lifetime.seconds == entity.lifetime.nanos == 0 for entity in scene.entities)
     (body,) = scene.entities[0].cubes
     assert (body.size.x, body.pose.orientation.w, body.color.a) == (4.0, 1.0, 1.0)
     (wheel,) = scene.entities[1].cylinders
     assert (wheel.size.z, wheel.bottom_scale, wheel.top_scale) == (0.2, 1.0, 1.0)
+    (link,) = scene.entities[2].metadata
+    assert (scene.entities[2].id, link.key) == ("fl_rod", "activesteer.link")
+    table = json.loads(link.value)
+    assert table["points"] == [["chassis", [0.0, 0.3, 0.2]], ["fl_wheel", [0.0, 0.0, 0.1]]]
+    assert (table["kind"], table["radius_m"]) == ("link", 0.012)
 
 
 def test_units_meanings_metadata_and_attachments_are_within_reach(recording: Recording, mcap_file: Path) -> None:

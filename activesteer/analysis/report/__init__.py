@@ -1,0 +1,9 @@
+"""The report of runs: one HTML page with scorecard, plots to zoom into, metrics, parameters; it works offline.
+
+The plots are drawn in the browser by uPlot (https://github.com/leeoniya/uPlot, MIT), of which a copy is in `assets`.
+"""
+
+from activesteer.analysis.report.page import report_page, write_report
+from activesteer.analysis.report.runs import open_all
+
+__all__ = ["open_all", "report_page", "write_report"]

@@ -1,0 +1,312 @@
+// The plots of the report. Each group of runs has plots over one time axis, linked, and a track with the same instant
+// marked. Data: the JSON in #data, as `curves.plots` makes it.
+"use strict";
+(() => {
+  const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
+  const QUIET = "#656b73", GRID = "#eceef0", LANE = "#f3ead0", CONE = "#d98200", PATH = "#8a9097";
+  const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290;
+  // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
+  const PRINTED = 660, PRINTED_GAP = 16;
+
+  const element = (name, attributes = {}, ...children) => {
+    const made = document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+    made.append(...children);
+    return made;
+  };
+  // Axis labels with a real minus sign, and without the digits that floating point leaves.
+  const labels = (unit) => (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit));
+  const axis = (size, unit = "") => ({ values: labels(unit), stroke: QUIET, font: FONT, size, gap: 4, grid: { stroke: GRID, width: 1 }, ticks: { show: false } });
+  const shown = (number) => (number == null ? "–" : number.toFixed(Math.abs(number) < 10 ? 2 : Math.abs(number) < 1000 ? 1 : 0).replace("-", "−"));
+
+  // Limits of a vertical axis, with some room, and no closer than `least`.
+  function padded(low, high, least) {
+    if (low == null) return [0, least];
+    const half = Math.max(0.55 * (high - low), least / 2), middle = (low + high) / 2;
+    return [middle - half, middle + half];
+  }
+
+  class Group {
+    constructor(data) {
+      this.data = data;
+      this.plots = [];
+      this.visible = data.runs.map(() => true);
+      this.time = Array.from({ length: data.samples }, (_, i) => data.start_s + i * data.step_s);
+      this.box = document.querySelector(`.plots[data-group="${data.anchor}"]`);
+      this.toolbar();
+      if (data.track) this.track = new Track(this, data.track);
+      for (const panel of data.panels) this.plots.push(this.panel(panel));
+      new ResizeObserver(() => this.fit()).observe(this.box);
+      this.zoom(null);
+    }
+
+    figure(title, wide, name) {
+      const values = element("span", { class: "values" });
+      const holder = element("div", { role: "img", "aria-label": name });
+      this.box.append(element("figure", { class: wide ? "plot wide" : "plot" }, element("figcaption", {}, ...title, values), holder));
+      return [holder, values];
+    }
+
+    toolbar() {
+      const bar = document.querySelector(`.toolbar[data-group="${this.data.anchor}"]`);
+      this.data.runs.forEach((run, i) => {
+        const swatch = element("span", { class: "swatch", style: `background:${run.colour}` });
+        const button = element("button", { type: "button", "aria-pressed": "true" }, swatch, run.label);
+        button.addEventListener("click", () => {
+          this.visible[i] = !this.visible[i];
+          button.setAttribute("aria-pressed", String(this.visible[i]));
+          for (const plot of this.plots) {
+            plot.panel.series.forEach((series, k) => { if (series.run === i) plot.setSeries(k + 1, { show: this.visible[i] }); });
+          }
+          if (this.track) this.track.redraw();
+        });
+        bar.append(button);
+      });
+      const reset = element("button", { type: "button", class: "reset" }, "Whole run");
+      reset.addEventListener("click", () => { this.zoom(null); if (this.track) this.track.whole(); });
+      const touch = matchMedia("(pointer: coarse)").matches;
+      bar.append(reset, element("span", { class: "hint" }, touch ? "Pinch to zoom, slide to read values." : "Drag to zoom, double-click for the whole run."));
+    }
+
+    panel(panel) {
+      const { runs } = this.data;
+      const title = [element("b", {}, panel.title), element("span", { class: "quiet" }, `${panel.unit}${panel.note ? ", " + panel.note : ""}`)];
+      const [holder, values] = this.figure(title, false, `${panel.title} over time`);
+      const lines = panel.series.map((series) => ({
+        stroke: runs[series.run].colour, width: series.dashed ? 1 : 1.6, dash: series.dashed ? [4, 4] : undefined, points: { show: false },
+      }));
+      const plot = new uPlot({
+        width: holder.clientWidth, height: PLOT_HEIGHT, padding: [6, 18, 0, 0], legend: { show: false }, pxAlign: 0,
+        cursor: { y: false, sync: { key: this.data.anchor }, drag: { x: true, y: false }, points: { size: 7 } },
+        scales: { x: { time: false, range: (_, min, max) => [min, max] }, y: { range: (_, low, high) => padded(low, high, panel.least) } },
+        axes: [axis(26, " s"), axis(46)],
+        series: [{}, ...lines],
+        hooks: {
+          draw: [(u) => this.marks(u)],
+          setCursor: [(u) => this.read(u, panel, values)],
+        },
+      }, [this.time, ...panel.series.map((series) => series.values)], holder);
+      plot.panel = panel;
+      touchable(plot, (range) => this.zoom(range));
+      return plot;
+    }
+
+    read(u, panel, values) {
+      const i = u.cursor.idx;
+      values.replaceChildren();
+      if (i == null || u.cursor.left < 0) { if (this.track) this.track.at(null); return; }
+      values.append(`${this.time[i].toFixed(2)} s`);
+      panel.series.forEach((series) => {
+        if (series.dashed || !this.visible[series.run]) return;
+        values.append(" ", element("span", { style: `color:${this.data.runs[series.run].colour}` }, shown(series.values[i])));
+      });
+      if (this.track) this.track.at(i);
+    }
+
+    marks(u) {
+      const { ctx, bbox } = u;
+      ctx.save();
+      ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
+      ctx.strokeStyle = ctx.fillStyle = QUIET;
+      ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
+      ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
+      ctx.textBaseline = "top"; ctx.textAlign = "left";
+      let free = bbox.left;
+      for (const mark of this.data.marks) {
+        const x = u.valToPos(mark.time_s, "x", true);
+        ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
+        // A text that would run into the one before it is left out.
+        if (u.panel !== this.data.panels[0] || x < free) continue;
+        ctx.fillText(mark.text, x + 3 * devicePixelRatio, bbox.top);
+        free = x + ctx.measureText(mark.text).width + 6 * devicePixelRatio;
+      }
+      ctx.restore();
+    }
+
+    zoom(range) {
+      const whole = { min: this.time[0], max: this.time[this.time.length - 1] || 1 };
+      for (const plot of this.plots) plot.setScale("x", range || whole);
+    }
+
+    pointAt(i) {
+      const plot = this.plots[0];
+      if (plot) plot.setCursor({ left: plot.valToPos(this.time[i], "x"), top: 1 }, true, true);
+    }
+
+    fit(width = null) {
+      for (const plot of this.plots) {
+        const room = width == null ? plot.root.parentElement.clientWidth : (width - PRINTED_GAP) / 2;
+        if (room > 0 && room !== plot.width) plot.setSize({ width: room, height: PLOT_HEIGHT });
+      }
+      if (this.track) this.track.fit(width);
+    }
+  }
+
+  // The road from above. uPlot gives axes and zoom; what lies in them is drawn here.
+  class Track {
+    constructor(group, data) {
+      this.group = group;
+      this.data = data;
+      const note = this.note = element("span", { class: "quiet" });
+      const title = [element("b", {}, "Track of the front axle centre"), note];
+      const [holder] = group.figure(title, true, "Tracks from above, with lanes and cones");
+      const finite = (key) => data.tracks.flatMap((track) => track[key]).filter((value) => value != null);
+      this.limits = data.view || { x: this.ends(finite("x")), y: this.ends(finite("y")) };
+      const { x, y } = this.limits;
+      this.plot = new uPlot({
+        width: holder.clientWidth, height: TRACK_HEIGHT, padding: [6, 18, 0, 0], legend: { show: false },
+        cursor: { drag: { x: true, y: true, uni: 20 }, points: { show: false }, x: false, y: false },
+        scales: { x: { time: false, range: (u) => this.range(u, "x") }, y: { range: (u) => this.range(u, "y") } },
+        axes: [axis(26, " m"), axis(46, " m")],
+        series: [{}, { show: true, paths: () => null, points: { show: false } }],
+        hooks: {
+          drawAxes: [(u) => this.draw(u)],
+          setCursor: [(u) => this.nearest(u)],
+          setScale: [() => this.place()],
+        },
+      }, [x, y], holder);
+      this.dots = data.tracks.map((track) => {
+        const dot = element("div", { class: "dot", style: `background:${group.data.runs[track.run].colour}` });
+        dot.hidden = true;
+        this.plot.over.append(dot);
+        return dot;
+      });
+      touchable(this.plot, (range) => (range ? this.plot.setScale("x", range) : this.whole()));
+    }
+
+    ends(values) {
+      let low = Infinity, high = -Infinity;
+      for (const value of values) { low = Math.min(low, value); high = Math.max(high, value); }
+      const margin = 0.04 * (high - low) + 1;
+      return [low - margin, high + margin];
+    }
+
+    // A course is stretched to fill its plot; without one, both directions have the same scale.
+    range(u, key) {
+      const { x, y } = this.limits;
+      const { width, height } = u.bbox;
+      if (this.data.view || !width || !height) return [...this.limits[key]];
+      const scale = Math.max((x[1] - x[0]) / width, (y[1] - y[0]) / height);
+      const [limits, pixels] = key === "x" ? [x, width] : [y, height];
+      const middle = (limits[0] + limits[1]) / 2, half = (scale * pixels) / 2;
+      return [middle - half, middle + half];
+    }
+
+    whole() {
+      this.plot.batch(() => {
+        for (const key of ["x", "y"]) {
+          const [min, max] = this.range(this.plot, key);
+          this.plot.setScale(key, { min, max });
+        }
+      });
+    }
+
+    redraw() { this.plot.redraw(false, false); this.place(); }
+
+    fit(width) {
+      const room = width == null ? this.plot.root.parentElement.clientWidth : width;
+      if (room > 0 && room !== this.plot.width) { this.plot.setSize({ width: room, height: TRACK_HEIGHT }); this.whole(); }
+    }
+
+    draw(u) {
+      const { ctx, bbox } = u, dpr = devicePixelRatio;
+      const px = (x) => u.valToPos(x, "x", true), py = (y) => u.valToPos(y, "y", true);
+      const metre = (px(1) - px(0)), stretch = (py(0) - py(1)) / metre;
+      this.note.textContent = stretch > 1.05 || stretch < 0.95 ? `lateral positions stretched ${stretch.toFixed(1)} times` : "";
+      ctx.save();
+      ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
+      ctx.lineJoin = "round";
+      ctx.fillStyle = LANE;
+      for (const { x, y } of this.data.lanes) ctx.fillRect(px(x[0]), py(y[1]), px(x[1]) - px(x[0]), py(y[0]) - py(y[1]));
+      const line = ({ x, y }, colour, width, dash) => {
+        ctx.strokeStyle = colour; ctx.lineWidth = width * dpr; ctx.setLineDash(dash.map((length) => length * dpr));
+        ctx.beginPath();
+        let pen = false;
+        for (let i = 0; i < x.length; i++) {
+          if (x[i] == null || y[i] == null) { pen = false; continue; }
+          if (pen) ctx.lineTo(px(x[i]), py(y[i])); else ctx.moveTo(px(x[i]), py(y[i]));
+          pen = true;
+        }
+        ctx.stroke();
+      };
+      if (this.data.path) line(this.data.path, PATH, 1.2, [2, 4]);
+      for (const track of this.data.tracks) {
+        if (this.group.visible[track.run]) line(track, this.group.data.runs[track.run].colour, 1.6, []);
+      }
+      ctx.fillStyle = CONE;
+      for (const [x, y] of this.data.cones) {
+        const [cx, cy, r] = [px(x), py(y), 4 * dpr];
+        ctx.beginPath(); ctx.moveTo(cx, cy - r); ctx.lineTo(cx + r, cy + r); ctx.lineTo(cx - r, cy + r); ctx.fill();
+      }
+      ctx.restore();
+    }
+
+    // Where the cars are at the instant under the cursor of the plots over time.
+    at(i) { this.instant = i; this.place(); }
+
+    place() {
+      if (!this.dots) return;
+      this.data.tracks.forEach((track, k) => {
+        const i = this.instant, x = i == null ? null : track.x[i];
+        this.dots[k].hidden = x == null || !this.group.visible[track.run];
+        if (x == null) return;
+        this.dots[k].style.left = `${this.plot.valToPos(x, "x")}px`;
+        this.dots[k].style.top = `${this.plot.valToPos(track.y[i], "y")}px`;
+      });
+    }
+
+    // The other way round: the instant at which a car is nearest to the cursor.
+    nearest(u) {
+      const { left, top } = u.cursor;
+      if (left == null || left < 0) return;
+      let best = Infinity, found = null;
+      for (const track of this.data.tracks) {
+        if (!this.group.visible[track.run]) continue;
+        for (let i = 0; i < track.x.length; i++) {
+          if (track.x[i] == null) continue;
+          const distance = Math.hypot(u.valToPos(track.x[i], "x") - left, u.valToPos(track.y[i], "y") - top);
+          if (distance < best) { best = distance; found = i; }
+        }
+      }
+      if (found != null) this.group.pointAt(found);
+    }
+  }
+
+  // One finger reads values, two zoom in time, a double tap shows all; up and down the page still scrolls.
+  function touchable(u, zoom) {
+    const over = u.over, fingers = new Map();
+    let start = null, tapped = 0;
+    const at = (event) => event.clientX - over.getBoundingClientRect().left;
+    over.addEventListener("pointerdown", (event) => {
+      if (event.pointerType !== "touch") return;
+      fingers.set(event.pointerId, at(event));
+      if (fingers.size === 2) {
+        const [a, b] = [...fingers.values()].sort((p, q) => p - q);
+        start = { a: u.posToVal(a, "x"), b: u.posToVal(b, "x") };
+      } else if (fingers.size === 1) {
+        if (event.timeStamp - tapped < 300) zoom(null);
+        tapped = event.timeStamp;
+      }
+    });
+    over.addEventListener("pointermove", (event) => {
+      if (!fingers.has(event.pointerId)) return;
+      fingers.set(event.pointerId, at(event));
+      if (fingers.size === 1) u.setCursor({ left: at(event), top: event.clientY - over.getBoundingClientRect().top }, true, true);
+      if (fingers.size !== 2 || !start) return;
+      const [a, b] = [...fingers.values()].sort((p, q) => p - q);
+      if (b - a < 10) return;
+      const scale = (start.b - start.a) / (b - a), min = start.a - a * scale;
+      zoom({ min, max: min + over.clientWidth * scale });
+    });
+    for (const name of ["pointerup", "pointercancel"]) {
+      over.addEventListener(name, (event) => { fingers.delete(event.pointerId); if (fingers.size < 2) start = null; });
+    }
+  }
+
+  const groups = JSON.parse(document.getElementById("data").textContent).map((data) => new Group(data));
+  addEventListener("beforeprint", () => {
+    for (const details of document.querySelectorAll(".group details")) details.open = true;
+    for (const group of groups) group.fit(PRINTED);
+  });
+  addEventListener("afterprint", () => { for (const group of groups) group.fit(); });
+})();

@@ -1,0 +1,51 @@
+"""What the paper claims about the runs of a group, or why that cannot be said."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from activesteer.analysis.claims import SYSTEMS, Scorecard, claims_for, scorecard
+from activesteer.analysis.report.runs import Group, entry
+from activesteer.errors import ActiveSteerError
+from activesteer.recording import Recording
+
+
+class Judgement(NamedTuple):
+    """The claims about a group of runs.
+
+    Attributes:
+        scorecard: Claims with their verdicts; without any where the paper claims nothing, or nothing can be said.
+        obstacle: Why nothing can be said; empty where something is, or where the paper claims nothing.
+    """
+
+    scorecard: Scorecard
+    obstacle: str = ""
+
+
+def judge(group: Group) -> Judgement:
+    """Checks the paper's claims, where the runs are those that they speak of.
+
+    The three systems are needed, complete, driven by the same manoeuvre with the same car.
+    """
+    nothing = scorecard([], known={})
+    recordings = group.by_name()
+    check = claims_for(group.runs[0].recording)
+    if check is None:
+        return Judgement(nothing)
+    missing = [system for system in SYSTEMS if system not in recordings]
+    if missing:
+        return Judgement(nothing, f"no run of {', '.join(missing)}, and the claims compare {', '.join(SYSTEMS)}")
+    systems = [recordings[system] for system in SYSTEMS]
+    for system, recording in zip(SYSTEMS, systems, strict=True):
+        if not recording.metadata.get("complete", True):
+            return Judgement(nothing, f"the run {system} is not complete")
+    if not (_same(systems, "maneuver") and _same(systems, "vehicle")):
+        return Judgement(nothing, "the three runs differ in manoeuvre or vehicle; see the parameters")
+    try:
+        return Judgement(scorecard(check(recordings), entry(systems[0], "vehicle", "name")))
+    except ActiveSteerError as error:
+        return Judgement(nothing, str(error))
+
+
+def _same(recordings: list[Recording], table: str) -> bool:
+    return all(recording.metadata.get(table) == recordings[0].metadata.get(table) for recording in recordings)

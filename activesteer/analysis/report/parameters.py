@@ -1,0 +1,71 @@
+"""Parameters of runs side by side: the tables of their metadata, flat, as text."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from activesteer.recording import Recording
+
+_SHOWN_AS: Final = (("_radps", "deg/s", math.degrees(1.0)), ("_rad", "deg", math.degrees(1.0)), ("_mps", "km/h", 3.6))
+"""Ending of a key, unit that its value is also told in, factor to it."""
+
+
+class Row(NamedTuple):
+    """A parameter.
+
+    Attributes:
+        key: Its name, with the tables that it stands in.
+        values: Its value in each run; a single one where it is the same in all.
+    """
+
+    key: str
+    values: tuple[str, ...]
+
+    @property
+    def differs(self) -> bool:
+        """Whether runs differ in it."""
+        return len(self.values) > 1
+
+
+def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
+    """The entries of tables of the metadata, in the order of the first run, those that only later ones have after it.
+
+    Args:
+        recordings: The runs.
+        tables: Keys of the metadata: tables, or single values. The entries of a single one are told without its name.
+    """
+    flat = [dict(_flat(_chosen(run.metadata, tables))) for run in recordings]
+    found = []
+    for key in dict.fromkeys(key for entries in flat for key in entries):
+        values = tuple(entries.get(key, "") for entries in flat)
+        found.append(Row(key, values if len(set(values)) > 1 else values[:1]))
+    return found
+
+
+def _chosen(metadata: Mapping[str, Any], tables: Sequence[str]) -> Mapping[str, Any]:
+    if len(tables) == 1:
+        table = metadata.get(tables[0], {})
+        return table if isinstance(table, Mapping) else {tables[0]: table}
+    return {key: metadata[key] for key in tables if key in metadata}
+
+
+def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", _text(key, value)
+
+
+def _text(key: str, value: Any) -> str:
+    if isinstance(value, bool) or value is None:
+        return str(value).lower() if value is not None else "none"
+    if isinstance(value, int | float):
+        for ending, unit, factor in _SHOWN_AS:
+            if key.endswith(ending):
+                return f"{value:.6g} ({value * factor:.4g} {unit})"
+        return f"{value:.6g}"
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

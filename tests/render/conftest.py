@@ -1,0 +1,39 @@
+"""A viewer without a window, and drives of the three systems to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from activesteer.recording import Recording
+from activesteer.runner import run_scenario
+from activesteer.scenario import resolve
+from tests.render.headless import Headless, ViewerDied
+
+
+@pytest.fixture(scope="session")
+def viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+    """Skips, visibly, where there is nothing that could draw."""
+    try:
+        headless = Headless(tmp_path_factory.mktemp("viewer"))
+    except ViewerDied as error:
+        if "No graphics adapter was found" in str(error):
+            pytest.skip("no Vulkan driver here: apt-get install mesa-vulkan-drivers brings one in software")
+        raise
+    yield headless
+    headless.close()
+
+
+@pytest.fixture(scope="session")
+def drives() -> dict[str, Recording]:
+    """A double lane change on a road so slippery that the cars differ."""
+    scenario = resolve("double_lane_change_low_mu")
+    return {controller: run_scenario(scenario, controller) for controller in ("none", "ars", "afs")}
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where files and pictures go; `--basetemp` says where that is."""
+    return tmp_path_factory.mktemp("pictures")

@@ -1,0 +1,235 @@
+"""The report as a person sees it: in a browser, on a desk, on a phone, on paper. Skipped where there is no browser."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from activesteer.analysis.report import write_report
+from activesteer.conventions import RUN_COLOURS
+from tests.unit.analysis.made_up_files import lane_changes, step_steers
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Locator, Page
+
+pytestmark = pytest.mark.render
+
+DESK = {"viewport": {"width": 1280, "height": 900}}
+PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
+DURATION_S = 7.0
+
+# How many pixels of a canvas have about a colour; blending with white makes others of it.
+COUNT = """(canvas, [r, g, b, tolerance]) => {
+  const copy = document.createElement("canvas");
+  [copy.width, copy.height] = [canvas.width, canvas.height];
+  const context = copy.getContext("2d", { willReadFrequently: true });
+  context.drawImage(canvas, 0, 0);
+  const { data } = context.getImageData(0, 0, copy.width, copy.height);
+  const near = (i) => Math.abs(data[i] - r) + Math.abs(data[i + 1] - g) + Math.abs(data[i + 2] - b) < tolerance;
+  let found = 0;
+  for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 200 && near(i)) found++;
+  return found;
+}"""
+TELL_WIDTHS = """() => {
+  const widths = () => [...document.querySelectorAll(".uplot")].map((plot) => plot.clientWidth);
+  addEventListener("beforeprint", () => { window.printed = widths(); });
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright, of the extra `dev`")
+    names = ("chromium", "chromium-browser", "google-chrome")
+    found = next((path for name in names if (path := shutil.which(name))), None)
+    if found is None:
+        pytest.skip("needs a browser: apt-get install chromium")
+    # As root, as in a container, Chromium refuses to start with its sandbox.
+    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+    with sync_api.sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=found, args=arguments)
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    return write_report({**step_steers(), **lane_changes()}, path)
+
+
+@pytest.fixture
+def open_page(browser: Browser, report: Path) -> Iterator[Callable[..., Page]]:
+    """Opens the report; a message in the console, an error, or a request for anything else fails the test."""
+    wrong: list[str] = []
+    contexts: list[Any] = []
+
+    def open_page(**device: Any) -> Page:
+        context = browser.new_context(**device)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda message: wrong.append(f"{message.type}: {message.text}"))
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("request", lambda request: wrong.extend({request.url} - {report.as_uri()}))
+        page.goto(report.as_uri())
+        page.wait_for_selector(".uplot canvas")
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert wrong == []
+
+
+def plot(page: Page, title: str, group: int = 1) -> Locator:
+    return page.locator(f"#group-{group} figure", has=page.locator("b", has_text=re.compile(f"^{title}$")))
+
+
+def pixels(figure: Locator, colour: str, tolerance: int = 24) -> int:
+    rgb = [int(colour[start : start + 2], 16) for start in (1, 3, 5)]
+    return figure.locator("canvas").evaluate(COUNT, [*rgb, tolerance])
+
+
+def hover(page: Page, figure: Locator, share: float) -> None:
+    figure.scroll_into_view_if_needed()
+    box = figure.locator(".u-over").bounding_box()
+    assert box
+    page.mouse.move(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
+
+
+def told(figure: Locator) -> list[str]:
+    """The instant and the values that a plot tells of it."""
+    return re.findall(r"[\N{MINUS SIGN}\d.]+", figure.locator(".values").inner_text())
+
+
+def test_plots_show_the_curves_of_all_runs(open_page):
+    page = open_page(**DESK)
+    yaw_rate = plot(page, "Yaw rate")
+    assert all(pixels(yaw_rate, colour) > 200 for colour in RUN_COLOURS[:3])
+    assert pixels(yaw_rate, RUN_COLOURS[3]) == 0
+    for figure in page.locator("figure").all():
+        # A level line lies between two rows of pixels and is paler in both.
+        drawn = [pixels(figure, colour, 130) for colour in RUN_COLOURS[:3]]
+        assert max(drawn) > 100, figure.locator("b").inner_text()
+    track = plot(page, "Track of the front axle centre", 2)
+    assert pixels(track, "#f3ead0") > 5000  # lanes
+    assert pixels(track, "#d98200") > 50  # cones
+    assert "stretched" in track.inner_text()
+
+
+def test_cursor_is_in_all_plots_at_once_and_tells_the_values(open_page):
+    page = open_page(**DESK)
+    hover(page, plot(page, "Yaw rate"), 6.0 / DURATION_S)
+    time_s, *values = told(plot(page, "Yaw rate"))
+    assert float(time_s) == pytest.approx(6.0, abs=0.02)
+    # 0.2, 0.17, 0.14 rad/s
+    assert [float(value) for value in values] == pytest.approx([11.5, 9.74, 8.02], abs=0.06)
+    other = plot(page, "Lateral acceleration")
+    assert told(other)[0] == time_s
+    assert float(told(other)[1]) == pytest.approx(4.0, abs=0.01)
+    assert told(plot(page, "Yaw rate", 2)) == []  # other runs, other time
+
+
+def test_place_of_the_cars_at_the_cursor_is_on_the_track_and_back(open_page):
+    page = open_page(**DESK)
+    track, yaw_rate = plot(page, "Track of the front axle centre", 2), plot(page, "Yaw rate", 2)
+    assert track.locator(".dot:visible").count() == 0
+    hover(page, yaw_rate, 0.4)
+    assert track.locator(".dot:visible").count() == 2
+    # At 80 m, after 4 s at 20 m/s, of 10 m to 205 m that are shown.
+    hover(page, track, 70.0 / 195.0)
+    assert float(told(yaw_rate)[0]) == pytest.approx(4.0, abs=0.05)
+
+
+def test_zoom_holds_for_all_plots_of_a_group_and_can_be_undone(open_page):
+    page = open_page(**DESK)
+    yaw_rate, other = plot(page, "Yaw rate"), plot(page, "Lateral acceleration")
+    hover(page, yaw_rate, 0.2)
+    page.mouse.down()
+    hover(page, yaw_rate, 0.4)
+    page.mouse.up()
+    hover(page, other, 0.5)
+    assert float(told(other)[0]) == pytest.approx(0.3 * DURATION_S, abs=0.03)
+    page.locator("#group-1 button.reset").click()
+    hover(page, other, 0.5)
+    assert float(told(other)[0]) == pytest.approx(0.5 * DURATION_S, abs=0.03)
+
+
+def test_runs_can_be_hidden(open_page):
+    page = open_page(**DESK)
+    yaw_rate = plot(page, "Yaw rate")
+    before = pixels(yaw_rate, RUN_COLOURS[1])
+    button = page.locator("#group-1 button", has_text="2 active rear steering")
+    button.click()
+    assert button.get_attribute("aria-pressed") == "false"
+    assert pixels(yaw_rate, RUN_COLOURS[1]) == 0
+    button.click()
+    assert pixels(yaw_rate, RUN_COLOURS[1]) == before
+
+
+def test_phone_shows_everything_within_its_width(open_page):
+    page = open_page(**PHONE)
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    boxes = [box for figure in page.locator("figure .uplot").all() if (box := figure.bounding_box())]
+    assert len(boxes) == page.locator("figure").count()
+    for box in boxes:
+        assert box["x"] >= 0.0
+        assert 300.0 < box["width"] <= 390.0 - box["x"]
+
+
+def test_fingers_read_values_and_zoom(open_page):
+    page = open_page(**PHONE)
+    yaw_rate, other = plot(page, "Yaw rate"), plot(page, "Sideslip angle")
+    yaw_rate.scroll_into_view_if_needed()
+    box = yaw_rate.locator(".u-over").bounding_box()
+    assert box
+    session = page.context.new_cdp_session(page)
+
+    def touch(kind: str, *shares: float) -> None:
+        points = [
+            {"x": box["x"] + share * box["width"], "y": box["y"] + 50.0, "id": number}
+            for number, share in enumerate(shares)
+        ]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    touch("touchStart", 0.3)
+    touch("touchMove", 0.5)
+    assert float(told(other)[0]) == pytest.approx(0.5 * DURATION_S, abs=0.05)
+    touch("touchEnd")
+    # What was between 0.4 and 0.6 is pulled to 0.2 and 0.8: a third of the run remains.
+    touch("touchStart", 0.4)
+    touch("touchStart", 0.4, 0.6)
+    touch("touchMove", 0.2, 0.8)
+    touch("touchEnd")
+    page.wait_for_timeout(400)  # or it would be a double tap
+    touch("touchStart", 0.7)
+    touch("touchMove", 0.8)
+    assert float(told(other)[0]) == pytest.approx(0.6 * DURATION_S, abs=0.1)
+    touch("touchEnd")
+
+
+def test_plots_follow_the_width_of_the_window(open_page):
+    page = open_page(**DESK)
+    figure = plot(page, "Yaw rate")
+    page.set_viewport_size({"width": 900, "height": 900})
+    page.wait_for_function("document.querySelector('#group-1 figure:not(.wide) .uplot').clientWidth < 450")
+    box = figure.locator(".uplot").bounding_box()
+    assert box
+    assert box["x"] + box["width"] <= 900
+    assert pixels(figure, RUN_COLOURS[2]) > 100
+
+
+def test_printed_plots_fit_the_paper(open_page):
+    page = open_page(**DESK)
+    page.evaluate(TELL_WIDTHS)
+    assert page.pdf(format="A4").startswith(b"%PDF")
+    # A4 less its margins is 182 mm, 688 px of CSS.
+    assert set(page.evaluate("window.printed")) == {660, 322}
+    box = plot(page, "Yaw rate").locator(".uplot").bounding_box()
+    assert box
+    assert box["width"] > 400.0  # as before

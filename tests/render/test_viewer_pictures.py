@@ -1,0 +1,192 @@
+"""What the viewer really shows: pictures of every view, drawn in software, looked at by colour and place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+from numpy.typing import NDArray
+
+from activesteer.conventions import CORNERS
+from activesteer.playback import runs_of, save
+from activesteer.playback.layout import blueprint
+from activesteer.playback.plots import WHEELS, links
+from activesteer.playback.runs import COLOURS
+from activesteer.playback.stream import fill
+from activesteer.recording import Recording
+from tests.render.headless import Headless, Picture, save_pictures
+
+pytestmark = pytest.mark.render
+
+Pictures = dict[str, Picture]
+Drives = dict[str, Recording]
+
+SKY, ASPHALT, CONE, LANE = (176, 196, 214), (58, 60, 64), (255, 120, 20), (0, 158, 115)
+NONE, ARS, AFS = COLOURS[:3]
+AT_S = 4.5
+"""Between the gates."""
+
+CARS = ("1 no control", "2 active rear steering", "3 active front steering")
+PLOTS = (
+    "Steering wheel angle [deg]",
+    "Yaw rate, desired one thin [deg/s]",
+    "Sideslip angle [deg]",
+    "Lateral acceleration [m/s²]",
+    "Added steer angles, rear thick, front thin [deg]",
+)
+BESIDE = ("Course [m]", "Summary", *PLOTS)
+"""What stands beside the cars on the first page."""
+
+
+@pytest.fixture(scope="module")
+def alone(viewer: Headless, drives: Drives, folder: Path) -> dict[float, Pictures]:
+    """The page of a single run, at two instants."""
+    save(runs_of({"ars": drives["ars"]}), folder / "alone.rrd")
+    return _looked_at(viewer, folder / "alone.rrd", (CARS[1], f"{CARS[1]}, from above", *BESIDE), (0.5, AT_S))
+
+
+@pytest.fixture(scope="module")
+def together(viewer: Headless, drives: Drives, folder: Path) -> Pictures:
+    """The page that compares."""
+    save(runs_of(drives), folder / "together.rrd", compare=True)
+    return _looked_at(viewer, folder / "together.rrd", (*CARS, f"{CARS[0]}, from above", *BESIDE), (AT_S,))[AT_S]
+
+
+def _looked_at(
+    viewer: Headless, file: Path, names: tuple[str, ...], times_s: tuple[float, ...]
+) -> dict[float, Pictures]:
+    viewer.open(file)
+    found = {}
+    for time_s in times_s:
+        found[time_s] = viewer.pictures(time_s, names)
+        place = file.with_suffix("") / f"{time_s} s"
+        place.mkdir(parents=True, exist_ok=True)
+        save_pictures(found[time_s], place)
+    return found
+
+
+def like(pixels: NDArray[np.int16], colour: str | tuple[int, int, int], within: int = 40) -> NDArray[np.bool_]:
+    """Where a picture has about that colour."""
+    if isinstance(colour, str):
+        colour = (int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:], 16))
+    return np.abs(pixels - np.array(colour)).max(axis=-1) <= within
+
+
+def spread(mask: NDArray[np.bool_]) -> float:
+    """Share of the columns of a picture in which the colour occurs."""
+    return float(mask.any(axis=0).mean())
+
+
+def _shell(pixels: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """Where the blue shell of the body is, which is seen through."""
+    return (pixels[..., 2] - pixels[..., 0] > 40) & (pixels[..., 2] - pixels[..., 1] > 15)
+
+
+def view(pictures: Pictures, start: str) -> NDArray[np.int16]:
+    """The picture of the view whose name begins like that."""
+    (name,) = [name for name in pictures if name.startswith(start)]
+    return pictures[name].pixels
+
+
+def test_no_view_reports_anything(alone: dict[float, Pictures], together: Pictures) -> None:
+    for pictures in (*alone.values(), together):
+        assert {name: picture.reports for name, picture in pictures.items() if picture.reports} == {}
+
+
+def test_the_car_is_seen_from_behind_on_its_road(alone: dict[float, Pictures]) -> None:
+    pixels = alone[AT_S][CARS[1]].pixels
+    height, width = pixels.shape[:2]
+    assert like(pixels[: height // 5], SKY, 6).mean() > 0.95
+    assert like(pixels[-height // 5 :], ASPHALT, 12).mean() > 0.5
+    middle = pixels[height // 4 :, width // 4 : -width // 4]
+    assert like(middle, (0, 0, 0), 25).mean() > 0.002  # tyres
+    assert _shell(middle).mean() > 0.02
+    assert (middle[..., 1] - middle[..., 2] > 50).mean() > 0.002  # friction use: green or yellow discs
+    assert like(pixels, CONE, 60).mean() > 0.0005
+    assert like(pixels, LANE, 30).mean() > 0.0005
+
+
+def test_the_camera_follows_the_car(alone: dict[float, Pictures]) -> None:
+    """120 m further on the car is in the same place of the picture, but not the road."""
+    early, late = (alone[time_s][CARS[1]].pixels for time_s in (0.5, AT_S))
+    tyres = [np.argwhere(like(pixels, (0, 0, 0), 25)) for pixels in (early, late)]
+    assert np.abs(tyres[0].mean(axis=0) - tyres[1].mean(axis=0)).max() < 0.05 * early.shape[1]
+    assert (np.abs(early - late).max(axis=-1) > 20).mean() > 0.02
+
+
+def test_car_and_tyre_forces_are_seen_from_above_left_is_up(alone: dict[float, Pictures], drives: Drives) -> None:
+    pixels = alone[AT_S][f"{CARS[1]}, from above"].pixels
+    rows, columns = np.nonzero(_shell(pixels))
+    assert np.ptp(columns) > 1.5 * np.ptp(rows)
+    assert np.abs(np.mean([columns.min(), columns.max()]) / pixels.shape[1] - 0.5) < 0.1
+    arrows = np.argwhere((pixels.min(axis=-1) > 150) & (np.ptp(pixels, axis=-1) < 40))
+    beside = arrows[(arrows[:, 0] < rows.min()) | (arrows[:, 0] > rows.max())]
+    assert len(beside) > 10
+    run = drives["ars"]
+    force = sum(run[f"{corner}_tyre_fy_N"][round(AT_S * 1000)] for corner in CORNERS)
+    assert np.sign(rows.mean() - beside[:, 0].mean()) == np.sign(force)
+
+
+def test_the_whole_course_is_on_the_map(alone: dict[float, Pictures]) -> None:
+    pixels = alone[AT_S]["Course [m]"].pixels
+    for colour, least in ((CONE, 0.02), (LANE, 0.12), (ARS, 0.7)):
+        assert spread(like(pixels, colour, 50)) > least
+    track = like(pixels, ARS, 50)
+    assert 0.02 < np.flatnonzero(track.any(axis=0)).min() / pixels.shape[1] < 0.2
+
+
+def test_the_car_moves_on_the_map(alone: dict[float, Pictures]) -> None:
+    early, late = (alone[time_s]["Course [m]"].pixels for time_s in (0.5, AT_S))
+    changed = np.flatnonzero((np.abs(early - late).max(axis=-1) > 60).any(axis=0))
+    assert np.ptp(changed) > 0.2 * early.shape[1]
+
+
+def test_signals_are_plotted_over_the_whole_time(alone: dict[float, Pictures]) -> None:
+    for name in PLOTS:
+        pixels = alone[AT_S][name].pixels
+        line = like(pixels, ARS, 70)
+        assert spread(line) > 0.6, name  # the desired yaw rate covers some of it
+        assert np.ptp(np.nonzero(line)[0]) > 0.25 * pixels.shape[0], name
+
+
+def test_the_summary_is_there(alone: dict[float, Pictures]) -> None:
+    pixels = view(alone[AT_S], "Summary")
+    text = pixels.min(axis=-1) > 180
+    assert text.mean() > 0.01
+    assert text.any(axis=1).sum() > 40
+
+
+def test_each_car_is_compared_with_the_ghosts_of_the_others(together: Pictures) -> None:
+    for own, others in zip(CARS, ((ARS, AFS), (NONE, AFS), (NONE, ARS)), strict=True):
+        pixels = together[own].pixels
+        assert like(pixels[: len(pixels) // 5], SKY, 6).mean() > 0.9
+        for colour in others:
+            assert like(pixels, colour, 45).mean() > 0.001, (own, colour)
+
+
+def test_the_plots_hold_all_runs_in_their_colours(together: Pictures) -> None:
+    for start in ("Yaw rate", "Sideslip", "Lateral"):
+        pixels = view(together, start)
+        seen = [spread(like(pixels, colour, 35)) for colour in (NONE, ARS, AFS)]
+        assert min(seen) > 0.1, (start, seen)
+
+
+def test_the_plots_of_wheels_and_links_are_drawn(viewer: Headless, drives: Drives, folder: Path) -> None:
+    """They stand on pages behind the first one."""
+    runs = runs_of({"ars": drives["ars"]})
+    for page, plots in ((1, WHEELS), (2, links(runs[0]))):
+        file = folder / f"page {page}.rrd"
+        stream = rr.RecordingStream(f"page {page}")
+        stream.save(file)
+        fill(stream, runs, blueprint(runs, compare=False, page=page))
+        stream.disconnect()
+        titles = tuple(plot.title for plot in plots)
+        assert len(titles) == 4
+        for name, picture in _looked_at(viewer, file, titles, (AT_S,))[AT_S].items():
+            assert picture.reports == []
+            bright = np.ptp(picture.pixels, axis=-1) > 60
+            assert spread(bright) > 0.6, name  # the legend covers some of it
+            hues = {tuple(pixel) for pixel in (picture.pixels[bright] // 64).tolist()}
+            assert len(hues) >= 3, name

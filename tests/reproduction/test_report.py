@@ -1,0 +1,34 @@
+"""The report of all fifteen runs."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from activesteer import reproduction
+from activesteer.analysis.claims.scorecard import CLAIM_IDS
+from activesteer.cli import main
+from activesteer.reproduction import Reproduction
+
+
+def test_reproduce_writes_a_report_of_all_runs(
+    reproduced: Reproduction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reproduction, "reproduce", lambda *_, **__: reproduced)
+    main(["reproduce", "-o", str(tmp_path)])
+    assert f"report: {tmp_path / 'report.html'}" in capsys.readouterr().out
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "15 runs of 5 manoeuvres, vehicle compact." in page
+    for number in CLAIM_IDS:
+        assert f'-{number}"' in page
+    assert "not judged" not in page
+
+
+def test_report_of_all_runs_is_small_and_quickly_made(folder: Path, tmp_path: Path) -> None:
+    files = [str(path) for path in sorted(folder.glob("*.mcap"))]
+    start = time.perf_counter()
+    assert main(["report", *files, "-o", str(tmp_path / "report.html")]) == 0
+    assert time.perf_counter() - start < 20.0
+    assert (tmp_path / "report.html").stat().st_size < 5e6

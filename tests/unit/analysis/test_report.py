@@ -1,0 +1,264 @@
+from __future__ import annotations
+
+import json
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from activesteer.analysis.report import open_all, report_page, write_report
+from activesteer.analysis.report.curves import MOST_SAMPLES, plots, time_grid
+from activesteer.analysis.report.judgement import judge
+from activesteer.analysis.report.parameters import rows
+from activesteer.analysis.report.runs import groups_of
+from activesteer.errors import ParameterError, RecordingError
+from activesteer.recording import Recording
+from activesteer.signals import Channel
+from tests.unit.analysis.made_up import step_steer
+from tests.unit.analysis.made_up_files import lane_changes, recording_of, sines, step_steers
+
+VOID = {"meta", "link", "br"}
+
+
+class Page(HTMLParser):
+    """Reads a page: its text, its links, and whether every element that is opened is closed in order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.addresses: list[str] = []
+        self.text: list[str] = []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(str(value))
+            if name in {"src", "href", "srcset", "action", "data"}:
+                self.addresses.append(str(value))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] not in {"script", "style"}:
+            self.text.append(data)
+
+    @property
+    def words(self) -> str:
+        plain = {"\N{NO-BREAK SPACE}": " ", "\N{MINUS SIGN}": "-", "\N{EN DASH}": "-"}
+        return " ".join(" ".join(self.text).translate(str.maketrans(plain)).split())
+
+
+def data_of(page: str) -> list[dict[str, Any]]:
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    assert found
+
+    def refuse(word: str) -> None:
+        pytest.fail(f"{word} is no JSON")
+
+    return json.loads(found[1], parse_constant=refuse)
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return report_page({**lane_changes(), **step_steers(), **sines()})
+
+
+def test_page_needs_nothing_but_itself(page):
+    read = Page(page)
+    assert all(address == "data:," or address.startswith("#") for address in read.addresses)
+    assert {address[1:] for address in read.addresses if address.startswith("#")} <= set(read.ids)
+    assert len(read.ids) == len(set(read.ids))
+    styles = "".join(re.findall(r"<style>(.*?)</style>", page, re.DOTALL))
+    assert "url(" not in styles
+    assert "@import" not in styles
+    assert "default-src 'none'" in page
+
+
+def test_same_runs_give_the_same_page(page):
+    assert report_page({**lane_changes(), **step_steers(), **sines()}) == page
+
+
+def test_runs_are_grouped_by_manoeuvre_in_the_papers_order(page):
+    words = Page(page).words
+    assert "6 runs of 3 manoeuvres, vehicle made_up." in words
+    data = data_of(page)
+    assert [group["name"] for group in data] == ["step_steer", "sine_with_dwell", "cones"]
+    assert [run["name"] for run in data[0]["runs"]] == ["none", "ars", "afs"]
+    assert "Through <cones> & lanes" in words
+
+
+def test_metrics_are_told_with_their_difference_to_the_first_run(page):
+    words = Page(page).words
+    # 0.25, 0.2 and 0.22 rad/s
+    assert "yaw rate peak deg/s 14.32 11.46 -2.865 (-20 %) 12.61 -1.719 (-12 %)" in words
+
+
+def test_claims_are_judged_where_the_three_systems_are_there(page):
+    words = Page(page).words
+    for claim in ("S1", "S2", "S3", "S4", "S5"):
+        assert f"{claim} " in words
+    assert "Of 5 claims of the paper:" in words
+    assert "The claims of the paper are not judged: no run of ars, afs" in words  # the sine with dwell
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (
+            {"maneuver": {"name": "step_steer", "kind": "step_steer", "speed_mps": 9.0}},
+            "differ in manoeuvre or vehicle",
+        ),
+        ({"complete": False}, "the run ars is not complete"),
+    ],
+)
+def test_claims_are_not_judged_of_runs_that_cannot_be_compared(change, reason):
+    runs = step_steers()
+    runs["runs/step-ars.mcap"].metadata.update(change)
+    judgement = judge(groups_of(runs)[0])
+    assert judgement.scorecard.judged == ()
+    assert reason in judgement.obstacle
+
+
+def test_parameters_that_differ_stand_beside_each_other():
+    one = recording_of(step_steer(), "ars", {"speed_mps": 20.0, "road": {"mu": 0.9}})
+    two = recording_of(step_steer(), "ars", {"speed_mps": 10.0, "road": {"mu": 0.9}})
+    found = {row.key: row.values for row in rows([one, two], "controller", "maneuver")}
+    assert found["maneuver.speed_mps"] == ("20 (72 km/h)", "10 (36 km/h)")
+    assert found["maneuver.road.mu"] == ("0.9",)
+    assert found["controller"] == ("ars",)
+
+
+def test_runs_of_one_controller_are_called_by_their_files():
+    runs = {"a.mcap": recording_of(step_steer(), "ars"), "b.mcap": recording_of(step_steer(), "ars")}
+    (group,) = groups_of(runs)
+    assert [run.name for run in group.runs] == ["a", "b"]
+    assert group.runs[0].colour != group.runs[1].colour
+    again = {f"{folder}/a.mcap": run for folder, run in zip("xy", runs.values(), strict=True)}
+    assert [run.name for run in groups_of(again)[0].runs] == ["x/a.mcap", "y/a.mcap"]
+
+
+def test_users_controller_is_called_by_its_class():
+    (group,) = groups_of({"a.mcap": recording_of(step_steer(), "my/file.py:Mine")})
+    assert group.runs[0].label == "Mine"
+
+
+def test_curves_are_in_degrees_and_thinned(page):
+    group = data_of(page)[0]
+    yaw_rate = next(panel for panel in group["panels"] if panel["title"] == "Yaw rate")
+    assert yaw_rate["unit"] == "deg/s"
+    drawn = yaw_rate["series"][0]
+    recording = next(iter(step_steers().values()))
+    assert group["step_s"] == pytest.approx(0.005)
+    assert len(drawn["values"]) == group["samples"] == 1401
+    expected = np.degrees(recording["yaw_rate_radps"][::5])
+    assert np.abs(np.array(drawn["values"]) - expected).max() < 1e-4 * np.ptp(expected)
+
+
+def test_added_angles_are_those_of_the_systems_that_add_any(page):
+    panel = next(panel for panel in data_of(page)[0]["panels"] if panel["title"].startswith("Added"))
+    assert [(series["run"], series["dashed"]) for series in panel["series"]] == [(1, False), (2, True)]
+
+
+def test_track_has_lanes_cones_and_path(page):
+    track = data_of(page)[2]["track"]
+    assert [lane["name"] for lane in track["lanes"]] == ["entry", "offset", "exit"]
+    assert len(track["cones"]) == 4
+    assert track["path"]["x"][-1] == pytest.approx(299.5)
+    assert track["tracks"][1]["run"] == 1
+    assert track["view"]["x"] == [10.0, 205.0]
+
+
+def test_instants_of_the_standard_are_marked(page):
+    step, sine, cones = data_of(page)
+    assert [mark["text"] for mark in sine["marks"]] == ["end of steer", "+1.00 s", "+1.75 s"]
+    assert step["marks"] == cones["marks"] == []
+
+
+def test_what_is_not_finite_is_left_out():
+    run = step_steer()
+    run.channels["yaw_rate_radps"] = np.where(run.time_s > 3.0, math.nan, run.channels["yaw_rate_radps"])
+    page = report_page({"a.mcap": recording_of(run, metrics={"yaw_rate_peak_radps": math.nan})})
+    values = data_of(page)[0]["panels"][1]["series"][0]["values"]
+    assert values[600] is not None
+    assert set(values[601:]) == {None}
+    assert "yaw rate peak deg/s -" in Page(page).words
+
+
+def test_runs_of_different_length_and_step_share_their_time():
+    short = recording_of(step_steer(duration_s=3.0, timestep_s=0.002), "none")
+    long = recording_of(step_steer(duration_s=6.0), "ars")
+    shown = plots(groups_of({"a": short, "b": long})[0])
+    assert shown["step_s"] == pytest.approx(0.006)
+    assert shown["samples"] == 1001
+    values = [series["values"] for series in shown["panels"][0]["series"]]
+    assert values[0][500] is not None
+    assert values[0][501] is None
+    assert values[1][1000] is not None
+
+
+def test_long_runs_keep_a_bounded_number_of_samples():
+    grid = time_grid([np.linspace(0.0, 599.999, 600_000)])
+    assert MOST_SAMPLES / 2 < len(grid) <= MOST_SAMPLES
+    assert grid[-1] == pytest.approx(599.999, abs=grid[1])
+
+
+def test_recording_that_lacks_channels_shows_the_others():
+    time_s = np.arange(100) * 0.01
+    run = Recording([Channel("ay_mps2", "m/s2", "", "vehicle")], time_s, np.sin(time_s)[:, None])
+    page = report_page({"foreign": run})
+    (group,) = data_of(page)
+    assert [panel["title"] for panel in group["panels"]] == ["Lateral acceleration"]
+    assert group["track"] is None
+
+
+def test_text_of_a_recording_cannot_become_markup():
+    evil = "</script><script>alert(1)</script>"
+    run = recording_of(step_steer(), evil, {"title": evil, "name": evil, "note": evil}, overrides={evil: evil})
+    run.metadata["vehicle"]["name"] = evil
+    run.metadata |= {"complete": False, "error": evil}
+    page = report_page({evil: run})
+    assert evil not in page
+    assert "alert(1)</script>" not in page
+    assert data_of(page)[0]["name"] == evil
+    Page(page)
+
+
+def test_run_that_did_not_end_properly_is_marked():
+    run = recording_of(step_steer(), complete=False, error="SimulationDiverged: too much", overrides={"road.mu": 0.4})
+    words = Page(report_page({"a.mcap": run})).words
+    assert "Incomplete: a.mcap: SimulationDiverged: too much" in words
+    assert "road.mu = 0.4" in words
+
+
+def test_wrong_input_is_answered(tmp_path: Path):
+    with pytest.raises(ParameterError, match="0 recordings; a report is made of 1 to"):
+        report_page({})
+    empty = Recording([Channel("ay_mps2", "m/s2", "", "vehicle")], [], np.empty((0, 1)))
+    with pytest.raises(RecordingError, match=r"a\.mcap has no rows"):
+        report_page({"a.mcap": empty})
+    with pytest.raises(ParameterError, match=r"the report .*nowhere.*: No such file"):
+        write_report(sines(), tmp_path / "nowhere" / "report.html")
+    next(iter(sines().values())).save(tmp_path / "a.mcap")
+    with pytest.raises(ParameterError, match=r"a\.mcap is named twice"):
+        open_all([tmp_path / "a.mcap", tmp_path / "a.mcap"])
+
+
+def test_files_that_were_cut_short_are_shown_as_far_as_they_go(tmp_path: Path):
+    path = tmp_path / "cut.mcap"
+    next(iter(step_steers().values())).save(path)
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) * 2 // 3])
+    recordings = open_all([path])
+    assert 1000 < len(recordings[str(path)]) < 7001
+    assert "Incomplete" in Page(report_page(recordings)).words

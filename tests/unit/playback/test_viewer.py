@@ -1,0 +1,130 @@
+"""The viewer's window, the browser's page, and what is said where there is neither."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import psutil
+import pytest
+
+from activesteer.cli import main
+from activesteer.errors import PlaybackError
+from activesteer.playback import runs_of, show
+from activesteer.playback.viewer import viewer_binary
+from tests.unit.playback.made_up import circle
+from tests.unit.playback.rrd import Rrd
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "run.mcap"
+    circle(0.5).save(path)
+    return path
+
+
+def told(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str]:
+    status = main(["replay", *(str(word) for word in words)])
+    return status, capsys.readouterr().err
+
+
+def test_the_command_writes_a_file(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out.rrd"
+    status, text = told(capsys, file, "--save", out)
+    assert status == 0
+    assert str(out) in text
+    rrd = Rrd(out)
+    assert "/ars/scene/car/chassis" in rrd.entities
+    # Metrics are shown in the units of the tables.
+    assert "| yaw rate peak | deg/s | 11.459 |" in rrd.column("/summary", "TextDocument:text")[0][0]
+
+
+def test_files_of_the_same_controller_are_told_apart_by_their_names(file: Path, tmp_path: Path) -> None:
+    other = tmp_path / "wet.mcap"
+    other.write_bytes(file.read_bytes())
+    out = tmp_path / "out.rrd"
+    assert main(["replay", str(file), str(other), "--compare", "--save", str(out)]) == 0
+    entities = Rrd(out).entities
+    assert {"/1_run/scene/car/chassis", "/2_wet/scene/car/chassis"} <= entities
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["missing.mcap"], "cannot read missing.mcap: No such file"),
+        (["{file}", "--compare"], "--compare needs at least two files"),
+        (["{file}", "{file}"], "a file is named twice"),
+        (["{file}", "--save", "nowhere/out.rrd"], "cannot write nowhere/out.rrd: No such file or directory"),
+        ([__file__], "is not an MCAP file"),
+    ],
+)
+def test_what_is_wrong_is_said(
+    file: Path, capsys: pytest.CaptureFixture[str], words: list[str], message: str, monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    status, text = told(capsys, *(word.format(file=file) for word in words))
+    assert status == 1
+    assert message in text
+
+
+def test_a_missing_viewer_is_named_with_what_works_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(PlaybackError, match=r"viewer is missing.*rerun-sdk.*--save"):
+        show(runs_of({"ars": circle(0.1)}))
+
+
+def test_a_viewer_that_does_not_start_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    broken = tmp_path / "rerun"
+    broken.write_text("not a program")
+    monkeypatch.setattr("activesteer.playback.viewer.viewer_binary", lambda: broken)
+    with pytest.raises(PlaybackError, match=f"viewer {broken} does not start"):
+        show(runs_of({"ars": circle(0.1)}))
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux tells a display by the environment")
+def test_without_a_display_the_error_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(PlaybackError, match=r"there is no display; --web .* --save"):
+        show(runs_of({"ars": circle(0.1)}))
+
+
+def test_web_serves_the_viewer_to_this_machine_until_it_is_interrupted(file: Path, tmp_path: Path) -> None:
+    code = "import sys; from activesteer.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, "replay", str(file), "--web"]
+    environment = {**os.environ, "BROWSER": "true", "HOME": str(tmp_path)}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        found = re.match(
+            r"serving at (http://127\.0\.0\.1:\d+/)\?url=rerun%2Bhttp%3A%2F%2F127\.0\.0\.1%3A(\d+)%2F", line
+        )
+        assert found, line
+        with urllib.request.urlopen(found[1], timeout=10) as page:
+            assert page.status == 200
+            assert b"rerun" in page.read().lower()
+        (viewer,) = psutil.Process(process.pid).children()
+        assert Path(viewer.exe()) == viewer_binary()
+        listening = [c.laddr for c in viewer.net_connections("inet") if c.status == psutil.CONN_LISTEN]
+        assert {address.ip for address in listening} == {"127.0.0.1"}
+        assert int(found[2]) in {address.port for address in listening}
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=20)
+        assert process.returncode == 0, error
+        deadline = time.monotonic() + 5.0
+        while viewer.is_running() and viewer.status() != psutil.STATUS_ZOMBIE:
+            assert time.monotonic() < deadline, "the viewer goes on"
+            time.sleep(0.05)
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.communicate()
