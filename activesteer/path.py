@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
@@ -82,20 +84,16 @@ class Path:
         """Arc length [m]."""
         return float(self.s_m[-1])
 
-    def at(self, s_m: Array) -> tuple[Array, Array]:
-        """Points at arc lengths, also before the beginning and beyond the end.
+    def at(self, s_m: float) -> tuple[float, float]:
+        """The point at an arc length, also before the beginning and beyond the end.
 
         Args:
-            s_m: Arc lengths [m], shape (k,).
+            s_m: Arc length [m].
 
         Returns:
-            World x and y [m], shape (k,) each.
+            World x and y [m].
         """
-        x, y = np.interp(s_m, self.s_m, self.x_m), np.interp(s_m, self.s_m, self.y_m)
-        for end, beyond in ((0, np.minimum(s_m, 0.0)), (-1, np.maximum(s_m - self.s_m[-1], 0.0))):
-            x += beyond * math.cos(self.heading_rad[end])
-            y += beyond * math.sin(self.heading_rad[end])
-        return x, y
+        return point_at(s_m, *self.line)
 
     def nearest(self, x_m: float, y_m: float, around_m: float, window_m: float) -> float:
         """Arc length of the point of the path nearest to a point, looked for around a place where it was before.
@@ -109,15 +107,48 @@ class Path:
         Returns:
             Arc length [m]; below 0 or above the length where the path goes on straight.
         """
-        s = np.arange(around_m - window_m, around_m + window_m + SPACING_M, SPACING_M)
-        px, py = self.at(s)
-        distance = (px - x_m) ** 2 + (py - y_m) ** 2
-        best = min(max(int(np.argmin(distance)), 1), s.size - 2)
-        # The parabola through the three nearest points: the result moves on smoothly between them.
-        before, here, after = distance[best - 1 : best + 2]
-        bend = before - 2.0 * here + after
-        shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
-        return float(s[best] + min(max(shift, -1.0), 1.0) * SPACING_M)
+        return nearest(x_m, y_m, around_m, window_m, *self.line)
+
+    @cached_property
+    def line(self) -> tuple[float, Array, Array, float, float]:
+        """What the kernels take: spacing [m], x and y of the points [m], headings at both ends [rad]."""
+        spacing = self.length_m / (len(self.s_m) - 1)
+        return spacing, self.x_m, self.y_m, float(self.heading_rad[0]), float(self.heading_rad[-1])
+
+
+@njit(cache=True, error_model="numpy")
+def point_at(s, spacing, xs, ys, heading_first, heading_last):
+    """`Path.at` for native code: linear between points, straight beyond the ends."""
+    last = len(xs) - 1
+    place = s / spacing
+    if place <= 0.0:
+        return xs[0] + s * math.cos(heading_first), ys[0] + s * math.sin(heading_first)
+    if place >= last:
+        beyond = s - last * spacing
+        return xs[last] + beyond * math.cos(heading_last), ys[last] + beyond * math.sin(heading_last)
+    index = min(int(place), last - 1)
+    share = place - index
+    return xs[index] + share * (xs[index + 1] - xs[index]), ys[index] + share * (ys[index + 1] - ys[index])
+
+
+@njit(cache=True, error_model="numpy")
+def nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
+    """`Path.nearest` for native code."""
+    count = math.ceil(2.0 * window / SPACING_M) + 1
+    best, least, before, after = 0, math.inf, math.inf, math.inf
+    previous = math.inf
+    for index in range(count):
+        px, py = point_at(around - window + index * SPACING_M, spacing, xs, ys, heading_first, heading_last)
+        distance = (px - x) ** 2 + (py - y) ** 2
+        if index == best + 1:
+            after = distance
+        if distance < least:
+            best, least, before, after = index, distance, previous, math.inf
+        previous = distance
+    # The parabola through the three nearest points: the result moves on smoothly between them.
+    bend = before - 2.0 * least + after
+    shift = 0.5 * (before - after) / bend if 0.0 < bend < math.inf else 0.0
+    return around - window + (best + min(max(shift, -1.0), 1.0)) * SPACING_M
 
 
 def _first(wrong: Sequence[bool] | NDArray[np.bool_]) -> int:

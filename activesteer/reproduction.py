@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Scorecard, scorecard
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
-from activesteer.recording import Recording
+from activesteer.recording import Recording, check_target
 from activesteer.runner import prepared, run_scenario
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation import Simulation
@@ -87,6 +87,9 @@ def reproduce(
         msg = f"cannot make the folder {target}: {reason.strerror}"
         raise ParameterError(msg) from reason
     result = Reproduction({name: {system: _path(target, name, system) for system in SYSTEMS} for name in scenarios})
+    for systems in result.paths.values():
+        for path in systems.values():
+            check_target(path)
     total = len(scenarios) * len(SYSTEMS)
     for done, (name, system, problem) in enumerate(_drive(scenarios, result.paths, jobs), 1):
         if problem:

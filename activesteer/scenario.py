@@ -117,9 +117,9 @@ def resolve(
     )
     files |= {f"tyres/{path.name}": path.read_bytes() for path in (front, rear)}
     files |= {f"mjcf/{mjcf.parent.name}/{path.name}": path.read_bytes() for path in sorted(mjcf.parent.glob("*.xml"))}
-    front_tyre = load_tir(front)
-    tyres = (front_tyre, front_tyre if rear == front else load_tir(rear))
-    return Scenario(built, car, mjcf, tyres, changes, files)
+    front_tyre = replace(load_tir(front), conventions=car.tyres.conventions)
+    rear_tyre = front_tyre if rear == front else replace(load_tir(rear), conventions=car.tyres.conventions)
+    return Scenario(built, car, mjcf, (front_tyre, rear_tyre), changes, files)
 
 
 def _plain(value: Any) -> Any:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.figures.style import COLOURS
 from activesteer.analysis.frequency_response import OUTPUTS, frequency_response
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import RUN_COLOURS
 from activesteer.errors import ParameterError
 from activesteer.pictures import new_figure, save
 
@@ -62,7 +62,7 @@ def draw_bode(
     figure = new_figure(width_in=7.5, height_in=9.0)
     axes = figure.subplots(len(OUTPUTS), 2, sharex=True)
     frequency_Hz = np.geomspace(*BODE_RANGE_Hz, 300)
-    for (label, system), colour in zip(systems.items(), COLOURS[1:] * len(systems), strict=False):
+    for (label, system), colour in zip(systems.items(), RUN_COLOURS[1:] * len(systems), strict=False):
         if input_name not in system.input_labels:
             raise ParameterError(f"{label}: there is no input {input_name!r}; its inputs are {system.input_labels}")
         response = system(2j * math.pi * frequency_Hz, squeeze=False)
@@ -76,9 +76,11 @@ def draw_bode(
         points = np.geomspace(0.2, 4.0, 25)
         for row, output in enumerate(OUTPUTS):
             found = frequency_response(recording, output, points)
-            axes[row, 0].loglog(found.frequency_Hz, np.abs(found.response), "o", ms=3.5, c=COLOURS[0], label="sweep")
+            axes[row, 0].loglog(
+                found.frequency_Hz, np.abs(found.response), "o", ms=3.5, c=RUN_COLOURS[0], label="sweep"
+            )
             phase = np.degrees(np.unwrap(np.angle(found.response)))
-            axes[row, 1].semilogx(found.frequency_Hz, phase, "o", ms=3.5, c=COLOURS[0])
+            axes[row, 1].semilogx(found.frequency_Hz, phase, "o", ms=3.5, c=RUN_COLOURS[0])
     for row, output in enumerate(OUTPUTS):
         axes[row, 0].set_ylabel(_TITLES[output])
         axes[row, 1].set_ylabel("phase [deg]")

@@ -85,6 +85,8 @@ def _label(controller: str) -> str:
 
 
 def _output_paths(output: Path, maneuver: str, controllers: Sequence[str]) -> list[Path]:
+    from activesteer.recording import check_target
+
     labels = [_label(controller) for controller in controllers]
     if len(set(labels)) != len(labels):
         msg = f"-c {' -c '.join(controllers)}: two of them have the same name, which tells runs and files apart"
@@ -101,6 +103,9 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[str]) -> li
     except OSError as reason:
         msg = f"-o {output}: cannot make the folder {folder}: {reason.strerror}"
         raise ParameterError(msg) from reason
+    # Before the first run, not before the last.
+    for path in paths:
+        check_target(path)
     return paths
 
 

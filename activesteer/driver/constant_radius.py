@@ -49,7 +49,7 @@ class ConstantRadiusDriver:
             return self.robot.step(reference, measurement)
         robot = self.robot
         angle = robot.steering_ratio * self._wheelbase_m * (curvature + self._correction_1pm)
-        command = robot.step(reference._replace(steering_wheel_rad=angle), measurement)
+        command = robot.turn(angle, reference, measurement)
         if command.steering_wheel_rad == angle and measurement.speed_mps > _LEAST_SPEED_MPS:
             error = curvature - measurement.yaw_rate_radps / measurement.speed_mps
             self._correction_1pm += self._share * error

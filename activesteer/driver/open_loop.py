@@ -36,7 +36,19 @@ class OpenLoopDriver:
         Returns:
             The command.
         """
-        angle = reference.steering_wheel_rad
+        return self.turn(reference.steering_wheel_rad, reference, measurement)
+
+    def turn(self, angle: float, reference: Reference, measurement: Measurement) -> DriverCommand:
+        """The same with another steering wheel angle than that of the reference.
+
+        Args:
+            angle: Steering wheel angle [rad].
+            reference: What is asked otherwise.
+            measurement: What the car's sensors say.
+
+        Returns:
+            The command.
+        """
         limited = False
         if angle > self._limit_rad:
             angle, limited = self._limit_rad, True

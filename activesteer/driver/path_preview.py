@@ -17,12 +17,13 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
-from activesteer.path import Path
+from activesteer.path import Path, point_at
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 
 Array = NDArray[np.float64]
@@ -101,14 +102,7 @@ class PathPreviewDriver:
             self._decide(self._decided_rad[-1])
             return
         preview = self._preview(speed)
-        x, y = path.at(along + speed * preview.times_s)
-        ahead_y = math.cos(motion.yaw_rad) * (y - motion.y_m) - math.sin(motion.yaw_rad) * (x - motion.x_m)
-        free_y = (
-            motion.yaw_rate_radps * preview.by_yaw_rate_m
-            + math.atan2(motion.lateral_speed_mps, speed) * preview.by_sideslip_m
-        )
-        steering = preview.by_steering_m
-        self._decide(self.robot.steering_ratio * float((ahead_y - free_y) @ steering / (steering @ steering)))
+        self._decide(self.robot.steering_ratio * _best_steering(along, *motion, *preview, *path.line))
 
     def _decide(self, steering_wheel_rad: float) -> None:
         """Puts an angle into the line; what stands at its head is what the hands now begin to do."""
@@ -135,7 +129,7 @@ class PathPreviewDriver:
         else:
             limited = False
         wheel = self._wheel_rad + change
-        command = self.robot.step(reference._replace(steering_wheel_rad=wheel), measurement)
+        command = self.robot.turn(wheel, reference, measurement)
         self._wheel_rad = command.steering_wheel_rad
         return command._replace(limited=True) if limited else command
 
@@ -146,6 +140,27 @@ class PathPreviewDriver:
         if found is None:
             found = self._previews[rounded] = _look_ahead(rounded * _SPEED_STEP_MPS, self._model, self._preview_s)
         return found
+
+
+@njit(cache=True, error_model="numpy")
+def _best_steering(
+    along, x, y, yaw, speed, lateral_speed, yaw_rate, times, by_yaw_rate, by_sideslip, by_steering, spacing, xs, ys,
+    heading_first, heading_last,
+):  # fmt: skip
+    """Road-wheel angle held from now on that comes closest to the path, in the least squares sense [rad].
+
+    The arguments are where the car is on the path, the members of `Motion`, of `_Preview`, and of `Path.line`.
+    """
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    sideslip = math.atan2(lateral_speed, speed)
+    product, square = 0.0, 0.0
+    for index in range(len(times)):
+        px, py = point_at(along + speed * times[index], spacing, xs, ys, heading_first, heading_last)
+        wanted = cos * (py - y) - sin * (px - x)
+        missing = wanted - yaw_rate * by_yaw_rate[index] - sideslip * by_sideslip[index]
+        product += missing * by_steering[index]
+        square += by_steering[index] * by_steering[index]
+    return product / square
 
 
 def _look_ahead(speed_mps: float, model: LateralModel, preview_s: float) -> _Preview:

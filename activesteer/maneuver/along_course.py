@@ -61,6 +61,10 @@ class AlongCourse(Maneuver):
 
     def reference(self, time_s: float) -> Reference:
         """The speed; where to go the driver sees on the path."""
+        return self._reference
+
+    @cached_property
+    def _reference(self) -> Reference:
         return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
 
 

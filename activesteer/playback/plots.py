@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -187,7 +187,7 @@ def views_by_corner(plot: Plot, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]
 
 
 def _view(
-    title: str, contents: list[str], looks: dict[str, rr.SeriesLines] | None = None, *, legend: bool
+    title: str, contents: list[str], looks: dict[Any, rr.SeriesLines] | None = None, *, legend: bool
 ) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",

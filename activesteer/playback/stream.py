@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import rerun as rr
@@ -24,8 +25,9 @@ def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
     id: another manoeuvre, other runs.
     """
     maneuver = runs[0].recording.metadata.get("maneuver", {})
-    names = ", ".join(run.name for run in runs)
-    stream = rr.RecordingStream(f"activesteer {maneuver.get('name', '')}: {names}{', compared' if compare else ''}")
+    words = ["activesteer", str(maneuver.get("name", "")), *(run.name for run in runs), "compared" if compare else ""]
+    # An application id takes letters, digits, spaces, - and _ only.
+    stream = rr.RecordingStream(re.sub(r"[^A-Za-z0-9_-]+", " ", " ".join(words)).strip())
     stream.send_recording_name(str(maneuver.get("title") or "activesteer"))
     return stream
 

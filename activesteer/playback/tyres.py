@@ -52,7 +52,7 @@ def send_tyre_forces(stream: rr.RecordingStream, run: Run) -> None:
     discs = f"{run.scene}/tyres/friction_use"
     size = rr.Cylinders3D.from_fields(radii=[_DISC_RADIUS_M], lengths=[0.02], fill_mode="solid")
     stream.log(discs, size, static=True)
-    flat = origins[good] * np.float32((1.0, 1.0, 0.0))
+    flat = origins[good] * np.array((1.0, 1.0, 0.0), np.float32)
     stream.send_columns(
         discs, when, rr.Cylinders3D.columns(centers=flat.reshape(-1, 3), colors=painted).partition(lengths=four)
     )
@@ -86,4 +86,4 @@ def use_colours(friction_use: NDArray[np.float64]) -> NDArray[np.uint32]:
         .astype(np.uint32)
         for part in range(3)
     )
-    return (red << 24) | (green << 16) | (blue << 8) | np.uint32(255)
+    return ((red << 24) | (green << 16) | (blue << 8) | 255).astype(np.uint32)

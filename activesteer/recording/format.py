@@ -10,6 +10,8 @@ import json
 from collections.abc import Mapping
 
 import numpy as np
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
 
 from activesteer.errors import RecordingError
 
@@ -22,6 +24,19 @@ RUN_RECORD, RESULT_RECORD, METRICS_RECORD = "activesteer.run", "activesteer.resu
 
 FORMAT_RECORD = "activesteer.format"
 """Name of the metadata record that marks a file as ours."""
+
+
+LIBRARY = "activesteer "
+"""How the header of our files names the program that wrote them; its version follows."""
+
+
+def is_recording_start(data: bytes) -> bool:
+    """Whether a file that begins like this is a recording of ours, be it damaged, or empty as a full disk leaves it."""
+    # Magic, opcode, length of the record, and then two texts with their lengths: profile and library.
+    start = len(MCAP0_MAGIC) + 9
+    head = MCAP0_MAGIC + bytes([Opcode.HEADER])
+    profile_end = start + 4 + int.from_bytes(data[start : start + 4], "little")
+    return not data or (data.startswith(head) and data[profile_end + 4 :].startswith(LIBRARY.encode()))
 
 
 def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict[str, str]]:

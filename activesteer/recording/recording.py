@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from activesteer.errors import RecordingError
+from activesteer.recording import export
 from activesteer.recording.arrays import nanoseconds, shaped
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.reader import Poses, read_mcap
 from activesteer.recording.scene import ScenePart
 from activesteer.recording.writer import McapWriter
 from activesteer.signals import Channel
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class Recording:
@@ -103,13 +107,16 @@ class Recording:
             else:
                 message += "Metadata and attachments can be read, but no rows"
             raise RecordingError(message + ", with Recording.open(path, recover=True)")
+        metadata = contents.metadata
+        if contents.damage:
+            metadata.setdefault("error", f"the file is damaged: {contents.damage}")
         try:
             return cls(
                 contents.channels,
                 contents.time_s,
                 contents.values,
                 poses=contents.poses,
-                metadata=contents.metadata,
+                metadata=metadata,
                 metrics=contents.metrics,
                 attachments=contents.attachments,
                 scene=contents.scene,
@@ -123,7 +130,7 @@ class Recording:
 
         Args:
             path: The file.
-            overwrite: Whether a file that exists may be replaced.
+            overwrite: Whether a recording that exists may be replaced; any other file never is.
 
         Raises:
             RecordingError: the file cannot be written, or a metadata value cannot be kept as JSON.
@@ -138,6 +145,22 @@ class Recording:
             overwrite=overwrite,
         ) as writer:
             writer.write(self._time_s, self._values, self.poses.time_s, self.poses.positions_m, self.poses.quaternions)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """A pandas data frame; see `activesteer.recording.export.to_dataframe`."""
+        return export.to_dataframe(self)
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write a CSV file; see `activesteer.recording.export.to_csv`."""
+        return export.to_csv(self, path)
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write a Parquet file; see `activesteer.recording.export.to_parquet`."""
+        return export.to_parquet(self, path)
+
+    def to_mat(self, path: str | Path) -> Path:
+        """Write a MATLAB file; see `activesteer.recording.export.to_mat`."""
+        return export.to_mat(self, path)
 
     @property
     def time_s(self) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
@@ -21,12 +22,14 @@ from activesteer.recording.encoder import BlockEncoder, one_message
 from activesteer.recording.format import (
     FORMAT_RECORD,
     FORMAT_VERSION,
+    LIBRARY,
     METRICS_RECORD,
     RESULT_RECORD,
     RUN_RECORD,
     SCENE_TOPIC,
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
+    is_recording_start,
     metadata_texts,
 )
 from activesteer.recording.scene import ScenePart, encode_scene
@@ -42,6 +45,7 @@ from activesteer.signals import Channel
 from activesteer.version import __version__
 
 _ROWS_PER_CHUNK = 1000
+_START_BYTES = 64
 _BLOCKS_IN_FLIGHT = 1  # More would be lost when the process is killed, and held when the disk is slow.
 
 
@@ -76,7 +80,7 @@ class McapWriter:
             metadata: What is needed to run it again; values must be representable in JSON.
             attachments: Files to keep with the recording, by name.
             scene: What the car looks like: solids in body frames, and links between bodies.
-            overwrite: Whether a file that exists may be replaced.
+            overwrite: Whether a recording that exists may be replaced; any other file never is.
 
         Raises:
             RecordingError: the file cannot be written, or a channel, body, metadata value or primitive is not usable.
@@ -96,10 +100,13 @@ class McapWriter:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="mcap-writer")
         self._closed = False
         try:
-            self._file = McapFile(self._stream, f"activesteer {__version__}")
+            self._file = McapFile(self._stream, LIBRARY + __version__)
             self._begin(texts, metrics, attachments or {}, scene_data)
         except BaseException as error:
             self._abandon()
+            if self.path.is_file():  # It holds no rows, and cannot be opened.
+                with suppress(OSError):
+                    self.path.unlink()
             if isinstance(error, OSError):
                 raise self._failure(error) from error
             raise
@@ -251,15 +258,46 @@ class McapWriter:
             self._stream.close()
 
 
-def _open(path: Path, *, overwrite: bool) -> BinaryIO:
+def check_target(path: str | Path, *, overwrite: bool = True) -> None:
+    """Says now what would be wrong with writing a recording there; touches nothing.
+
+    Args:
+        path: The file.
+        overwrite: Whether a recording that exists may be replaced; any other file never is.
+
+    Raises:
+        RecordingError: its folder does not exist or may not be written to, or something is there that is not replaced.
+    """
+    path = Path(path)
     if not path.parent.is_dir():
         message = f"cannot write {path}: folder {path.parent} does not exist"
         raise RecordingError(message)
+    if path.is_dir():
+        message = f"cannot write {path}: Is a directory"
+        raise RecordingError(message)
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        message = f"cannot write {path}: Permission denied"
+        raise RecordingError(message)
+    if not path.is_file():  # nothing there, or a device
+        return
+    if not overwrite:
+        message = f"cannot write {path}: it exists already"
+        raise RecordingError(message)
+    try:
+        with path.open("rb") as stream:
+            ours = is_recording_start(stream.read(_START_BYTES))
+    except OSError as error:
+        message = f"cannot write {path}: it exists already, and cannot be read: {error.strerror}"
+        raise RecordingError(message) from None
+    if not ours:
+        message = f"cannot write {path}: it exists already and is no recording of activesteer; delete it, or choose "
+        raise RecordingError(message + "another name")
+
+
+def _open(path: Path, *, overwrite: bool) -> BinaryIO:
+    check_target(path, overwrite=overwrite)
     try:
         return path.open("wb" if overwrite else "xb")
-    except FileExistsError:
-        message = f"cannot write {path}: it exists already"
-        raise RecordingError(message) from None
     except OSError as error:
         message = f"cannot write {path}: {error.strerror}"
         raise RecordingError(message) from None

@@ -46,3 +46,46 @@ def slip_induced_side_force(
     """S_Vykappa: the lateral force [N] that longitudinal slip induces (4.E66, 4.E67); mu_fz is mu_y F_z [N]."""
     d = mu_fz * (p[c.RVY1] + p[c.RVY2] * dfz + p[c.RVY3] * gamma_s) * math.cos(math.atan(p[c.RVY4] * alpha_s)) * z2
     return d * math.sin(p[c.RVY5] * math.atan(p[c.RVY6] * kappa)) * p[c.LVYKA]
+
+
+@njit(cache=True, error_model="numpy")
+def friction_ellipse(
+    p, fz: float, dfz: float, d: float, kappa: float, alpha_s: float, fx0: float, fy0: float, dx: float, dy: float,
+    k_x: float, k_y: float, s_hy: float, s_vy: float, lmux: float,
+):  # fmt: skip
+    """What combined slip leaves of both pure forces: an ellipse, divided by the ratio of the shifted slips.
+
+    Args:
+        p: Parameter array.
+        fz: Load [N].
+        dfz: Load relative to the nominal one, less 1.
+        d: Rolling direction.
+        kappa: Longitudinal slip.
+        alpha_s: Slip angle alpha*.
+        fx0: Longitudinal force at pure slip [N].
+        fy0: Lateral force at pure slip [N].
+        dx: Peak D_x [N].
+        dy: Peak D_y [N].
+        k_x: Slip stiffness [N].
+        k_y: Cornering stiffness [N/rad].
+        s_hy: Horizontal shift of the lateral force.
+        s_vy: Vertical shift of the lateral force [N].
+        lmux: Longitudinal friction scale.
+
+    Returns:
+        Factors of the longitudinal and of the lateral force, 0 to 1.
+
+    Source: the friction ellipse of MSC's PAC2002 (without its weights), as in Project Chrono's ChPac02Tire: with
+    t = |alpha_c| / |kappa_c|, F_x = F_x0 / sqrt(1 + (mu_x t / mu_ymax)^2), F_y = F_y0 / sqrt(1 + (mu_y / (t mu_xmax))^2).
+    """
+    s_hx = (p[c.PHX1] + p[c.PHX2] * dfz) * p[c.LHX] * d
+    shifted = p[c.LMUX] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmux
+    s_vx = fz * (p[c.PVX1] + p[c.PVX2] * dfz) * p[c.LVX] * shifted * d
+    along = abs(kappa + s_hx + s_vx / k_x)
+    across = abs(math.sin(alpha_s + s_hy + s_vy / k_y))
+    # Multiplied out: either slip may vanish.
+    x, used_x = along * dy, across * abs(fx0 - s_vx)
+    y, used_y = across * dx, along * abs(fy0 - s_vy)
+    g_x = x / math.sqrt(x * x + used_x * used_x) if used_x > 0.0 else 1.0
+    g_y = y / math.sqrt(y * y + used_y * used_y) if used_y > 0.0 else 1.0
+    return g_x, g_y

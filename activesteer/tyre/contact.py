@@ -109,9 +109,6 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     the heading [m/s], the spin and the yaw rate of the wheel plane [rad/s], the camber [rad] and the relaxation states.
     """
     vsx = vx - spin * effective_rolling_radius(p, fz, spin, pressure_Pa)
-    sigma_x, sigma_y = relaxation_lengths(p, fz, gamma, pressure_Pa)
-    sigma_x = max(sigma_x, _MIN_RELAXATION_LENGTH_M)
-    sigma_y = max(sigma_y, _MIN_RELAXATION_LENGTH_M)
     limit_x = max(p[prm.KPUMAX] if vsx < 0.0 else -p[prm.KPUMIN], _SMALLEST_SLIP_LIMIT)
     limit_y = max(math.tan(min(p[prm.ALPMAX] if vsy > 0.0 else -p[prm.ALPMIN], 1.5)), _SMALLEST_SLIP_LIMIT)
     speed = abs(vx)
@@ -123,12 +120,18 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
         stiffness_x, stiffness_y = slip_stiffnesses(p, fz, gamma, pressure_Pa, mu)
         stiffness_x = abs(stiffness_x)
         stiffness_y = abs(stiffness_y)
-        sliding = _SLIDING_TO_LINEAR * mu * fz
+        sliding = _SLIDING_TO_LINEAR * mu / p[prm.REFERENCE_FRICTION] * fz
         limit_x = _low_speed_slip_limit(limit_x, sliding / stiffness_x, share)
         limit_y = _low_speed_slip_limit(limit_y, sliding / stiffness_y, share)
         damping_slip_x = -low_speed_damping_Nspm * share * vsx / stiffness_x
         damping_slip_y = low_speed_damping_Nspm * share * vsy / stiffness_y
 
+    sigma_x, sigma_y = relaxation_lengths(p, fz, gamma, pressure_Pa)
+    if p[prm.RELAXATION_OFF] != 0.0:
+        sigma_x *= share
+        sigma_y *= share
+    sigma_x = max(sigma_x, _MIN_RELAXATION_LENGTH_M)
+    sigma_y = max(sigma_y, _MIN_RELAXATION_LENGTH_M)
     sliding_x = abs(vsx) / limit_x
     sliding_y = abs(vsy) / limit_y
     if share > 0.0:
@@ -136,8 +139,9 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
         together = share * math.sqrt(sliding_x * sliding_x + sliding_y * sliding_y)
         sliding_x = (1.0 - share) * sliding_x + together
         sliding_y = (1.0 - share) * sliding_y + together
-    carry_x = max(speed, sliding_x)
-    carry_y = max(speed, sliding_y)
+    rolling = speed + p[prm.SPEED_OFFSET]
+    carry_x = max(rolling, sliding_x)
+    carry_y = max(rolling, sliding_y)
     rate_x = (-vsx - carry_x * u / sigma_x) * _mean_decay(timestep_s * carry_x / sigma_x)
     rate_y = (vsy - carry_y * v / sigma_y) * _mean_decay(timestep_s * carry_y / sigma_y)
     half_length = max(0.5 * contact_patch(p, fz, pressure_Pa)[0], _MIN_RELAXATION_LENGTH_M)
@@ -148,7 +152,7 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
 
     # Where the wind-up limit of a rolling tyre holds the deflection, the slip that it should have is out of range.
     limited = 0.0
-    held = speed >= low_speed_mps and (carry_x > speed or carry_y > speed)
+    held = speed >= low_speed_mps and (carry_x > rolling or carry_y > rolling)
     if held or limit_flags(p, fz, kappa, alpha, gamma, pressure_Pa) != 0:
         limited = 1.0
     # Camber works by the path that the tread takes through the patch of a rolling tyre: at rest there is none.
@@ -252,6 +256,8 @@ def tyre_on_road(
     contact_y = velocity_y_mps + turn_z * arm_x - turn_x * arm_z
     vx = velocity_x_mps * heading_x + velocity_y_mps * heading_y
     vsy = contact_y * heading_x - contact_x * heading_y
+    if p[prm.SLIP_AT_CENTRE] != 0.0:
+        vsy = velocity_y_mps * heading_x - velocity_x_mps * heading_y
 
     deflection = free_radius(p, spin) - loaded_radius
     axis_z_rate = turn_x * axis_y - turn_y * axis_x

@@ -21,7 +21,12 @@ import math
 from numba import njit
 
 from activesteer.tyre import parameters as c
-from activesteer.tyre.combined_slip import lateral_weight, longitudinal_weight, slip_induced_side_force
+from activesteer.tyre.combined_slip import (
+    friction_ellipse,
+    lateral_weight,
+    longitudinal_weight,
+    slip_induced_side_force,
+)
 from activesteer.tyre.moments import (
     SMALLEST_FRICTION,
     aligning_moment,
@@ -105,6 +110,9 @@ def steady_state(
     kappa = clamp(kappa, p[c.KPUMIN], p[c.KPUMAX])
     alpha = side * clamp(alpha, p[c.ALPMIN], p[c.ALPMAX])
     gamma = side * clamp(gamma, p[c.CAMMIN], p[c.CAMMAX])
+    if p[c.CAMBER_OFF] != 0.0:
+        gamma = 0.0
+    mu = mu / p[c.REFERENCE_FRICTION]
     pressure = clamp(pressure, p[c.PRESMIN], p[c.PRESMAX])
     fz0 = p[c.LFZO] * p[c.FNOMIN]
     dfz = (fz - fz0) / fz0
@@ -132,7 +140,16 @@ def steady_state(
         )
     fx0, mu_x, k_x = longitudinal_force(p, fz, dfz, dpi, kappa, gamma_x, lmux, d, z1)
     fy0, mu_y, k_y, b_y, c_y, s_hy, s_vy = lateral_force(p, fz, dfz, dpi, alpha_s, gamma_y, lmuy, d, z0, z2, z3, z4)
-    fx = longitudinal_weight(p, dfz, kappa_m, alpha_m, gamma_s) * fx0
+    kappa_z, lmu_z = kappa, p[c.LMUY] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmuy
+    if p[c.FRICTION_ELLIPSE] != 0.0:
+        g_x, g_y = friction_ellipse(
+            p, fz, dfz, d, kappa, alpha_s, fx0, fy0, mu_x * fz, mu_y * fz, k_x, k_y, s_hy, s_vy, lmux
+        )
+        # The moment knows longitudinal slip only by the side force that is left.
+        kappa_z = 0.0
+    else:
+        g_x = longitudinal_weight(p, dfz, kappa_m, alpha_m, gamma_s)
+    fx = g_x * fx0
     fy = g_y * fy0
     fy_trail = fy
     if not mf52:
@@ -143,7 +160,7 @@ def steady_state(
     mx = overturning_moment(p, fz, fy, gamma, dpi)
     my = rolling_resistance_moment(p, fz, fx, gamma, pressure, vx, d)
     mz, trail, residual = aligning_moment(
-        p, fz, dfz, dpi, kappa, alpha_s, gamma_z, gamma, vx, tan_alpha, lmuy, d, k_x, k_y, b_y, c_y, s_hy, s_vy,
+        p, fz, dfz, dpi, kappa_z, alpha_s, gamma_z, gamma, vx, tan_alpha, lmu_z, d, k_x, k_y, b_y, c_y, s_hy, s_vy,
         fx, fy, fy_trail, z0, z2, z5, z6, z7, z8,
     )  # fmt: skip
     mirrored = side * scale

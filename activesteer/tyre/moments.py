@@ -115,7 +115,9 @@ def aligning_moment(
     curve = (p[c.QEZ4] + p[c.QEZ5] * gamma_s) * 2.0 / math.pi * math.atan(b_t * c_t * alpha_t)
     e_t = min((p[c.QEZ1] + p[c.QEZ2] * dfz + p[c.QEZ3] * dfz * dfz) * (1.0 + curve), 1.0)
     bt = b_t * alpha_t_eq
-    trail = d_t * math.cos(c_t * math.atan(bt - e_t * (bt - math.atan(bt)))) * cos_alpha * p[c.LFZO]
+    trail = d_t * math.cos(c_t * math.atan(bt - e_t * (bt - math.atan(bt)))) * cos_alpha
+    if p[c.TRAIL_BY_SCALED_LOAD] == 0.0:
+        trail *= p[c.LFZO]
 
     b_r = (p[c.QBZ9] * stiffness + p[c.QBZ10] * b_y * c_y) * z6
     d_r = (p[c.QDZ6] + p[c.QDZ7] * dfz) * p[c.LRES] * z2

@@ -71,7 +71,14 @@ from __future__ import annotations
     Q_RA_GIVEN,     # 1 where the file gives the contact length
     Q_RB_GIVEN,     # 1 where the file gives the contact width
 ) = range(271, 278)
+
+(
+    # How the coefficients are evaluated: `conventions.TyreConventions`; 0 and 1 where not said otherwise.
+    CAMBER_OFF, RELAXATION_OFF, FRICTION_ELLIPSE, SCALE_PEAKS_ONLY, SLIP_AT_CENTRE, RADIUS_BY_DEFLECTION, TRAIL_BY_SCALED_LOAD,
+    SPEED_OFFSET,         # [m/s]
+    REFERENCE_FRICTION,
+) = range(278, 287)
 # fmt: on
 
-PARAMETER_COUNT = 278
+PARAMETER_COUNT = 287
 """Length of the parameter array."""

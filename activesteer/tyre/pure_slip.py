@@ -83,7 +83,8 @@ def longitudinal_force(
     d_x = mu * fz * z1
     k_x = longitudinal_stiffness(p, fz, dfz, dpi)
     kappa_x = kappa + (p[c.PHX1] + p[c.PHX2] * dfz) * p[c.LHX] * d
-    s_v = fz * (p[c.PVX1] + p[c.PVX2] * dfz) * p[c.LVX] * lmu * z1 * d
+    shifted = p[c.LMUX] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmu
+    s_v = fz * (p[c.PVX1] + p[c.PVX2] * dfz) * p[c.LVX] * shifted * z1 * d
     e_x = (p[c.PEX1] + p[c.PEX2] * dfz + p[c.PEX3] * dfz * dfz) * (1.0 - p[c.PEX4] * d * sign(kappa_x)) * p[c.LEX]
     b_x = k_x / guarded(c_x * d_x)
     return sine_formula(b_x, c_x, d_x, e_x, kappa_x) + s_v, mu, k_x
@@ -115,13 +116,14 @@ def lateral_force(
     """
     k_y = cornering_stiffness(p, fz, gamma_s, dpi) * z3
     shift = (p[c.PHY1] + p[c.PHY2] * dfz) * p[c.LHY] * d
-    s_vg = fz * (p[c.PVY3] + p[c.PVY4] * dfz) * gamma_s * p[c.LKYC] * lmu * z2
+    shifted = p[c.LMUY] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmu
+    s_vg = fz * (p[c.PVY3] + p[c.PVY4] * dfz) * gamma_s * p[c.LKYC] * shifted * z2
     if p[c.MF_VERSION] == MF52:
         s_h = shift + p[c.PHY3] * gamma_s * p[c.LKYC]
     else:
         k_yg = fz * (p[c.PKY6] + p[c.PKY7] * dfz) * (1.0 + p[c.PPY5] * dpi) * p[c.LKYC]
         s_h = shift + (k_yg * gamma_s - s_vg) * z0 / guarded(k_y) + z4 - 1.0
-    s_v = fz * (p[c.PVY1] + p[c.PVY2] * dfz) * p[c.LVY] * lmu * z2 * d + s_vg
+    s_v = fz * (p[c.PVY1] + p[c.PVY2] * dfz) * p[c.LVY] * shifted * z2 * d + s_vg
     mu = (p[c.PDY1] + p[c.PDY2] * dfz) * (1.0 + p[c.PPY3] * dpi + p[c.PPY4] * dpi * dpi)
     mu *= (1.0 - p[c.PDY3] * gamma_s * gamma_s) * lmu
     c_y = p[c.PCY1] * p[c.LCY]

@@ -14,6 +14,7 @@ import numpy as np
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.tyre import parameters as index
 from activesteer.tyre.coefficients import BY_NAME, COEFFICIENTS
+from activesteer.tyre.conventions import TyreConventions
 
 DEFAULT_PRESSURE_PA = 220_000.0
 DEFAULT_LONGITUDINAL_STIFFNESS_NPM = 300_000.0
@@ -42,6 +43,7 @@ class TyreParameters(Mapping[str, float]):
         texts: Values of the file that are words, by (section, key).
         unused: Numbers of the file that no formula of the package uses, by (section, key).
         tables: Rows of numbers, by section.
+        conventions: What the file leaves to the program that reads it.
     """
 
     given: Mapping[str, float]
@@ -52,6 +54,7 @@ class TyreParameters(Mapping[str, float]):
     texts: Mapping[tuple[str, str], str] = field(default_factory=dict)
     unused: Mapping[tuple[str, str], float] = field(default_factory=dict)
     tables: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+    conventions: TyreConventions = TyreConventions()
 
     def __post_init__(self) -> None:
         """Check the values and work out what the file leaves open.
@@ -66,7 +69,7 @@ class TyreParameters(Mapping[str, float]):
         """Travels between processes by what it was made from: read-only views cannot be copied."""
         texts, unused, tables = dict(self.texts), dict(self.unused), dict(self.tables)
         made_from = (dict(self.given), self.source, self.side, self.mounted, self.slip_tangent, texts, unused, tables)
-        return TyreParameters, made_from
+        return TyreParameters, (*made_from, self.conventions)
 
     @property
     def version(self) -> int:
@@ -85,6 +88,7 @@ class TyreParameters(Mapping[str, float]):
         array[index.PTY_GIVEN] = self.version == 52 and "PTY1" in self.given
         array[index.Q_RA_GIVEN] = "Q_RA1" in self.given or "Q_RA2" in self.given
         array[index.Q_RB_GIVEN] = "Q_RB1" in self.given or "Q_RB2" in self.given
+        array[index.CAMBER_OFF :] = self.conventions.numbers()
         for name in ("VERTICAL_STIFFNESS", "Q_FZ1", "Q_FZ2", "Q_FZ3"):
             array[getattr(index, name)] *= self["LCZ"]
         return array

@@ -45,6 +45,8 @@ def effective_rolling_radius(p, fz_N: float, omega_radps: float, pressure_Pa: fl
     fz0 = p[c.FNOMIN]
     ratio = max(fz_N, 0.0) / fz0
     stiffness = p[c.VERTICAL_STIFFNESS] * stiffness_pressure_factor(p, pressure_Pa)
+    if p[c.RADIUS_BY_DEFLECTION] != 0.0:
+        return free_radius(p, omega_radps) - max(fz_N, 0.0) / (3.0 * stiffness)
     curve = p[c.DREFF] * math.atan(p[c.BREFF] * ratio) + p[c.FREFF] * ratio
     return free_radius(p, omega_radps) - fz0 / stiffness * curve
 

@@ -8,6 +8,7 @@ from typing import Annotated, Final
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
+from activesteer.tyre.conventions import TyreConventions
 from activesteer.vehicle.force_block import MAX_CURVE_POINTS
 
 Positive = Annotated[float, Range(1e-12)]
@@ -32,6 +33,8 @@ class TyreFitment:
     low_speed_damping_Nspm: NotNegative = 1500.0
     """Viscous coefficient of the contact patch at rest [N s/m]: a third of critical for a wheel of 1 kg m2 that swings
     on a carcass of 450 kN/m, 2 sqrt(k J) / R = 4400 N s/m."""
+    conventions: TyreConventions = TyreConventions()
+    """What a tyre file leaves to the program that reads it; ours where not given."""
 
 
 @dataclass(frozen=True)

@@ -137,6 +137,16 @@ def test_output_that_cannot_be_written_is_answered(call, tmp_path, output):
     assert (tmp_path / "file").read_text() == "in the way"
 
 
+def test_file_that_is_no_recording_is_kept_and_nothing_runs(call, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "straight_line-ars.mcap").write_text("my notes")
+    told = call("run", "straight_line", "-c", "none", "-c", "ars", *SHORT, "-o", "out")
+    refused(told, "straight_line-ars.mcap: it exists already and is no recording of activesteer")
+    (tmp_path / "out" / "slalom-afs.mcap").write_text("my notes")
+    refused(call("reproduce", "-o", "out"), "slalom-afs.mcap: it exists already")
+    assert {path.read_text() for path in (tmp_path / "out").iterdir()} == {"my notes"}
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is always full")
 def test_full_disk_is_answered(call, tmp_path):
     (tmp_path / "run.mcap").symlink_to("/dev/full")

@@ -101,9 +101,10 @@ def test_output_goes_to_runs_where_nothing_is_said(call, tmp_path):
     assert (tmp_path / "runs" / "straight_line-none.mcap").is_file()
 
 
-def test_file_that_exists_is_replaced(call, tmp_path):
-    (tmp_path / "run.mcap").write_text("something else")
-    assert call("run", "straight_line", *SHORT, "-o", "run.mcap").status == 0
+def test_recording_that_exists_is_replaced(call, tmp_path):
+    for duration_s in (0.2, 0.3):
+        told = call("run", "straight_line", *SHORT, "--set", f"duration_s={duration_s}", "-o", "run.mcap")
+        assert told.status == 0
     assert len(Recording.open(tmp_path / "run.mcap")) == 300
 
 

@@ -98,7 +98,7 @@ def test_override_replaces_a_whole_table():
         ("maneuver.sped_kmh", r"override maneuver\.sped_kmh: sped_kmh: there is no such key; did you mean 'speed_kmh'"),
         ("vehicle.tyres.frnt", r"override vehicle\.tyres\.frnt: frnt: there is no such key; did you mean 'front'"),
         ("name", r"override name: both manoeuvre and vehicle have this key; say maneuver\.name or vehicle\.name"),
-        ("speed_kmh.x", r"neither manoeuvre nor vehicle has such a key"),
+        ("speed_kmh.x", r"speed_kmh is a value, not a table"),
     ],
 )
 def test_override_of_a_key_that_does_not_exist_is_answered(key, told):

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.figures import style
-from activesteer.analysis.figures.style import COLOURS, DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, Curve, Panel
+from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, Curve, Panel
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import RUN_COLOURS
 from activesteer.errors import RecordingError
 from activesteer.pictures import new_figure, save
 
@@ -101,8 +102,8 @@ def figure_2(
     figure = new_figure(width_in=7.5, height_in=5.5)
     axes: list[Axes] = list(figure.subplots(2, 1, sharex=True))
     for axis, panel in zip(axes, (YAW_RATE, ROLL), strict=True):
-        style.draw(axis, Curve(recording, "", COLOURS[0]), panel, label="multibody car", width=2.0)
-        for (label, channels), colour in zip((models or {}).items(), COLOURS[1:], strict=False):
+        style.draw(axis, Curve(recording, "", RUN_COLOURS[0]), panel, label="multibody car", width=2.0)
+        for (label, channels), colour in zip((models or {}).items(), RUN_COLOURS[1:], strict=False):
             if panel.channel in channels:
                 values = channels[panel.channel] * panel.factor
                 axis.plot(recording.time_s, values, "--", color=colour, linewidth=1.4, label=label)

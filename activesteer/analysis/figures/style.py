@@ -10,18 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import ParameterError
 from activesteer.pictures import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering", "afs": "3 active front steering"}
-"""What the curves of the three systems are called, numbered as in the paper's figures."""
-
-COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
-"""Colours that colour-blind readers can tell apart (Okabe and Ito, 2008)."""
 
 MOST_POINTS: Final = 5000
 """A curve with more samples than this is drawn with fewer: a picture cannot show them, and its file would hold them."""
@@ -75,12 +70,12 @@ def curves(recordings: Mapping[str, RecordingLike]) -> list[Curve]:
     """
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
-    known = [label for label in LABELS if label in recordings]
-    others = [label for label in recordings if label not in LABELS]
-    colours = dict(zip(LABELS, COLOURS, strict=False))
-    spare = COLOURS[len(LABELS) :]
+    known = [label for label in SYSTEM_LABELS if label in recordings]
+    others = [label for label in recordings if label not in SYSTEM_LABELS]
+    colours = dict(zip(SYSTEM_LABELS, RUN_COLOURS, strict=False))
+    spare = RUN_COLOURS[len(SYSTEM_LABELS) :]
     colours |= {label: spare[i % len(spare)] for i, label in enumerate(others)}
-    return [Curve(recordings[label], LABELS.get(label, label), colours[label]) for label in known + others]
+    return [Curve(recordings[label], SYSTEM_LABELS.get(label, label), colours[label]) for label in known + others]
 
 
 def draw(axis: Axes, curve: Curve, panel: Panel, label: str = "", width: float = 1.4, style: str = "-") -> None:

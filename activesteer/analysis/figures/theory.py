@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.figures import style
-from activesteer.analysis.figures.style import COLOURS, LABELS
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import RecordingError
 from activesteer.pictures import new_figure
 
@@ -74,10 +74,12 @@ def figure_7(recording: RecordingLike) -> Figure:
     figure = new_figure(width_in=7.5, height_in=4.2)
     axis: Axes = figure.subplots()
     axis.axhline(0.0, color="#999999", linewidth=0.8)
-    axis.plot(3.6 * speed_mps, share, color=COLOURS[1], linewidth=1.6, label="keeps the sideslip angle at zero (eq. 5)")
+    axis.plot(
+        3.6 * speed_mps, share, color=RUN_COLOURS[1], linewidth=1.6, label="keeps the sideslip angle at zero (eq. 5)"
+    )
     if gain != 1.0:
         label = f"used by the rear system: {100.0 * gain:.3g} %"
-        axis.plot(3.6 * speed_mps, gain * share, "--", color=COLOURS[1], linewidth=1.4, label=label)
+        axis.plot(3.6 * speed_mps, gain * share, "--", color=RUN_COLOURS[1], linewidth=1.4, label=label)
     zero = np.flatnonzero((share[:-1] < 0.0) & (share[1:] >= 0.0))
     if zero.size:
         at = 3.6 * float(np.interp(0.0, share[zero[0] : zero[0] + 2], speed_mps[zero[0] : zero[0] + 2]))
@@ -119,8 +121,8 @@ def figure_9(recording: RecordingLike) -> Figure:
     figure = new_figure(width_in=7.5, height_in=4.0)
     axis: Axes = figure.subplots()
     for (off, full), systems in bands.items():
-        colour = COLOURS[list(LABELS).index(systems[0])] if len(systems) == 1 else COLOURS[0]
-        label = " and ".join(LABELS[system] for system in systems)
+        colour = RUN_COLOURS[list(SYSTEM_LABELS).index(systems[0])] if len(systems) == 1 else RUN_COLOURS[0]
+        label = " and ".join(SYSTEM_LABELS[system] for system in systems)
         axis.plot(np.degrees(error_radps), tolerance(error_radps, off, full), color=colour, linewidth=1.6, label=label)
         for name, value in (("off", off), ("in", full)):
             axis.axvline(math.degrees(value), color=colour, linewidth=0.8, linestyle=":")

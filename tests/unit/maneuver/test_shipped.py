@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from activesteer.maneuver import LaneChange, SineWithDwell, Slalom
@@ -51,11 +54,16 @@ def test_sine_with_dwell_is_that_of_the_paper():
     assert maneuver.duration_s - maneuver.steer.completion_s > 2.5
 
 
-def test_both_lane_changes_differ_by_the_road_alone():
+def test_both_lane_changes_differ_by_the_road_and_by_how_much_of_the_lanes_is_used():
     dry, slippery = (resolve(name).maneuver for name in ("double_lane_change", "double_lane_change_low_mu"))
     assert isinstance(dry, LaneChange)
     assert isinstance(slippery, LaneChange)
-    assert dry.lane == slippery.lane
+    assert dry.course.lanes == slippery.course.lanes
+    assert replace(dry.lane, margin_m=slippery.lane.margin_m) == slippery.lane
+    # Neither line asks for more than its road gives.
+    for maneuver in (dry, slippery):
+        asked = np.abs(maneuver.course.path.curvature_1pm).max() * maneuver.speed_mps**2
+        assert asked < maneuver.road.mu * 9.81 * 1.01
     assert dry.lane.standard == "iso_3888_1"
     assert dry.speed_mps == slippery.speed_mps
 

@@ -46,6 +46,21 @@ def test_the_command_writes_a_file(file: Path, tmp_path: Path, capsys: pytest.Ca
     assert "| yaw rate peak | deg/s | 11.459 |" in rrd.column("/summary", "TextDocument:text")[0][0]
 
 
+def test_the_viewer_says_nothing_of_its_own(tmp_path: Path) -> None:
+    """It warns of application ids that it has to change; names of manoeuvres and files are free."""
+    circle(0.1, {"maneuver": {"name": "an: odd/name, ü", "title": "Odd"}}).save(tmp_path / "run.mcap")
+    code = "import sys; from activesteer.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, "replay", "run.mcap", "--save", "out.rrd"]
+    done = subprocess.run(command, cwd=tmp_path, env=_environment(tmp_path), capture_output=True, text=True, check=True)
+    assert done.stdout == ""
+    assert done.stderr == "out.rrd: open it with `rerun out.rrd`\n"
+
+
+def _environment(home: Path) -> dict[str, str]:
+    root = str(Path(__file__).parents[3])
+    return {**os.environ, "BROWSER": "true", "HOME": str(home), "PYTHONPATH": root}
+
+
 def test_files_of_the_same_controller_are_told_apart_by_their_names(file: Path, tmp_path: Path) -> None:
     other = tmp_path / "wet.mcap"
     other.write_bytes(file.read_bytes())
@@ -100,8 +115,9 @@ def test_without_a_display_the_error_says_so(monkeypatch: pytest.MonkeyPatch) ->
 def test_web_serves_the_viewer_to_this_machine_until_it_is_interrupted(file: Path, tmp_path: Path) -> None:
     code = "import sys; from activesteer.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", code, "replay", str(file), "--web"]
-    environment = {**os.environ, "BROWSER": "true", "HOME": str(tmp_path)}
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=_environment(tmp_path)
+    )
     try:
         assert process.stdout is not None
         line = process.stdout.readline()

@@ -91,6 +91,7 @@ def test_a_damaged_block_is_named_and_what_comes_before_it_recovered(recording: 
         Recording.open(mcap_file)
     recovered = Recording.open(mcap_file, recover=True)
     assert len(recovered) == 2 * BLOCK_ROWS
+    assert recovered.metadata["error"].startswith("the file is damaged: the chunk in bytes ")
     assert np.array_equal(recovered["yaw_rate_radps"], recording["yaw_rate_radps"][: 2 * BLOCK_ROWS])
     assert recovered.metadata["complete"] is False
 

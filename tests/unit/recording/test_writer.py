@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 
 from activesteer.errors import RecordingError
-from activesteer.recording import McapWriter, Recording
+from activesteer.recording import McapWriter, Recording, check_target
 from activesteer.signals import Channel
 
 SPEED = [Channel("v_mps", "m/s", "Speed", "vehicle", single=False)]
@@ -128,20 +129,77 @@ def test_a_path_that_cannot_be_written_says_why(tmp_path: Path) -> None:
         McapWriter(tmp_path, SPEED)
 
 
-def test_an_existing_file_is_kept_unless_told_otherwise(recording: Recording, tmp_path: Path) -> None:
+@pytest.mark.parametrize("content", [b"precious", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n\x01" + bytes(30)])
+def test_a_file_that_is_no_recording_of_ours_is_never_replaced(
+    recording: Recording, tmp_path: Path, content: bytes
+) -> None:
     path = tmp_path / "run.mcap"
-    path.write_bytes(b"precious")
-    with pytest.raises(RecordingError, match="it exists already"):
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"run\.mcap: it exists already and is no recording of activesteer"):
+        recording.save(path)
+    assert path.read_bytes() == content
+
+
+def test_a_file_of_another_program_is_never_replaced(recording: Recording, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    foreign = Writer(str(path))
+    foreign.start(profile="ros2", library="not activesteer 1")
+    foreign.finish()
+    content = path.read_bytes()
+    with pytest.raises(RecordingError, match="it exists already and is no recording of activesteer"):
+        recording.save(path)
+    assert path.read_bytes() == content
+
+
+def test_a_recording_is_replaced_unless_told_otherwise(recording: Recording, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"")  # as a full disk leaves it
+    recording.save(path)
+    with pytest.raises(RecordingError, match=r"run\.mcap: it exists already$"):
         recording.save(path, overwrite=False)
-    assert path.read_bytes() == b"precious"
+    path.write_bytes(path.read_bytes()[:1000])  # as a killed process leaves it
     recording.save(path)
     assert len(Recording.open(path)) == len(recording)
+
+
+def test_a_target_can_be_checked_without_touching_it(recording: Recording, tmp_path: Path) -> None:
+    check_target(tmp_path / "new.mcap")
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(RecordingError, match=r"folder .*no does not exist"):
+        check_target(tmp_path / "no" / "run.mcap")
+    with pytest.raises(RecordingError, match="Is a directory"):
+        check_target(tmp_path)
+    recording.save(tmp_path / "run.mcap")
+    before = (tmp_path / "run.mcap").read_bytes()
+    check_target(tmp_path / "run.mcap")
+    with pytest.raises(RecordingError, match="it exists already"):
+        check_target(tmp_path / "run.mcap", overwrite=False)
+    assert (tmp_path / "run.mcap").read_bytes() == before
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_that_may_not_be_written_to_is_an_error(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(RecordingError, match="Permission denied"):
+        check_target(tmp_path / "run.mcap")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a device that is always full")
 def test_a_full_disk_is_an_error_before_the_run_starts() -> None:
     with pytest.raises(RecordingError, match=r"cannot write /dev/full: No space left on device"):
         McapWriter("/dev/full", SPEED)
+
+
+def test_a_file_that_cannot_be_begun_is_not_left_behind(tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        with pytest.raises(RecordingError, match=r"cannot write .*run\.mcap: File too large"):
+            McapWriter(tmp_path / "run.mcap", SPEED, attachments={"vehicle.toml": bytes(1000)})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_disk_that_fills_up_ends_the_recording_with_what_was_saved(

@@ -17,7 +17,7 @@ def test_every_coefficient_has_its_index() -> None:
         assert getattr(parameters, coefficient.name) == place
     assert len({coefficient.name for coefficient in COEFFICIENTS}) == len(COEFFICIENTS)
     assert len(COEFFICIENTS) == parameters.MF_VERSION
-    assert parameters.Q_RB_GIVEN + 1 == parameters.PARAMETER_COUNT
+    assert parameters.REFERENCE_FRICTION + 1 == parameters.PARAMETER_COUNT
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

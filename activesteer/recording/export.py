@@ -1,0 +1,151 @@
+"""Recordings for other programs: data frames, CSV, Parquet, MATLAB. `Recording` has a method for each.
+
+pandas for the data frame: it is what the people of this field have, its index carries the time, and everything that it
+needs to write files (pyarrow) comes with rerun-sdk anyway. CSV and Parquet are written with pyarrow and need no pandas.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from activesteer.errors import RecordingError
+from activesteer.recording.format import metadata_texts
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+    from activesteer.recording.recording import Recording
+
+TIME: Final = "time_s"
+"""What the time is called in every export."""
+
+MATLAB_NAME_LENGTH: Final = 63
+"""Longest name of a variable or field in MATLAB (`namelengthmax`)."""
+
+MATLAB_TABLES: Final = ("units", "meanings", "metrics", "metadata")
+"""Variables beside the channels."""
+
+
+def to_dataframe(recording: Recording) -> pd.DataFrame:
+    """A column for each channel, the time as the index.
+
+    Returns:
+        The frame, a copy; `attrs["units"]` has the units by column, `attrs["metrics"]` the metrics.
+
+    Raises:
+        RecordingError: pandas is not installed.
+    """
+    try:
+        import pandas as pd  # noqa: PLC0415 - an extra, and slow to import
+    except ImportError:
+        message = "to_dataframe needs pandas, which is not installed: pip install 'activesteer[data]'"
+        raise RecordingError(message) from None
+    index = pd.Index(recording.time_s, name=TIME)
+    frame = pd.DataFrame(recording.values, index=index, columns=list(recording.channels.names), copy=True)
+    frame.attrs["units"] = {channel.name: channel.unit for channel in recording.channels}
+    frame.attrs["metrics"] = dict(recording.metrics)
+    return frame
+
+
+def to_csv(recording: Recording, path: str | os.PathLike[str]) -> Path:
+    """Writes a line of names and a line for each row: `time_s`, then the channels; a file that exists is replaced.
+
+    Numbers have as many digits as are needed to read the same ones back; channels with `single` have 32 bit.
+
+    Raises:
+        RecordingError: the file cannot be written.
+    """
+    from pyarrow import csv  # noqa: PLC0415 - slow to import
+
+    def write(target: Path) -> None:
+        with target.open("wb") as stream:
+            # pyarrow would put the names in quotes, which some readers take as part of them.
+            stream.write((",".join((TIME, *recording.channels.names)) + "\n").encode())
+            csv.write_csv(_table(recording), stream, csv.WriteOptions(include_header=False))
+
+    return _written(path, write)
+
+
+def to_parquet(recording: Recording, path: str | os.PathLike[str]) -> Path:
+    """Writes `time_s` and the channels as columns; a file that exists is replaced.
+
+    Channels with `single` have 32 bit. Each field carries `unit` and `meaning`, the schema `metadata` and `metrics` as
+    JSON texts.
+
+    Raises:
+        RecordingError: the file cannot be written.
+    """
+    from pyarrow import parquet  # noqa: PLC0415 - slow to import
+
+    return _written(path, lambda target: parquet.write_table(_table(recording), target, compression="zstd"))
+
+
+def to_mat(recording: Recording, path: str | os.PathLike[str]) -> Path:
+    """Writes a MATLAB file (version 5, as `load` of every MATLAB and Octave reads it); one that exists is replaced.
+
+    `time_s` and every channel is a column of doubles: single ones would turn all that is computed with them single.
+    Structs `units`, `meanings` and `metrics` have a field for each name; `metadata` is JSON text, for `jsondecode`.
+
+    Raises:
+        RecordingError: the file cannot be written, or a name is longer than MATLAB allows or taken.
+    """
+    from scipy.io import savemat  # noqa: PLC0415 - slow to import
+
+    taken = {TIME, *MATLAB_TABLES}
+    for name in (*recording.channels.names, *recording.metrics):
+        if len(name) > MATLAB_NAME_LENGTH:
+            message = f"{name!r} has {len(name)} letters; MATLAB allows {MATLAB_NAME_LENGTH}"
+            raise RecordingError(message)
+    if clash := taken.intersection(recording.channels.names):
+        message = f"a channel is called {clash.pop()!r}, which is taken by what stands beside the channels"
+        raise RecordingError(message)
+    variables: dict[str, Any] = {TIME: recording.time_s}
+    variables |= {name: recording[name] for name in recording.channels.names}
+    variables["units"] = {channel.name: channel.unit for channel in recording.channels}
+    variables["meanings"] = {channel.name: channel.meaning for channel in recording.channels}
+    variables["metrics"] = dict(recording.metrics)
+    variables["metadata"] = _metadata(recording)
+
+    def write(target: Path) -> None:
+        # Fields longer than 31 letters are for MATLAB 7.6 and later, of 2008.
+        savemat(target, variables, appendmat=False, long_field_names=True, do_compression=True, oned_as="column")
+
+    return _written(path, write)
+
+
+def _table(recording: Recording) -> pa.Table:
+    import pyarrow as pa  # noqa: PLC0415 - slow to import
+
+    columns = [pa.array(recording.time_s)]
+    fields = [pa.field(TIME, pa.float64(), metadata={"unit": "s", "meaning": "time since the recording began"})]
+    for channel in recording.channels:
+        kind = np.float32 if channel.single else np.float64
+        columns.append(pa.array(recording[channel.name].astype(kind)))
+        notes = {"unit": channel.unit, "meaning": channel.meaning}
+        fields.append(pa.field(channel.name, pa.from_numpy_dtype(kind), metadata=notes))
+    metrics = {name: value if math.isfinite(value) else None for name, value in recording.metrics.items()}
+    about = {"metadata": _metadata(recording), "metrics": json.dumps(metrics)}
+    return pa.table(columns, schema=pa.schema(fields, metadata=about))
+
+
+def _metadata(recording: Recording) -> str:
+    texts, _ = metadata_texts(recording.metadata)
+    return json.dumps({key: json.loads(text) for key, text in texts.items()}, ensure_ascii=False)
+
+
+def _written(path: str | os.PathLike[str], write: Callable[[Path], object]) -> Path:
+    target = Path(path)
+    try:
+        write(target)
+    except OSError as error:
+        message = f"cannot write {target}: {error.strerror or error}"
+        raise RecordingError(message) from None
+    return target

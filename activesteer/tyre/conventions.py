@@ -1,0 +1,75 @@
+"""Where programs that use the same tyre file differ: what the file's formula leaves to them.
+
+A .tir file holds coefficients, not a program. The defaults here are what this package means by them; the alternatives
+are what other codes do, so that a car can be compared with one of theirs, force by force.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from activesteer.errors import ParameterError, nearest_names
+
+_CHOICES: Final = {
+    "combined_slip": ("weights", "friction_ellipse"),
+    "friction_scales": ("formula", "peaks"),
+    "slip_velocity": ("contact_point", "wheel_centre"),
+    "rolling_radius": ("file", "third_of_deflection"),
+    "trail_load": ("nominal", "scaled"),
+}
+"""Words that a key takes; the first is the default, the second stands as 1 in the parameter array."""
+
+
+@dataclass(frozen=True)
+class TyreConventions:
+    """How a tyre's coefficients are evaluated; keys of the table [tyres.conventions] in a vehicle file."""
+
+    camber: bool = True
+    """Whether camber enters the formula. Without it, it still acts by geometry: contact point, direction of forces."""
+    relaxation: bool = True
+    """Whether slip builds up over the relaxation length. Without it forces follow slip within 20 mm of road, except at
+    walking speed, where the standing tyre needs its carcass."""
+    combined_slip: str = "weights"
+    """`weights`: the cosine functions of the formula, which a file without R.. coefficients leaves at 1;
+    `friction_ellipse`: longitudinal and lateral force scaled down to an ellipse by the ratio of the slips."""
+    friction_scales: str = "formula"
+    """What the road's friction scales: `formula`: all that LMUX and LMUY do; `peaks`: only the peaks D_x and D_y, not
+    shifts, trail and residual moment."""
+    slip_velocity: str = "contact_point"
+    """Whose lateral velocity is the slip: `contact_point` has a part from the rate of camber, `wheel_centre` has not."""
+    rolling_radius: str = "file"
+    """Effective rolling radius: `file`: from BREFF, DREFF, FREFF; `third_of_deflection`: R_0 less a third of the
+    deflection."""
+    trail_load: str = "nominal"
+    """Load that the pneumatic trail is related to: `nominal`: FNOMIN; `scaled`: LFZO FNOMIN."""
+    speed_offset_mps: float = 0.0
+    """Added to the speed by which slip velocities are divided [m/s], against division by zero; 0.1 m/s makes slips
+    0.45 % smaller at 80 km/h."""
+    reference_friction: float = 1.0
+    """Friction of the road to which the file's peaks belong: the road's friction is divided by it [-]."""
+
+    def __post_init__(self) -> None:
+        """Checks the values.
+
+        Raises:
+            ParameterError: a word is unknown, or a number out of range.
+        """
+        for key, words in _CHOICES.items():
+            if (word := getattr(self, key)) not in words:
+                msg = f"{key}: there is no {word!r}; {nearest_names(str(word), words)}"
+                raise ParameterError(msg)
+        if not 0.0 <= self.speed_offset_mps <= 1.0:
+            msg = f"speed_offset_mps: {self.speed_offset_mps:g} m/s is outside 0 to 1 m/s"
+            raise ParameterError(msg)
+        if not 0.1 <= self.reference_friction <= 2.0 or not math.isfinite(self.reference_friction):
+            msg = f"reference_friction: {self.reference_friction:g} is outside 0.1 to 2"
+            raise ParameterError(msg)
+
+    def numbers(self) -> tuple[float, ...]:
+        """The conventions as they stand at the end of a parameter array, in the order of `parameters`."""
+        chosen = (float(getattr(self, key) == words[1]) for key, words in _CHOICES.items())
+        return (
+            float(not self.camber), float(not self.relaxation), *chosen, self.speed_offset_mps, self.reference_friction,
+        )  # fmt: skip

@@ -1,0 +1,170 @@
+"""The axles that can be built: which hardpoints each needs, and which links run between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from activesteer.errors import ParameterError, nearest_names
+
+
+@dataclass(frozen=True)
+class LinkKind:
+    """One link between chassis (or rack) and knuckle, and the elasticity it has where the table gives none."""
+
+    name: str
+    inner: str
+    """Point on the chassis, or on the rack."""
+    outer: str
+    """Point on the knuckle; the two links of an arm share it."""
+    stiffness_Npm: float
+    """Rod and both bushings in series, unloaded [N/m]."""
+    hardening_Npm3: float
+    """Cubic part of the force [N/m3]."""
+    damping_Nspm: float
+    """Of the rubber [N s/m]."""
+    reason: str
+    """What the default stands for."""
+
+
+@dataclass(frozen=True)
+class AxleKind:
+    """One kind of suspension.
+
+    Attributes:
+        name: What it is called in a table.
+        axles: Where it can be used, `front` or `rear`.
+        links: Its links.
+        points: Points that are needed beside the ends of the links.
+        carriers: What can carry a spring or damper: `strut`, `knuckle`, or an arm (name -> its inner points) that is a
+            link or the two links of an arm.
+        spring_on: Which of these does where the table does not say.
+    """
+
+    name: str
+    axles: tuple[str, ...]
+    links: tuple[LinkKind, ...]
+    points: tuple[str, ...]
+    carriers: dict[str, tuple[str, ...]]
+    spring_on: str
+
+    @property
+    def strut(self) -> bool:
+        """Whether the knuckle slides on a strut."""
+        return self.spring_on == "strut"
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """All points that a table has to give, in the order in which they are asked for."""
+        ends = [point for link in self.links for point in (link.inner, link.outer)]
+        return tuple(dict.fromkeys((*self.points, *ends)))
+
+    @property
+    def arms(self) -> dict[str, tuple[tuple[str, ...], str]]:
+        """What swings: name -> inner points (one or two) and outer point."""
+        found = {}
+        for name, inner in self.carriers.items():
+            if inner:
+                outer = next(link.outer for link in self.links if link.inner == inner[0])
+                found[name] = (inner, outer)
+        return found
+
+
+def _link(name: str, stiffness: float, hardening: float, damping: float, reason: str, outer: str = "") -> LinkKind:
+    return LinkKind(name, f"{name}_inner", outer or f"{name}_outer", stiffness, hardening, damping, reason)
+
+
+_SPRINGS: Final = ("spring_inner", "spring_outer", "damper_inner", "damper_outer")
+_HANDLING, _COMFORT = "two hard handling bushings", "a hard and a soft comfort bushing, hardening"
+_TIE_ROD: Final = _link("tie_rod", 1e6, 0.0, 3000.0, "rod, ball joints, and the rubber mounts of rack and subframe")
+_TOE_LINK: Final = _link("toe_link", 1.64e6, 0.0, 3000.0, "two bushings of 3.3 kN/mm")
+_TRAILING: Final = "two soft comfort bushings, hardening"
+
+MCPHERSON: Final = AxleKind(
+    "mcpherson",
+    ("front",),
+    (
+        _link("lca_front", 8.5e6, 0.0, 3000.0, _HANDLING, "lca_outer"),
+        _link("lca_rear", 1e6, 8e9, 2000.0, _COMFORT, "lca_outer"),
+        _TIE_ROD,
+    ),
+    ("wheel_centre", "strut_top", "strut_bottom"),
+    {"strut": ()},
+    "strut",
+)
+
+_WISHBONES: Final = (
+    _link("uca_front", 5e6, 0.0, 3000.0, _HANDLING, "uca_outer"),
+    _link("uca_rear", 5e6, 0.0, 3000.0, _HANDLING, "uca_outer"),
+    _link("lca_front", 8.5e6, 0.0, 3000.0, _HANDLING, "lca_outer"),
+    _link("lca_rear", 2e6, 8e9, 2000.0, _COMFORT, "lca_outer"),
+)
+_ARMS: Final = {
+    "knuckle": (),
+    "lca": ("lca_front_inner", "lca_rear_inner"),
+    "uca": ("uca_front_inner", "uca_rear_inner"),
+}
+DOUBLE_WISHBONE: Final = AxleKind(
+    "double_wishbone", ("front",), (*_WISHBONES, _TIE_ROD), ("wheel_centre", *_SPRINGS), _ARMS, "lca"
+)
+DOUBLE_WISHBONE_REAR: Final = AxleKind(
+    "double_wishbone", ("rear",), (*_WISHBONES, _TOE_LINK), ("wheel_centre", *_SPRINGS), _ARMS, "lca"
+)
+FIVE_LINK: Final = AxleKind(
+    "five_link",
+    ("rear",),
+    (
+        _link("spring_link", 5.2e6, 0.0, 3000.0, _HANDLING),
+        _TOE_LINK,
+        _link("camber_link", 5.7e6, 0.0, 3000.0, _HANDLING),
+        _link("trailing_lower", 2.4e5, 3e9, 1500.0, _TRAILING),
+        _link("trailing_upper", 2.5e5, 3e9, 1500.0, _TRAILING),
+    ),
+    ("wheel_centre", *_SPRINGS),
+    {"knuckle": (), "spring_link": ("spring_link_inner",)},
+    "knuckle",
+)
+MULTILINK: Final = AxleKind(
+    "multilink",
+    ("rear",),
+    (
+        _link("upper_front", 5e6, 0.0, 3000.0, _HANDLING, "upper_outer"),
+        _link("upper_rear", 5e6, 0.0, 3000.0, _HANDLING, "upper_outer"),
+        _link("lateral_link", 5.2e6, 0.0, 3000.0, _HANDLING),
+        _link("trailing_link", 5e5, 3e9, 1500.0, _TRAILING),
+        _TOE_LINK,
+    ),
+    ("wheel_centre", *_SPRINGS),
+    {
+        "knuckle": (),
+        "lateral_link": ("lateral_link_inner",),
+        "trailing_link": ("trailing_link_inner",),
+        "upper": ("upper_front_inner", "upper_rear_inner"),
+    },
+    "knuckle",
+)
+
+KINDS: Final = (MCPHERSON, DOUBLE_WISHBONE, DOUBLE_WISHBONE_REAR, FIVE_LINK, MULTILINK)
+DEFAULTS: Final = {"front": "mcpherson", "rear": "five_link"}
+
+
+def kinds_for(axle: str) -> dict[str, AxleKind]:
+    """The kinds of suspension that a front or a rear axle can have, by name."""
+    return {kind.name: kind for kind in KINDS if axle in kind.axles}
+
+
+def kind_of(axle: str, name: str) -> AxleKind:
+    """One kind of suspension.
+
+    Args:
+        axle: `front` or `rear`.
+        name: Its name.
+
+    Raises:
+        ParameterError: there is none of this name for this axle.
+    """
+    kinds = kinds_for(axle)
+    if name not in kinds:
+        msg = f"no {axle} suspension is named {name!r}; {nearest_names(name, kinds)}"
+        raise ParameterError(msg)
+    return kinds[name]

@@ -1,0 +1,90 @@
+"""Springs and dampers that stand on an arm: links have no body, so the arm's lever goes into the tendon.
+
+A massless arm that turns about its inner bushings carries a force f at P as a force r f at its outer joint O, where
+r = |PH| / |OH| and H is where the line through O and P meets the arm's axis; the rest of f goes into the chassis. The
+tendon therefore runs from a point that is 1/r times as far from O as the spring's upper end is from P, to O, and through
+a pulley of 1/r. By similar triangles its length is that of the spring, in every position of the arm. What P lies beside
+the arm's plane keeps its direction and its motion ratio at the design position, but does not turn with the arm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import ParameterError
+from activesteer.vehicle_builder.axle_kinds import AxleKind
+
+Array = NDArray[np.float64]
+
+_LEAST, _MOST = 0.05, 1.5
+"""Levers beyond these are no springs of a car."""
+
+
+@dataclass(frozen=True)
+class Mount:
+    """How a spring or damper is attached.
+
+    Attributes:
+        carrier: What carries its lower end.
+        lever: Force at the arm's outer joint per force of the spring; 1 on the knuckle.
+        outer: Site at which the tendon ends, without the corner.
+        start_m: Where the tendon begins on the chassis; None where it lies along a strut.
+        length_m: Its length in the design position; 0 along a strut.
+    """
+
+    carrier: str
+    lever: float
+    outer: str
+    start_m: Array | None
+    length_m: float
+
+
+def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, Array]) -> Mount:
+    """Attaches a spring or damper.
+
+    Args:
+        axle: For messages.
+        part: `spring` or `damper`.
+        carrier: What carries its lower end, one of the kind's carriers.
+        kind: The suspension.
+        points: Its points.
+
+    Raises:
+        ParameterError: the arm cannot carry it there.
+    """
+    if carrier == "strut":
+        return Mount(carrier, 1.0, "", None, 0.0)
+    upper, lower = points[f"{part}_inner"], points[f"{part}_outer"]
+    length = float(np.linalg.norm(upper - lower))
+    if length < 0.02:
+        msg = f"{axle}: {part}_inner and {part}_outer are {1e3 * length:.1f} mm apart; a {part} needs length"
+        raise ParameterError(msg)
+    if carrier == "knuckle":
+        return Mount(carrier, 1.0, f"{part}_outer", upper, length)
+    inner, outer = kind.arms[carrier]
+    lever = _lever([points[name] for name in inner], points[outer], lower, (upper - lower) / length)
+    if not _LEAST < lever < _MOST:
+        msg = (
+            f"{axle}: {part}_outer lies at {lever:.2f} of the length of {carrier}, seen from its inner end; a {part} on "
+            f"an arm lies between {_LEAST:g} and {_MOST:g}. Is {part}_on right, and {part}_outer on the left side?"
+        )
+        raise ParameterError(msg)
+    return Mount(carrier, lever, outer, points[outer] + (upper - lower) / lever, length)
+
+
+def _lever(inner: list[Array], outer: Array, foot: Array, along: Array) -> float:
+    """Shortening of a spring per travel of the arm's outer joint along the spring, at the design position."""
+    base = inner[0]
+    if len(inner) == 1:
+        rod = outer - base
+        axis = np.cross(rod, [0.0, 0.0, 1.0])
+    else:
+        axis = inner[1] - base
+    turned = np.cross(axis, outer - base)
+    along_outer, along_foot = float(along @ turned), float(along @ np.cross(axis, foot - base))
+    if abs(along_outer) < 1e-3 * float(np.linalg.norm(turned)):
+        return float("nan")
+    return along_foot / along_outer

@@ -1,0 +1,432 @@
+"""The table of a car as its user writes it: TOML, or CSV with the same dotted keys; what is wrong is said at once.
+
+In a CSV file a row is a dotted key and its values: `front.wheel_centre, 0, 762.5, 297.2` is the point `wheel_centre` of
+[front.points], `mass.total_kg, 1430` the key `total_kg` of [mass]. `#` begins a comment.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from activesteer.config import Range, Source, build, read_toml
+from activesteer.errors import ParameterError, nearest_names
+from activesteer.vehicle.parameters import Aerodynamics, Brakes, Powertrain
+from activesteer.vehicle_builder.axle_kinds import DEFAULTS, AxleKind, kind_of
+
+Positive = Annotated[float, Range(1e-9)]
+NotNegative = Annotated[float, Range(0.0)]
+Point = tuple[float, ...]
+
+UNITS: Final = {"m": 1.0, "mm": 1e-3}
+"""Units of the points and their factor to metres."""
+
+
+@dataclass(frozen=True)
+class LinkTable:
+    """What a table may say of a link; one of `stiffness_Npm`, `bushings_Npm` and `bushing`."""
+
+    stiffness_Npm: Positive | None = None
+    """Rod and both bushings in series [N/m]."""
+    bushings_Npm: tuple[float, ...] | None = None
+    """Radial stiffness of the inner and of the outer bushing [N/m]; the rod between them counts as rigid."""
+    bushing: str | None = None
+    """Class of its bushings: ball_joint, hard, medium, soft."""
+    hardening_Npm3: NotNegative | None = None
+    """Cubic part of the force [N/m3]."""
+    damping_Nspm: NotNegative | None = None
+    """Of the rubber [N s/m]."""
+
+
+@dataclass(frozen=True)
+class AxleTable:
+    """What a table may say of an axle; points of its left side."""
+
+    type: str | None = None
+    """Kind of suspension."""
+    points: dict[str, Point] = field(default_factory=dict)
+    """Hardpoints of the left side, in the table's units."""
+    links: dict[str, LinkTable] = field(default_factory=dict)
+    """Elasticity of the links."""
+    tyre: str | None = None
+    """Tyre file: beside the table, or a name in models/tyres."""
+    toe_rad: Annotated[float, Range(-0.1, 0.1)] | None = None
+    """Static toe of one wheel, positive toe-in [rad]."""
+    camber_rad: Annotated[float, Range(-0.2, 0.2)] | None = None
+    """Static camber, negative with the top inwards [rad]."""
+    spring_rate_Npm: Positive | None = None
+    """Rate of the spring itself [N/m]."""
+    wheel_rate_Npm: Positive | None = None
+    """Change of wheel load per wheel travel, both wheels together, links included [N/m]."""
+    ride_frequency_Hz: Positive | None = None
+    """Of the sprung mass of this axle on springs and tyres [Hz]."""
+    spring_on: str | None = None
+    """What carries the lower end of the spring."""
+    damper_on: str | None = None
+    """What carries the lower end of the damper."""
+    damper_velocity_mps: tuple[float, ...] | None = None
+    """Compression velocities of the damper's curve [m/s]."""
+    damper_force_N: tuple[float, ...] | None = None
+    """Forces that resist them [N]."""
+    damper_Nspm: Positive | None = None
+    """Or: mean damping around rest [N s/m]; the curve has the shape of the compact's."""
+    damping_ratio: Annotated[float, Range(0.01, 2.0)] | None = None
+    """Or: damping ratio of the sprung mass of this axle on springs and tyres."""
+    damper_friction_N: NotNegative | None = None
+    """Dry friction of a damper [N]."""
+    anti_roll_bar_Npm: NotNegative | None = None
+    """Force at each wheel per difference of travel (at a strut: along it) [N/m]."""
+    anti_roll_bar_Nmprad: NotNegative | None = None
+    """Or: its part of the axle's roll stiffness [N m/rad]."""
+    bump_stop_m: Positive | None = None
+    """Compression of the damper from the design position to the bump stop [m]."""
+    rebound_stop_m: Positive | None = None
+    """Extension of the damper to the rebound stop [m]."""
+    stop_stiffness: tuple[float, ...] | None = None
+    """a, b, c of the stops' force a x + b x2 + c x3, x < 0 in bump [N/m, N/m2, N/m3]."""
+    wheel_mass_kg: Positive | None = None
+    """Wheel with tyre, hub flange and whatever else turns [kg]."""
+    wheel_spin_inertia_kgm2: Positive | None = None
+    """Of the same, about its axle [kg m2]."""
+    wheel_inertia_kgm2: Positive | None = None
+    """Of the same, about a diameter [kg m2]."""
+    knuckle_mass_kg: Positive | None = None
+    """Knuckle with half of the links, spring and damper; in front with hub and brake [kg]."""
+    knuckle_cg: Point | None = None
+    """Its centre of gravity, in the table's units."""
+    knuckle_inertia_kgm2: tuple[float, ...] | None = None
+    """Its inertia about it, vehicle axes [kg m2]."""
+    carrier_mass_kg: Positive | None = None
+    """Rear: what steers with the wheel: carrier, hub, brake [kg]."""
+    carrier_cg: Point | None = None
+    """Its centre of gravity, in the table's units."""
+    carrier_inertia_kgm2: tuple[float, ...] | None = None
+    """Its inertia [kg m2]."""
+    strut_mass_kg: Positive | None = None
+    """McPherson: what hangs on the top mount and does not travel: piston rod, half of the spring [kg]."""
+    strut_cg: Point | None = None
+    """Its centre of gravity, in the table's units."""
+    strut_inertia_kgm2: tuple[float, ...] | None = None
+    """Its inertia [kg m2]."""
+
+
+@dataclass(frozen=True)
+class MassTable:
+    """The whole car as it stands, driver included; or the chassis by itself."""
+
+    total_kg: Positive | None = None
+    """Mass of the whole car [kg]."""
+    front_share: Annotated[float, Range(0.2, 0.8)] | None = None
+    """Share of the weight on the front wheels."""
+    cg_height_m: Annotated[float, Range(0.1, 2.0)] | None = None
+    """Height of its centre of gravity over the road [m]."""
+    inertia_kgm2: tuple[float, ...] | None = None
+    """Roll, pitch and yaw inertia of the whole car about it [kg m2]."""
+    chassis_kg: Positive | None = None
+    """Or: mass of the chassis with everything that no other body has [kg]."""
+    chassis_cg: Point | None = None
+    """Its centre of gravity, in the table's units."""
+    chassis_inertia_kgm2: tuple[float, ...] | None = None
+    """Its inertia about it [kg m2]."""
+
+
+@dataclass(frozen=True)
+class SteeringTable:
+    """Rack and column."""
+
+    ratio: Annotated[float, Range(1.0, 60.0)] | None = None
+    """Steering wheel angle over mean road-wheel angle at the centre, unloaded."""
+    pinion_radius_m: Annotated[float, Range(5e-4, 0.5)] | None = None
+    """Or: rack travel per steering wheel angle [m/rad]."""
+    rack_limit_m: Annotated[float, Range(0.01, 0.3)] | None = None
+    """Rack travel to either side [m]."""
+    rack_mass_kg: Positive | None = None
+    """Rack and half of the tie rods [kg]."""
+    rack_friction_N: NotNegative | None = None
+    """Dry friction of the rack [N]."""
+    column_stiffness_Npm: Positive | None = None
+    """Torsion bar and assist, at the rack [N/m]."""
+
+
+@dataclass(frozen=True)
+class RearSteeringTable:
+    """The hinge between rear knuckle and carrier; every car of the package has one, steered or not."""
+
+    axis_lower: Point | None = None
+    """A point of its axis on the left side, in the table's units."""
+    axis_upper: Point | None = None
+    """A higher point of its axis."""
+    limit_rad: Annotated[float, Range(1e-3, 0.3)] | None = None
+    """Mechanical stop [rad]."""
+
+
+@dataclass(frozen=True)
+class CarTable:
+    """A whole table."""
+
+    units: str = "m"
+    """Unit of all points: m or mm."""
+    origin: Point = (0.0, 0.0, 0.0)
+    """Where the point on the road below the middle of the front axle lies in the table's own coordinates."""
+    source: str = ""
+    """Where the numbers come from, for the README."""
+    width_m: Annotated[float, Range(0.5, 4.0)] | None = None
+    """Width of the body without mirrors [m]."""
+    front: AxleTable = AxleTable()
+    rear: AxleTable = AxleTable()
+    mass: MassTable = MassTable()
+    steering: SteeringTable = SteeringTable()
+    rear_steering: RearSteeringTable = RearSteeringTable()
+    brakes: Brakes | None = None
+    powertrain: Powertrain | None = None
+    aerodynamics: Aerodynamics | None = None
+
+    def axle(self, name: str) -> AxleTable:
+        """One of the axles."""
+        return self.front if name == "front" else self.rear
+
+
+_POINT_FIELDS: Final = {"knuckle_cg", "carrier_cg", "strut_cg", "chassis_cg", "axis_lower", "axis_upper"}
+_MIDDLE: Final = {"chassis_cg"}
+"""Points that lie in the middle of the car, not on its left side."""
+
+_PLAUSIBLE: Final = {
+    "spring_rate_Npm": (5e3, 8e5, 1e3, "N/mm"),
+    "wheel_rate_Npm": (5e3, 3e5, 1e3, "N/mm"),
+    "stiffness_Npm": (2e4, 1e10, 1e3, "N/mm"),
+    "damper_Nspm": (200.0, 5e4, 1e3, "N s/mm"),
+    "cg_height_m": (0.2, 1.5, 1e-3, "mm"),
+    "anti_roll_bar_Npm": (300.0, 3e5, 1e3, "N/mm"),
+    "total_kg": (200.0, 6000.0, 1e3, "t"),
+    "bump_stop_m": (0.003, 0.3, 1e-3, "mm"),
+    "rebound_stop_m": (0.003, 0.3, 1e-3, "mm"),
+    "rack_limit_m": (0.02, 0.15, 1e-3, "mm"),
+    "pinion_radius_m": (0.003, 0.3, 1e-3, "mm"),
+}
+"""Key -> lowest and highest value of a road car, and the unit it may have been written in by mistake with its factor."""
+
+
+def read_table(path: Path) -> tuple[CarTable, Source]:
+    """Reads a table and checks what can be said of it by itself.
+
+    Args:
+        path: A .toml or .csv file.
+
+    Returns:
+        The table as written, and its source for later messages.
+
+    Raises:
+        ParameterError: it cannot be read, has unknown keys, or values of the wrong kind.
+    """
+    if path.suffix.lower() == ".csv":
+        raw, source = _read_csv(path)
+    elif path.suffix.lower() == ".toml":
+        raw, source = read_toml(path)
+    else:
+        msg = f"{path}: a table ends in .toml or .csv"
+        raise ParameterError(msg)
+    table = build(CarTable, raw, source)
+    if table.units not in UNITS:
+        raise source.fail(("units",), f"{table.units!r} is no unit of length here; {nearest_names(table.units, UNITS)}")
+    return table, source
+
+
+def _read_csv(path: Path) -> tuple[dict[str, Any], Source]:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as reason:
+        msg = f"cannot read {path}: {reason}"
+        raise ParameterError(msg) from reason
+    axle_keys = {item.name for item in dataclasses.fields(AxleTable)} | {"toe_deg", "camber_deg"}
+    raw: dict[str, Any] = {}
+    lines = []
+    rows = list(csv.reader(line.partition("#")[0] for line in text.splitlines()))
+    for number, row in enumerate(rows, 1):
+        cells = [cell.strip() for cell in row]
+        while cells and not cells[-1]:
+            cells.pop()
+        lines.append("")
+        if not cells or (cells[0].lower() in ("name", "key") and not raw):
+            continue
+        if len(cells) < 2:
+            msg = f"{path.name}, line {number}: {cells[0]!r} has no value"
+            raise ParameterError(msg)
+        keys = cells[0].split(".")
+        if len(keys) == 2 and keys[0] in ("front", "rear") and keys[1] not in axle_keys:
+            keys = [keys[0], "points", keys[1]]
+        lines[-1] = f"{'.'.join(keys)} ="
+        values = [_value(cell) for cell in cells[1:]]
+        within = raw
+        for key in keys[:-1]:
+            within = within.setdefault(key, {})
+        if not isinstance(within, dict) or keys[-1] in within:
+            msg = f"{path.name}, line {number}: {cells[0]} is given twice"
+            raise ParameterError(msg)
+        within[keys[-1]] = values[0] if len(values) == 1 else values
+    return raw, Source(path.name, "\n".join(lines))
+
+
+def _value(cell: str) -> float | str:
+    try:
+        return float(cell)
+    except ValueError:
+        return cell
+
+
+def chosen_kinds(table: CarTable, front: str | None = None, rear: str | None = None) -> dict[str, AxleKind]:
+    """Which suspension each axle has: as asked for, else as the table says, else the default.
+
+    Raises:
+        ParameterError: there is no such kind.
+    """
+    asked = {"front": front, "rear": rear}
+    return {
+        axle: kind_of(axle, asked[axle] or table.axle(axle).type or DEFAULTS[axle]) for axle in ("front", "rear")
+    }
+
+
+def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source) -> None:
+    """Checks names, number and units of all points, and units of other values, and says everything that is wrong.
+
+    Raises:
+        ParameterError: with one line for each thing that is wrong.
+    """
+    problems = [
+        *_name_problems(table, kinds),
+        *_length_problems(table, source),
+        *_unit_problems(table),
+    ]
+    if problems:
+        raise ParameterError("\n  ".join([f"{source.name}: {len(problems)} things are wrong:", *problems]))
+
+
+def _name_problems(table: CarTable, kinds: Mapping[str, AxleKind]) -> Iterator[str]:
+    for axle, kind in kinds.items():
+        given = table.axle(axle)
+        for name in given.points:
+            if name not in kind.needed:
+                yield f"{axle}.points.{name}: a {kind.name} axle has no such point; {nearest_names(name, kind.needed)}"
+        missing = [name for name in kind.needed if name not in given.points]
+        if missing:
+            yield f"{axle}.points: a {kind.name} axle also needs {', '.join(missing)}"
+        links = [link.name for link in kind.links]
+        for name, link in given.links.items():
+            if name not in links:
+                yield f"{axle}.links.{name}: a {kind.name} axle has no such link; {nearest_names(name, links)}"
+            ways = [way for way in ("stiffness_Npm", "bushings_Npm", "bushing") if getattr(link, way) is not None]
+            if len(ways) > 1:
+                yield f"{axle}.links.{name}: {' and '.join(ways)} say the same; give one of them"
+        for key in ("spring_on", "damper_on"):
+            on = getattr(given, key)
+            if on is not None and on not in kind.carriers:
+                yield f"{axle}.{key}: nothing that could carry it is named {on!r}; {nearest_names(on, kind.carriers)}"
+        for group in (
+            ("spring_rate_Npm", "wheel_rate_Npm", "ride_frequency_Hz"),
+            ("damper_force_N", "damper_Nspm", "damping_ratio"),
+            ("anti_roll_bar_Npm", "anti_roll_bar_Nmprad"),
+        ):
+            ways = [way for way in group if getattr(given, way) is not None]
+            if len(ways) > 1:
+                yield f"{axle}: {' and '.join(ways)} say the same; give one of them"
+        if (given.damper_force_N is None) != (given.damper_velocity_mps is None):
+            yield f"{axle}: damper_velocity_mps and damper_force_N belong together; give both"
+    mass = table.mass
+    if (mass.total_kg is None) == (mass.chassis_kg is None):
+        yield "mass: total_kg (of the whole car) or chassis_kg is needed, one of them"
+    if mass.total_kg is not None and (mass.front_share is None or mass.cg_height_m is None):
+        yield "mass: with total_kg, front_share and cg_height_m are needed"
+    if mass.chassis_kg is not None and mass.chassis_cg is None:
+        yield "mass: with chassis_kg, chassis_cg is needed"
+    if table.steering.ratio is not None and table.steering.pinion_radius_m is not None:
+        yield "steering: ratio and pinion_radius_m say the same; give one of them"
+    if (table.rear_steering.axis_lower is None) != (table.rear_steering.axis_upper is None):
+        yield "rear_steering: axis_lower and axis_upper belong together; give both"
+
+
+def all_points(table: CarTable) -> Iterator[tuple[str, Point]]:
+    """Every point of the table by its dotted key."""
+    for axle in ("front", "rear"):
+        for name, point in table.axle(axle).points.items():
+            yield f"{axle}.points.{name}", point
+    for part in ("front", "rear", "mass", "rear_steering"):
+        for name in sorted(_POINT_FIELDS):
+            point = getattr(getattr(table, part), name, None)
+            if point is not None:
+                yield f"{part}.{name}", point
+
+
+def _length_problems(table: CarTable, source: Source) -> Iterator[str]:
+    for key, point in (*all_points(table), ("origin", table.origin)):
+        if len(point) != 3:
+            yield f"{key}: {len(point)} numbers given; x, y, z are needed"
+    for axle in ("front", "rear"):
+        given = table.axle(axle)
+        for key in ("knuckle_inertia_kgm2", "carrier_inertia_kgm2", "strut_inertia_kgm2", "stop_stiffness"):
+            _count = getattr(given, key)
+            if _count is not None and len(_count) != 3:
+                yield f"{axle}.{key}: {len(_count)} numbers given; 3 are needed"
+        for name, link in given.links.items():
+            if link.bushings_Npm is not None and (len(link.bushings_Npm) != 2 or min(link.bushings_Npm) <= 0.0):
+                yield f"{axle}.links.{name}.bushings_Npm: two stiffnesses above 0 are needed, inner and outer"
+    for key in ("inertia_kgm2", "chassis_inertia_kgm2"):
+        value = getattr(table.mass, key)
+        if value is not None and (len(value) != 3 or min(value) <= 0.0):
+            yield f"mass.{key}: three numbers above 0 are needed: roll, pitch, yaw"
+
+
+def _unit_problems(table: CarTable) -> Iterator[str]:
+    points = list(all_points(table))
+    size = {key: max(map(abs, point), default=0.0) for key, point in points}
+    if table.units == "m":
+        large = [key for key in size if size[key] > 15.0]
+        if large:
+            example = large[0]
+            yield (
+                f'{len(large)} of {len(points)} points are not in metres, as {example} with {size[example]:g}: '
+                + ('are all in mm? then write units = "mm"' if len(large) > len(points) / 2 else "are these in mm?")
+                + ("" if len(large) > len(points) / 2 else f" ({', '.join(large[:6])})")
+            )
+    elif points and max(size.values()) < 15.0:
+        yield f'units is "mm", and no point is further than {max(size.values()):g} from the origin: are they in m?'
+    for path, value in _numbers(table):
+        key = path.rpartition(".")[2]
+        if key in _PLAUSIBLE:
+            low, high, factor, unit = _PLAUSIBLE[key]
+            if not low <= value <= high and value != 0.0:
+                hint = f"; is it in {unit}? then write {value * factor:g}" if low <= value * factor <= high else ""
+                yield f"{path}: {value:g} is no value of a road car ({low:g} to {high:g}){hint}"
+
+
+def _numbers(part: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    if dataclasses.is_dataclass(part):
+        for item in dataclasses.fields(part):
+            yield from _numbers(getattr(part, item.name), f"{path}.{item.name}" if path else item.name)
+    elif isinstance(part, dict):
+        for key, value in part.items():
+            yield from _numbers(value, f"{path}.{key}")
+    elif isinstance(part, float) and math.isfinite(part):
+        yield path, part
+
+
+def in_vehicle_axes(table: CarTable) -> CarTable:
+    """The same table with all points in metres and vehicle coordinates, origin on the road below the front axle."""
+    factor = UNITS[table.units]
+
+    def moved(point: Point) -> Point:
+        return tuple(factor * (value - origin) for value, origin in zip(point, table.origin, strict=True))
+
+    def converted(part: Any) -> Any:
+        changes: dict[str, Any] = {
+            name: moved(point) for name in _POINT_FIELDS if (point := getattr(part, name, None)) is not None
+        }
+        if isinstance(part, AxleTable):
+            changes["points"] = {name: moved(point) for name, point in part.points.items()}
+        return dataclasses.replace(part, **changes)
+
+    parts = {name: converted(getattr(table, name)) for name in ("front", "rear", "mass", "rear_steering")}
+    return dataclasses.replace(table, units="m", origin=(0.0, 0.0, 0.0), **parts)

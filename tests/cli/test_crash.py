@@ -1,0 +1,97 @@
+"""What is left when a run is ended from outside: killed, or by a disk that is full."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.exceptions import McapError
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
+
+from activesteer import Recording
+
+ROOT = Path(__file__).resolve().parents[2]
+MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
+LIMITED = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000)); " + MAIN
+STATES = ("/state/vehicle", "/state/control")
+
+
+def activesteer(folder: Path, *words: str, program: str = MAIN) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-c", program, *words],
+        cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+
+
+def stock_messages(path: Path) -> dict[str, int]:
+    """Log time [ns] of the last message of each topic that the reader of the `mcap` library finds."""
+    topics: dict[int, str] = {}
+    last: dict[str, int] = {}
+    with path.open("rb") as stream:
+        try:
+            for record in StreamReader(stream).records:
+                if isinstance(record, Message):
+                    last[topics[record.channel_id]] = record.log_time
+                elif hasattr(record, "topic"):
+                    topics[record.id] = record.topic  # type: ignore[union-attr]
+        except McapError:  # the end, which is missing
+            pass
+    return last
+
+
+# Just before a block is written, and just after: the last one may then still be on its way.
+@pytest.mark.parametrize("steps", [2999, 3001])
+def test_killed_run_can_be_opened_up_to_a_second_before_the_kill(call, controller, tmp_path, steps):
+    body = f"if self.steps > {steps}:\n    import os\n    os.kill(os.getpid(), 9)\nreturn SteerCommand()"
+    words = ("run", "slalom", "-c", controller(body), "--set", "settle_s=0", "-o", "run.mcap")
+    done = activesteer(tmp_path, *words)
+    assert done.returncode == -9, done.stderr
+    path = tmp_path / "run.mcap"
+    killed_s = steps * 0.001
+
+    told = call("info", path)
+    assert told.status == 0
+    assert "INCOMPLETE: the run did not end properly" in told.out
+    recording = Recording.open(path)
+    assert recording.time_s[-1] >= killed_s - 1.0
+    assert np.isfinite(recording.values).all()
+    assert recording.metadata["maneuver"]["name"] == "slalom"
+    assert {"maneuver.toml", "vehicle.toml", "mine.py"} <= set(recording.attachments)
+    assert call("report", path).status == 0
+
+    last_ns = stock_messages(path)
+    assert all(last_ns[topic] >= (killed_s - 1.0) * 1e9 for topic in (*STATES, "/tf"))
+
+
+def test_rerun_opens_what_a_killed_run_left(controller, tmp_path):
+    spec = importlib.util.find_spec("rerun_cli")
+    binary = Path(spec.origin).with_name("rerun") if spec and spec.origin else None
+    if binary is None or not binary.exists():
+        pytest.skip("this rerun-sdk brings no rerun binary")
+    body = "if self.steps > 1700:\n    import os\n    os.kill(os.getpid(), 9)\nreturn SteerCommand()"
+    activesteer(tmp_path, "run", "slalom", "-c", controller(body), "--set", "settle_s=0", "-o", "run.mcap")
+    words = ("mcap", "convert", "--recover", "run.mcap", "-o", "run.rrd")
+    environment = os.environ | {"HOME": str(tmp_path)}  # it keeps its settings out of the user's home
+    done = subprocess.run([binary, *words], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "run.rrd").stat().st_size > 10_000
+
+
+def test_disk_that_fills_up_ends_the_run_with_what_was_saved(tmp_path):
+    """No file of the process may get larger than 1 MB, which is about a second and a half of a run."""
+    pytest.importorskip("resource")
+    done = activesteer(tmp_path, "run", "slalom", "-o", "run.mcap", program=LIMITED)
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert "cannot write run.mcap: File too large; saved up to" in done.stderr
+    recording = Recording.open(tmp_path / "run.mcap")
+    assert recording.metadata["complete"] is False
+    assert f"saved up to {recording.time_s[-1]:.3f} s" in done.stderr
+    assert len(recording) >= 500
