@@ -14,7 +14,7 @@ from activesteer.config import Source, build, key_paths, merged, read_toml, to_t
 from activesteer.controllers import ControllerParameters, ControllerSetup, SingleTrackParameters
 from activesteer.driver import DriverParameters
 from activesteer.errors import ManeuverError, ModelError, ParameterError, TyreFileError, nearest_names
-from activesteer.maneuver import FollowPath, Maneuver, build_maneuver, maneuver_class, with_csv
+from activesteer.maneuver import Maneuver, build_maneuver, filled_from_csv, maneuver_class
 from activesteer.resources import find_maneuver, find_vehicle, models_dir
 from activesteer.tyre.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
@@ -104,10 +104,9 @@ def resolve(
     car = build(CarFile, car_table, car_source)
     if any(field.name == "vehicle_width_m" for field in fields(kind)):
         maneuver_table = {"vehicle_width_m": car.width_m, **maneuver_table}
-    if kind is FollowPath:
-        own = None if isinstance(maneuver, Mapping) else find_maneuver(maneuver).parent
-        maneuver_table, path_files = with_csv(maneuver_table, own, maneuver_source)
-        files |= path_files
+    own = None if isinstance(maneuver, Mapping) else find_maneuver(maneuver).parent
+    maneuver_table, csv_files = filled_from_csv(maneuver_table, own, maneuver_source)
+    files |= csv_files
     built = build_maneuver(maneuver_table, maneuver_source)
     own = None if isinstance(vehicle, Mapping) else find_vehicle(vehicle).parent
     mjcf = _find_file(car.mjcf, own, models_dir() / "mjcf", car_source, ("mjcf",), ModelError)

@@ -26,6 +26,18 @@ class Channel(NamedTuple):
     single: bool = True
 
 
+class WheelTorques(NamedTuple):
+    """Torques of the wheels, given one by one; order of `CORNERS`.
+
+    Attributes:
+        drive_Nm: Drive torques, forward positive [Nm].
+        brake_Nm: Brake torques, against the rotation [Nm].
+    """
+
+    drive_Nm: tuple[float, float, float, float]
+    brake_Nm: tuple[float, float, float, float]
+
+
 class Reference(NamedTuple):
     """What the manoeuvre asks of the driver at one instant.
 
@@ -35,6 +47,8 @@ class Reference(NamedTuple):
         brake: Brake pedal position, 0 to 1.
         hold_speed: Whether the drive holds `speed_mps`; where False the car coasts.
         curvature_1pm: Curvature to drive [1/m], left positive; where given, the driver finds the steering wheel angle.
+        rack_m: Rack position asked for [m], positive steers left; where given, it stands for the steering wheel angle.
+        wheel_torques: Torques of the wheels; where given, they stand for drive and brake.
     """
 
     steering_wheel_rad: float
@@ -42,6 +56,8 @@ class Reference(NamedTuple):
     brake: float
     hold_speed: bool
     curvature_1pm: float | None = None
+    rack_m: float | None = None
+    wheel_torques: WheelTorques | None = None
 
 
 class DriverCommand(NamedTuple):
@@ -53,6 +69,7 @@ class DriverCommand(NamedTuple):
         drive_torque_Nm: Torque at the driven wheels together [Nm]; negative is engine braking.
         brake: Brake pedal position, 0 to 1.
         limited: Whether the lock of the steering or a limit of the engine is active.
+        wheel_torques: Torques of the wheels; where given, they stand for drive and brake.
     """
 
     steering_wheel_rad: float
@@ -60,6 +77,7 @@ class DriverCommand(NamedTuple):
     drive_torque_Nm: float
     brake: float
     limited: bool = False
+    wheel_torques: WheelTorques | None = None
 
 
 class Measurement(NamedTuple):

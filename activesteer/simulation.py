@@ -59,7 +59,7 @@ class Simulation:
         car = scenario.car
         self.maneuver = scenario.maneuver
         self.vehicle = Vehicle(scenario.mjcf, car, scenario.tyres, scenario.maneuver.road, timestep_s)
-        self.driver = _driver(scenario, timestep_s)
+        self.driver = _driver(scenario, timestep_s, self.vehicle.rack_per_steering_wheel_m)
         self.controller: Controller = load_controller(controller, scenario.controller_setup(timestep_s))
         self._controller_name = controller
         self._measurement = self.vehicle.start(self.maneuver.speed_mps)
@@ -131,12 +131,17 @@ class Simulation:
         self._measurement, self._step = state.measurement, state.step
 
 
-def _driver(scenario: Scenario, timestep_s: float) -> OpenLoopDriver | ConstantRadiusDriver | PathPreviewDriver:
+def _driver(
+    scenario: Scenario, timestep_s: float, rack_per_steering_wheel_m: float | None
+) -> OpenLoopDriver | ConstantRadiusDriver | PathPreviewDriver:
     """Who can do what the manoeuvre asks: a robot, one who keeps a curvature, or one who looks at a path."""
     maneuver, car = scenario.maneuver, scenario.car
     torque = car.powertrain
     speed_hold = SpeedHold(car.driver, torque.max_torque_Nm, torque.engine_brake_torque_Nm, timestep_s)
-    robot = OpenLoopDriver(speed_hold, car.steering.ratio, car.steering.steering_wheel_limit_rad)
+    steering = car.steering
+    robot = OpenLoopDriver(
+        speed_hold, steering.ratio, steering.steering_wheel_limit_rad, rack_per_steering_wheel_m
+    )
     single_track = SingleTrack(car.single_track)
     if maneuver.course is not None:
         return PathPreviewDriver(robot, maneuver.course.path, single_track.matrices, car.driver, timestep_s)

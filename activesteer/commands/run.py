@@ -7,11 +7,14 @@ import sys
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError
+
+if TYPE_CHECKING:
+    from activesteer.analysis.claims import Scorecard
 
 _DEFAULT_FOLDER: Final = Path("runs")
 
@@ -61,17 +64,19 @@ def _run(options: argparse.Namespace) -> int:
             print(f"{scenario.maneuver.name} {label}: {path}", file=sys.stderr)
         if problem := recordings[label].metadata.get("metrics_error"):
             print(f"{scenario.maneuver.name} {label}: no metrics: {problem}", file=sys.stderr)
-    claims = _claims(recordings)
+    claims = _claims(recordings, scenario.car.name)
     if options.json:
         runs = [
             {"controller": controller, "file": str(path), "metrics": recording.metrics}
             for controller, path, recording in zip(controllers, paths, recordings.values(), strict=True)
         ]
-        print_json({"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs, "claims": claims})
+        table = {"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs}
+        print_json({**table, "claims": claims.to_json()["claims"] if claims else []})
     elif any(recording.metrics for recording in recordings.values()):
         print(comparison({label: recording.metrics for label, recording in recordings.items()}))
-        for claim in claims:
-            print(f"{claim['id']} {'passed' if claim['passed'] else 'FAILED'}: {claim['text']}")
+        for judged in claims.judged if claims else ():
+            verdict = "FAILED" if judged.verdict == "failed" else judged.verdict
+            print(f"{judged.claim.id} {verdict}: {judged.claim.text}")
     if options.plot:
         for figure in _plot(recordings, paths[0].parent, scenario):
             if not options.json:
@@ -121,26 +126,14 @@ def _override(text: str) -> tuple[str, Any]:
         return key.strip(), value
 
 
-def _claims(recordings: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _claims(recordings: Mapping[str, Any], vehicle: str) -> Scorecard | None:
     """The paper's claims, where the runs are those that they speak of."""
-    from activesteer.analysis.claims import SYSTEMS, claims_for
+    from activesteer.analysis.claims import SYSTEMS, claims_for, scorecard
 
-    first = next(iter(recordings.values()))
-    check = claims_for(first)
-    if check is None or not set(SYSTEMS) <= set(recordings):
-        return []
-    if not all(recordings[system].metrics for system in SYSTEMS):
-        return []
-    return [
-        {
-            "id": claim.id,
-            "text": claim.text,
-            "passed": claim.passed,
-            "values": claim.values,
-            "criterion": claim.criterion,
-        }
-        for claim in check(recordings)
-    ]
+    check = claims_for(next(iter(recordings.values())))
+    if check is None or not all(system in recordings and recordings[system].metrics for system in SYSTEMS):
+        return None
+    return scorecard(check(recordings), vehicle)
 
 
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from activesteer.driver.speed_hold import SpeedHold
+from activesteer.errors import ManeuverError
 from activesteer.signals import DriverCommand, Measurement, Reference
 
 
@@ -14,17 +15,25 @@ class OpenLoopDriver:
         steering_ratio: Steering wheel angle over road-wheel angle [-].
     """
 
-    def __init__(self, speed_hold: SpeedHold, steering_ratio: float, steering_wheel_limit_rad: float) -> None:
+    def __init__(
+        self,
+        speed_hold: SpeedHold,
+        steering_ratio: float,
+        steering_wheel_limit_rad: float,
+        rack_per_steering_wheel_m: float | None = None,
+    ) -> None:
         """Takes its parts.
 
         Args:
             speed_hold: The cruise control.
             steering_ratio: Steering wheel angle over road-wheel angle [-].
             steering_wheel_limit_rad: Lock angle [rad]; more cannot be turned.
+            rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None where there is no rack.
         """
         self.speed_hold = speed_hold
         self.steering_ratio = steering_ratio
         self._limit_rad = steering_wheel_limit_rad
+        self._rack_per_steering_wheel_m = rack_per_steering_wheel_m
 
     def step(self, reference: Reference, measurement: Measurement) -> DriverCommand:
         """What the driver does now.
@@ -35,8 +44,16 @@ class OpenLoopDriver:
 
         Returns:
             The command.
+
+        Raises:
+            ManeuverError: a rack position is asked for and the car has no rack.
         """
-        return self.turn(reference.steering_wheel_rad, reference, measurement)
+        if reference.rack_m is None:
+            return self.turn(reference.steering_wheel_rad, reference, measurement)
+        if self._rack_per_steering_wheel_m is None:
+            msg = "steering.rack_m: the car has no rack that its steering wheel drives; give steering_wheel_rad"
+            raise ManeuverError(msg)
+        return self.turn(reference.rack_m / self._rack_per_steering_wheel_m, reference, measurement)
 
     def turn(self, angle: float, reference: Reference, measurement: Measurement) -> DriverCommand:
         """The same with another steering wheel angle than that of the reference.
@@ -60,4 +77,6 @@ class OpenLoopDriver:
         else:
             self.speed_hold.reset()
             torque = 0.0
-        return DriverCommand(angle, angle / self.steering_ratio, torque, reference.brake, limited)
+        return DriverCommand(
+            angle, angle / self.steering_ratio, torque, reference.brake, limited, reference.wheel_torques
+        )

@@ -4,8 +4,8 @@ from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.constant_radius import ConstantRadius
 from activesteer.maneuver.course import Course, Lane
-from activesteer.maneuver.follow_path import FollowPath, with_csv
-from activesteer.maneuver.kinds import KINDS, build_maneuver, maneuver_class
+from activesteer.maneuver.follow_path import FollowPath
+from activesteer.maneuver.kinds import KINDS, build_maneuver, filled_from_csv, maneuver_class
 from activesteer.maneuver.lane_change import LaneChange
 from activesteer.maneuver.open_loop import OpenLoop
 from activesteer.maneuver.sine_sweep import SineSweep
@@ -30,6 +30,6 @@ __all__ = [
     "SlowlyIncreasingSteer",
     "StepSteer",
     "build_maneuver",
+    "filled_from_csv",
     "maneuver_class",
-    "with_csv",
 ]

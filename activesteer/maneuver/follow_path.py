@@ -8,9 +8,10 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from activesteer.config import Source
-from activesteer.errors import ManeuverError, nearest_names
+from activesteer.errors import ManeuverError
 from activesteer.maneuver.along_course import AlongCourse
 from activesteer.maneuver.course import Course
+from activesteer.maneuver.csv_table import find_csv
 from activesteer.maneuver.path_points import check_points, read_csv
 from activesteer.path import Path
 
@@ -72,20 +73,10 @@ def with_csv(table: Mapping[str, Any], own: FilePath | None, source: Source) -> 
         if own is None:
             return dict(table), {}
         raise source.fail(("path", "csv"), "csv and the lists x_m, y_m are two ways to give the points; leave one out")
-    file = _find(points["csv"], own, source)
+    file = find_csv(points["csv"], own, source, ("path", "csv"))
     try:
         x_m, y_m, places = read_csv(file)
         check_points(x_m, y_m, places.__getitem__)
     except ManeuverError as reason:
         raise source.fail(("path", "csv"), str(reason)) from reason
     return {**table, "path": {**points, "x_m": x_m, "y_m": y_m}}, {f"path/{file.name}": file.read_bytes()}
-
-
-def _find(name: str, own: FilePath | None, source: Source) -> FilePath:
-    beside = () if own is None else (own / name,)
-    for candidate in (*beside, FilePath(name).expanduser()):
-        if candidate.is_file():
-            return candidate
-    folder = own or FilePath.cwd()
-    present = [path.name for path in folder.glob("*.csv")]
-    raise source.fail(("path", "csv"), f"there is no file {name!r} in {folder}; {nearest_names(name, present)}")

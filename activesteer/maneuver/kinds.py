@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, Final
 
 from activesteer.config import Source, build
@@ -10,9 +11,10 @@ from activesteer.errors import nearest_names
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.constant_radius import ConstantRadius
-from activesteer.maneuver.follow_path import FollowPath
+from activesteer.maneuver.follow_path import FollowPath, with_csv
 from activesteer.maneuver.lane_change import LaneChange
 from activesteer.maneuver.open_loop import OpenLoop
+from activesteer.maneuver.open_loop_tables import with_tables
 from activesteer.maneuver.sine_sweep import SineSweep
 from activesteer.maneuver.sine_with_dwell import SineWithDwell
 from activesteer.maneuver.slalom import Slalom
@@ -32,6 +34,30 @@ KINDS: Final[dict[str, type[Maneuver]]] = {
     "follow_path": FollowPath,
 }
 """Value of `kind` in a file -> class."""
+
+_Fill = Callable[[Mapping[str, Any], Path | None, Source], tuple[dict[str, Any], dict[str, bytes]]]
+_FROM_CSV: Final[dict[type[Maneuver], _Fill]] = {FollowPath: with_csv, OpenLoop: with_tables}
+"""Kinds whose files may name CSV files, and what fills their values in."""
+
+
+def filled_from_csv(
+    table: Mapping[str, Any], own: Path | None, source: Source
+) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """A manoeuvre's table with the values of the CSV files that it names.
+
+    Args:
+        table: The table.
+        own: Folder of the manoeuvre file; None for a table that has no file.
+        source: For error messages.
+
+    Returns:
+        The table, and the files by their names, to be kept with the recording.
+
+    Raises:
+        ManeuverError: a file is not found or wrong, or values are given beside it.
+    """
+    fill = _FROM_CSV.get(maneuver_class(table, source))
+    return (dict(table), {}) if fill is None else fill(table, own, source)
 
 
 def maneuver_class(table: Mapping[str, Any], source: Source) -> type[Maneuver]:

@@ -1,92 +1,88 @@
-"""Open loop: steering wheel angle, speed and brake as tables over time."""
+"""Open loop: steering, speed, brake and the torques of the wheels as tables over time."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Annotated
 
-from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.choices import DRIVES, check_choice
-from activesteer.signals import Reference
-
-
-@dataclass(frozen=True)
-class SteeringTable:
-    """Steering wheel angle over time."""
-
-    time_s: tuple[float, ...] = (0.0,)
-    """Times, increasing [s]; linear between them, constant outside."""
-    steering_wheel_rad: tuple[float, ...] = (0.0,)
-    """Angles, left positive [rad]."""
-
-
-@dataclass(frozen=True)
-class SpeedTable:
-    """Speed to hold over time."""
-
-    time_s: tuple[float, ...]
-    """Times, increasing [s]; linear between them, constant outside."""
-    speed_mps: tuple[float, ...]
-    """Speeds [m/s]."""
-
-
-@dataclass(frozen=True)
-class BrakeTable:
-    """Brake pedal over time."""
-
-    time_s: tuple[float, ...]
-    """Times, increasing [s]; linear between them, constant outside."""
-    pedal: Annotated[tuple[float, ...], Range(0.0, 1.0)]
-    """Pedal positions, 0 to 1."""
+from activesteer.maneuver.open_loop_tables import BrakeTable, SpeedTable, SteeringTable, WheelTorqueTable, check_table
+from activesteer.signals import Reference, WheelTorques
 
 
 @dataclass(frozen=True, kw_only=True)
 class OpenLoop(Maneuver):
-    """Tables over time; the drive holds the speed, or the car coasts."""
+    """Tables over time; the drive holds the speed, or the car coasts, or the wheels' torques are given."""
 
     steering: SteeringTable = SteeringTable()
-    """Steering wheel; straight ahead where not given."""
+    """Steering wheel or rack; straight ahead where not given."""
+    steering_csv: str | None = None
+    """File with the columns time_s and steering_wheel_rad or rack_m, beside the manoeuvre file or a path of its own."""
     speed: SpeedTable | None = None
     """Speed to hold; the speed at the start where not given."""
     brake: BrakeTable | None = None
     """Brake; released where not given. While it is pressed, the drive is off."""
+    wheel_torques: WheelTorqueTable | None = None
+    """Torques of each wheel, at once and without the engine's lag; where given, nothing else drives or brakes."""
+    drive_csv: str | None = None
+    """File with the columns time_s and fl_drive_Nm ... rr_brake_Nm, as many as are needed."""
     drive: str = "hold_speed"
-    """`hold_speed` or `coast`."""
+    """`hold_speed` or `coast`; with torques of the wheels, what happens before the recording starts."""
 
     def __post_init__(self) -> None:
         """Checks the tables.
 
         Raises:
-            ManeuverError: a table's columns differ in length, or its times do not increase.
+            ManeuverError: a table's columns differ in length, its times do not increase, or two contradict each other.
         """
         check_choice("drive", self.drive, DRIVES)
-        for key, table, column in (
-            ("steering", self.steering, "steering_wheel_rad"),
-            ("speed", self.speed, "speed_mps"),
-            ("brake", self.brake, "pedal"),
-        ):
-            if table is not None:
-                self._check(key, table.time_s, getattr(table, column))
-
-    def _check(self, key: str, times: tuple[float, ...], values: tuple[float, ...]) -> None:
-        if not times or len(times) != len(values):
-            msg = f"{key}: has {len(times)} times and {len(values)} values; as many of each are needed, at least one"
-            raise ManeuverError(msg)
-        for earlier, later in pairwise(times):
-            if later <= earlier:
-                msg = f"{key}.time_s: does not increase from {earlier:g} to {later:g} s"
+        torques = self.wheel_torques
+        tables = [("steering", self.steering.time_s, self.steering.values)]
+        if self.speed is not None:
+            tables.append(("speed", self.speed.time_s, self.speed.speed_mps))
+        if self.brake is not None:
+            tables.append(("brake", self.brake.time_s, self.brake.pedal))
+        if torques is not None:
+            columns = [*(torques.columns("drive") or ()), *(torques.columns("brake") or ())]
+            tables += [("wheel_torques", torques.time_s, column) for column in columns]
+            if self.speed is not None or self.brake is not None:
+                msg = "wheel_torques: given beside a speed or a brake pedal; either the one or the other"
                 raise ManeuverError(msg)
+        for key, times_s, values in tables:
+            try:
+                check_table(times_s, values)
+            except ManeuverError as reason:
+                msg = f"{key}.{reason}" if str(reason).startswith("time_s") else f"{key}: {reason}"
+                raise ManeuverError(msg) from reason
 
     def reference(self, time_s: float) -> Reference:
         """Values of the tables; see the base class."""
-        angle = _interpolate(time_s, self.steering.time_s, self.steering.steering_wheel_rad)
+        value = _interpolate(time_s, self.steering.time_s, self.steering.values)
+        angle, rack = (value, None) if self.steering.rack_m is None else (0.0, value)
+        if self.wheel_torques is not None:
+            return Reference(angle, self.speed_mps, 0.0, False, None, rack, self._torques(self.wheel_torques, time_s))
         speed = self.speed_mps if self.speed is None else _interpolate(time_s, self.speed.time_s, self.speed.speed_mps)
         pedal = 0.0 if self.brake is None else _interpolate(time_s, self.brake.time_s, self.brake.pedal)
-        return Reference(angle, speed, pedal, hold_speed=self.drive == "hold_speed" and pedal == 0.0)
+        return Reference(angle, speed, pedal, self.drive == "hold_speed" and pedal == 0.0, None, rack)
+
+    def settling_reference(self) -> Reference:
+        """As at the start, but without the torques of the wheels: the car is to roll at its speed; see the base class."""
+        reference = self.reference(0.0)
+        if self.wheel_torques is None:
+            return reference
+        return reference._replace(wheel_torques=None, hold_speed=self.drive == "hold_speed")
+
+    @staticmethod
+    def _torques(table: WheelTorqueTable, time_s: float) -> WheelTorques:
+        def at(columns: tuple[tuple[float, ...], ...] | None) -> tuple[float, float, float, float]:
+            if columns is None:
+                return (0.0, 0.0, 0.0, 0.0)
+            fl, fr, rl, rr = (_interpolate(time_s, table.time_s, column) for column in columns)
+            return fl, fr, rl, rr
+
+        return WheelTorques(at(table.columns("drive")), at(table.columns("brake")))
 
 
 def _interpolate(x: float, xs: tuple[float, ...], ys: tuple[float, ...]) -> float:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final, NoReturn
 
-from activesteer.errors import ManeuverError, nearest_names
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.csv_table import read_columns
 
 COLUMNS: Final = ("x_m", "y_m")
 """Columns that a CSV must have, others may stand beside them."""
@@ -39,37 +39,8 @@ def read_csv(path: Path) -> tuple[list[float], list[float], list[str]]:
     Raises:
         ManeuverError: the file cannot be read, a column is missing, or a value is no number.
     """
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as reason:
-        msg = f"cannot read {path}: {reason}"
-        raise ManeuverError(msg) from reason
-    reader = csv.DictReader(lines, skipinitialspace=True)
-    header = [name.strip() for name in reader.fieldnames or []]
-    for column in COLUMNS:
-        if column not in header:
-            known = nearest_names(column, header)
-            msg = f"{path.name}, line 1: must name the columns x_m and y_m; {column} is missing: {known}"
-            raise ManeuverError(msg)
-    reader.fieldnames = header
-    x, y, places = [], [], []
-    for row in reader:
-        place = f"{path.name}, line {reader.line_num}"
-        for column, values in zip(COLUMNS, (x, y), strict=True):
-            values.append(_number(row[column], f"{place}: {column}"))
-        places.append(place)
-    return x, y, places
-
-
-def _number(text: str | None, where: str) -> float:
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        msg = f"{where}: {text!r} is not a number"
-        raise ManeuverError(msg)
-    return value
+    columns, places = read_columns(path, COLUMNS)
+    return columns["x_m"], columns["y_m"], places
 
 
 def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[int], str]) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.errors import ModelError, SimulationDiverged
 from activesteer.road import Road
-from activesteer.signals import DriverCommand, Measurement, Motion, SteerCommand
+from activesteer.signals import DriverCommand, Measurement, Motion, SteerCommand, WheelTorques
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels import ChannelMap, RawRows
@@ -131,6 +131,8 @@ class Vehicle:
         front, rear = 0.5 * powertrain.front_share, 0.5 * (1.0 - powertrain.front_share)
         shares = zip(CORNERS, (front, front, rear, rear), strict=True)
         self._drives = tuple((actuator(f"{corner}_drive"), share) for corner, share in shares if share > 0.0)
+        each = [actuator(f"{corner}_drive") for corner in CORNERS]
+        self._each_drive = tuple((index, int(model.actuator_actadr[index])) for index in each)
         torques = (brakes.front_torque_Nm, brakes.front_torque_Nm, brakes.rear_torque_Nm, brakes.rear_torque_Nm)
         self._brakes = tuple((actuator(f"{corner}_brake"), most) for corner, most in zip(CORNERS, torques, strict=True))
         self._ratio = self.parameters.steering.ratio
@@ -216,7 +218,32 @@ class Vehicle:
             self._brake = command.brake
             for index, torque in self._brakes:
                 ctrl[index] = command.brake * torque
+        if command.wheel_torques is not None:
+            self._apply_torques(command.wheel_torques)
         mujoco.mj_step(self.model, self.data)
+
+    def _apply_torques(self, torques: WheelTorques) -> None:
+        """Torques of the wheels, one by one: drive torques at once, without the lag of the engine."""
+        ctrl, act = self._ctrl, self.data.act
+        for (index, state), torque in zip(self._each_drive, torques.drive_Nm, strict=True):
+            ctrl[index] = act[state] = torque
+        for (index, _), torque in zip(self._brakes, torques.brake_Nm, strict=True):
+            ctrl[index] = torque
+        # Whatever is commanded next in the usual way is to be written again.
+        self._drive_torque_Nm = self._brake = math.nan
+
+    @property
+    def rack_per_steering_wheel_m(self) -> float | None:
+        """Rack travel per steering wheel angle [m/rad], from the fixed tendon `steering_column`; None without one."""
+        model = self.model
+        tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, "steering_column")
+        if tendon < 0:
+            return None
+        parts = range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
+        ratios = {model.joint(int(model.wrap_objid[part])).name: float(model.wrap_prm[part]) for part in parts}
+        if "rack" not in ratios or "steering_wheel" not in ratios:
+            return None
+        return -ratios["steering_wheel"] / ratios["rack"]
 
     def measure(self) -> Measurement:
         """What the car's sensors say of the instant at which the last step began, and the yaw rate at its end.

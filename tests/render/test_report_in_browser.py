@@ -132,7 +132,20 @@ def test_cursor_is_in_all_plots_at_once_and_tells_the_values(open_page):
     other = plot(page, "Lateral acceleration")
     assert told(other)[0] == time_s
     assert float(told(other)[1]) == pytest.approx(4.0, abs=0.01)
+    assert len(told(plot(page, "Added angle at the wheels"))) == 3  # of the two systems that add one
     assert told(plot(page, "Yaw rate", 2)) == []  # other runs, other time
+
+
+def test_nothing_moves_when_values_are_told(open_page):
+    for device in (DESK, PHONE):
+        page = open_page(**device)
+        figure = plot(page, "Added angle at the wheels")
+        hover(page, figure, 0.5)
+        page.mouse.move(0, 0)
+        before = figure.bounding_box()
+        hover(page, figure, 0.5)
+        assert told(figure)
+        assert figure.bounding_box() == before
 
 
 def test_place_of_the_cars_at_the_cursor_is_on_the_track_and_back(open_page):

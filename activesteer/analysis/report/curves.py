@@ -204,11 +204,16 @@ def _courses(group: Group) -> Iterator[Course]:
 
 def _course(course: Course) -> dict[str, Any]:
     (left, right), (low, high) = course.shown()
+    # Beyond its last point the path goes on straight.
+    dx, dy = (float(values[-1] - values[-2]) for values in (course.path_x_m, course.path_y_m))
+    far = (right - left) / math.hypot(dx, dy)
+    path_x = np.append(course.path_x_m, course.path_x_m[-1] + far * dx)
+    path_y = np.append(course.path_y_m, course.path_y_m[-1] + far * dy)
     return {
         "lanes": [
             {"name": name, "x": [start, end], "y": [below, above]} for name, start, end, below, above in course.lanes
         ],
         "cones": [[round(x, 3), round(y, 3)] for x, y in course.cones_m.tolist()],
-        "path": {"x": _rounded(course.path_x_m, 2), "y": _rounded(course.path_y_m, 3)},
+        "path": {"x": _rounded(path_x, 2), "y": _rounded(path_y, 3)},
         "view": {"x": [left, right], "y": [low, high]},
     }

@@ -174,7 +174,8 @@ def test_track_has_lanes_cones_and_path(page):
     track = data_of(page)[2]["track"]
     assert [lane["name"] for lane in track["lanes"]] == ["entry", "offset", "exit"]
     assert len(track["cones"]) == 4
-    assert track["path"]["x"][-1] == pytest.approx(299.5)
+    assert track["path"]["x"][-2] == pytest.approx(299.5)
+    assert (track["path"]["x"][-1] > 400.0, track["path"]["y"][-1]) == (True, 0)  # straight on
     assert track["tracks"][1]["run"] == 1
     assert track["view"]["x"] == [10.0, 205.0]
 

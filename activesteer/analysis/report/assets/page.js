@@ -96,8 +96,9 @@
       values.replaceChildren();
       if (i == null || u.cursor.left < 0) { if (this.track) this.track.at(null); return; }
       values.append(`${this.time[i].toFixed(2)} s`);
-      panel.series.forEach((series) => {
-        if (series.dashed || !this.visible[series.run]) return;
+      panel.series.forEach((series, k) => {
+        // Of each run the first curve: what is desired beside it is not told.
+        if (panel.series.findIndex((other) => other.run === series.run) !== k || !this.visible[series.run]) return;
         values.append(" ", element("span", { style: `color:${this.data.runs[series.run].colour}` }, shown(series.values[i])));
       });
       if (this.track) this.track.at(i);

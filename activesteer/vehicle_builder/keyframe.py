@@ -1,0 +1,31 @@
+"""The keyframe `static_ride`: where the car stands on its tyres, for viewers and for whoever loads the model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from activesteer.scenario import FileOrTable, resolve
+from activesteer.vehicle import Vehicle
+
+
+def keyframe_xml(vehicle: FileOrTable) -> tuple[str, Path]:
+    """The text of keyframes.xml, and the path of the file that it belongs into.
+
+    Args:
+        vehicle: Name, path, or table of a vehicle.
+
+    Raises:
+        ActiveSteerError: the car cannot be built, or has no static equilibrium.
+    """
+    scenario = resolve("standstill", vehicle)
+    car = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.maneuver.road)
+    qpos = " ".join(f"{value:.15g}" for value in car.data.qpos)
+    text = f"""<mujocoinclude>
+  <!-- Written by tools/make_keyframe.py: static equilibrium on the tyres. -->
+  <keyframe>
+    <key name="static_ride"
+      qpos="{qpos}"/>
+  </keyframe>
+</mujocoinclude>
+"""
+    return text, scenario.mjcf.parent / "keyframes.xml"

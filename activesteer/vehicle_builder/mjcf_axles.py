@@ -1,0 +1,277 @@
+"""The MJCF of an axle: the left side as designed, the right side with y negated."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.vehicle_builder.design import Axle, Car, Solid
+from activesteer.vehicle_builder.levers import Mount
+from activesteer.vehicle_builder.numbers import num, sig, vec
+from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
+
+Array = NDArray[np.float64]
+_ON_RACK = "tie_rod"
+
+
+def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
+    """Text of front_axle.xml or rear_axle.xml.
+
+    Args:
+        car: The car.
+        axle: One of its axles.
+        trimmed: What was trimmed.
+    """
+    words = axle.kind.name.replace("_", " ")
+    lines = [
+        "<mujocoinclude>",
+        f"  <!-- {words.capitalize()} {axle.name} axle, a fragment of the chassis body. Every position is a hardpoint in",
+        "       vehicle coordinates: origin on the road below the middle of the front axle, x forward, y left, z up, design",
+        "       position. Links are tendons; an arm is two links that share their outer point. -->",
+        "",
+        "  <!-- Chassis side of links, springs and dampers"
+        + ("; the tie rods start at the rack (steering.xml). -->" if axle.name == "front" else ". -->"),
+    ]
+    for side in (1.0, -1.0):
+        lines += _chassis_sites(axle, side)
+    for side, title in ((1.0, "Left"), (-1.0, "Right")):
+        lines += ["", f"  <!-- {title} {axle.name} corner" + (": the left one with y negated. -->" if side < 0 else ". -->")]
+        lines += _corner(car, axle, trimmed.axle(axle.name), side)
+    return "\n".join([*lines, "</mujocoinclude>", ""])
+
+
+def corner_name(axle: Axle, side: float) -> str:
+    """Name of the left (side 1) or right corner."""
+    return axle.corner if side > 0.0 else f"{axle.corner[0]}r"
+
+
+def _at(point: Array, side: float) -> str:
+    return vec((point[0], side * point[1], point[2]))
+
+
+def _site(name: str, point: Array, side: float, indent: str) -> str:
+    return f'{indent}<site name="{name}" pos="{_at(point, side)}"/>'
+
+
+def _mounts(axle: Axle) -> tuple[tuple[str, Mount], ...]:
+    return (("spring", axle.spring), ("damper", axle.damper))
+
+
+def _chassis_sites(axle: Axle, side: float) -> list[str]:
+    corner, lines = corner_name(axle, side), []
+    for link in axle.links:
+        if link.name != _ON_RACK:
+            lines.append(_site(f"{corner}_{link.name}_inner", axle.points[link.inner], side, "  "))
+    for part, mount in _mounts(axle):
+        upper = axle.points["strut_top"] if axle.kind.strut else axle.points[f"{part}_inner"]
+        lines.append(_site(f"{corner}_{part}_inner", upper, side, "  "))
+        if mount.lever != 1.0 and mount.start_m is not None:
+            lines.append(_site(f"{corner}_{part}_lever", mount.start_m, side, "  "))
+    return lines
+
+
+def _inertial(solid: Solid, side: float, indent: str) -> str:
+    return (
+        f'{indent}<inertial pos="{_at(solid.cg_m, side)}" mass="{num(solid.mass_kg)}" '
+        f'diaginertia="{vec(solid.inertia_kgm2)}"/>'
+    )
+
+
+def _corner(car: Car, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[str]:
+    corner = corner_name(axle, side)
+    if axle.kind.strut:
+        inner = _knuckle(axle, trimmed, side, "    ", _jounce(axle, corner, side))
+        strut = axle.strut
+        return [
+            f'  <body name="{corner}_strut">',
+            f'    <joint name="{corner}_topmount" class="top_mount" pos="{_at(axle.points["strut_top"], side)}"/>',
+            *([_inertial(strut, side, "    ")] if strut else []),
+            *inner,
+            "  </body>",
+        ]
+    joints = [
+        f'<joint name="{corner}_x" class="knuckle_slide" axis="1 0 0"/>',
+        f'<joint name="{corner}_y" class="knuckle_slide" axis="0 1 0"/>',
+        f'<joint name="{corner}_z" class="knuckle_slide" axis="0 0 1"/>',
+        f'<joint name="{corner}_rot" class="knuckle_ball" pos="{_at(axle.wheel_centre_m, side)}"/>',
+    ]
+    return _knuckle(axle, trimmed, side, "  ", joints, _carrier(car, axle, trimmed, side) if axle.carrier else None)
+
+
+def _jounce(axle: Axle, corner: str, side: float) -> list[str]:
+    axis = axle.points["strut_top"] - axle.points["strut_bottom"]
+    axis = axis / np.linalg.norm(axis)
+    return [f'<joint name="{corner}_jounce" class="jounce" axis="{_at(axis, side)}"/>']
+
+
+def _knuckle(
+    axle: Axle, trimmed: TrimmedAxle, side: float, indent: str, joints: list[str], carrier: list[str] | None = None
+) -> list[str]:
+    corner, inside = corner_name(axle, side), indent + "  "
+    lines = [f'{indent}<body name="{corner}_knuckle">']
+    lines += [inside + joint for joint in joints]
+    lines.append(_inertial(axle.knuckle, side, inside))
+    lines += [_site(f"{corner}_{link.name}_outer", axle.points[link.outer], side, inside) for link in axle.links]
+    for part, _ in _mounts(axle):
+        lower = axle.points["strut_bottom"] if axle.kind.strut else axle.points[f"{part}_outer"]
+        lines.append(_site(f"{corner}_{part}_outer", lower, side, inside))
+    centre = axle.wheel_centre_m - np.array([0.0, 0.06, 0.0])
+    for point in dict.fromkeys(link.outer for link in axle.links):
+        if np.linalg.norm(axle.points[point] - centre) > 0.01:
+            ends = f"{_at(axle.points[point], side)} {_at(centre, side)}"
+            lines.append(f'{inside}<geom class="knuckle" fromto="{ends}"/>')
+    if axle.kind.strut:
+        ends = f"{_at(axle.points['strut_bottom'], side)} {_at(centre, side)}"
+        lines.append(f'{inside}<geom class="knuckle" fromto="{ends}"/>')
+    lines += carrier if carrier is not None else _wheel(axle, trimmed, side, inside)
+    return [*lines, f"{indent}</body>"]
+
+
+def _carrier(car: Car, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[str]:
+    corner, indent, inside = corner_name(axle, side), "    ", "      "
+    lower, upper = car.kingpin_m
+    axis = (upper - lower) / np.linalg.norm(upper - lower)
+    middle = lower + axis * (axle.wheel_centre_m[2] - lower[2]) / axis[2]
+    solid = axle.carrier
+    return [
+        f'{indent}<body name="{corner}_carrier">',
+        f'{inside}<joint name="{corner}_steer" class="rear_steer" pos="{_at(middle, side)}" axis="{_at(axis, side)}"/>',
+        *([_inertial(solid, side, inside)] if solid else []),
+        f'{inside}<geom class="carrier" fromto="{_at(lower, side)} {_at(upper, side)}"/>',
+        *_wheel(axle, trimmed, side, inside),
+        f"{indent}</body>",
+    ]
+
+
+def _wheel(axle: Axle, trimmed: TrimmedAxle, side: float, indent: str) -> list[str]:
+    corner, inside = corner_name(axle, side), indent + "  "
+    euler = vec((side * trimmed.wheel_x_rad, 0.0, side * trimmed.wheel_z_rad), 8)
+    across, spin = num(axle.wheel_inertia_kgm2, 4), num(axle.wheel_spin_inertia_kgm2, 4)
+    width = 0.5 * float(axle.tyre_parameters["WIDTH"])
+    return [
+        f'{indent}<body name="{corner}_wheel" pos="{_at(axle.wheel_centre_m, side)}" euler="{euler}">',
+        f'{inside}<joint name="{corner}_spin" class="spin"/>',
+        f'{inside}<inertial pos="0 0 0" mass="{num(axle.wheel_mass_kg)}" diaginertia="{across} {spin} {across}"/>',
+        f'{inside}<site name="{corner}_wheel_centre"/>',
+        f'{inside}<geom name="{corner}_tyre" class="tyre" size="{num(axle.radius_m)} {num(width)}"/>',
+        f'{inside}<geom class="rim"/>',
+        f'{inside}<geom class="spoke"/>',
+        f'{inside}<geom class="valve"/>',
+        f"{indent}</body>",
+    ]
+
+
+def link_classes(car: Car) -> str:
+    """Default classes of the links, one per link and axle."""
+    lines = []
+    for axle in car.axles:
+        for link in axle.links:
+            stiffness = sig(link.stiffness_Npm)
+            if link.hardening_Npm3:
+                stiffness += f" 0 {sig(link.hardening_Npm3)}"
+            colour = ' width="0.009" rgba="0.85 0.3 0.2 1"' if link.name in ("tie_rod", "toe_link") else ""
+            lines += [
+                f"      <!-- {axle.name}: {link.remark}. -->",
+                f'      <default class="{class_of(axle, link.name)}"><tendon stiffness="{stiffness}" '
+                f'damping="{sig(link.damping_Nspm)}"{colour}/></default>',
+            ]
+    return "\n".join(lines) + "\n"
+
+
+def class_of(axle: Axle, link: str) -> str:
+    """Class of a link: front and rear may have links of the same name."""
+    return f"{axle.name}_{link}"
+
+
+def link_tendons(car: Car) -> str:
+    """The links of all corners."""
+    lines = []
+    for axle in car.axles:
+        for side in (1.0, -1.0):
+            corner = corner_name(axle, side)
+            for link in axle.links:
+                name = f"{corner}_{link.name}"
+                lines.append(
+                    f'    <spatial name="{name}" class="{class_of(axle, link.name)}">'
+                    f'<site site="{name}_inner"/><site site="{name}_outer"/></spatial>'
+                )
+    return "\n".join(lines)
+
+
+def part_tendons(car: Car, part: str) -> str:
+    """Springs or dampers of all corners."""
+    lines = []
+    told = set()
+    for axle in car.axles:
+        mount = axle.spring if part == "spring" else axle.damper
+        if mount.lever == 1.0 or mount.start_m is None:
+            continue
+        divisor = 1.0 / mount.lever
+        told.add(axle.name)
+        lines += [
+            f"    <!-- {axle.name}: the {part} stands on {mount.carrier}, which has no body; the pulley ({num(divisor)}) is its",
+            f"         lever, and *_{part}_lever the point from which the length is that of the {part}. They are functions of",
+            f"         the points *_{part}_inner, *_{part}_outer, which only draw it: docs/own_car.md. -->",
+        ]
+    for axle in car.axles:
+        mount = axle.spring if part == "spring" else axle.damper
+        for side in (1.0, -1.0):
+            corner = corner_name(axle, side)
+            start = f'    <{{}} name="{corner}_{part}" class="{axle.name}_{part}">'
+            if mount.start_m is None:
+                lines.append(start.format("fixed") + f'<joint joint="{corner}_jounce" coef="-1"/></fixed>')
+            elif mount.lever == 1.0:
+                sites = f'<site site="{corner}_{part}_inner"/><site site="{corner}_{part}_outer"/>'
+                lines.append(start.format("spatial") + f"{sites}</spatial>")
+            else:
+                link = next(link.name for link in axle.links if link.outer == mount.outer)
+                sites = f'<site site="{corner}_{part}_lever"/><site site="{corner}_{link}_outer"/>'
+                pulley = f'<pulley divisor="{num(1.0 / mount.lever)}"/>'
+                lines.append(start.format("spatial") + f"{pulley}{sites}</spatial>")
+    return "\n".join(lines)
+
+
+def viewer_springs(car: Car) -> str:
+    """For the scene: springs that have no shape of their own, or stand on an arm."""
+    lines = []
+    for axle in car.axles:
+        if axle.spring.start_m is None or axle.spring.lever != 1.0:
+            if not lines:
+                lines.append("    <!-- Without force: springs whose tendons have no shape, or another one. -->")
+            for side in (1.0, -1.0):
+                corner = corner_name(axle, side)
+                lines.append(
+                    f'    <spatial name="{corner}_viewer_spring" class="coil"><site site="{corner}_spring_inner"/>'
+                    f'<site site="{corner}_spring_outer"/></spatial>'
+                )
+    return "\n".join(lines) + ("\n" if lines else "")
+
+
+def spring_classes(car: Car, trimmed: Trimmed) -> str:
+    """Default classes of the springs."""
+    lines = []
+    for axle in car.axles:
+        found = trimmed.axle(axle.name)
+        squeezed = found.spring_force_N / found.spring_rate_Npm
+        length = axle.spring.length_m + squeezed
+        hidden = ' group="3"' if axle.spring.start_m is not None and axle.spring.lever != 1.0 else ""
+        lines.append(
+            f'      <default class="{axle.name}_spring"><tendon stiffness="{sig(found.spring_rate_Npm)}" '
+            f'springlength="{num(length)}"{hidden}/></default>'
+        )
+    return "\n".join(lines) + "\n"
+
+
+def damper_classes(car: Car, trimmed: Trimmed) -> str:
+    """Default classes of the dampers."""
+    lines = []
+    for axle in car.axles:
+        found, length = trimmed.axle(axle.name), axle.damper.length_m
+        ends = f"{num(length - found.bump_stop_m)} {num(length + found.rebound_stop_m)}"
+        stiffness = " ".join(sig(value) for value in axle.stop_stiffness)
+        hidden = ' group="3"' if axle.damper.start_m is not None and axle.damper.lever != 1.0 else ""
+        lines.append(
+            f'      <default class="{axle.name}_damper"><tendon springlength="{ends}" stiffness="{stiffness}"{hidden}/>'
+            "</default>"
+        )
+    return "\n".join(lines) + "\n"
