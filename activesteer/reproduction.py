@@ -6,8 +6,10 @@ from the files, not from what the processes hold.
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field
@@ -166,8 +168,11 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
     return ""
 
 
-def worker_pool(jobs: int | None = None) -> ProcessPoolExecutor:
+@contextlib.contextmanager
+def worker_pool(jobs: int | None = None) -> Iterator[ProcessPoolExecutor]:
     """Processes that share nothing with this one, started afresh: the engine's callbacks belong to a process.
+
+    Where the work ends early, by an error or Ctrl-C, what has not begun is not begun; what runs is ended properly.
 
     Args:
         jobs: How many; as many as there are processors where not given.
@@ -178,7 +183,14 @@ def worker_pool(jobs: int | None = None) -> ProcessPoolExecutor:
     if jobs is not None and jobs < 1:
         msg = f"--jobs {jobs}: at least 1 is needed"
         raise ParameterError(msg)
-    return ProcessPoolExecutor(jobs or os.cpu_count() or 1, mp_context=multiprocessing.get_context("spawn"))
+    # Ctrl-C reaches every process of a terminal; this one decides.
+    ignore = (signal.SIGINT, signal.SIG_IGN)
+    spawn = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(jobs or os.cpu_count() or 1, spawn, initializer=signal.signal, initargs=ignore)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 class _Car(NamedTuple):

@@ -139,9 +139,7 @@ def _driver(
     torque = car.powertrain
     speed_hold = SpeedHold(car.driver, torque.max_torque_Nm, torque.engine_brake_torque_Nm, timestep_s)
     steering = car.steering
-    robot = OpenLoopDriver(
-        speed_hold, steering.ratio, steering.steering_wheel_limit_rad, rack_per_steering_wheel_m
-    )
+    robot = OpenLoopDriver(speed_hold, steering.ratio, steering.steering_wheel_limit_rad, rack_per_steering_wheel_m)
     single_track = SingleTrack(car.single_track)
     if maneuver.course is not None:
         return PathPreviewDriver(robot, maneuver.course.path, single_track.matrices, car.driver, timestep_s)

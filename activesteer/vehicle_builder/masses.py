@@ -62,15 +62,14 @@ def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
     table, others = car.table.mass, whole(model, without_chassis=True)
     base = car.wheelbase_m
     if table.chassis_kg is not None and table.chassis_cg is not None:
-        mass = table.chassis_kg + others.mass_kg
         inertia = table.chassis_inertia_kgm2
         if inertia is None:
             inertia = _usual_inertia(table.chassis_kg, base, car, 0.5)
             log.note("mass.chassis_inertia_kgm2", _words(inertia), _INERTIA_RULE)
         return Solid(table.chassis_kg, np.array(table.chassis_cg), np.array(inertia))
-    assert table.total_kg is not None  # noqa: S101 - the table was checked
-    assert table.front_share is not None  # noqa: S101
-    assert table.cg_height_m is not None  # noqa: S101
+    if table.total_kg is None or table.front_share is None or table.cg_height_m is None:
+        msg = "mass: total_kg, front_share and cg_height_m are needed, or chassis_kg and chassis_cg"
+        raise ParameterError(msg)
     mass = table.total_kg - others.mass_kg
     cg = np.array([_cg_x(car, table.front_share), 0.0, table.cg_height_m])
     if mass < 0.3 * table.total_kg:
@@ -94,7 +93,9 @@ def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
     return Solid(mass, chassis_cg, own)
 
 
-_INERTIA_RULE = "yaw 0.91 m l_f l_r, pitch 0.95 of yaw, roll with a radius of gyration of 0.4 of the track: the compact's"
+_INERTIA_RULE = (
+    "yaw 0.91 m l_f l_r, pitch 0.95 of yaw, roll with a radius of gyration of 0.4 of the track: the compact's"
+)
 
 
 def _usual_inertia(mass: float, base: float, car: Car, front_share: float) -> tuple[float, float, float]:

@@ -35,7 +35,10 @@ def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
     for side in (1.0, -1.0):
         lines += _chassis_sites(axle, side)
     for side, title in ((1.0, "Left"), (-1.0, "Right")):
-        lines += ["", f"  <!-- {title} {axle.name} corner" + (": the left one with y negated. -->" if side < 0 else ". -->")]
+        lines += [
+            "",
+            f"  <!-- {title} {axle.name} corner" + (": the left one with y negated. -->" if side < 0 else ". -->"),
+        ]
         lines += _corner(car, axle, trimmed.axle(axle.name), side)
     return "\n".join([*lines, "</mujocoinclude>", ""])
 

@@ -285,9 +285,7 @@ def chosen_kinds(table: CarTable, front: str | None = None, rear: str | None = N
         ParameterError: there is no such kind.
     """
     asked = {"front": front, "rear": rear}
-    return {
-        axle: kind_of(axle, asked[axle] or table.axle(axle).type or DEFAULTS[axle]) for axle in ("front", "rear")
-    }
+    return {axle: kind_of(axle, asked[axle] or table.axle(axle).type or DEFAULTS[axle]) for axle in ("front", "rear")}
 
 
 def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source) -> None:
@@ -387,7 +385,7 @@ def _unit_problems(table: CarTable) -> Iterator[str]:
         if large:
             example = large[0]
             yield (
-                f'{len(large)} of {len(points)} points are not in metres, as {example} with {size[example]:g}: '
+                f"{len(large)} of {len(points)} points are not in metres, as {example} with {size[example]:g}: "
                 + ('are all in mm? then write units = "mm"' if len(large) > len(points) / 2 else "are these in mm?")
                 + ("" if len(large) > len(points) / 2 else f" ({', '.join(large[:6])})")
             )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -81,13 +80,25 @@ def test_the_number_of_processes_is_checked(tmp_path: Path) -> None:
         reproduce(tmp_path, jobs=0)
 
 
-def test_a_run_that_fails_ends_no_other(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
-    """The first block of a failed run is a folder in the way of its file."""
+def test_a_run_that_fails_ends_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mine.py").write_text(
+        "class Mine:\n    def step(self, command, measurement):\n        raise RuntimeError('after all')\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("activesteer.reproduction.SCENARIOS", {"slalom": SCENARIOS["slalom"]})
+    monkeypatch.setattr("activesteer.reproduction.SYSTEMS", ("none", "mine.py:Mine"))
+    result = reproduce(tmp_path)
+    assert list(result.failures) == [("slalom", "mine.py:Mine")]
+    assert "after all" in result.failures["slalom", "mine.py:Mine"]
+    assert result.scorecard.judged == ()
+    assert result.exit_status == 1
+    assert Recording.open(result.paths["slalom"]["none"]).metadata["complete"]
+
+
+def test_what_cannot_be_written_is_told_before_anything_is_driven(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "slalom-ars.mcap").mkdir()
-    monkeypatch.setattr("activesteer.reproduction.SCENARIOS", {name: SCENARIOS[name] for name in ("slalom",)})
-    assert main(["reproduce", "-o", str(tmp_path), "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
-    assert list(told["failures"]) == ["slalom ars"]
-    assert told["claims"] == []
-    assert (tmp_path / "slalom-none.mcap").is_file()
-    assert (tmp_path / "slalom-afs.mcap").is_file()
+    assert main(["reproduce", "-o", str(tmp_path)]) == 1
+    assert "slalom-ars.mcap" in capsys.readouterr().err
+    assert list(tmp_path.glob("*.mcap")) == [tmp_path / "slalom-ars.mcap"]

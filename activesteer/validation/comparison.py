@@ -1,0 +1,88 @@
+"""One number of ours beside one of the reference, the tolerance between them, and whether it is kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Kind = Literal["relative", "absolute"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A number of ours and its reference.
+
+    Attributes:
+        run: Run or rig that it belongs to.
+        quantity: What is compared.
+        unit: Unit of both numbers.
+        ours: Our number; for curves, where the difference is greatest.
+        reference: The reference there.
+        error: Difference, in the sense of `kind`.
+        tolerance: How large its size may be; None where the two codes mean different things, and only the difference
+            is told.
+        kind: `relative`: error and tolerance are shares (0.02 is 2 %), of the reference or of what `quantity` says;
+            `absolute`: they are in the unit.
+    """
+
+    run: str
+    quantity: str
+    unit: str
+    ours: float
+    reference: float
+    error: float
+    tolerance: float | None
+    kind: Kind = "absolute"
+
+    @property
+    def inside(self) -> bool | None:
+        """Whether the tolerance is kept; None where there is none. What is not a number is not inside."""
+        return None if self.tolerance is None else bool(abs(self.error) <= self.tolerance)
+
+    def row(self) -> dict[str, Any]:
+        """As in the JSON output."""
+        return {
+            "run": self.run,
+            "quantity": self.quantity,
+            "unit": self.unit,
+            "ours": _number(self.ours),
+            "reference": _number(self.reference),
+            "error": _number(self.error),
+            "tolerance": self.tolerance,
+            "kind": self.kind,
+            "inside": self.inside,
+        }
+
+    def words(self) -> tuple[str, str, str, str, str, str]:
+        """Run, quantity, ours, reference, error and tolerance as they are printed."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.kind == "relative":
+            error = f"{100.0 * self.error:+.2f} %"
+            tolerance = "-" if self.tolerance is None else f"{100.0 * self.tolerance:g} %"
+        else:
+            error = f"{self.error:+.4g}{unit}"
+            tolerance = "-" if self.tolerance is None else f"{self.tolerance:g}{unit}"
+        return self.run, self.quantity, f"{self.ours:.5g}{unit}", f"{self.reference:.5g}{unit}", error, tolerance
+
+
+def relative(run: str, quantity: str, unit: str, ours: float, reference: float, tolerance: float | None) -> Comparison:
+    """A comparison whose error is a share of the reference."""
+    error = ours / reference - 1.0 if reference else math.inf
+    return Comparison(run, quantity, unit, ours, reference, error, tolerance, "relative")
+
+
+def absolute(run: str, quantity: str, unit: str, ours: float, reference: float, tolerance: float | None) -> Comparison:
+    """A comparison whose error is the difference."""
+    return Comparison(run, quantity, unit, ours, reference, ours - reference, tolerance)
+
+
+def to_json(comparisons: Iterable[Comparison]) -> dict[str, list[dict[str, Any]]]:
+    """The comparisons as they are written to JSON."""
+    return {"comparisons": [comparison.row() for comparison in comparisons]}
+
+
+def _number(value: float) -> float | None:
+    """JSON has no word for what is not finite."""
+    return value if math.isfinite(value) else None

@@ -1,0 +1,134 @@
+"""The whole comparison, as it is called."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.errors import ParameterError
+from activesteer.road import Road
+from activesteer.runner import prepared, run_scenario
+from activesteer.scenario import resolve
+from activesteer.validation.comparison import Comparison
+from activesteer.validation.kinematics import Curves, compare_kinematics
+from activesteer.validation.motion import reference_columns
+from activesteer.validation.reference import ReferenceData, Table
+from activesteer.validation.runs import compare_run
+from activesteer.validation.static import compare_static
+from activesteer.validation.tyre_grid import compare_tyre
+from activesteer.vehicle import Vehicle
+
+_FRICTION: Final = 0.9
+"""Friction of the road in all reference runs."""
+_WRITTEN_EVERY_S: Final = 0.005
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What came out.
+
+    Attributes:
+        reference: What was compared with.
+        comparisons: All numbers.
+        curves: The sweeps of the rig.
+        runs: Our columns of every run, whether the reference has it or not.
+        references: Those of the reference, where there are.
+    """
+
+    reference: ReferenceData
+    comparisons: list[Comparison]
+    curves: list[Curves]
+    runs: dict[str, Table]
+    references: dict[str, Table]
+
+    @property
+    def outside(self) -> list[Comparison]:
+        """Comparisons that do not keep their tolerance."""
+        return [comparison for comparison in self.comparisons if comparison.inside is False]
+
+    @property
+    def judged(self) -> int:
+        """Number of comparisons with a tolerance."""
+        return sum(comparison.inside is not None for comparison in self.comparisons)
+
+
+def validate(
+    reference: str = "sedan",
+    *,
+    more: Path | None = None,
+    timestep_s: float = DEFAULT_TIMESTEP_S,
+    unknown_runs: bool = True,
+    progress: Callable[[float, str], None] | None = None,
+) -> Validation:
+    """Compares a car with the same car in another multibody code.
+
+    Args:
+        reference: Folder in `models/reference`.
+        more: Folder with further reference runs, NAME.csv in the same columns.
+        timestep_s: Step of our simulation [s].
+        unknown_runs: Whether runs are driven whose reference is not known.
+        progress: Called with the share that is done and what comes next.
+
+    Returns:
+        The comparisons.
+
+    Raises:
+        ActiveSteerError: reference or car are not found or wrong, or a run failed.
+    """
+    data = ReferenceData.load(reference, more)
+    references = {run: table for run in data.runs if (table := data.run(run)) is not None}
+    driven = data.runs if unknown_runs else list(references)
+
+    def tell(done: int, what: str) -> None:
+        if progress is not None:
+            progress(done / (len(driven) + 2), what)
+
+    tell(0, "rig")
+    scenario = resolve(data.maneuver(data.runs[0]), data.vehicle)
+    vehicle = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, Road(mu=_FRICTION), timestep_s)
+    rows, curves = compare_kinematics(vehicle, data)
+    tell(1, "static")
+    comparisons = [*compare_static(vehicle, data), *rows, *compare_tyre(scenario.tyres[0], data)]
+    runs = {}
+    for number, run in enumerate(driven):
+        tell(number + 2, run)
+        one = prepared(resolve(data.maneuver(run), data.vehicle), timestep_s)
+        recording = run_scenario(one, timestep_s=timestep_s)
+        runs[run] = reference_columns(recording, data.point_from_cg_m)
+        if run in references:
+            comparisons += compare_run(run, runs[run], references[run])
+    return Validation(data, comparisons, curves, runs, references)
+
+
+def write_runs(result: Validation, folder: Path) -> list[Path]:
+    """Writes our runs as CSV files, in the columns and signs of the reference.
+
+    Args:
+        result: What came out.
+        folder: Where to; made where it does not exist.
+
+    Returns:
+        The files.
+
+    Raises:
+        ParameterError: a file cannot be written.
+    """
+    paths = []
+    for run, table in result.runs.items():
+        path = folder / f"{run}.csv"
+        t = table["t"]
+        every = max(1, round(_WRITTEN_EVERY_S / float(t[1] - t[0])))
+        rows = np.column_stack(list(table.values()))[::every]
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            np.savetxt(path, rows, fmt="%.8g", delimiter=",", header=",".join(table), comments="")
+        except OSError as reason:
+            msg = f"cannot write {path}: {reason}"
+            raise ParameterError(msg) from reason
+        paths.append(path)
+    return paths

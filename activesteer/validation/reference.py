@@ -1,0 +1,110 @@
+"""Reads the reference numbers that travel with the package: `models/reference/NAME`, whose README says what they are."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import ParameterError, nearest_names
+from activesteer.resources import models_dir
+
+Array = NDArray[np.float64]
+Table = dict[str, Array]
+
+_ENDING: Final = "_reference.csv"
+
+
+@dataclass(frozen=True)
+class ReferenceData:
+    """What another code says of a car.
+
+    Attributes:
+        name: Name of the folder.
+        vehicle: The car of ours that is the same.
+        code: The other code, with its version.
+        point_from_cg_m: Where the other code measures the motion, from our `cg` site, chassis axes [m].
+        folder: Where the files are.
+        folders: Folders to look for runs in; the first that has one counts.
+    """
+
+    name: str
+    vehicle: str
+    code: str
+    point_from_cg_m: tuple[float, float, float]
+    folder: Path
+    folders: tuple[Path, ...]
+
+    @classmethod
+    def load(cls, name: str = "sedan", more: Path | None = None) -> ReferenceData:
+        """Finds the data.
+
+        Args:
+            name: Folder in `models/reference`.
+            more: Folder with further runs as NAME.csv, in the same columns.
+
+        Raises:
+            ParameterError: there is no such folder.
+        """
+        home = models_dir() / "reference"
+        folder = home / name
+        if not (folder / "reference.toml").is_file():
+            names = [path.parent.name for path in home.glob("*/reference.toml")]
+            msg = f"there is no reference named {name!r}; {nearest_names(name, names)}"
+            raise ParameterError(msg)
+        if more is not None and not more.is_dir():
+            msg = f"the folder of reference runs {more} does not exist"
+            raise ParameterError(msg)
+        table: dict[str, Any] = tomllib.loads((folder / "reference.toml").read_text(encoding="utf-8"))
+        x, y, z = table["point_from_cg_m"]
+        folders = (folder / "runs",) if more is None else (more, folder / "runs")
+        return cls(name, table["vehicle"], table["code"], (x, y, z), folder, folders)
+
+    def table(self, name: str) -> Table:
+        """A CSV of the folder, numbers only, by column."""
+        return read_table(self.folder / f"{name}.csv")
+
+    def texts(self, name: str) -> list[dict[str, str]]:
+        """A CSV of the folder with words in it, row by row."""
+        header, *lines = (self.folder / f"{name}.csv").read_text(encoding="utf-8").splitlines()
+        return [dict(zip(header.split(","), line.split(","), strict=True)) for line in lines]
+
+    @property
+    def runs(self) -> list[str]:
+        """Names of all runs that are defined, sorted."""
+        return sorted(path.stem for path in (self.folder / "runs").glob("*.toml"))
+
+    def maneuver(self, run: str) -> Path:
+        """Manoeuvre file of a run."""
+        return self.folder / "runs" / f"{run}.toml"
+
+    def run(self, run: str) -> Table | None:
+        """What the other code says of a run, by column; None where that is not known."""
+        for folder in self.folders:
+            for path in (folder / f"{run}.csv", folder / f"{run}{_ENDING}"):
+                if path.is_file():
+                    return read_table(path)
+        return None
+
+
+def read_table(path: Path) -> Table:
+    """A CSV of numbers by column.
+
+    Raises:
+        ParameterError: it cannot be read.
+    """
+    try:
+        with path.open(encoding="utf-8") as file:
+            header = file.readline().strip().split(",")
+            values = np.loadtxt(file, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as reason:
+        msg = f"cannot read the reference {path}: {reason}"
+        raise ParameterError(msg) from reason
+    if values.shape[1] != len(header):
+        msg = f"cannot read the reference {path}: {len(header)} names and {values.shape[1]} columns"
+        raise ParameterError(msg)
+    return {name: values[:, column] for column, name in enumerate(header)}

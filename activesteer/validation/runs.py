@@ -1,0 +1,171 @@
+"""Runs against the reference: steady state, peaks and their times, and the difference over the whole run.
+
+Tolerances are those agreed for this comparison; the way to look at it, corridors around the reference in time and
+amplitude, is that of ISO 19364 (steady-state circular driving) and ISO 19365 (sine with dwell).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.validation.comparison import Comparison, absolute, relative
+from activesteer.validation.reference import Table
+
+Array = NDArray[np.float64]
+
+STEADY_TOLERANCE: Final = 0.02
+PEAK_TOLERANCE: Final = 0.05
+TIME_TOLERANCE_S: Final = 0.02
+RMS_TOLERANCE: Final = 0.02
+LOAD_TOLERANCE: Final = 0.01
+SPEED_TOLERANCE: Final = 0.005
+_STEADY_S: Final = 0.5
+"""Length of the end of a run that counts as its steady state [s]."""
+_STEADY_CHANGE: Final = 0.01
+"""A quantity is steady where it changes by less than this share of its range in that time."""
+
+
+class Quantity(NamedTuple):
+    """A column that is compared.
+
+    Attributes:
+        column: Its name in the reference.
+        word: Its name in the comparisons.
+        unit: Its unit.
+        least_range: A run in which it changes by less says nothing about it, in its unit.
+    """
+
+    column: str
+    word: str
+    unit: str
+    least_range: float
+
+
+QUANTITIES: Final = (
+    Quantity("r", "yaw_rate", "rad/s", 0.01),
+    Quantity("ay", "lateral_acceleration", "m/s2", 0.2),
+    Quantity("roll", "roll", "rad", 1e-3),
+    Quantity("beta", "sideslip", "rad", 1e-3),
+)
+"""What the agreement is asked for."""
+_WHEELS: Final = ("FL", "FR", "RL", "RR")
+_PITCH: Final = Quantity("pitch", "pitch", "rad", 2e-3)
+_DECELERATION: Final = Quantity("ax", "longitudinal_acceleration", "m/s2", 0.5)
+
+
+class Trace(NamedTuple):
+    """A quantity of one run, ours beside the reference on its instants.
+
+    Attributes:
+        quantity: What it is.
+        time_s: Instants.
+        ours: Our values.
+        reference: Those of the reference.
+    """
+
+    quantity: Quantity
+    time_s: Array
+    ours: Array
+    reference: Array
+
+    @property
+    def span(self) -> float:
+        """Peak to peak of the reference."""
+        return float(np.ptp(self.reference))
+
+    def corridor(self) -> tuple[Array, Array]:
+        """Lower and upper edge around the reference: 20 ms to either side, and 2 % of peak to peak."""
+        t, values = self.time_s, self.reference
+        fine = np.linspace(-TIME_TOLERANCE_S, TIME_TOLERANCE_S, 9)
+        moved = np.stack([np.interp(t + shift, t, values) for shift in fine])
+        width = RMS_TOLERANCE * self.span
+        return moved.min(axis=0) - width, moved.max(axis=0) + width
+
+
+def traces(ours: Table, reference: Table, quantities: tuple[Quantity, ...] = QUANTITIES) -> list[Trace]:
+    """Our values on the reference's instants."""
+    t = reference["t"]
+    t = t[t <= ours["t"][-1]]
+    return [
+        Trace(quantity, t, np.interp(t, ours["t"], ours[quantity.column]), reference[quantity.column][: len(t)])
+        for quantity in quantities
+    ]
+
+
+def compare_run(run: str, ours: Table, reference: Table) -> list[Comparison]:
+    """A run against the reference.
+
+    Args:
+        run: Its name.
+        ours: Our columns; see `motion.reference_columns`.
+        reference: Those of the reference.
+
+    Returns:
+        The comparisons.
+    """
+    rows: list[Comparison] = []
+    for trace in traces(ours, reference, (*QUANTITIES, _PITCH, _DECELERATION)):
+        if trace.span >= trace.quantity.least_range:
+            rows += _compare(run, trace)
+    end = reference["t"] >= reference["t"][-1] - _STEADY_S
+    t = reference["t"][end]
+
+    def mean(column: str) -> tuple[float, float]:
+        return float(np.interp(t, ours["t"], ours[column]).mean()), float(reference[column][end].mean())
+
+    rows.append(relative(run, "speed_at_the_end", "m/s", *mean("vx"), SPEED_TOLERANCE))
+    rows += [
+        relative(run, f"{wheel.lower()}_load_at_the_end", "N", *mean(f"Fz_{wheel}"), LOAD_TOLERANCE)
+        for wheel in _WHEELS
+    ]
+    return rows
+
+
+def _compare(run: str, trace: Trace) -> list[Comparison]:
+    quantity, t = trace.quantity, trace.time_s
+    rows = []
+    end = t >= t[-1] - _STEADY_S
+    steady = [float(values[end].mean()) for values in (trace.ours, trace.reference)]
+    drift = np.ptp(trace.reference[end])
+    is_steady = drift < _STEADY_CHANGE * trace.span and abs(steady[1]) > 0.1 * trace.span
+    if is_steady:
+        rows.append(relative(run, f"{quantity.word}_steady", quantity.unit, steady[0], steady[1], STEADY_TOLERANCE))
+    base = steady[1] if is_steady else 0.0
+    for word, sign in (("highest", 1.0), ("lowest", -1.0)):
+        theirs = _peak(t, sign * trace.reference)
+        # A value that is only reached at the end, or before anything happens, is no peak.
+        if theirs is None or sign * base + 0.02 * trace.span > theirs[1] or theirs[1] < 0.1 * trace.span:
+            continue
+        ours = _peak(t, sign * trace.ours)
+        if ours is None:
+            ours = (math.nan, math.nan)
+        rows.append(
+            relative(run, f"{quantity.word}_{word}", quantity.unit, sign * ours[1], sign * theirs[1], PEAK_TOLERANCE)
+        )
+        rows.append(absolute(run, f"{quantity.word}_{word}_time", "s", ours[0], theirs[0], TIME_TOLERANCE_S))
+    rms = math.sqrt(float(np.trapezoid((trace.ours - trace.reference) ** 2, t)) / float(t[-1] - t[0])) / trace.span
+    worst = int(np.abs(trace.ours - trace.reference).argmax())
+    rows.append(
+        Comparison(
+            run, f"{quantity.word}_rms_of_peak_to_peak", quantity.unit, float(trace.ours[worst]),
+            float(trace.reference[worst]), rms, RMS_TOLERANCE, "relative",
+        )
+    )  # fmt: skip
+    return rows
+
+
+def _peak(t: Array, values: Array) -> tuple[float, float] | None:
+    """Time and height of the highest point, by a parabola through its neighbours; None where it is at an end."""
+    index = int(values.argmax())
+    if index in (0, len(values) - 1):
+        return None
+    around = slice(index - 1, index + 2)
+    a, b, c = np.polyfit(t[around] - t[index], values[around], 2)
+    if a >= 0.0:
+        return float(t[index]), float(values[index])
+    shift = float(np.clip(-b / (2.0 * a), t[index - 1] - t[index], t[index + 1] - t[index]))
+    return float(t[index]) + shift, float(c + shift * (b + shift * a))

@@ -1,0 +1,130 @@
+"""From a table to a folder with a car that stands: `activesteer vehicle new`."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+
+from activesteer.errors import ParameterError, TyreFileError, nearest_names
+from activesteer.resources import models_dir
+from activesteer.tyre.tir import load_tir
+from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle_builder.design import DEFAULT_TYRE, Assumption, Car, Log, complete
+from activesteer.vehicle_builder.keyframe import keyframe_xml
+from activesteer.vehicle_builder.mjcf import mjcf_files
+from activesteer.vehicle_builder.readme import readme_text
+from activesteer.vehicle_builder.table import CarTable, check_points, chosen_kinds, in_vehicle_axes, read_table
+from activesteer.vehicle_builder.trim import trim
+from activesteer.vehicle_builder.trimmed import Trimmed
+from activesteer.vehicle_builder.vehicle_text import vehicle_text
+
+
+@dataclass(frozen=True)
+class NewVehicle:
+    """A car that was made.
+
+    Attributes:
+        folder: Where its files are.
+        vehicle_file: What `--vehicle` takes.
+        assumptions: The values that the table does not give.
+        trimmed: What was found by letting it stand.
+    """
+
+    folder: Path
+    vehicle_file: Path
+    assumptions: tuple[Assumption, ...]
+    trimmed: Trimmed
+
+
+def new_vehicle(
+    name: str,
+    table: str | os.PathLike[str],
+    folder: str | os.PathLike[str] | None = None,
+    front: str | None = None,
+    rear: str | None = None,
+    *,
+    overwrite: bool = False,
+) -> NewVehicle:
+    """Makes a car from a table of hardpoints, masses, springs and bushings.
+
+    Args:
+        name: Name of the car: letters, digits, `_` and `-`.
+        table: The table, .toml or .csv.
+        folder: Where its files go; `vehicles/NAME` in the current folder where not given.
+        front: Kind of the front suspension; what the table says where not given.
+        rear: Kind of the rear suspension.
+        overwrite: Replace files of an earlier car in that folder.
+
+    Returns:
+        What was made.
+
+    Raises:
+        ParameterError: the table is wrong, or the folder has files already.
+        TyreFileError: a tyre file is not found or wrong.
+        ModelError: the car cannot stand.
+    """
+    if not re.fullmatch(r"[A-Za-z][\w-]*", name):
+        msg = f"{name!r} cannot be the name of a car: a letter first, then letters, digits, _ and -"
+        raise ParameterError(msg)
+    target, table_path = Path(folder) if folder is not None else Path("vehicles") / name, Path(table)
+    if target.exists() and (not target.is_dir() or any(target.iterdir())) and not overwrite:
+        msg = f"{target} exists already and is not empty; give another folder with -o, or --overwrite to replace its files"
+        raise ParameterError(msg)
+    raw, source = read_table(table_path)
+    kinds = chosen_kinds(raw, front, rear)
+    check_points(raw, kinds, source)
+    log = Log()
+    tyres = {axle: _tyre(axle, raw, table_path.parent, log) for axle in ("front", "rear")}
+    given = in_vehicle_axes(raw)
+    car = complete(name, given, kinds, {axle: (file, parameters) for axle, (file, parameters, _) in tyres.items()}, log)
+    # Everything is made in a folder of its own: a car that cannot stand leaves nothing behind.
+    with tempfile.TemporaryDirectory() as scratch:
+        made = Path(scratch)
+        for _, _, own in tyres.values():
+            if own is not None:
+                shutil.copyfile(own, made / own.name)
+        trimmed = trim(car, lambda found: _write(made, car, found), log)
+        _write(made, car, trimmed, final=True)
+        text, keyframes = keyframe_xml(made / f"{name}.toml")
+        keyframes.write_text(text, encoding="utf-8")
+        shutil.copyfile(table_path, made / f"table{table_path.suffix.lower()}")
+        readme = readme_text(car, trimmed, f"table{table_path.suffix.lower()}")
+        (made / "README.md").write_text(readme, encoding="utf-8")
+        try:
+            shutil.copytree(made, target, dirs_exist_ok=True)
+        except OSError as reason:
+            msg = f"cannot write {target}: {reason}"
+            raise ParameterError(msg) from reason
+    return NewVehicle(target, target / f"{name}.toml", tuple(car.assumptions), trimmed)
+
+
+def _write(folder: Path, car: Car, trimmed: Trimmed, *, final: bool = False) -> Path:
+    """Writes MJCF and vehicle file; the final one holds the single-track model of the car itself."""
+    for name, text in mjcf_files(car, trimmed).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    model = mujoco.MjModel.from_xml_path(str(folder / f"{car.name}.xml")) if final else None
+    file = folder / f"{car.name}.toml"
+    file.write_text(vehicle_text(car, trimmed, model), encoding="utf-8")
+    return file
+
+
+def _tyre(axle: str, table: CarTable, beside: Path, log: Log) -> tuple[str, TyreParameters, Path | None]:
+    """Name of an axle's tyre file, its parameters, and the file that is to be copied into the car's folder."""
+    name = table.axle(axle).tyre
+    if name is None:
+        log.note(f"{axle}.tyre", DEFAULT_TYRE, "the compact's")
+        name = DEFAULT_TYRE
+    own, shipped = beside / Path(name).expanduser(), models_dir() / "tyres" / name
+    if own.is_file():
+        return own.name, load_tir(own), own
+    if shipped.is_file():
+        return name, load_tir(shipped), None
+    present = [path.name for path in shipped.parent.glob("*.tir")]
+    msg = f"{axle}.tyre: there is no file {name!r} beside the table or in models/tyres; {nearest_names(name, present)}"
+    raise TyreFileError(msg)

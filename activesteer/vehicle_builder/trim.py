@@ -1,0 +1,264 @@
+"""Lets the car stand and changes what has to change until it stands, weighs, rides and steers as the table asks.
+
+The load on an axle follows from the centre of gravity, so each spring's force is found by itself: a wheel that stands
+t too high in its arch (bump) needs a force greater by (wheel rate / motion ratio) t.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.errors import ModelError
+from activesteer.rigs.kc.held_car import Case, HeldCar
+from activesteer.scenario import resolve
+from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.tyre.vertical import deflection_under_load, vertical_force
+from activesteer.vehicle import Vehicle
+from activesteer.vehicle.parameters import Friction
+from activesteer.vehicle_builder.design import Axle, Car, Log, rack_per_steer_m
+from activesteer.vehicle_builder.masses import chassis_of, whole
+from activesteer.vehicle_builder.motion import corner_motion
+from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
+
+Array = NDArray[np.float64]
+Write = Callable[[Trimmed], Path]
+"""Writes the car's files and returns the vehicle file."""
+
+_ROUNDS: Final = 25
+_TRAVEL_M: Final = 1e-5
+_ANGLE_RAD: Final = 2e-6
+_RATE_SHARE: Final = 1e-4
+_SWEEP_M: Final = np.linspace(-0.015, 0.015, 7)
+"""As in the rig's definition of the wheel rate [m]."""
+_STEER_RAD: Final = np.radians(np.linspace(-20.0, 20.0, 9))
+_RATIO: Final = 16.0
+_STOPS_M: Final = (0.035, 0.065)
+"""Wheel travel to the stops where the table says nothing: bump, rebound [m]."""
+_CURVE_MPS: Final = (-1.5, -0.6, -0.3, -0.13, -0.05, 0.0, 0.05, 0.13, 0.3, 0.6, 1.5)
+_CURVE_N: Final = (-1750.0, -950.0, -620.0, -320.0, -130.0, 0.0, 60.0, 155.0, 310.0, 500.0, 950.0)
+_CURVE_NSPM: Final = 1900.0
+"""The front damper of the compact, and the mean of its slopes on both sides of rest."""
+
+
+@dataclass(frozen=True)
+class _Stand:
+    """How the car stands."""
+
+    vehicle: Vehicle
+    held: HeldCar
+    travel_m: Array
+    toe_rad: Array
+    camber_rad: Array
+
+
+def trim(car: Car, write: Write, log: Log) -> Trimmed:
+    """Finds everything that `Trimmed` holds.
+
+    Args:
+        car: The car.
+        write: Writes its files.
+        log: Where assumptions go.
+
+    Returns:
+        What was found; the files are written with it.
+
+    Raises:
+        ActiveSteerError: the car cannot stand.
+    """
+    trimmed = Trimmed(pinion_radius_m=car.table.steering.pinion_radius_m or rack_per_steer_m(car.front) / _RATIO)
+    mjcf = write(trimmed).with_suffix(".xml")
+    model = _compiled(mjcf)
+    trimmed.chassis = chassis_of(car, model, log)
+    write(trimmed)
+    model = _compiled(mjcf)
+    body = whole(model)
+    trimmed.cg_m = float(body.cg_m[0]), float(body.cg_m[2])
+    share = (body.cg_m[0] - car.rear.wheel_centre_m[0]) / car.wheelbase_m
+    loads = {
+        "front": 0.5 * body.mass_kg * share * GRAVITY_MPS2,
+        "rear": 0.5 * body.mass_kg * (1 - share) * GRAVITY_MPS2,
+    }
+    if min(loads.values()) <= 0.0:
+        msg = f"the centre of gravity, at x {body.cg_m[0]:.3f} m, does not lie between the axles: the car falls over"
+        raise ModelError(msg)
+    ratios: dict[str, tuple[float, float]] = {}
+    rates: dict[str, float | None] = {}
+    sprung: dict[str, float] = {}
+    for axle in car.axles:
+        motion = corner_motion(model, axle.corner).per_travel
+        ratios[axle.name] = motion[f"{axle.corner}_spring"], motion[f"{axle.corner}_damper"]
+        for part, ratio in zip(("spring", "damper"), ratios[axle.name], strict=True):
+            if not 0.15 < ratio < 1.6:
+                msg = (
+                    f"{axle.name}: the {part} shortens by {ratio:.2f} of the wheel's travel in bump; 0.15 to 1.6 are "
+                    f"possible in a car. Are {part}_inner (chassis) and {part}_outer (suspension) exchanged, or {part}_on wrong?"
+                )
+                raise ModelError(msg)
+        unsprung = float(model.body_subtreemass[model.body(f"{axle.corner}_knuckle").id])
+        sprung[axle.name] = loads[axle.name] / GRAVITY_MPS2 - unsprung
+        rates[axle.name] = _wanted_rate(axle, loads[axle.name], sprung[axle.name])
+        _first_guess(axle, trimmed.axle(axle.name), ratios[axle.name], rates[axle.name], sprung[axle.name], log)
+    wheel_rates = _let_stand(car, trimmed, write, ratios, rates)
+    _fit_steering(car, trimmed, write, log)
+    for axle in car.axles:
+        tyre = tyre_rate_Npm(axle.tyre_parameters, loads[axle.name])
+        rate = wheel_rates[axle.name]
+        _fit_damper(axle, trimmed.axle(axle.name), ratios[axle.name][1], rate * tyre / (rate + tyre), sprung[axle.name])
+    write(trimmed)
+    return trimmed
+
+
+def _compiled(mjcf: Path) -> mujoco.MjModel:
+    try:
+        return mujoco.MjModel.from_xml_path(str(mjcf))
+    except ValueError as reason:
+        msg = f"{mjcf.name}: {reason}"
+        raise ModelError(msg) from reason
+
+
+def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
+    """Vertical stiffness of a tyre under a load [N/m]."""
+    pressure = float(tyre["INFLPRES"])
+    deflection = deflection_under_load(tyre.array, load_N, 0.0, pressure, 0.0, 0.0, 0.0)
+    more, less = (vertical_force(tyre.array, deflection + step, 0.0, pressure) for step in (1e-4, -1e-4))
+    return float((more - less) / 2e-4)
+
+
+def _wanted_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
+    """Wheel rate that the table asks for, by itself or by the ride frequency; None where it gives the spring's rate."""
+    if axle.table.wheel_rate_Npm is not None or axle.ride_frequency_Hz is None:
+        return axle.table.wheel_rate_Npm
+    ride = sprung_kg * (2.0 * math.pi * axle.ride_frequency_Hz) ** 2
+    tyre = tyre_rate_Npm(axle.tyre_parameters, load_N)
+    if ride > 0.8 * tyre:
+        msg = (
+            f"{axle.name}.ride_frequency_Hz: {axle.ride_frequency_Hz:g} Hz of {sprung_kg:.0f} kg needs {ride:.0f} N/m, "
+            f"and the tyre alone has {tyre:.0f} N/m"
+        )
+        raise ModelError(msg)
+    return ride * tyre / (tyre - ride)
+
+
+def _first_guess(
+    axle: Axle, found: TrimmedAxle, ratios: tuple[float, float], rate: float | None, sprung_kg: float, log: Log
+) -> None:
+    spring, damper = ratios
+    found.spring_rate_Npm = axle.table.spring_rate_Npm or (rate or 24000.0) / spring**2
+    found.spring_force_N = sprung_kg * GRAVITY_MPS2 / spring
+    found.wheel_x_rad, found.wheel_z_rad = -axle.camber_rad, -axle.toe_rad
+    bump, rebound = axle.table.bump_stop_m, axle.table.rebound_stop_m
+    found.bump_stop_m = log.take(f"{axle.name}.bump_stop_m", bump, _STOPS_M[0] * damper, "35 mm at the wheel", "m")
+    found.rebound_stop_m = log.take(
+        f"{axle.name}.rebound_stop_m", rebound, _STOPS_M[1] * damper, "65 mm at the wheel", "m"
+    )
+
+
+def _stand(vehicle_file: Path) -> _Stand:
+    scenario = resolve("standstill", vehicle_file)
+    smooth = dataclasses.replace(scenario.car, friction=Friction())
+    vehicle = Vehicle(scenario.mjcf, smooth, scenario.tyres, scenario.maneuver.road)
+    design = mujoco.MjData(vehicle.model)
+    mujoco.mj_kinematics(vehicle.model, design)
+    chassis = vehicle.model.body("chassis").id
+    turn = vehicle.data.xmat[chassis].reshape(3, 3).T
+    travel, toe, camber = [], [], []
+    for corner in CORNERS:
+        wheel = vehicle.model.body(f"{corner}_wheel").id
+        now = turn @ (vehicle.data.xpos[wheel] - vehicle.data.xpos[chassis])
+        travel.append(now[2] - design.xpos[wheel, 2])
+        x, y, z = turn @ vehicle.data.xmat[wheel].reshape(3, 3)[:, 1]
+        inwards = -1.0 if corner.endswith("l") else 1.0
+        toe.append(math.atan2(-x, y) * inwards)
+        camber.append(math.asin(z) * inwards)
+    return _Stand(vehicle, HeldCar(vehicle), np.array(travel), np.array(toe), np.array(camber))
+
+
+def wheel_rates_Npm(held: HeldCar) -> dict[str, float]:
+    """Wheel rates by axle as the rig defines them [N/m]."""
+    loads = []
+    for travel in _SWEEP_M:
+        held.equilibrium(Case(height_m=np.full(4, travel)))
+        loads.append(held.load_N.copy())
+    held.reset()
+    slopes = np.polyfit(_SWEEP_M, np.array(loads), 1)[0]
+    return {"front": float(slopes[:2].mean()), "rear": float(slopes[2:].mean())}
+
+
+def _let_stand(
+    car: Car, trimmed: Trimmed, write: Write, ratios: dict[str, tuple[float, float]], wanted: dict[str, float | None]
+) -> dict[str, float]:
+    """Newton's method by axle; returns the wheel rates."""
+    for _ in range(_ROUNDS):
+        stand = _stand(write(trimmed))
+        rates = wheel_rates_Npm(stand.held)
+        done = True
+        for index, axle in ((0, car.front), (2, car.rear)):
+            found, ratio, rate = trimmed.axle(axle.name), ratios[axle.name][0], wanted[axle.name]
+            travel = float(stand.travel_m[index : index + 2].mean())
+            toe = float(stand.toe_rad[index : index + 2].mean()) - axle.toe_rad
+            camber = float(stand.camber_rad[index : index + 2].mean()) - axle.camber_rad
+            off = 0.0 if rate is None else rates[axle.name] / rate - 1.0
+            done &= abs(travel) < _TRAVEL_M and max(abs(toe), abs(camber)) < _ANGLE_RAD and abs(off) < _RATE_SHARE
+            found.spring_force_N += travel * max(rates[axle.name], 0.3 * found.spring_rate_Npm * ratio**2) / ratio
+            found.wheel_x_rad += camber
+            found.wheel_z_rad += toe
+            # Only near the design position: beyond it stops and progressive links take part.
+            if rate is not None and abs(travel) < 0.01:
+                found.spring_rate_Npm -= off * rate / ratio**2
+                if found.spring_rate_Npm <= 0.0:
+                    msg = f"{axle.name}: the links alone give a wheel rate above the {rate:.0f} N/m that are asked for"
+                    raise ModelError(msg)
+        if done:
+            return rates
+    msg = (
+        f"the car does not come to stand in its design position within {_ROUNDS} rounds: wheels at "
+        f"{', '.join(f'{1e3 * value:.2f}' for value in stand.travel_m)} mm of travel; are spring rates and stops possible?"
+    )
+    raise ModelError(msg)
+
+
+def _fit_steering(car: Car, trimmed: Trimmed, write: Write, log: Log) -> None:
+    """The pinion for the ratio, or the ratio of the pinion."""
+    wanted = car.table.steering.ratio
+    if wanted is None and car.table.steering.pinion_radius_m is None:
+        wanted = _RATIO
+        log.note("steering.ratio", f"{_RATIO:g}", "passenger car, 14 to 18")
+    for _ in range(4):
+        trimmed.ratio = _ratio(_stand(write(trimmed)).held)
+        if wanted is None or abs(trimmed.ratio / wanted - 1.0) < 1e-4:
+            return
+        trimmed.pinion_radius_m *= trimmed.ratio / wanted
+        trimmed.ratio = wanted
+
+
+def _ratio(held: HeldCar) -> float:
+    """Steering wheel angle over mean steer angle of the front wheels, slope within 20 deg, unloaded."""
+    steer = []
+    for angle in _STEER_RAD:
+        held.equilibrium(Case("contact", steering_wheel_rad=float(angle)))
+        axles = [held.wheel(corner).rotation[:, 1] for corner in (0, 1)]
+        steer.append(np.mean([math.atan2(-axis[0], axis[1]) for axis in axles]))
+    held.reset()
+    return 1.0 / float(np.polyfit(_STEER_RAD, steer, 1)[0])
+
+
+def _fit_damper(axle: Axle, found: TrimmedAxle, ratio: float, ride_Npm: float, sprung_kg: float) -> None:
+    table = axle.table
+    if table.damper_velocity_mps is not None and table.damper_force_N is not None:
+        found.damper_velocity_mps, found.damper_force_N = table.damper_velocity_mps, table.damper_force_N
+        return
+    damping = table.damper_Nspm
+    if damping is None:
+        damping = 2.0 * (axle.damping_ratio or 0.28) * math.sqrt(ride_Npm * sprung_kg) / ratio**2
+    found.damper_velocity_mps = _CURVE_MPS
+    found.damper_force_N = tuple(round(force * damping / _CURVE_NSPM, 1) for force in _CURVE_N)
