@@ -20,6 +20,10 @@ from activesteer.commands import (
     reproduce,
     run,
     tyre,
+    validate,
+    vehicle,
+    video,
+    watch,
 )
 from activesteer.errors import ActiveSteerError
 from activesteer.version import __version__
@@ -54,6 +58,23 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="activesteer", description="A multibody car with active steering, in MuJoCo.")
     parser.add_argument("--version", action="version", version=f"activesteer {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for command in (run, reproduce, figures, replay, report, listing, info, tyre, kc, identify, linearise, bench):
+    for command in (
+        run,
+        reproduce,
+        figures,
+        replay,
+        watch,
+        video,
+        report,
+        listing,
+        info,
+        tyre,
+        kc,
+        validate,
+        vehicle,
+        identify,
+        linearise,
+        bench,
+    ):
         command.add_to(commands)
     return parser

@@ -1,12 +1,15 @@
-"""Makes the pictures of the documentation that come from runs: `python tools/make_doc_pictures.py [NAME]...`
+"""Makes the pictures of the documentation that come from runs: `python tools/make_doc_pictures.py [NAME]...`.
 
-One for every manoeuvre, as `activesteer run MANEUVER --plot` draws it, and those of the controller and tyre pages. Without names all
-are made, in a minute or two; to be run again when the car, a controller or a manoeuvre has changed.
+One for every manoeuvre and those of the pages on controllers and tyres. Without names all are made, in a minute or two;
+to be run again when the car, a controller or a manoeuvre has changed. What `activesteer run MANEUVER --plot` draws is
+taken where it says something; driving straight and standing are shown by other channels, and the sweep as the frequency
+response that it is driven for.
 """
 
 from __future__ import annotations
 
 import io
+import math
 import re
 import sys
 import tempfile
@@ -14,12 +17,17 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
 from PIL import Image
 
-from activesteer.analysis.figures import BY_KIND, time_histories
+from activesteer.analysis.figures import BY_KIND, style, time_histories
+from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL, Panel
+from activesteer.analysis.frequency_response import frequency_response
+from activesteer.pictures import new_figure
 from activesteer.resources import list_maneuvers, models_dir
 from activesteer.runner import prepared, run_scenario
 from activesteer.scenario import resolve
+from activesteer.tyre import MagicFormula, load_tir
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,6 +39,29 @@ COLOURS: Final = 64
 SYSTEMS: Final = ("none", "ars", "afs")
 CONTROL_FREE: Final = frozenset({"slowly_increasing_steer", "constant_radius", "open_loop"})
 """Kinds that are there to look at the car itself, or in which no system has anything to do."""
+
+LOADS: Final = (
+    Panel("front left\nload [kN]", "fl_tyre_fz_N", 1e-3),
+    Panel("rear left\nload [kN]", "rl_tyre_fz_N", 1e-3),
+)
+PITCH: Final = Panel("pitch angle\n[deg]", "pitch_rad", math.degrees(1.0))
+WAY: Final = Panel("way\n[mm]", "x_m", 1e3)
+BRAKE: Final = Panel("brake torque\nfront left [Nm]", "fl_brake_torque_Nm", 1.0)
+PANELS: Final[Mapping[str, Sequence[Panel]]] = {
+    "straight_line": (SPEED, Panel("drive torque\nfront left [Nm]", "fl_drive_torque_Nm", 1.0), *LOADS),
+    "standstill": (WAY, *LOADS),
+    "hill_hold": (WAY, BRAKE, *LOADS),
+    "drive_off_and_stop": (SPEED, Panel("longitudinal\nacc. [m/s²]", "ax_mps2", 1.0), PITCH, *LOADS),
+    "parking": (
+        STEERING_WHEEL,
+        Panel("front left\nsteer [deg]", "fl_steer_rad", math.degrees(1.0)),
+        Panel("aligning moment\nfront left [Nm]", "fl_tyre_mz_Nm", 1.0),
+        Panel("tie rod force\nfront left [kN]", "fl_tie_rod_force_N", 1e-3),
+    ),
+}
+"""What shows a manoeuvre better than the general picture: where the car goes straight or stands, that is rounding."""
+LEAST_SPAN: Final = 0.1
+"""No axis of these is enlarged further than this, in its unit, so that what stays as it is looks so."""
 
 
 def main(names: Sequence[str]) -> None:
@@ -50,7 +81,44 @@ def _manoeuvre(name: str) -> Figure:
     scenario = prepared(resolve(name))
     kind = scenario.maneuver.kind
     controllers = ("none",) if kind in CONTROL_FREE else SYSTEMS
-    return _draw(kind, {controller: run_scenario(scenario, controller) for controller in controllers})
+    runs = {controller: run_scenario(scenario, controller) for controller in controllers}
+    if kind == "sine_sweep":
+        return _frequency_responses(runs)
+    if name not in PANELS:
+        return _draw(kind, runs)
+    figure = style.time_figure(runs, PANELS[name])
+    for axis in figure.get_axes():
+        low, high = axis.get_ylim()
+        if high - low < LEAST_SPAN:
+            middle = 0.5 * (low + high)
+            axis.set_ylim(middle - 0.5 * LEAST_SPAN, middle + 0.5 * LEAST_SPAN)
+        axis.ticklabel_format(useOffset=False)
+    return figure
+
+
+def _frequency_responses(runs: Mapping[str, Any]) -> Figure:
+    """Gain and phase of the yaw rate, and gain of the lateral acceleration, over the steering wheel angle."""
+    figure = new_figure(7.5, 6.0)
+    axes = figure.subplots(3, 1, sharex=True)
+    frequencies_Hz = np.geomspace(0.2, 4.0, 120)
+    for curve in style.curves(runs):
+        yaw, lateral = (
+            frequency_response(curve.recording, name, frequencies_Hz) for name in ("yaw_rate_radps", "ay_mps2")
+        )
+        phase_deg = np.degrees(np.unwrap(np.angle(yaw.response)))
+        shown = (np.abs(yaw.response), phase_deg, np.radians(np.abs(lateral.response)))
+        for axis, values in zip(axes, shown, strict=True):
+            axis.semilogx(yaw.frequency_Hz, values, color=curve.colour, linewidth=1.4, label=curve.label)
+    titles = ("yaw rate gain\n[1/s]", "yaw rate phase\n[deg]", "lateral acc. gain\n[m/s² per deg]")
+    for axis, title in zip(axes, titles, strict=True):
+        style.plain(axis, title)
+    ticks = (0.2, 0.5, 1, 2, 4)
+    axes[-1].set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes[-1].minorticks_off()
+    axes[-1].set_xlabel("frequency [Hz]")
+    figure.align_ylabels(list(axes))
+    style.name_curves(figure, axes[0])
+    return figure
 
 
 def _controller() -> dict[str, Figure]:
@@ -69,11 +137,6 @@ def _controller() -> dict[str, Figure]:
 
 def _tyres() -> dict[str, Figure]:
     """Side force of the summer and of the winter tyre over slip angle, at three loads."""
-    import numpy as np  # noqa: PLC0415 - only for this one
-
-    from activesteer.pictures import new_figure  # noqa: PLC0415
-    from activesteer.tyre import MagicFormula, load_tir  # noqa: PLC0415
-
     figure = new_figure(6.0, 3.2)
     axis = figure.subplots()
     alpha_deg = np.linspace(0.0, 15.0, 151)
@@ -83,9 +146,8 @@ def _tyres() -> dict[str, Figure]:
             forces = tyre.evaluate(np.full_like(alpha_deg, load_N), 0.0, np.radians(alpha_deg))
             label = file if load_N == 4000.0 else "_hidden"
             axis.plot(alpha_deg, forces.fy_N / 1000.0, color=colour, label=label)
-    axis.set(xlabel="slip angle [deg]", ylabel="side force [kN]", xlim=(0.0, 15.0))
-    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
-    axis.spines[["top", "right"]].set_visible(False)
+    axis.set(xlabel="slip angle [deg]", xlim=(0.0, 15.0))
+    style.plain(axis, "side force [kN]")
     axis.legend(frameon=False)
     return {"tyres_side_force": figure}
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
+from activesteer.lane import Lane
 
 Array = NDArray[np.float64]
 
@@ -18,24 +19,6 @@ AFTER_M: Final = 50.0
 """How much of the road is shown before the first gate and after the last [m]."""
 BESIDE_M: Final = 2.0
 """How much of it beside the course [m]; who leaves the track leaves the picture."""
-
-
-class Lane(NamedTuple):
-    """A stretch that the car has to stay within.
-
-    Attributes:
-        name: Its name.
-        start_x_m: Where it begins [m].
-        end_x_m: Where it ends [m].
-        right_y_m: Its right side [m].
-        left_y_m: Its left side [m].
-    """
-
-    name: str
-    start_x_m: float
-    end_x_m: float
-    right_y_m: float
-    left_y_m: float
 
 
 class Course(NamedTuple):

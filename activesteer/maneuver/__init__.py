@@ -1,9 +1,10 @@
 """Manoeuvres: TOML files that say what is asked of the driver, on which road, and for how long."""
 
+from activesteer.lane import Lane
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.constant_radius import ConstantRadius
-from activesteer.maneuver.course import Course, Lane
+from activesteer.maneuver.course import Course
 from activesteer.maneuver.follow_path import FollowPath
 from activesteer.maneuver.kinds import KINDS, build_maneuver, filled_from_csv, maneuver_class
 from activesteer.maneuver.lane_change import LaneChange

@@ -68,7 +68,7 @@ class OpenLoop(Maneuver):
         return Reference(angle, speed, pedal, self.drive == "hold_speed" and pedal == 0.0, None, rack)
 
     def settling_reference(self) -> Reference:
-        """As at the start, but without the torques of the wheels: the car is to roll at its speed; see the base class."""
+        """As at the start, but without torques of the wheels: the car is to roll at its speed; see the base class."""
         reference = self.reference(0.0)
         if self.wheel_torques is None:
             return reference

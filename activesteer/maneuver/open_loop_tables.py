@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 
 from activesteer.config import Range, Source
 from activesteer.conventions import CORNERS
-from activesteer.errors import ManeuverError, nearest_names
+from activesteer.errors import ManeuverError
 from activesteer.maneuver.csv_table import find_csv, read_columns
 
 
@@ -143,16 +143,20 @@ def with_tables(table: Mapping[str, Any], own: Path | None, source: Source) -> t
             raise source.fail((key,), f"{key} and the table [{name}] are two ways to give the values; leave one out")
         file = find_csv(filled[key], own, source, (key,))
         try:
-            values, places = read_columns(file, ("time_s",), columns)
-            if len(values) == 1:
-                msg = f"{file.name}, line 1: none of the columns {', '.join(columns)}; {nearest_names('', columns)}"
-                raise ManeuverError(msg)
-            for number, (earlier, later) in enumerate(pairwise(values["time_s"]), 1):
-                if later <= earlier:
-                    msg = f"{places[number]}: time_s does not increase from {earlier:g} to {later:g} s"
-                    raise ManeuverError(msg)
+            filled[name] = _read(file, columns)
         except ManeuverError as reason:
             raise source.fail((key,), str(reason)) from reason
-        filled[name] = values
         files[f"tables/{file.name}"] = file.read_bytes()
     return filled, files
+
+
+def _read(file: Path, columns: Sequence[str]) -> dict[str, list[float]]:
+    values, places = read_columns(file, ("time_s",), columns)
+    if len(values) == 1:
+        msg = f"{file.name}, line 1: must name at least one of the columns {', '.join(columns)}"
+        raise ManeuverError(msg)
+    for number, (earlier, later) in enumerate(pairwise(values["time_s"]), 1):
+        if later <= earlier:
+            msg = f"{places[number]}: time_s does not increase from {earlier:g} to {later:g} s"
+            raise ManeuverError(msg)
+    return values

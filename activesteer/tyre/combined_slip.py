@@ -75,8 +75,9 @@ def friction_ellipse(
     Returns:
         Factors of the longitudinal and of the lateral force, 0 to 1.
 
-    Source: the friction ellipse of MSC's PAC2002 (without its weights), as in Project Chrono's ChPac02Tire: with
-    t = |alpha_c| / |kappa_c|, F_x = F_x0 / sqrt(1 + (mu_x t / mu_ymax)^2), F_y = F_y0 / sqrt(1 + (mu_y / (t mu_xmax))^2).
+    Source: the friction ellipse of MSC's PAC2002 (without its weights), as in Project Chrono's ChPac02Tire:
+    F_x = F_x0 / sqrt(1 + (mu_x t / mu_ymax)^2), F_y = F_y0 / sqrt(1 + (mu_y / (t mu_xmax))^2) with the ratio of the
+    shifted slips t = |alpha_c| / |kappa_c|.
     """
     s_hx = (p[c.PHX1] + p[c.PHX2] * dfz) * p[c.LHX] * d
     shifted = p[c.LMUX] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmux

@@ -38,7 +38,7 @@ class TyreConventions:
     """What the road's friction scales: `formula`: all that LMUX and LMUY do; `peaks`: only the peaks D_x and D_y, not
     shifts, trail and residual moment."""
     slip_velocity: str = "contact_point"
-    """Whose lateral velocity is the slip: `contact_point` has a part from the rate of camber, `wheel_centre` has not."""
+    """Whose lateral velocity is the slip: `contact_point` (has a part from the rate of camber) or `wheel_centre`."""
     rolling_radius: str = "file"
     """Effective rolling radius: `file`: from BREFF, DREFF, FREFF; `third_of_deflection`: R_0 less a third of the
     deflection."""

@@ -74,7 +74,8 @@ from __future__ import annotations
 
 (
     # How the coefficients are evaluated: `conventions.TyreConventions`; 0 and 1 where not said otherwise.
-    CAMBER_OFF, RELAXATION_OFF, FRICTION_ELLIPSE, SCALE_PEAKS_ONLY, SLIP_AT_CENTRE, RADIUS_BY_DEFLECTION, TRAIL_BY_SCALED_LOAD,
+    CAMBER_OFF, RELAXATION_OFF, FRICTION_ELLIPSE, SCALE_PEAKS_ONLY, SLIP_AT_CENTRE, RADIUS_BY_DEFLECTION,
+    TRAIL_BY_SCALED_LOAD,
     SPEED_OFFSET,         # [m/s]
     REFERENCE_FRICTION,
 ) = range(278, 287)

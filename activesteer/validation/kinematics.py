@@ -176,15 +176,15 @@ def _rack(rig: _Rig, reference: Table, rack_per_rad_m: float) -> tuple[list[Comp
     order = np.argsort(np.abs(x), kind="stable")
     for index in order:
         rig.set(held_mm, 1e-3 * float(x[index]) / rack_per_rad_m)
-        for corner in steer:
+        for corner, angles in steer.items():
             axis = rig.axis(corner)
-            steer[corner].append(math.degrees(math.atan2(-axis[0], axis[1])))
+            angles.append(math.degrees(math.atan2(-axis[0], axis[1])))
             inclination[corner].append(math.degrees(math.asin(axis[2])))
     back = np.argsort(order)
     rows: list[Comparison] = []
     curves = []
-    for corner in steer:
-        ours, theirs = np.array(steer[corner])[back], reference[f"steer_deg_{corner}"]
+    for corner, angles in steer.items():
+        ours, theirs = np.array(angles)[back], reference[f"steer_deg_{corner}"]
         centre = int(np.abs(x).argmin())
         gain = [float(np.polyfit(x[np.abs(x) <= 6.1], v[np.abs(x) <= 6.1], 3)[2]) for v in (ours, theirs)]
         rows.append(

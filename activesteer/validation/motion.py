@@ -30,8 +30,8 @@ def reference_columns(recording: Recording, point_from_cg_m: tuple[float, float,
 
     Returns:
         Column -> values at every recorded step: `t`, velocities `vx`, `vy` and accelerations `ax`, `ay` of the point in
-        the heading frame, `r`, `beta`, `roll`, `pitch`, `x`, `y`, `z`, `psi`, `rack` (negative steers left), and of each
-        wheel `delta` (heading on the ground less psi), `incl`, `Fx`, `Fy`, `Fz`, `Mz`, `alpha`, `kappa`, `travel`,
+        the heading frame, `r`, `beta`, `roll`, `pitch`, `x`, `y`, `z`, `psi`, `rack` (negative steers left), and of
+        each wheel `delta` (heading on the ground less psi), `incl`, `Fx`, `Fy`, `Fz`, `Mz`, `alpha`, `kappa`, `travel`,
         `omega`.
     """
     r = recording

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from activesteer.errors import ParameterError
 from activesteer.road import Road
 from activesteer.runner import prepared, run_scenario
 from activesteer.scenario import resolve
-from activesteer.validation.comparison import Comparison
+from activesteer.validation.comparison import Comparison, to_json
 from activesteer.validation.kinematics import Curves, compare_kinematics
 from activesteer.validation.motion import reference_columns
 from activesteer.validation.reference import ReferenceData, Table
@@ -103,6 +104,28 @@ def validate(
         if run in references:
             comparisons += compare_run(run, runs[run], references[run])
     return Validation(data, comparisons, curves, runs, references)
+
+
+def write_json(result: Validation, path: Path) -> Path:
+    """Writes the comparisons as JSON; see `comparison.to_json`.
+
+    Args:
+        result: What came out.
+        path: The file.
+
+    Returns:
+        The path.
+
+    Raises:
+        ParameterError: it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(to_json(result.comparisons), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    except OSError as reason:
+        msg = f"cannot write {path}: {reason}"
+        raise ParameterError(msg) from reason
+    return path
 
 
 def write_runs(result: Validation, folder: Path) -> list[Path]:

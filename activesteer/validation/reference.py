@@ -1,4 +1,4 @@
-"""Reads the reference numbers that travel with the package: `models/reference/NAME`, whose README says what they are."""
+"""Reads the reference numbers that travel with the package in `models/reference/NAME`, where a README explains them."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ class ReferenceData:
         point_from_cg_m: Where the other code measures the motion, from our `cg` site, chassis axes [m].
         folder: Where the files are.
         folders: Folders to look for runs in; the first that has one counts.
+        notes: Where the two codes differ, and which is right.
+        study_run: The step steer by which conventions and step sizes are compared.
     """
 
     name: str
@@ -38,6 +40,8 @@ class ReferenceData:
     point_from_cg_m: tuple[float, float, float]
     folder: Path
     folders: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
+    study_run: str = ""
 
     @classmethod
     def load(cls, name: str = "sedan", more: Path | None = None) -> ReferenceData:
@@ -62,7 +66,9 @@ class ReferenceData:
         table: dict[str, Any] = tomllib.loads((folder / "reference.toml").read_text(encoding="utf-8"))
         x, y, z = table["point_from_cg_m"]
         folders = (folder / "runs",) if more is None else (more, folder / "runs")
-        return cls(name, table["vehicle"], table["code"], (x, y, z), folder, folders)
+        notes = tuple(table.get("notes", ()))
+        study = table.get("study_run", "")
+        return cls(name, table["vehicle"], table["code"], (x, y, z), folder, folders, notes, study)
 
     def table(self, name: str) -> Table:
         """A CSV of the folder, numbers only, by column."""

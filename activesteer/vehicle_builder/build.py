@@ -15,11 +15,13 @@ from activesteer.errors import ParameterError, TyreFileError, nearest_names
 from activesteer.resources import models_dir
 from activesteer.tyre.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
-from activesteer.vehicle_builder.design import DEFAULT_TYRE, Assumption, Car, Log, complete
+from activesteer.vehicle_builder.completion import DEFAULT_TYRE, check_origin, complete
+from activesteer.vehicle_builder.design import Assumption, Car, Log
 from activesteer.vehicle_builder.keyframe import keyframe_xml
 from activesteer.vehicle_builder.mjcf import mjcf_files
 from activesteer.vehicle_builder.readme import readme_text
-from activesteer.vehicle_builder.table import CarTable, check_points, chosen_kinds, in_vehicle_axes, read_table
+from activesteer.vehicle_builder.table import CarTable, chosen_kinds, in_vehicle_axes, read_table
+from activesteer.vehicle_builder.table_checks import check_points
 from activesteer.vehicle_builder.trim import trim
 from activesteer.vehicle_builder.trimmed import Trimmed
 from activesteer.vehicle_builder.vehicle_text import vehicle_text
@@ -74,7 +76,7 @@ def new_vehicle(
         raise ParameterError(msg)
     target, table_path = Path(folder) if folder is not None else Path("vehicles") / name, Path(table)
     if target.exists() and (not target.is_dir() or any(target.iterdir())) and not overwrite:
-        msg = f"{target} exists already and is not empty; give another folder with -o, or --overwrite to replace its files"
+        msg = f"{target} is not empty; give another folder with -o, or --overwrite to replace its files"
         raise ParameterError(msg)
     raw, source = read_table(table_path)
     kinds = chosen_kinds(raw, front, rear)
@@ -83,6 +85,7 @@ def new_vehicle(
     tyres = {axle: _tyre(axle, raw, table_path.parent, log) for axle in ("front", "rear")}
     given = in_vehicle_axes(raw)
     car = complete(name, given, kinds, {axle: (file, parameters) for axle, (file, parameters, _) in tyres.items()}, log)
+    check_origin(car, raw)
     # Everything is made in a folder of its own: a car that cannot stand leaves nothing behind.
     with tempfile.TemporaryDirectory() as scratch:
         made = Path(scratch)

@@ -4,26 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.errors import ParameterError, nearest_names
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.parameters import Aerodynamics, Brakes, Powertrain
-from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind
-from activesteer.vehicle_builder.levers import Mount, mount
-from activesteer.vehicle_builder.table import AxleTable, CarTable, LinkTable
+from activesteer.vehicle_builder.axle_kinds import AxleKind
+from activesteer.vehicle_builder.levers import Mount
+from activesteer.vehicle_builder.table import AxleTable, CarTable
 
 Array = NDArray[np.float64]
-
-DEFAULT_TYRE: Final = "compact_205_55R16.tir"
-BUSHINGS_NPM: Final = {"ball_joint": 1e8, "hard": 1e7, "medium": 1e6, "soft": 3e5}
-"""Radial stiffness of one bushing by class [N/m]; classes as in pysuspension's guide to joint types, `soft` raised from
-1e5, which lets a wheel move 10 mm under 1 kN."""
-_DAMPING: Final = ((3e6, 3000.0), (6e5, 2000.0), (0.0, 1500.0))
-"""Stiffness of a link from which on it has this damping [N/m, N s/m]: 10 to 35 % of critical, as in the compact."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +70,6 @@ class Axle:
     spring: Mount
     damper: Mount
     anti_roll_bar_Npm: float
-    stop_stiffness: tuple[float, ...]
-    friction_N: float
     ride_frequency_Hz: float | None
     damping_ratio: float | None
 
@@ -146,281 +135,12 @@ class Log:
         self.note(key, f"{default:.4g} {unit}".strip(), rule)
         return default
 
+    def angle(self, key: str, given_rad: float | None, default_deg: float, rule: str) -> float:
+        """The given angle, or the default in degrees, which is then written down [rad]."""
+        if given_rad is None:
+            self.note(key, f"{default_deg:g} deg", rule)
+        return math.radians(default_deg) if given_rad is None else given_rad
+
     def note(self, key: str, value: str, rule: str) -> None:
         """Writes an assumption down."""
         self.assumptions.append(Assumption(key, value, rule))
-
-
-def complete(
-    name: str, table: CarTable, kinds: dict[str, AxleKind], tyres: dict[str, tuple[str, TyreParameters]], log: Log
-) -> Car:
-    """Makes a car of a table in vehicle coordinates.
-
-    Args:
-        name: Name of the car.
-        table: The table, points in vehicle coordinates.
-        kinds: Suspension of each axle.
-        tyres: Tyre of each axle: name of its file, and its parameters.
-        log: Where assumptions go.
-
-    Returns:
-        The car, with everything but what `trim` finds.
-
-    Raises:
-        ParameterError: something is geometrically impossible.
-    """
-    front, rear = (_axle(axle, table.axle(axle), kinds[axle], *tyres[axle], log) for axle in ("front", "rear"))
-    _check_origin(front, rear, table)
-    steering, brakes = table.steering, table.brakes
-    if brakes is None:
-        brakes = Brakes(front_torque_Nm=2200.0, rear_torque_Nm=700.0, drag_torque_Nm=1.5)
-        log.note("brakes", "2200 and 700 N m per wheel", "the compact's: 1.35 g of a car of 1430 kg, 76 % in front")
-    powertrain = table.powertrain
-    if powertrain is None:
-        powertrain = Powertrain(front_share=1.0, max_torque_Nm=1900.0, engine_brake_torque_Nm=350.0)
-        log.note("powertrain", "front-wheel drive, 1900 N m", "the compact's")
-    aero = table.aerodynamics
-    if aero is None:
-        middle = 0.5 * float(front.wheel_centre_m[0] + rear.wheel_centre_m[0])
-        aero = Aerodynamics(drag_area_m2=0.65, pressure_point_m=(round(middle, 3), 0.0, 0.6))
-        log.note("aerodynamics", "0.65 m2", "a car of the compact's class; acts between the axles, 0.6 m high")
-    track = 2.0 * max(front.wheel_centre_m[1], rear.wheel_centre_m[1])
-    rack_points = front.points["tie_rod_inner"], front.points["tie_rod_outer"]
-    return Car(
-        name,
-        table,
-        front,
-        rear,
-        log.take("width_m", table.width_m, round(float(track) + 0.27, 2), "greatest track + 0.27 m", "m"),
-        log.take("steering.rack_mass_kg", steering.rack_mass_kg, 3.0, "rack bar and half of the tie rods", "kg"),
-        log.take("steering.rack_limit_m", steering.rack_limit_m, _rack_limit(front), "36 deg of steer angle", "m"),
-        log.take("steering.rack_friction_N", steering.rack_friction_N, 150.0, "the compact's, electric assist", "N"),
-        _rack_sign(_steering_axis(front), *rack_points),
-        log.take(
-            "steering.column_stiffness_Npm", steering.column_stiffness_Npm, 4e6, "the compact's: torsion bar and assist",
-            "N/m",
-        ),
-        _kingpin(table, rear, log),
-        log.take("rear_steering.limit_deg", table.rear_steering.limit_rad, math.radians(3.0), "3 deg", "rad"),
-        brakes,
-        powertrain,
-        aero,
-        log.assumptions,
-    )  # fmt: skip
-
-
-def _axle(
-    axle: str, table: AxleTable, kind: AxleKind, tyre: str, parameters: TyreParameters, log: Log
-) -> Axle:  # fmt: skip
-    points = {name: np.array(point) for name, point in table.points.items()}
-    front = axle == "front"
-    centre, radius = points["wheel_centre"], float(parameters["UNLOADED_RADIUS"])
-    wheel_kg = log.take(
-        f"{axle}.wheel_mass_kg", table.wheel_mass_kg, round(18.5 * (radius / 0.316) ** 2, 1),
-        "18.5 kg at a tyre radius of 0.316 m, as its square", "kg",
-    )  # fmt: skip
-    outer = np.mean([points[link.outer] for link in kind.links], axis=0)
-    knuckle = _solid(
-        f"{axle}.knuckle", table.knuckle_mass_kg, table.knuckle_cg, table.knuckle_inertia_kgm2,
-        (20.5 if kind.strut else 18.0) if front else 12.5, 0.5 * (centre + outer), (0.3, 0.28, 0.16), 20.5,
-        "between the wheel centre and the mean of the outer points", log,
-    )  # fmt: skip
-    strut = carrier = None
-    if kind.strut:
-        top, bottom = points["strut_top"], points["strut_bottom"]
-        down = (bottom - top) / np.linalg.norm(bottom - top)
-        strut = _solid(
-            f"{axle}.strut", table.strut_mass_kg, table.strut_cg, table.strut_inertia_kgm2, 3.0, top + 0.1 * down,
-            (0.03, 0.03, 0.006), 3.0, "0.1 m below the top mount", log,
-        )  # fmt: skip
-    if not front:
-        carrier = _solid(
-            f"{axle}.carrier", table.carrier_mass_kg, table.carrier_cg, table.carrier_inertia_kgm2, 6.0,
-            centre - np.array([0.0, 0.04, 0.0]), (0.04, 0.05, 0.04), 6.0, "40 mm inside the wheel centre", log,
-        )  # fmt: skip
-    toe, camber = (0.05, -0.5) if front else (0.1, -1.0)
-    spring_on = table.spring_on
-    if spring_on is None:
-        spring_on = kind.spring_on
-        if not kind.strut:
-            log.note(f"{axle}.spring_on", spring_on, f"usual for a {kind.name} axle")
-    damper_on = table.damper_on or spring_on
-    if table.damper_on is None and not kind.strut:
-        log.note(f"{axle}.damper_on", damper_on, "as the spring")
-    frequency = table.ride_frequency_Hz
-    if table.spring_rate_Npm is None and table.wheel_rate_Npm is None and frequency is None:
-        frequency = 1.2 if front else 1.4
-        log.note(f"{axle}.ride_frequency_Hz", f"{frequency:g} Hz", "passenger car; the rear faster, against pitch")
-    damping = table.damping_ratio
-    if damping is None and table.damper_Nspm is None and table.damper_force_N is None:
-        damping = 0.28
-        log.note(f"{axle}.damping_ratio", "0.28", "passenger car; curve of the compact's shape, rebound twice bump")
-    return Axle(
-        axle,
-        kind,
-        points,
-        tuple(_link(axle, link, table.links.get(link.name), log) for link in kind.links),
-        table,
-        tyre,
-        parameters,
-        log.take(f"{axle}.toe_deg", table.toe_rad, math.radians(toe), f"{toe:g} deg in", "rad"),
-        log.take(f"{axle}.camber_deg", table.camber_rad, math.radians(camber), f"{camber:g} deg", "rad"),
-        wheel_kg,
-        log.take(
-            f"{axle}.wheel_spin_inertia_kgm2", table.wheel_spin_inertia_kgm2, wheel_kg * (0.736 * radius) ** 2,
-            "radius of gyration 0.736 of the tyre's radius", "kg m2",
-        ),
-        log.take(
-            f"{axle}.wheel_inertia_kgm2", table.wheel_inertia_kgm2, wheel_kg * (0.56 * radius) ** 2,
-            "radius of gyration 0.56 of the tyre's radius", "kg m2",
-        ),
-        knuckle,
-        strut,
-        carrier,
-        mount(axle, "spring", spring_on, kind, points),
-        mount(axle, "damper", damper_on, kind, points),
-        _anti_roll_bar(axle, table, float(centre[1]), log),
-        table.stop_stiffness or _stops(axle, log),
-        log.take(f"{axle}.damper_friction_N", table.damper_friction_N, 40.0 if kind.strut else 30.0, "the compact's", "N"),
-        frequency,
-        damping,
-    )  # fmt: skip
-
-
-def _stops(axle: str, log: Log) -> tuple[float, ...]:
-    log.note(f"{axle}.stop_stiffness", "40000, 2.4e6, 9e7", "the compact's: cellular rubber")
-    return (40000.0, 2.4e6, 9e7)
-
-
-def _solid(
-    key: str,
-    mass: float | None,
-    cg: tuple[float, ...] | None,
-    inertia: tuple[float, ...] | None,
-    default_kg: float,
-    default_cg: Array,
-    default_inertia: tuple[float, ...],
-    of_kg: float,
-    where: str,
-    log: Log,
-) -> Solid:
-    """Mass properties of one part; inertia scales with the mass where it is not given."""
-    kg = log.take(f"{key}_mass_kg", mass, default_kg, "a part of this kind in the compact's class", "kg")
-    if cg is None:
-        log.note(f"{key}_cg", " ".join(f"{value:.3f}" for value in default_cg) + " m", where)
-    if inertia is None:
-        inertia = tuple(float(f"{value * kg / of_kg:.3g}") for value in default_inertia)
-        log.note(f"{key}_inertia_kgm2", " ".join(f"{value:g}" for value in inertia), "the compact's, in proportion")
-    return Solid(kg, default_cg if cg is None else np.array(cg), np.array(inertia))
-
-
-def _link(axle: str, kind: LinkKind, table: LinkTable | None, log: Log) -> Link:
-    table = table or LinkTable()
-    hardening, remark = table.hardening_Npm3, "given"
-    if table.stiffness_Npm is not None:
-        stiffness = table.stiffness_Npm
-    elif table.bushings_Npm is not None:
-        one, two = table.bushings_Npm
-        stiffness, remark = one * two / (one + two), f"two bushings of {one:g} and {two:g} N/m in series"
-    elif table.bushing is not None:
-        if table.bushing not in BUSHINGS_NPM:
-            words = nearest_names(table.bushing, BUSHINGS_NPM)
-            msg = f"{axle}.links.{kind.name}.bushing: no class of bushings is named {table.bushing!r}; {words}"
-            raise ParameterError(msg)
-        stiffness, remark = 0.5 * BUSHINGS_NPM[table.bushing], f"two bushings of class {table.bushing}"
-        log.note(f"{axle}.links.{kind.name}.stiffness_Npm", f"{stiffness:g} N/m", remark)
-    else:
-        stiffness, remark = kind.stiffness_Npm, f"assumed: {kind.reason}"
-        hardening = kind.hardening_Npm3 if hardening is None else hardening
-        log.note(
-            f"{axle}.links.{kind.name}",
-            f"{stiffness:g} N/m" + (f" + {hardening:g} N/m3" if hardening else ""),
-            kind.reason,
-        )
-    damping = table.damping_Nspm
-    if damping is None:
-        damping = next(value for least, value in _DAMPING if stiffness >= least)
-        log.note(f"{axle}.links.{kind.name}.damping_Nspm", f"{damping:g} N s/m", "by stiffness, as in the compact")
-    return Link(kind.name, kind.inner, kind.outer, stiffness, hardening or 0.0, damping, remark)
-
-
-def _anti_roll_bar(axle: str, table: AxleTable, half_track: float, log: Log) -> float:
-    if table.anti_roll_bar_Nmprad is not None:
-        # Both wheels carry k (z_l - z_r) = k t phi at an arm of t/2 each: K = k t2.
-        return table.anti_roll_bar_Nmprad / (2.0 * half_track) ** 2
-    return log.take(f"{axle}.anti_roll_bar_Npm", table.anti_roll_bar_Npm, 0.0, "no anti-roll bar", "N/m")
-
-
-def _steering_axis(front: Axle) -> tuple[Array, Array]:
-    """Lower and upper point of the front wheels' steering axis, without elasticity."""
-    upper = front.points["strut_top" if front.kind.strut else "uca_outer"]
-    return front.points["lca_outer"], upper
-
-
-def _rack_sign(axis: tuple[Array, Array], inner: Array, outer: Array) -> float:
-    """Sign of the rack's y when the left wheel steers left."""
-    return math.copysign(1.0, _rack_per_steer(axis, inner, outer))
-
-
-def _rack_per_steer(axis: tuple[Array, Array], inner: Array, outer: Array) -> float:
-    """Rack travel to the left per steer angle of the left wheel [m/rad], rigid links."""
-    along = (axis[1] - axis[0]) / np.linalg.norm(axis[1] - axis[0])
-    rod = outer - inner
-    if abs(rod[1]) < 1e-3:
-        msg = "front: the tie rod does not run across the car: tie_rod_inner and tie_rod_outer have the same y"
-        raise ParameterError(msg)
-    moved = np.cross(along, outer - axis[0])
-    per_steer = float(rod @ moved / rod[1])
-    if abs(per_steer) < 0.02:
-        msg = (
-            f"front: the tie rod passes the steering axis at {1e3 * abs(per_steer):.0f} mm: it cannot steer the wheel; "
-            "tie_rod_outer has to lie ahead of or behind the line through the upper and the lower joint"
-        )
-        raise ParameterError(msg)
-    return per_steer
-
-
-def rack_per_steer_m(front: Axle) -> float:
-    """Rack travel per steer angle around straight ahead, positive [m/rad], rigid links."""
-    return abs(_rack_per_steer(_steering_axis(front), front.points["tie_rod_inner"], front.points["tie_rod_outer"]))
-
-
-def _rack_limit(front: Axle) -> float:
-    return round(0.92 * rack_per_steer_m(front) * math.sin(math.radians(36.0)), 4)
-
-
-def _kingpin(table: CarTable, rear: Axle, log: Log) -> tuple[Array, Array]:
-    """Lower and upper point of the rear steering axis."""
-    lower, upper = table.rear_steering.axis_lower, table.rear_steering.axis_upper
-    if lower is not None and upper is not None:
-        return np.array(lower), np.array(upper)
-    centre = rear.wheel_centre_m
-    # The compact's: caster 2 deg, inclination 4 deg, 21 mm inside and 4 mm behind the wheel centre.
-    first = centre + np.array([0.0, -0.013, -0.1129])
-    second = centre + np.array([-0.008, -0.029, 0.1171])
-    log.note("rear_steering", "caster 2 deg, inclination 4 deg", "the compact's axis beside the wheel centre")
-    return first, second
-
-
-def _check_origin(front: Axle, rear: Axle, table: CarTable) -> None:
-    """Vehicle coordinates begin on the road below the front axle.
-
-    Raises:
-        ParameterError: the wheels do not stand there.
-    """
-    centre, radius = front.wheel_centre_m, front.radius_m
-    if abs(centre[0]) > 0.05 or not 0.75 * radius < centre[2] < 1.15 * radius:
-        scale = {"m": 1.0, "mm": 1e3}[table.units]
-        say = [f"{scale * value:g}" for value in (centre[0], 0.0, centre[2] - 0.94 * radius)]
-        msg = (
-            f"front.points.wheel_centre is at x {centre[0]:.3f} m, {centre[2]:.3f} m above the origin; vehicle "
-            f"coordinates begin on the road below the front axle, and the tyre's radius is {radius:.3f} m. If the table "
-            f"has another origin, say where that point lies in it: about origin = [{', '.join(say)}] on top of the origin given"
-        )
-        raise ParameterError(msg)
-    if rear.wheel_centre_m[0] > -0.5:
-        msg = (
-            f"rear.points.wheel_centre is at x {rear.wheel_centre_m[0]:.3f} m; x points forward, so the rear axle lies at "
-            "minus the wheelbase. Are the rear points those of the axle by itself?"
-        )
-        raise ParameterError(msg)

@@ -2,9 +2,9 @@
 
 A massless arm that turns about its inner bushings carries a force f at P as a force r f at its outer joint O, where
 r = |PH| / |OH| and H is where the line through O and P meets the arm's axis; the rest of f goes into the chassis. The
-tendon therefore runs from a point that is 1/r times as far from O as the spring's upper end is from P, to O, and through
-a pulley of 1/r. By similar triangles its length is that of the spring, in every position of the arm. What P lies beside
-the arm's plane keeps its direction and its motion ratio at the design position, but does not turn with the arm.
+tendon therefore runs from a point that is 1/r times as far from O as the spring's upper end is from P, to O, and
+through a pulley of 1/r. By similar triangles its length is that of the spring, in every position of the arm. A foot P
+beside the arm's plane has the right length and motion ratio at the design position, but does not turn with the arm.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
     lever = _lever([points[name] for name in inner], points[outer], lower, (upper - lower) / length)
     if not _LEAST < lever < _MOST:
         msg = (
-            f"{axle}: {part}_outer lies at {lever:.2f} of the length of {carrier}, seen from its inner end; a {part} on "
-            f"an arm lies between {_LEAST:g} and {_MOST:g}. Is {part}_on right, and {part}_outer on the left side?"
+            f"{axle}: {part}_outer lies at {lever:.2f} of the length of {carrier}, seen from its inner end; a {part} "
+            f"on an arm lies between {_LEAST:g} and {_MOST:g}. Is {part}_on right, and {part}_outer on the left side?"
         )
         raise ParameterError(msg)
     return Mount(carrier, lever, outer, points[outer] + (upper - lower) / lever, length)

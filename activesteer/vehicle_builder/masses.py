@@ -86,8 +86,8 @@ def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
     own = np.diag(left)
     if own.min() <= 0.0 or 2.0 * own.max() > own.sum():
         msg = (
-            f"mass.inertia_kgm2: of {_words(inertia)} kg m2 of the whole car {_words(own)} are left for the chassis when "
-            "wheels and suspensions are taken away; no body has such an inertia (each at most the sum of the others)"
+            f"mass.inertia_kgm2: of {_words(inertia)} kg m2 of the whole car {_words(own)} are left for the chassis "
+            "when wheels and suspensions are taken away; no body has such an inertia (each at most both others)"
         )
         raise ParameterError(msg)
     return Solid(mass, chassis_cg, own)

@@ -25,9 +25,9 @@ def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
     words = axle.kind.name.replace("_", " ")
     lines = [
         "<mujocoinclude>",
-        f"  <!-- {words.capitalize()} {axle.name} axle, a fragment of the chassis body. Every position is a hardpoint in",
-        "       vehicle coordinates: origin on the road below the middle of the front axle, x forward, y left, z up, design",
-        "       position. Links are tendons; an arm is two links that share their outer point. -->",
+        f"  <!-- {words.capitalize()} {axle.name} axle, a fragment of the chassis body. Every position is a",
+        "       hardpoint in vehicle coordinates: origin on the road below the front axle, x forward, y left,",
+        "       z up, design position. Links are tendons; an arm is two links that share their outer point. -->",
         "",
         "  <!-- Chassis side of links, springs and dampers"
         + ("; the tie rods start at the rack (steering.xml). -->" if axle.name == "front" else ". -->"),
@@ -212,9 +212,9 @@ def part_tendons(car: Car, part: str) -> str:
         divisor = 1.0 / mount.lever
         told.add(axle.name)
         lines += [
-            f"    <!-- {axle.name}: the {part} stands on {mount.carrier}, which has no body; the pulley ({num(divisor)}) is its",
-            f"         lever, and *_{part}_lever the point from which the length is that of the {part}. They are functions of",
-            f"         the points *_{part}_inner, *_{part}_outer, which only draw it: docs/own_car.md. -->",
+            f"    <!-- {axle.name}: the {part} stands on {mount.carrier}, which has no body: the",
+            f"         pulley ({num(divisor)}) is its lever, from *_{part}_lever on it has the {part}'s length.",
+            f"         Both follow from *_{part}_inner and *_{part}_outer, which only draw it: docs/own_car.md. -->",
         ]
     for axle in car.axles:
         mount = axle.spring if part == "spring" else axle.damper
@@ -271,7 +271,7 @@ def damper_classes(car: Car, trimmed: Trimmed) -> str:
     for axle in car.axles:
         found, length = trimmed.axle(axle.name), axle.damper.length_m
         ends = f"{num(length - found.bump_stop_m)} {num(length + found.rebound_stop_m)}"
-        stiffness = " ".join(sig(value) for value in axle.stop_stiffness)
+        stiffness = " ".join(sig(value) for value in found.stop_stiffness)
         hidden = ' group="3"' if axle.damper.start_m is not None and axle.damper.lever != 1.0 else ""
         lines.append(
             f'      <default class="{axle.name}_damper"><tendon springlength="{ends}" stiffness="{stiffness}"{hidden}/>'

@@ -55,7 +55,8 @@ def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
     free = len(dofs) - int(np.sum(values > 1e-6))
     if free != 1:
         many = "no way" if free < 1 else f"{free} ways"
-        msg = f"{corner}: {len(dofs)} degrees of freedom and {len(links)} links leave the wheel {many} to travel; 1 is needed"
+        counts = f"{len(dofs)} degrees of freedom and {len(links)} links"
+        msg = f"{corner}: {counts} leave the wheel {many} to travel; 1 is needed"
         raise ModelError(msg)
     direction = vectors[-1] / scale
     along = np.zeros((3, model.nv))

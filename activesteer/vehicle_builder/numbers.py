@@ -7,7 +7,9 @@ from collections.abc import Iterable
 
 def num(value: float, digits: int = 6) -> str:
     """A number with so many decimals at most, without zeros at its end."""
-    text = f"{round(float(value), digits):.{digits}f}".rstrip("0").rstrip(".")
+    text = f"{float(value):.{digits}f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 
 

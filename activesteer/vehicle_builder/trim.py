@@ -25,7 +25,8 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.tyre.vertical import deflection_under_load, vertical_force
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.parameters import Friction
-from activesteer.vehicle_builder.design import Axle, Car, Log, rack_per_steer_m
+from activesteer.vehicle_builder.completion import rack_per_steer_m
+from activesteer.vehicle_builder.design import Axle, Car, Log
 from activesteer.vehicle_builder.masses import chassis_of, whole
 from activesteer.vehicle_builder.motion import corner_motion
 from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
@@ -44,6 +45,8 @@ _STEER_RAD: Final = np.radians(np.linspace(-20.0, 20.0, 9))
 _RATIO: Final = 16.0
 _STOPS_M: Final = (0.035, 0.065)
 """Wheel travel to the stops where the table says nothing: bump, rebound [m]."""
+_STOP_AT_WHEEL: Final = (40000.0, 2.4e6, 9e7)
+"""Force of a stop at the wheel: a x + b x2 + c x3 [N/m, N/m2, N/m3]."""
 _CURVE_MPS: Final = (-1.5, -0.6, -0.3, -0.13, -0.05, 0.0, 0.05, 0.13, 0.3, 0.6, 1.5)
 _CURVE_N: Final = (-1750.0, -950.0, -620.0, -320.0, -130.0, 0.0, 60.0, 155.0, 310.0, 500.0, 950.0)
 _CURVE_NSPM: Final = 1900.0
@@ -83,7 +86,7 @@ def trim(car: Car, write: Write, log: Log) -> Trimmed:
     model = _compiled(mjcf)
     body = whole(model)
     trimmed.cg_m = float(body.cg_m[0]), float(body.cg_m[2])
-    share = (body.cg_m[0] - car.rear.wheel_centre_m[0]) / car.wheelbase_m
+    share = float(body.cg_m[0] - car.rear.wheel_centre_m[0]) / car.wheelbase_m
     loads = {
         "front": 0.5 * body.mass_kg * share * GRAVITY_MPS2,
         "rear": 0.5 * body.mass_kg * (1 - share) * GRAVITY_MPS2,
@@ -101,7 +104,8 @@ def trim(car: Car, write: Write, log: Log) -> Trimmed:
             if not 0.15 < ratio < 1.6:
                 msg = (
                     f"{axle.name}: the {part} shortens by {ratio:.2f} of the wheel's travel in bump; 0.15 to 1.6 are "
-                    f"possible in a car. Are {part}_inner (chassis) and {part}_outer (suspension) exchanged, or {part}_on wrong?"
+                    f"possible in a car. Are {part}_inner (chassis) and {part}_outer (suspension) exchanged, or is "
+                    f"{part}_on wrong?"
                 )
                 raise ModelError(msg)
         unsprung = float(model.body_subtreemass[model.body(f"{axle.corner}_knuckle").id])
@@ -156,10 +160,26 @@ def _first_guess(
     found.spring_rate_Npm = axle.table.spring_rate_Npm or (rate or 24000.0) / spring**2
     found.spring_force_N = sprung_kg * GRAVITY_MPS2 / spring
     found.wheel_x_rad, found.wheel_z_rad = -axle.camber_rad, -axle.toe_rad
+    if axle.kind.strut and axle.table.anti_roll_bar_Nmprad is not None:
+        # The bar acts along the strut, whose travel is less than the wheel's.
+        axle.anti_roll_bar_Npm /= damper**2
     bump, rebound = axle.table.bump_stop_m, axle.table.rebound_stop_m
     found.bump_stop_m = log.take(f"{axle.name}.bump_stop_m", bump, _STOPS_M[0] * damper, "35 mm at the wheel", "m")
     found.rebound_stop_m = log.take(
         f"{axle.name}.rebound_stop_m", rebound, _STOPS_M[1] * damper, "65 mm at the wheel", "m"
+    )
+    if axle.table.stop_stiffness is None:
+        # The force at the wheel is r F(r z): a stop that the wheel feels as the compact's is harder by r2, r3, r4.
+        found.stop_stiffness = tuple(
+            float(f"{value / damper ** (power + 2):.3g}") for power, value in enumerate(_STOP_AT_WHEEL)
+        )
+        words = ", ".join(f"{value:g}" for value in found.stop_stiffness)
+        log.note(f"{axle.name}.stop_stiffness", words, "cellular rubber, at the wheel as the compact's")
+    else:
+        found.stop_stiffness = axle.table.stop_stiffness
+    friction = axle.table.damper_friction_N
+    found.friction_N = log.take(
+        f"{axle.name}.damper_friction_N", friction, round(30.0 / damper), "30 N at the wheel", "N"
     )
 
 
@@ -171,16 +191,18 @@ def _stand(vehicle_file: Path) -> _Stand:
     mujoco.mj_kinematics(vehicle.model, design)
     chassis = vehicle.model.body("chassis").id
     turn = vehicle.data.xmat[chassis].reshape(3, 3).T
+    held = HeldCar(vehicle)
     travel, toe, camber = [], [], []
-    for corner in CORNERS:
+    for index, corner in enumerate(CORNERS):
         wheel = vehicle.model.body(f"{corner}_wheel").id
         now = turn @ (vehicle.data.xpos[wheel] - vehicle.data.xpos[chassis])
         travel.append(now[2] - design.xpos[wheel, 2])
-        x, y, z = turn @ vehicle.data.xmat[wheel].reshape(3, 3)[:, 1]
+        # On the rig, without the moments of the tyres' own asymmetry: static toe and camber are what `kc` measures.
+        x, y, z = held.wheel(index).rotation[:, 1]
         inwards = -1.0 if corner.endswith("l") else 1.0
         toe.append(math.atan2(-x, y) * inwards)
         camber.append(math.asin(z) * inwards)
-    return _Stand(vehicle, HeldCar(vehicle), np.array(travel), np.array(toe), np.array(camber))
+    return _Stand(vehicle, held, np.array(travel), np.array(toe), np.array(camber))
 
 
 def wheel_rates_Npm(held: HeldCar) -> dict[str, float]:
@@ -198,10 +220,11 @@ def _let_stand(
     car: Car, trimmed: Trimmed, write: Write, ratios: dict[str, tuple[float, float]], wanted: dict[str, float | None]
 ) -> dict[str, float]:
     """Newton's method by axle; returns the wheel rates."""
+    left_m = np.zeros(4)
     for _ in range(_ROUNDS):
         stand = _stand(write(trimmed))
         rates = wheel_rates_Npm(stand.held)
-        done = True
+        left_m, done = stand.travel_m, True
         for index, axle in ((0, car.front), (2, car.rear)):
             found, ratio, rate = trimmed.axle(axle.name), ratios[axle.name][0], wanted[axle.name]
             travel = float(stand.travel_m[index : index + 2].mean())
@@ -209,7 +232,8 @@ def _let_stand(
             camber = float(stand.camber_rad[index : index + 2].mean()) - axle.camber_rad
             off = 0.0 if rate is None else rates[axle.name] / rate - 1.0
             done &= abs(travel) < _TRAVEL_M and max(abs(toe), abs(camber)) < _ANGLE_RAD and abs(off) < _RATE_SHARE
-            found.spring_force_N += travel * max(rates[axle.name], 0.3 * found.spring_rate_Npm * ratio**2) / ratio
+            stiffness = max(rates[axle.name], 0.3 * found.spring_rate_Npm * ratio**2)
+            found.spring_force_N += travel * stiffness / ratio
             found.wheel_x_rad += camber
             found.wheel_z_rad += toe
             # Only near the design position: beyond it stops and progressive links take part.
@@ -220,9 +244,10 @@ def _let_stand(
                     raise ModelError(msg)
         if done:
             return rates
+    where = ", ".join(f"{1e3 * value:.2f}" for value in left_m)
     msg = (
-        f"the car does not come to stand in its design position within {_ROUNDS} rounds: wheels at "
-        f"{', '.join(f'{1e3 * value:.2f}' for value in stand.travel_m)} mm of travel; are spring rates and stops possible?"
+        f"the car does not come to stand in its design position within {_ROUNDS} rounds: wheels at {where} mm of "
+        "travel; are spring rates and stops possible?"
     )
     raise ModelError(msg)
 

@@ -23,6 +23,10 @@ class TrimmedAxle:
     bump_stop_m: float = 0.035
     """Compression of the damper to its bump stop."""
     rebound_stop_m: float = 0.065
+    stop_stiffness: tuple[float, ...] = (40000.0, 2.4e6, 9e7)
+    """a, b, c of the force a x + b x2 + c x3 [N/m, N/m2, N/m3]."""
+    friction_N: float = 0.0
+    """Dry friction of the damper."""
     damper_velocity_mps: tuple[float, ...] = (-1.0, 0.0, 1.0)
     damper_force_N: tuple[float, ...] = (-1900.0, 0.0, 1900.0)
 

@@ -187,8 +187,12 @@ def _named(linear: _Linear) -> dict[str, Mode]:
     for name, (inertia, rows) in _motions(linear).items():
         share = inertia * np.sum(np.abs(rows @ shapes) ** 2, axis=0) / energy
         if not share.size or share.max() < 0.1:
-            msg = f"kinematics and compliance rig: no mode of the standing car below {_FASTEST_HZ:g} Hz is its {name}"
-            raise ModelError(msg)
+            if name.startswith("body"):
+                msg = f"kinematics and compliance rig: no mode of the standing car below {_FASTEST_HZ:g} Hz is its {name}"
+                raise ModelError(msg)
+            # Hard dampers leave no oscillation of a wheel between spring and tyre.
+            named[name] = Mode(math.nan, math.nan)
+            continue
         if name == "body_pitch":
             # Bounce and pitch share two modes; what bounces more is the bounce.
             taken = np.isclose(np.abs(roots), 2.0 * math.pi * named["body_bounce"].frequency_Hz)

@@ -1,0 +1,91 @@
+"""`activesteer validate`: a car against the same car in another multibody code."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from activesteer.commands.output import print_json
+from activesteer.commands.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from activesteer.validation.reference import ReferenceData
+    from activesteer.validation.study import Response
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("validate", help="compare a car with the same car in another multibody code")
+    parser.add_argument("name", nargs="?", default="sedan", help="folder in models/reference (default: sedan)")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="folder for page, JSON and runs; none without it"
+    )
+    parser.add_argument(
+        "--reference", type=Path, metavar="DIR", help="folder with further reference runs, NAME.csv in the same columns"
+    )
+    parser.add_argument(
+        "--study", action="store_true",
+        help="also: what the other code's simplifications of the tyre cost, and what the step size costs",
+    )  # fmt: skip
+    parser.add_argument("--timestep", type=float, default=0.001, metavar="S", help="our step [s] (default: 0.001)")
+    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    parser.set_defaults(action=_validate)
+
+
+def _validate(options: argparse.Namespace) -> int:
+    from activesteer.validation import to_json, validate
+    from activesteer.validation.page import write_page
+    from activesteer.validation.programme import write_json, write_runs
+    from activesteer.validation.study import as_text
+
+    with ProgressBar("validate", quiet=options.json) as bar:
+        result = validate(
+            options.name,
+            more=options.reference,
+            timestep_s=options.timestep,
+            unknown_runs=options.output is not None,
+            progress=bar,
+        )
+    tables = _study(result.reference, quiet=options.json) if options.study else {}
+    files: list[Path] = []
+    if options.output is not None:
+        files = [
+            write_page(result, options.output / "validation.html", _titled(tables)),
+            write_json(result, options.output / "validation.json"),
+            *write_runs(result, options.output / "runs"),
+        ]
+    status = 1 if result.outside else 0
+    if options.json:
+        print_json(to_json(result.comparisons) | {key: [row._asdict() for row in rows] for key, rows in tables.items()})
+        return status
+    for comparison in result.comparisons:
+        mark = {True: " ", False: "!", None: "~"}[comparison.inside]
+        run, quantity, ours, theirs, error, tolerance = comparison.words()
+        print(f"{mark} {run:13} {quantity:42} {ours:>15} {theirs:>15} {error:>14} {tolerance:>9}")
+    kept = result.judged - len(result.outside)
+    print(f"{kept} of {result.judged} comparisons keep their tolerance (! does not, ~ has none)")
+    if options.output is not None:
+        print(f"page: {files[0]}\nruns: {len(result.runs)} CSV files in {options.output / 'runs'}")
+    if tables:
+        for title, rows in _titled(tables).items():
+            print(as_text(title, rows))
+    return status
+
+
+def _study(data: ReferenceData, *, quiet: bool) -> dict[str, list[Response]]:
+    from activesteer.validation.study import conventions, step_sizes
+
+    run = data.study_run
+    with ProgressBar("study", quiet=quiet) as bar:
+        return {
+            "conventions": conventions(data, run, lambda what: bar(0.0, what)),
+            "step_sizes": step_sizes(data, run, lambda what: bar(0.5, what)),
+        }
+
+
+def _titled(tables: Mapping[str, list[Response]]) -> dict[str, list[Response]]:
+    """The tables under the titles that they are shown with."""
+    titles = {"conventions": "What the other code's conventions cost", "step_sizes": "What the step size costs"}
+    return {titles[key]: rows for key, rows in tables.items()}

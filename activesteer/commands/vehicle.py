@@ -1,0 +1,105 @@
+"""`activesteer vehicle`: a car of one's own, from a table of hardpoints; and what is wrong with a car."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("vehicle", help="make a car from a table of hardpoints, check a car")
+    actions = parser.add_subparsers(required=True, metavar="ACTION")
+
+    new = actions.add_parser("new", help="make a car from a table of hardpoints, masses, springs and bushings")
+    new.add_argument("name", metavar="NAME", help="name of the car")
+    new.add_argument("--table", required=True, type=Path, metavar="FILE", help=".toml or .csv; see docs/own_car.md")
+    new.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for its files; default: vehicles/NAME")
+    new.add_argument("--front", metavar="KIND", help="mcpherson, double_wishbone; default: what the table says")
+    new.add_argument("--rear", metavar="KIND", help="five_link, multilink, double_wishbone; default: the table's")
+    new.add_argument("--overwrite", action="store_true", help="replace the files of an earlier car in that folder")
+    new.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    new.set_defaults(action=_new)
+
+    table = actions.add_parser("table", help="print a table that comes with the package, to start from")
+    table.add_argument("table", nargs="?", metavar="NAME", help="without it, which there are")
+    table.set_defaults(action=_table)
+
+    check = actions.add_parser("check", help="what is missing or implausible in a car; exit status 1 on errors")
+    check.add_argument("vehicle", metavar="NAME_OR_PATH", help="name, vehicle file, or its folder")
+    check.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    check.set_defaults(action=_check)
+
+    keyframe = actions.add_parser("keyframe", help="write the position in which a car stands, after it was edited")
+    keyframe.add_argument("vehicle", metavar="PATH", help="vehicle file")
+    keyframe.set_defaults(action=_keyframe)
+
+
+def _new(options: argparse.Namespace) -> int:
+    from activesteer.commands.output import print_json
+    from activesteer.vehicle_builder import new_vehicle
+
+    made = new_vehicle(
+        options.name, options.table, options.output, options.front, options.rear, overwrite=options.overwrite
+    )
+    if options.json:
+        print_json({
+            "folder": str(made.folder),
+            "vehicle_file": str(made.vehicle_file),
+            "assumptions": [
+                {"key": item.key, "value": item.value, "rule": item.rule} for item in made.assumptions
+            ],
+        })  # fmt: skip
+        return 0
+    print(f"vehicle: {made.vehicle_file}")
+    found = made.trimmed
+    for axle in ("front", "rear"):
+        part = found.axle(axle)
+        print(f"  {axle} springs {1e-3 * part.spring_rate_Npm:.1f} N/mm, {part.spring_force_N:.0f} N as it stands")
+    print(f"  steering ratio {found.ratio:.2f}, chassis {found.chassis.mass_kg:.0f} kg")
+    print(f"  {len(made.assumptions)} values were not given and assumed by a rule: {made.folder / 'README.md'}")
+    print(f"next: activesteer vehicle check {made.vehicle_file}")
+    return 0
+
+
+def _table(options: argparse.Namespace) -> int:
+    from activesteer.errors import ParameterError, nearest_names
+    from activesteer.resources import models_dir
+
+    files = {file.stem: file for file in sorted((models_dir() / "tables").iterdir())}
+    if options.table is None:
+        print("\n".join(file.name for file in files.values()))
+        return 0
+    file = files.get(options.table.removesuffix(".toml").removesuffix(".csv"))
+    if file is None:
+        msg = f"no table is named {options.table!r}; {nearest_names(options.table, files)}"
+        raise ParameterError(msg)
+    print(file.read_text(encoding="utf-8"), end="")
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from activesteer.commands.output import print_json
+    from activesteer.vehicle_builder import check_vehicle
+
+    report = check_vehicle(options.vehicle)
+    if options.json:
+        print_json(report.as_table())
+    else:
+        print(report.table())
+    return 1 if report.count("error") else 0
+
+
+def _keyframe(options: argparse.Namespace) -> int:
+    from activesteer.errors import ParameterError
+    from activesteer.vehicle_builder.keyframe import keyframe_xml
+
+    text, path = keyframe_xml(options.vehicle)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as reason:
+        msg = f"cannot write {path}: {reason}; copy the vehicle to a place of your own"
+        raise ParameterError(msg) from reason
+    print(path)
+    return 0

@@ -1,0 +1,83 @@
+"""`activesteer video FILE.mcap`: a recording as a film."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from activesteer.commands.progress import ProgressBar
+from activesteer.conventions import CORNERS
+from activesteer.errors import ParameterError
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser(
+        "video",
+        help="make a film of a recording",
+        description="Draws a recording picture by picture, without a window, and writes an MP4 or a GIF.",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE.mcap")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="OUT.mp4|gif", help="default: FILE.mp4 beside the recording"
+    )
+    parser.add_argument(
+        "--camera", default="chase", choices=("chase", "top", "wheel"), help="where it is taken from (default: chase)"
+    )
+    parser.add_argument(
+        "--corner", default=CORNERS[0], choices=CORNERS, help="the wheel that the camera `wheel` looks at (default: fl)"
+    )
+    parser.add_argument(
+        "--compare", type=Path, metavar="OTHER.mcap", help="also show the car of another recording, transparent"
+    )
+    parser.add_argument("--size", type=_size, default=(640, 480), metavar="WxH", help="pixels (default: 640x480)")
+    parser.add_argument("--fps", type=float, help="pictures a second (default: 30, of a GIF 20)")
+    parser.add_argument(
+        "--speed", type=float, default=1.0, metavar="FACTOR", help="0.25 is slow motion, 4 is fast (default: 1)"
+    )
+    parser.set_defaults(action=_video)
+
+
+def _size(text: str) -> tuple[int, int]:
+    """`640x480`."""
+    found = re.fullmatch(r"(\d{1,6})[x*](\d{1,6})", text.strip().lower())
+    if found is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is no size; one such as 1280x720 is needed")
+    return int(found[1]), int(found[2])
+
+
+def _video(options: argparse.Namespace) -> int:
+    from activesteer.recording import Recording
+    from activesteer.video import Settings, make_film
+
+    files = [options.file, *([options.compare] if options.compare is not None else [])]
+    if len(files) == 2 and files[0].resolve() == files[1].resolve():
+        msg = f"--compare {options.compare}: it is the same file, so there is nothing to compare"
+        raise ParameterError(msg)
+    recordings = [Recording.open(file, recover=True) for file in files]
+    output = options.output if options.output is not None else options.file.with_suffix(".mp4")
+    rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0
+    settings = Settings(options.camera, options.corner, options.size, rate, options.speed)
+    started = time.monotonic()
+    with ProgressBar(f"{output}", quiet=False) as progress:
+        made = make_film(dict(zip(_names(files, recordings), recordings, strict=True)), output, settings, progress)
+    took = time.monotonic() - started
+    print(
+        f"{output}: {made.pictures} pictures, {made.pictures / made.rate_hz:.1f} s at {made.rate_hz:g} a second, "
+        f"made in {took:.1f} s",
+        file=sys.stderr,
+    )
+    return 0
+
+
+def _names(files: list[Path], recordings: list[Any]) -> list[str]:
+    """The controllers where they tell the recordings apart, else the files."""
+    controllers = [str(recording.metadata.get("controller", "run")).rpartition(":")[2] for recording in recordings]
+    if len(set(controllers)) == len(controllers):
+        return controllers
+    stems = [file.stem for file in files]
+    return stems if len(set(stems)) == len(stems) else [str(file.with_suffix("")) for file in files]

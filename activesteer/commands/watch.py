@@ -1,0 +1,120 @@
+"""`activesteer watch MANEUVER`: a manoeuvre in a window, while it is driven."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, Final
+
+from activesteer.errors import ParameterError, PlaybackError
+
+_ELSEWHERE: Final = "`activesteer video` makes a film of a recording without a window"
+_LONGEST_CLOSING_S: Final = 5.0
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser(
+        "watch",
+        help="see a manoeuvre while it is driven",
+        description="Opens MuJoCo's viewer and drives the manoeuvre at the pace of a clock; nothing is recorded.",
+    )
+    parser.add_argument("maneuver", metavar="MANEUVER", help="a name from `activesteer list`, or a TOML file")
+    parser.add_argument(
+        "-c", "--controller", default="none", metavar="CONTROLLER",
+        help="none, ars, afs, or my_file.py:MyController (default: none)",
+    )  # fmt: skip
+    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
+    parser.add_argument(
+        "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
+        help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
+    )  # fmt: skip
+    parser.add_argument(
+        "--speed", type=float, default=1.0, metavar="FACTOR", help="0.25 is slow motion, 4 is fast (default: 1)"
+    )
+    parser.set_defaults(action=_watch)
+
+
+def _watch(options: argparse.Namespace) -> int:
+    from activesteer.commands.run import _override
+    from activesteer.runner import prepared
+    from activesteer.scenario import resolve
+
+    if not 0.01 <= options.speed <= 100.0:
+        msg = f"--speed: is {options.speed:g}, must be 0.01 to 100"
+        raise ParameterError(msg)
+    # What is wrong with the manoeuvre is said wherever one is; only then is a window needed.
+    scenario = resolve(options.maneuver, options.vehicle, dict(_override(text) for text in options.overrides))
+    check_display()
+    with suppress(KeyboardInterrupt):  # a way to end it
+        _show(prepared(scenario), options.controller, options.speed)
+    return 0
+
+
+def _show(scenario: Any, controller: str, speed: float) -> None:
+    import mujoco.viewer
+
+    from activesteer.live import Pacer, drive, stage_for
+    from activesteer.scenario import describe
+    from activesteer.simulation import Simulation
+
+    simulation = Simulation(scenario, controller)
+    course = scenario.maneuver.course
+    stage = stage_for(
+        simulation, course.describe() if course is not None else None, describe(scenario)["maneuver"]["road"]
+    )
+    with (
+        _threads_joined(),
+        mujoco.viewer.launch_passive(stage.model, stage.data, show_left_ui=False, show_right_ui=False) as viewer,
+    ):
+        pacer = Pacer(speed)
+        driven = drive(simulation, stage, viewer, pacer)
+        slow = f", {pacer.lost_s:.1f} s slower than the clock" if pacer.lost_s >= 0.1 else ""
+        if not driven.finished:
+            print(f"closed at {driven.simulated_s:.1f} s{slow}", file=sys.stderr)
+            return
+        print(f"{driven.simulated_s:.1f} s driven{slow}; close the window to end", file=sys.stderr)
+        while viewer.is_running():
+            time.sleep(0.05)
+            viewer.sync()
+
+
+@contextmanager
+def _threads_joined() -> Iterator[None]:
+    """Waits for the viewer's thread in the end: Python, when it shuts down under it, ends with a segmentation fault."""
+    before = set(threading.enumerate())
+    try:
+        yield
+    finally:
+        for thread in set(threading.enumerate()) - before:
+            thread.join(_LONGEST_CLOSING_S)
+
+
+def check_display() -> None:
+    """Looks for a display with OpenGL: without one, MuJoCo's viewer would wait for its window for ever.
+
+    Raises:
+        PlaybackError: there is none.
+    """
+    import glfw
+
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        window = None
+        if glfw.init():
+            glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
+            window = glfw.create_window(16, 16, "activesteer", None, None)
+            if window:
+                glfw.destroy_window(window)
+            glfw.terminate()
+    if not window:
+        # GLFW's messages come as "(number) b'words'".
+        reasons = [re.sub(r"^\(\d+\) b'(.*)'$", r"\1", str(warning.message)) for warning in told]
+        msg = f"there is no display to open a window on: {reasons[-1] if reasons else 'GLFW does not say why'}"
+        raise PlaybackError(f"{msg}; {_ELSEWHERE}")

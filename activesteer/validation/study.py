@@ -1,0 +1,127 @@
+"""What the other code's simplifications cost, and what the step size costs: tables beside the comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.runner import simulate
+from activesteer.validation.motion import reference_columns
+from activesteer.validation.reference import ReferenceData
+
+_STEADY_S: Final = 0.5
+_STEPS_S: Final = (0.000125, 0.00025, 0.0005, 0.001)
+"""The shortest stands first: the others are measured against it [s]."""
+_TYRE: Final = "vehicle.tyres.conventions."
+_RELAXATION: Final = {f"{_TYRE}relaxation": True}
+_CAMBER: Final = {f"{_TYRE}camber": True}
+_COMBINED: Final = {f"{_TYRE}combined_slip": "weights"}
+_OURS: Final = {
+    **_RELAXATION, **_CAMBER, **_COMBINED, f"{_TYRE}slip_velocity": "contact_point", f"{_TYRE}rolling_radius": "file",
+    f"{_TYRE}trail_load": "nominal", f"{_TYRE}friction_scales": "formula", f"{_TYRE}speed_offset_mps": 0.0,
+}  # fmt: skip
+VARIANTS: Final[dict[str, dict[str, Any]]] = {
+    "as the other code": {},
+    "with relaxation lengths": _RELAXATION,
+    "with camber": _CAMBER,
+    "with the formula's combined slip": _COMBINED,
+    "with all three": {**_RELAXATION, **_CAMBER, **_COMBINED},
+    "all conventions ours": _OURS,
+}
+"""Name -> overrides."""
+
+
+class Response(NamedTuple):
+    """What a step steer comes to."""
+
+    name: str
+    steady_yaw_rate_radps: float
+    peak_yaw_rate_radps: float
+    peak_time_s: float
+    steady_sideslip_rad: float
+    peak_sideslip_rad: float
+    steady_roll_rad: float
+
+    def relative_to(self, other: Response) -> dict[str, float]:
+        """Changes against another response, as shares; of the time, in seconds."""
+        changes = {
+            key: mine / theirs - 1.0
+            for key, mine, theirs in zip(self._fields[1:], self[1:], other[1:], strict=True)
+            if isinstance(mine, float) and isinstance(theirs, float)
+        }
+        return changes | {"peak_time_s": self.peak_time_s - other.peak_time_s}
+
+
+def step_sizes(data: ReferenceData, run: str, tell: Callable[[str], None] = lambda _: None) -> list[Response]:
+    """The same step steer at several steps of the engine, the shortest first.
+
+    Args:
+        data: The reference.
+        run: A step steer of it.
+        tell: Called with what comes next.
+
+    Returns:
+        A response for each step.
+    """
+    found = []
+    for step_s in _STEPS_S:
+        tell(f"step size {1e3 * step_s:g} ms")
+        found.append(_response(data, run, f"{1e3 * step_s:g} ms", {}, step_s))
+    return found
+
+
+def conventions(data: ReferenceData, run: str, tell: Callable[[str], None] = lambda _: None) -> list[Response]:
+    """The same step steer with the tyre evaluated as the other code does, and less so.
+
+    Args:
+        data: The reference.
+        run: A step steer of it.
+        tell: Called with what comes next.
+
+    Returns:
+        A response for each of `VARIANTS`.
+    """
+    found = []
+    for name, overrides in VARIANTS.items():
+        tell(name)
+        found.append(_response(data, run, name, overrides, DEFAULT_TIMESTEP_S))
+    return found
+
+
+def _response(data: ReferenceData, run: str, name: str, overrides: Mapping[str, Any], step_s: float) -> Response:
+    recording = simulate(data.maneuver(run), vehicle=data.vehicle, overrides=overrides, timestep_s=step_s)
+    columns = reference_columns(recording, data.point_from_cg_m)
+    end = columns["t"] >= columns["t"][-1] - _STEADY_S
+    turn = float(np.sign(columns["r"][end].mean()))
+    rate, slip = turn * columns["r"], turn * columns["beta"]
+    return Response(
+        name,
+        float(rate[end].mean()),
+        float(rate.max()),
+        float(columns["t"][rate.argmax()]),
+        float(slip[end].mean()),
+        float(slip.min()),
+        float(turn * columns["roll"][end].mean()),
+    )
+
+
+def as_text(title: str, rows: list[Response]) -> str:
+    """A table of responses and what they differ by from the first of them."""
+    lines = [title, f"  {'':34} {'yaw rate':>18} {'peak':>18} {'peak at':>16} {'sideslip':>18} {'peak':>18}"]
+    for row in rows:
+        change = row.relative_to(rows[0])
+        cells = [
+            f"{value:9.5f} ({100 * change[key]:+6.2f} %)"
+            for key, value in (
+                ("steady_yaw_rate_radps", row.steady_yaw_rate_radps),
+                ("peak_yaw_rate_radps", row.peak_yaw_rate_radps),
+                ("steady_sideslip_rad", row.steady_sideslip_rad),
+                ("peak_sideslip_rad", row.peak_sideslip_rad),
+            )
+        ]
+        when = f"{row.peak_time_s:.3f} s ({1e3 * change['peak_time_s']:+.0f} ms)"
+        lines.append(f"  {row.name:34} {cells[0]:>18} {cells[1]:>18} {when:>16} {cells[2]:>18} {cells[3]:>18}")
+    return "\n".join(lines)

@@ -1,0 +1,75 @@
+"""The whole check, in the order in which things can be looked at; what cannot be is said with its reason."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import mujoco
+
+from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.resources import find_vehicle
+from activesteer.rigs.kc import kinematics_compliance
+from activesteer.scenario import resolve
+from activesteer.vehicle import Vehicle
+from activesteer.vehicle_builder.check.findings import CheckReport, Finding
+from activesteer.vehicle_builder.check.geometry import geometry
+from activesteer.vehicle_builder.check.moving import moving
+from activesteer.vehicle_builder.check.parts import missing_parts
+from activesteer.vehicle_builder.check.standing import standing
+
+
+def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
+    """Looks at a car before anyone drives it.
+
+    Args:
+        vehicle: A name, the path of a vehicle file, or a folder with one.
+
+    Returns:
+        What was found; with an error at the first stage that the car does not get through.
+
+    Raises:
+        ParameterError: there is no such vehicle.
+    """
+    file = _file(vehicle)
+    findings: list[Finding] = []
+    try:
+        scenario = resolve("standstill", file)
+    except ActiveSteerError as reason:
+        return CheckReport(file.stem, (Finding("parts", "vehicle file", "error", "wrong", "", str(reason)),))
+    findings.append(Finding("parts", "vehicle file, MJCF and tyre files", "ok", "read"))
+    name = scenario.car.name
+    try:
+        model = mujoco.MjModel.from_xml_path(str(scenario.mjcf))
+    except ValueError as reason:
+        findings.append(Finding("parts", "MJCF compiles", "error", "no", "", str(reason)))
+        return CheckReport(name, tuple(findings))
+    findings += missing_parts(model)
+    if any(finding.level == "error" for finding in findings):
+        return CheckReport(name, tuple(findings))
+    findings += geometry(model)
+    try:
+        car = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.maneuver.road)
+    except ActiveSteerError as reason:
+        findings.append(Finding("standing", "static equilibrium", "error", "none", "", str(reason)))
+        return CheckReport(name, tuple(findings))
+    findings += standing(car, scenario)
+    try:
+        findings += moving(kinematics_compliance(file))
+    except ActiveSteerError as reason:
+        findings.append(Finding("riding", "kinematics and compliance", "error", "cannot be measured", "", str(reason)))
+    return CheckReport(name, tuple(findings))
+
+
+def _file(vehicle: str | os.PathLike[str]) -> Path:
+    """The vehicle file, which may be named by its folder."""
+    folder = Path(vehicle)
+    if folder.is_dir():
+        files = sorted(folder.glob("*.toml"))
+        cars = [file for file in files if file.stem == folder.name] or [file for file in files if file.stem != "table"]
+        if len(cars) == 1:
+            return cars[0]
+        names = ", ".join(file.name for file in cars) or "none"
+        msg = f"{folder} has no one vehicle file: {names}; name the file itself"
+        raise ParameterError(msg)
+    return find_vehicle(vehicle)

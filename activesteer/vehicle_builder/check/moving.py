@@ -1,0 +1,92 @@
+"""Numbers of the kinematics and compliance rig against what passenger cars have; usual.toml says that, with sources."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from activesteer.config import build, read_toml
+from activesteer.rigs.kc import KcResult
+from activesteer.vehicle_builder.check.findings import Finding, Usual, judged
+
+
+@dataclass(frozen=True)
+class UsualMetric:
+    """What is usual of one metric of the rig, in its unit."""
+
+    topic: str
+    axle: str
+    name: str
+    words: str
+    """What the report calls it."""
+    usual: tuple[float, ...]
+    """Lowest and highest; outside is a warning."""
+    possible: tuple[float, ...]
+    """Lowest and highest; beyond is an error."""
+    advice: str
+    """What to do where it is outside."""
+
+
+@dataclass(frozen=True)
+class _File:
+    metric: tuple[UsualMetric, ...]
+
+
+@functools.cache
+def usual_metrics() -> tuple[UsualMetric, ...]:
+    """All that usual.toml says, in its order."""
+    return build(_File, *read_toml(Path(__file__).with_name("usual.toml"))).metric
+
+
+def moving(result: KcResult) -> Iterator[Finding]:
+    """All findings from the rig.
+
+    Args:
+        result: What it measured.
+    """
+    yield from (finding for finding in _metrics(result) if finding.topic == "riding")
+    front, rear = result["front", "ride_frequency"], result["rear", "ride_frequency"]
+    yield judged(
+        "riding", "rear over front ride frequency", rear / front, "", Usual(1.0, 1.4, 0.4, 3.0),
+        "a rear a little faster than the front pitches least after a bump (Olley): change the springs of one axle",
+    )  # fmt: skip
+    yield from (finding for finding in _metrics(result) if finding.topic == "kinematics")
+    yield _sign(result)
+    yield from (finding for finding in _metrics(result) if finding.topic == "steering")
+    known = result.measured.parameters.steering.ratio
+    yield judged(
+        "steering", "ratio in the vehicle file, against the measured one",
+        100.0 * (known / result["front", "steering_ratio"] - 1.0), "%", Usual(-2.0, 2.0, -100.0, 100.0),
+        "write the measured one into [steering]: controllers and driver rely on it",
+    )  # fmt: skip
+
+
+def _metrics(result: KcResult) -> Iterator[Finding]:
+    units = {(entry.axle, entry.name): entry.unit for entry in result.metrics}
+    for row in usual_metrics():
+        unit = units[row.axle, row.name]
+        yield judged(
+            row.topic, row.words, result[row.axle, row.name], unit, Usual(*row.usual, *row.possible), row.advice
+        )
+
+
+def _sign(result: KcResult) -> Finding:
+    """Whether the steering wheel turned to the left turns both wheels to the left."""
+    sweep = result.curves["steering_rolling"]
+    turned = sweep.steer_rad[-1, :2] - sweep.steer_rad[sweep.zero, :2]
+    good = bool((turned > 0.0).all()) and float(sweep.x[-1]) > 0.0
+    degrees = ", ".join(f"{math.degrees(angle):.1f}" for angle in np.asarray(turned))
+    advice = "" if good else "turn the axis of the joint `rack` round: its positive travel has to steer left"
+    return Finding(
+        "steering",
+        "left turn of the steering wheel turns left",
+        "ok" if good else "error",
+        f"{degrees} deg",
+        "",
+        advice,
+    )

@@ -1,0 +1,186 @@
+"""The car at rest on its tyres: loads, height, tyres and dampers, and whether it stays where it stands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.errors import SimulationDiverged
+from activesteer.scenario import Scenario
+from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.vehicle import Vehicle, engine_warnings_held
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle_builder.check.findings import Finding, Usual, judged
+from activesteer.vehicle_builder.masses import whole
+
+_STEPS: Final = 500
+_STILL_MPS: Final = 0.01
+
+
+def standing(vehicle: Vehicle, scenario: Scenario) -> Iterator[Finding]:
+    """All findings about the car at rest.
+
+    Args:
+        vehicle: The car in static ride; it is stepped.
+        scenario: What it was made from.
+    """
+    model, data = vehicle.model, vehicle.data
+    load = data.userdata[: 4 * fb.USERDATA_PER_WHEEL].reshape(4, fb.USERDATA_PER_WHEEL)[:, fb.U_FZ].copy()
+    body = whole(model)
+    yield Finding("standing", "static equilibrium", "ok", "found")
+    yield from _loads(load, body.mass_kg)
+    yield from _height(vehicle)
+    yield from _stability(vehicle, float(data.subtree_com[0, 2]))
+    yield from _inertia(model)
+    yield from _dampers(scenario)
+    yield from _brakes(vehicle, scenario, body.mass_kg)
+    yield from _controllers_view(scenario, body.mass_kg, float(body.inertia_kgm2[2, 2]))
+    yield from _stays(vehicle)
+    yield from _tyres(scenario, load)
+
+
+def _loads(load_N: np.ndarray, mass_kg: float) -> Iterator[Finding]:
+    yield judged(
+        "standing", "mass of the whole car", mass_kg, "kg", Usual(700.0, 3000.0, 200.0, 6000.0), "check the masses"
+    )
+    share = 100.0 * load_N[:2].sum() / load_N.sum()
+    advice = "check mass.front_share, or x of the chassis' centre of gravity"
+    yield judged("standing", "share of the weight in front", share, "%", Usual(40.0, 65.0, 20.0, 80.0), advice)
+    for axle, left, right in (("front", 0, 1), ("rear", 2, 3)):
+        difference = 100.0 * abs(load_N[left] - load_N[right]) / load_N[left : right + 1].mean()
+        yield judged(
+            "standing", f"{axle} wheel loads, left against right", difference, "%", Usual(0.0, 0.1, 0.0, 2.0),
+            "left and right differ: mass off the middle, or points, springs or bushings of one side edited alone",
+        )  # fmt: skip
+
+
+def _height(vehicle: Vehicle) -> Iterator[Finding]:
+    """How far the wheels stand from where the hardpoints have them."""
+    model, data = vehicle.model, vehicle.data
+    design = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, design)
+    chassis = model.body("chassis").id
+    turn = data.xmat[chassis].reshape(3, 3).T
+    for axle, corners in (("front", CORNERS[:2]), ("rear", CORNERS[2:])):
+        travel = 0.0
+        for corner in corners:
+            wheel = model.body(f"{corner}_wheel").id
+            now = (turn @ (data.xpos[wheel] - data.xpos[chassis]))[2]
+            travel += 500.0 * float(now - (design.xpos[wheel, 2] - design.xpos[chassis, 2]))
+        advice = (
+            "the springs carry it at another height than the hardpoints were given for: change springlength "
+            "(docs/suspension.md), or make the car from its table again, which trims it"
+        )
+        yield judged(
+            "standing",
+            f"{axle} wheel travel from the design position",
+            travel,
+            "mm",
+            Usual(-2.0, 2.0, -60.0, 60.0),
+            advice,
+        )
+    w, x, y, z = data.qpos[3:7]
+    pitch = math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))))
+    roll = math.degrees(2.0 * math.atan2(x, w))
+    advice = (
+        "the wheel centres of both axles are at heights that the tyres' loaded radii do not have: check z and the tyres"
+    )
+    yield judged("standing", "pitch, positive nose down", pitch, "deg", Usual(-0.7, 0.7, -4.0, 4.0), advice)
+    yield judged("standing", "roll", roll, "deg", Usual(-0.01, 0.01, -1.0, 1.0), "left and right differ")
+
+
+def _stability(vehicle: Vehicle, height_m: float) -> Iterator[Finding]:
+    wheels = [vehicle.data.xpos[vehicle.model.body(f"{corner}_wheel").id, 1] for corner in CORNERS]
+    track = 0.5 * (wheels[0] - wheels[1] + wheels[2] - wheels[3])
+    yield judged(
+        "standing",
+        "height of the centre of gravity",
+        height_m,
+        "m",
+        Usual(0.4, 0.75, 0.15, 1.5),
+        "check mass.cg_height_m",
+    )
+    yield judged(
+        "standing", "static stability factor, track over twice the height", track / (2.0 * height_m), "",
+        Usual(1.1, 2.0, 0.8, 4.0), "below 1.1 a car rolls over before it slides: check track and height of the mass",
+    )  # fmt: skip
+
+
+def _inertia(model: mujoco.MjModel) -> Iterator[Finding]:
+    body = whole(model)
+    front, rear = (model.body(f"{corner}_wheel").id for corner in ("fl", "rl"))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    to_front, to_rear = data.xpos[front, 0] - body.cg_m[0], body.cg_m[0] - data.xpos[rear, 0]
+    index = float(body.inertia_kgm2[2, 2] / (body.mass_kg * to_front * to_rear))
+    yield judged(
+        "standing", "yaw inertia over m l_f l_r", index, "", Usual(0.8, 1.1, 0.3, 2.0),
+        "check the inertia: kg m2 about the centre of gravity, of the whole car or of the chassis",
+    )  # fmt: skip
+
+
+def _tyres(scenario: Scenario, load_N: np.ndarray) -> Iterator[Finding]:
+    for axle, tyre, load in zip(("front", "rear"), scenario.tyres, (load_N[:2].mean(), load_N[2:].mean()), strict=True):
+        nominal, most = float(tyre["FNOMIN"]), float(tyre["FZMAX"])
+        yield judged(
+            "tyres", f"{axle} static load over the tyre's nominal load", float(load) / nominal, "",
+            Usual(0.5, 1.3, 0.1, 3.0), "choose a tyre file for this load",
+        )  # fmt: skip
+        yield judged(
+            "tyres", f"{axle} highest valid load over the static load", most / float(load), "",
+            Usual(1.8, 10.0, 1.05, 100.0),
+            "in a turn the outer tyre carries up to twice its load; beyond the file's range forces stay at the limit",
+        )  # fmt: skip
+
+
+def _dampers(scenario: Scenario) -> Iterator[Finding]:
+    for axle, curve in (("front", scenario.car.dampers.front), ("rear", scenario.car.dampers.rear)):
+        pushes = [force * speed < 0.0 for speed, force in zip(curve.velocity_mps, curve.force_N, strict=True)]
+        bad = any(pushes) or float(np.interp(0.0, curve.velocity_mps, curve.force_N)) != 0.0
+        yield Finding(
+            "standing", f"{axle} damper resists its motion", "error" if bad else "ok", "no" if bad else "yes", "",
+            "force_N has the sign of velocity_mps, both positive in compression, and is 0 at rest" if bad else "",
+        )  # fmt: skip
+
+
+def _brakes(vehicle: Vehicle, scenario: Scenario, mass_kg: float) -> Iterator[Finding]:
+    brakes = scenario.car.brakes
+    radius = vehicle.data.xpos[vehicle.model.body("fl_wheel").id, 2]
+    most = 2.0 * (brakes.front_torque_Nm + brakes.rear_torque_Nm) / radius / (mass_kg * GRAVITY_MPS2)
+    yield judged(
+        "standing", "deceleration at full pedal, if the tyres hold", float(most), "g", Usual(0.9, 2.0, 0.0, 10.0),
+        "brakes.front_torque_Nm and rear_torque_Nm are per wheel",
+    )  # fmt: skip
+
+
+def _controllers_view(scenario: Scenario, mass_kg: float, yaw_inertia: float) -> Iterator[Finding]:
+    track = scenario.car.single_track
+    for what, known, real in (("mass", track.mass_kg, mass_kg), ("yaw inertia", track.yaw_inertia_kgm2, yaw_inertia)):
+        off = 100.0 * (known / real - 1.0)
+        yield judged(
+            "standing", f"{what} that controllers know, against the model's", off, "%", Usual(-2.0, 2.0),
+            "run `activesteer identify`, which writes [single_track]",
+        )  # fmt: skip
+
+
+def _stays(vehicle: Vehicle) -> Iterator[Finding]:
+    """Half a second at rest: what is unstable shows."""
+    try:
+        with engine_warnings_held():
+            for _ in range(_STEPS):
+                vehicle.step(DriverCommand(0.0, 0.0, 0.0, 0.0), SteerCommand())
+        speed = float(np.abs(vehicle.data.qvel[:6]).max())
+        warned = int(sum(warning.number for warning in vehicle.data.warning))
+    except SimulationDiverged:
+        speed, warned = math.inf, 0
+    good = math.isfinite(speed) and speed < _STILL_MPS and not warned
+    words = "yes" if good else f"no: {speed:.3g} m/s, rad/s"
+    yield Finding(
+        "standing", "stands still for 0.5 s", "ok" if good else "error", words, "",
+        "" if good else "a part without stiffness or damping, or one of a stiffness that the step cannot follow",
+    )  # fmt: skip

@@ -1,0 +1,93 @@
+"""Where the picture is taken from: behind the car, above it, or beside a wheel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import mujoco
+import numpy as np
+
+from activesteer.conventions import CORNERS
+from activesteer.errors import ParameterError, nearest_names
+from activesteer.video.track import Track
+
+CAMERAS: Final = ("chase", "top", "wheel")
+"""Names of the cameras."""
+
+
+class View(NamedTuple):
+    """A way to look at a car.
+
+    Attributes:
+        aim: Sets a camera for an instant [s].
+        shell_opacity: How opaque the shell of the car is to be: little, where the suspension is what is looked at.
+    """
+
+    aim: Callable[[mujoco.MjvCamera, float], None]
+    shell_opacity: float
+
+
+def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
+    """The camera of a name.
+
+    Args:
+        name: One of `CAMERAS`.
+        track: The car that it follows.
+        corner: The wheel that `wheel` looks at.
+
+    Raises:
+        ParameterError: there is no camera or no corner of this name.
+        PlaybackError: the recording has no such wheel.
+    """
+    if name == "chase":
+        return View(_chase(track), 1.0)
+    if name == "top":
+        return View(_top(track), 1.0)
+    if name == "wheel":
+        return View(_wheel(track, corner), 0.12)
+    msg = f"there is no camera {name!r}; {nearest_names(name, CAMERAS)}"
+    raise ParameterError(msg)
+
+
+def _chase(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
+    """Behind and above, looking over the roof at the road ahead."""
+
+    def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
+        heading = track.heading(time_s, steady=True)
+        ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+        camera.lookat = track.middle(time_s) + 1.0 * ahead - np.array([0.0, 0.0, 0.1])
+        camera.distance, camera.elevation, camera.azimuth = 9.3, -17.0, math.degrees(heading)
+
+    return aim
+
+
+def _top(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
+    """From above, x to the right and y up as in the plots; it does not turn, so that the car is seen to."""
+
+    def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
+        camera.lookat = track.middle(time_s)
+        camera.distance, camera.elevation, camera.azimuth = 28.0, -90.0, 90.0
+
+    return aim
+
+
+def _wheel(track: Track, corner: str) -> Callable[[mujoco.MjvCamera, float], None]:
+    """At a wheel from inside, where its links are; it follows the chassis, but neither rolls nor heaves with it."""
+    if corner not in CORNERS:
+        msg = f"there is no corner {corner!r}; {nearest_names(corner, CORNERS)}"
+        raise ParameterError(msg)
+    place = track.wheel_place(corner)
+    side, end = (1.0 if corner[1] == "l" else -1.0), (1.0 if corner[0] == "f" else -1.0)
+    # From the end of the car towards its middle, and outwards by 28 degrees.
+    azimuth = side * (90.0 + 62.0 * end)
+
+    def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
+        heading = track.heading(time_s)
+        cos, sin = math.cos(heading), math.sin(heading)
+        x, y, z = place
+        camera.lookat = track.chassis(time_s) + np.array([cos * x - sin * y, sin * x + cos * y, z + 0.05])
+        camera.distance, camera.elevation, camera.azimuth = 1.9, -10.0, math.degrees(heading) + azimuth
+
+    return aim

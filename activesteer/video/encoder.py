@@ -1,0 +1,204 @@
+"""Pictures into a file: MP4 by ffmpeg, GIF by Pillow."""
+
+from __future__ import annotations
+
+import importlib
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from activesteer.errors import ParameterError, PlaybackError
+
+Pixels = NDArray[np.uint8]
+
+FORMATS: Final = (".mp4", ".gif")
+"""Endings of the files that can be written."""
+
+_GIF_TICKS_HZ: Final = 100.0
+_COLOURS: Final = 128
+_SIDE_LIMIT: Final = 8192
+
+
+class Encoder(Protocol):
+    """What takes the pictures; the file is there, whole, once it is left without an error, and else not at all."""
+
+    def write(self, pixels: Pixels) -> None:
+        """Takes one picture, shape (height, width, 3)."""
+        ...
+
+    def __enter__(self) -> Self:
+        """Begins."""
+        ...
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        """Ends the file, or deletes what there is of it."""
+        ...
+
+
+def frame_rate(path: Path, wanted_hz: float) -> float:
+    """Pictures a second that the format of a file can have: a GIF shows each for a number of hundredths of a second.
+
+    Args:
+        path: The file.
+        wanted_hz: What is asked for [1/s].
+    """
+    if path.suffix.lower() != ".gif":
+        return wanted_hz
+    return _GIF_TICKS_HZ / max(2, round(_GIF_TICKS_HZ / wanted_hz))  # browsers show less than two ticks as ten
+
+
+def check(path: Path, size: tuple[int, int]) -> None:
+    """Looks for what would make writing fail, before anything is drawn.
+
+    Args:
+        path: The file.
+        size: Width and height of the pictures [pixels].
+
+    Raises:
+        ParameterError: the name or the size does not go with any format.
+        PlaybackError: there is no ffmpeg, or the folder does not exist.
+    """
+    if path.suffix.lower() not in FORMATS:
+        msg = f"{path}: a video's name must end in {' or '.join(FORMATS)}"
+        raise ParameterError(msg)
+    if min(size) < 16 or max(size) > _SIDE_LIMIT:
+        msg = f"a picture of {size[0]} x {size[1]} pixels cannot be made; each side must be 16 to {_SIDE_LIMIT}"
+        raise ParameterError(msg)
+    if not path.parent.is_dir():
+        msg = f"cannot write {path}: there is no folder {path.parent}"
+        raise PlaybackError(msg)
+    if path.suffix.lower() == ".mp4":
+        if size[0] % 2 or size[1] % 2:
+            msg = f"{size[0]} x {size[1]} pixels: an MP4 needs an even width and height"
+            raise ParameterError(msg)
+        ffmpeg()
+
+
+def encoder(path: Path, size: tuple[int, int], rate_hz: float, samples: Sequence[Pixels]) -> Encoder:
+    """What writes a file of this name.
+
+    Args:
+        path: The file; one that exists is replaced.
+        size: Width and height [pixels].
+        rate_hz: Pictures a second [1/s].
+        samples: Pictures from all over the video, of which the colours of a GIF are chosen.
+    """
+    if path.suffix.lower() == ".gif":
+        return _Gif(path, rate_hz, samples)
+    return _Mp4(path, size, rate_hz)
+
+
+def ffmpeg() -> str:
+    """The program that encodes: that of the package imageio-ffmpeg, else that of the system.
+
+    Raises:
+        PlaybackError: there is none.
+    """
+    with suppress(ImportError, RuntimeError):
+        return importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
+    if found := shutil.which("ffmpeg"):
+        return found
+    msg = "an MP4 needs ffmpeg: pip install 'activesteer[video]', or apt-get install ffmpeg; a .gif needs neither"
+    raise PlaybackError(msg)
+
+
+class _Mp4:
+    def __init__(self, path: Path, size: tuple[int, int], rate_hz: float) -> None:
+        self._path, self._part = path, path.with_name(f".{path.name}.part")
+        self._command = [
+            ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}",
+            "-r", f"{rate_hz:.6g}", "-i", "-", "-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20",
+            # What every player and browser takes, and starts to show before it has all of it.
+            "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(self._part),
+        ]  # fmt: skip
+
+    def __enter__(self) -> Self:
+        self._log = tempfile.TemporaryFile()
+        try:
+            self._process: Any = subprocess.Popen(self._command, stdin=subprocess.PIPE, stderr=self._log)
+        except OSError as reason:
+            self._log.close()
+            msg = f"{self._command[0]} does not start: {reason.strerror or reason}"
+            raise PlaybackError(msg) from None
+        return self
+
+    def write(self, pixels: Pixels) -> None:
+        try:
+            self._process.stdin.write(np.ascontiguousarray(pixels).data)
+        except OSError:
+            self._process.wait()
+            raise PlaybackError(self._complaint()) from None
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        if kind is not None:
+            self._process.kill()
+        with suppress(OSError):
+            self._process.stdin.close()
+        status = self._process.wait()
+        try:
+            if kind is None and status != 0:
+                raise PlaybackError(self._complaint())
+            if kind is None:
+                self._part.replace(self._path)
+        except OSError as reason:
+            msg = f"cannot write {self._path}: {reason.strerror or reason}"
+            raise PlaybackError(msg) from None
+        finally:
+            self._log.close()
+            self._part.unlink(missing_ok=True)
+
+    def _complaint(self) -> str:
+        self._log.seek(0)
+        lines = self._log.read().decode(errors="replace").strip().splitlines()
+        return f"cannot write {self._path}: ffmpeg says: {lines[-1] if lines else 'nothing'}"
+
+
+class _Gif:
+    def __init__(self, path: Path, rate_hz: float, samples: Sequence[Pixels]) -> None:
+        self._path, self._part = path, path.with_name(f".{path.name}.part")
+        self._duration_ms = round(1000.0 / rate_hz)
+        # One palette for all pictures: with one for each, the colours of what stands still would flicker.
+        mosaic = Image.fromarray(np.concatenate([np.asarray(sample) for sample in samples]))
+        self._palette = mosaic.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
+        self._pictures: list[Image.Image] = []
+
+    def __enter__(self) -> Self:
+        try:
+            self._part.open("wb").close()
+        except OSError as reason:
+            msg = f"cannot write {self._path}: {reason.strerror or reason}"
+            raise PlaybackError(msg) from None
+        return self
+
+    def write(self, pixels: Pixels) -> None:
+        picture = Image.fromarray(np.ascontiguousarray(pixels))
+        self._pictures.append(picture.quantize(palette=self._palette, dither=Image.Dither.NONE))
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        try:
+            if kind is None and self._pictures:
+                first, *others = self._pictures
+                first.save(
+                    self._part,
+                    "GIF",
+                    save_all=True,
+                    append_images=others,
+                    duration=self._duration_ms,
+                    loop=0,
+                    optimize=False,
+                )
+                self._part.replace(self._path)
+        except OSError as reason:
+            msg = f"cannot write {self._path}: {reason.strerror or reason}"
+            raise PlaybackError(msg) from None
+        finally:
+            self._part.unlink(missing_ok=True)

@@ -1,0 +1,172 @@
+"""Pictures of a stage without a window."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import importlib
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Any, Final, Self
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import PlaybackError
+
+BACKENDS: Final = {
+    "egl": "libegl1 libegl-mesa0 libgl1-mesa-dri",
+    "osmesa": "libosmesa6",
+}
+"""Ways to draw without a window, the one that can use a graphics card first, and the apt packages that they need."""
+
+_LIBRARIES: Final = {"egl": ("libEGL.so.1",), "osmesa": ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")}
+_MAX_GEOMS: Final = 20000
+_TRY: Final = "import sys, importlib as i; i.import_module('mujoco.' + sys.argv[1]).GLContext(16, 16).make_current()"
+_TRY_TIMEOUT_S: Final = 60.0
+
+
+@functools.cache
+def backend() -> str:
+    """The way to draw that works here: the one that MUJOCO_GL names, else the first that does.
+
+    Each is tried in a process of its own: a broken driver may end a process, and PyOpenGL, once it has taken up one of
+    them, cannot be brought to take up another.
+
+    Raises:
+        PlaybackError: none works; the message names the packages to install.
+    """
+    wanted = os.environ.get("MUJOCO_GL", "").lower()
+    # `glfw` draws to hidden windows of a display; whoever names it has one.
+    names = [wanted] if wanted in (*BACKENDS, "glfw") else list(BACKENDS)
+    problems = []
+    for name in names:
+        problem = _problem_with(name)
+        if problem is None:
+            return name
+        problems.append(f"{name}: {problem}")
+    install = " or ".join(f"apt-get install {BACKENDS[name]}" for name in names if name in BACKENDS)
+    chosen = f" (MUJOCO_GL={wanted})" if len(names) == 1 else ""
+    msg = f"no pictures can be drawn here{chosen}: {'; '.join(problems)}"
+    raise PlaybackError(f"{msg}. The libraries come with: {install}" if install else msg)
+
+
+def _problem_with(name: str) -> str | None:
+    """Why a way to draw does not work here; None where it does."""
+    environment = {**os.environ, "MUJOCO_GL": name}
+    environment.pop("PYOPENGL_PLATFORM", None)
+    if (platform := _platform_in_use()) not in (None, name):
+        return f"this process already uses OpenGL through {platform}"
+    try:
+        tried = subprocess.run(
+            [sys.executable, "-c", _TRY, name],
+            env=environment, capture_output=True, text=True, timeout=_TRY_TIMEOUT_S, check=False,
+        )  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired) as reason:
+        return str(reason)
+    if tried.returncode < 0:
+        return f"ended by signal {-tried.returncode}"
+    if tried.returncode == 0:
+        return None
+    # What PyOpenGL says of a missing library would not help anybody: "'NoneType' object has no attribute ...".
+    if name in _LIBRARIES and not any(_loads(library) for library in _LIBRARIES[name]):
+        return f"{_LIBRARIES[name][0]} is missing"
+    lines = [line for line in tried.stderr.splitlines() if "Error" in line and not line.startswith(" ")]
+    return lines[0].rstrip(".") if lines else f"ended with status {tried.returncode}"
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+def _platform_in_use() -> str | None:
+    """What this process's PyOpenGL has taken up; it never gives it up again."""
+    return os.environ.get("PYOPENGL_PLATFORM", "").lower() or None if "OpenGL" in sys.modules else None
+
+
+class Offscreen:
+    """A canvas in memory."""
+
+    def __init__(self, model: mujoco.MjModel, size: tuple[int, int]) -> None:
+        """Opens it.
+
+        Args:
+            model: What will be drawn; the size of its offscreen buffer is at least that of the pictures.
+            size: Width and height [pixels].
+
+        Raises:
+            PlaybackError: nothing can be drawn here.
+        """
+        self._name = backend()
+        self._rect = mujoco.MjrRect(0, 0, *size)
+        self._pixels = np.empty((size[1], size[0], 3), np.uint8)
+        self._scene = mujoco.MjvScene(model, _MAX_GEOMS)
+        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
+            self._scene.flags[flag] = 0
+        self._look = mujoco.MjvOption()
+        self._model = model
+        with _library(self._name):
+            try:
+                self._context: Any = importlib.import_module(f"mujoco.{self._name}").GLContext(*size)
+                self._context.make_current()
+                self._drawer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+            except (ImportError, RuntimeError, mujoco.FatalError) as reason:
+                msg = f"no pictures of {size[0]} x {size[1]} can be drawn here with {self._name}: {reason}"
+                raise PlaybackError(msg) from reason
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
+
+    def draw(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> NDArray[np.uint8]:
+        """One picture.
+
+        Args:
+            data: The state of the model.
+            camera: From where.
+
+        Returns:
+            Red, green and blue of each pixel, top row first, shape (height, width, 3); overwritten by the next picture.
+        """
+        every = int(mujoco.mjtCatBit.mjCAT_ALL)
+        mujoco.mjv_updateScene(self._model, data, self._look, None, camera, every, self._scene)
+        self._context.make_current()
+        mujoco.mjr_render(self._rect, self._scene, self._drawer)
+        mujoco.mjr_readPixels(self._pixels, None, self._rect, self._drawer)
+        return self._pixels[::-1]
+
+    def close(self) -> None:
+        """Gives the graphics memory back."""
+        self._context.make_current()
+        self._drawer.free()
+        self._context.free()
+
+    def __enter__(self) -> Self:
+        """Begins."""
+        return self
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, _error: BaseException | None, _: TracebackType | None
+    ) -> None:
+        """Gives the graphics memory back."""
+        self.close()
+
+
+@contextmanager
+def _library(name: str) -> Iterator[None]:
+    """MuJoCo reads MUJOCO_GL when it looks up the functions of OpenGL; who starts a viewer later finds it as it was."""
+    before = os.environ.get("MUJOCO_GL")
+    os.environ["MUJOCO_GL"] = name
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["MUJOCO_GL"]
+        else:
+            os.environ["MUJOCO_GL"] = before

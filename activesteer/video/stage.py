@@ -1,0 +1,214 @@
+"""What a camera sees, as a MuJoCo model without physics: road, sky, course, and cars whose bodies are placed by hand.
+
+It is built from what a recording says of the looks of its car, not from the MJCF that the recording also holds: so
+nothing of a file is compiled, and a car drawn over another is no more than the same solids, transparent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import PlaybackError
+from activesteer.recording import Primitive, ScenePart
+from activesteer.video.road import add_course, add_patches, add_road
+
+Array = NDArray[np.float64]
+
+CHASSIS: Final = "chassis"
+"""Body that cameras follow."""
+
+SEE_THROUGH: Final = 0.5
+"""Solids with less opacity are the shell of the body."""
+_GHOST_OPACITY: Final = 0.35
+"""Opacity of a solid of a ghost, relative to that of the same solid of a car."""
+_GLASS: Final = (0.1, 0.13, 0.17)
+_GLASS_OPACITY: Final = 0.85
+_SHADOW: Final = (0.02, 0.02, 0.025, 0.25)
+_SHADOW_M: Final = (0.12, 0.04, -0.04)
+"""How far the three layers of the shadow reach beyond the car [m]: the edge fades. Real shadows would cost three times
+the picture."""
+
+_BASE: Final = """
+<mujoco>
+  <option><flag contact="disable" gravity="disable"/></option>
+  <visual>
+    <headlight ambient="0.42 0.42 0.42" diffuse="0.32 0.32 0.32" specular="0.05 0.05 0.05"/>
+    <global offwidth="{width}" offheight="{height}"/>
+    <!-- Lengths in units of the extent below: 0.3 m and 600 m. -->
+    <map znear="0.075" zfar="150" haze="0.15"/>
+    <quality shadowsize="0" offsamples="4"/>
+    <rgba haze="0.78 0.83 0.88 1"/>
+  </visual>
+  <statistic center="0 0 0.5" extent="4"/>
+  <asset>
+    <texture name="sky" type="skybox" builtin="gradient" rgb1="0.36 0.52 0.72" rgb2="0.82 0.87 0.91" width="128" height="768"/>
+  </asset>
+  <worldbody>
+    <light name="sun" type="directional" pos="0 0 20" dir="0.35 0.25 -1" diffuse="0.62 0.6 0.56" specular="0.2 0.2 0.2"
+      castshadow="false"/>
+  </worldbody>
+</mujoco>
+"""  # noqa: E501
+
+
+class Car(NamedTuple):
+    """A car on the stage.
+
+    Attributes:
+        parts: What it looks like.
+        bodies: Names of its bodies, in the order of the poses.
+        colour: Colour of its shell, `#rrggbb`; that of the model where it is empty.
+        shell_opacity: Opacity of its shell, 0 to 1.
+        ghost: Whether it is transparent all over.
+    """
+
+    parts: tuple[ScenePart, ...]
+    bodies: tuple[str, ...]
+    colour: str = ""
+    shell_opacity: float = 1.0
+    ghost: bool = False
+
+
+class Stage:
+    """Road, course and cars.
+
+    Attributes:
+        model: The model, for a renderer or a viewer.
+        data: Its state; what is drawn.
+    """
+
+    def __init__(
+        self,
+        cars: Sequence[Car],
+        course: Mapping[str, Any] | None = None,
+        road: Mapping[str, Any] | None = None,
+        size: tuple[int, int] = (640, 480),
+    ) -> None:
+        """Builds it.
+
+        Args:
+            cars: The cars.
+            course: Lanes, cones and path, as in the metadata of a recording.
+            road: The road, as in the metadata of a recording.
+            size: Largest width and height of a picture [pixels].
+
+        Raises:
+            PlaybackError: what the recording says of the car, the course or the road cannot be built.
+        """
+        try:
+            spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
+            add_road(spec, road or {})
+            add_patches(spec, road or {})
+            if course:
+                add_course(spec, course)
+            for number, car in enumerate(cars):
+                _add_car(spec, car, f"{number}/")
+            self.model = spec.compile()
+        except (ValueError, KeyError, TypeError) as reason:
+            msg = f"car, course or road of the recording cannot be drawn: {reason!r}"
+            raise PlaybackError(msg) from reason
+        self.data = mujoco.MjData(self.model)
+        self._mocap = [
+            np.array([self._mocap_id(f"{number}/{body}") for body in car.bodies]) for number, car in enumerate(cars)
+        ]
+        self._chassis = [car.bodies.index(CHASSIS) for car in cars]
+        self._shadow = [self._mocap_id(f"{number}/shadow") for number in range(len(cars))]
+        mujoco.mj_forward(self.model, self.data)
+
+    def _mocap_id(self, body: str) -> int:
+        return int(self.model.body_mocapid[self.model.body(body).id])
+
+    def place(self, car: int, positions_m: Array, quaternions: Array) -> None:
+        """Puts a car somewhere; `update` makes it seen.
+
+        Args:
+            car: Its number.
+            positions_m: Positions of its bodies [m], shape (bodies, 3).
+            quaternions: Their orientations, w x y z, shape (bodies, 4).
+        """
+        data, chassis = self.data, self._chassis[car]
+        data.mocap_pos[self._mocap[car]] = positions_m
+        data.mocap_quat[self._mocap[car]] = quaternions
+        w, x, y, z = quaternions[chassis]
+        half = 0.5 * np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        data.mocap_pos[self._shadow[car]] = positions_m[chassis, 0], positions_m[chassis, 1], 0.0
+        data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
+
+    def update(self) -> None:
+        """Makes everything that hangs on the bodies follow them."""
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_camlight(self.model, self.data)
+        mujoco.mj_tendon(self.model, self.data)
+
+
+def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
+    bodies = {name: spec.worldbody.add_body(name=prefix + name, mocap=True) for name in car.bodies}
+    solids = [part for part in car.parts if isinstance(part, Primitive) and part.body in bodies]
+    kinds = {
+        "box": mujoco.mjtGeom.mjGEOM_BOX,
+        "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+        "sphere": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+    }
+    for part in car.parts:
+        if isinstance(part, Primitive):
+            if part.body not in bodies:
+                continue
+            x, y, z = part.size_m
+            size = (0.5 * x, 0.5 * z, 0.0) if part.kind == "cylinder" else (0.5 * x, 0.5 * y, 0.5 * z)
+            bodies[part.body].add_geom(
+                type=kinds[part.kind],
+                size=size,
+                pos=part.position_m,
+                quat=part.quaternion,
+                # Of a shell, what is round is the greenhouse.
+                rgba=_look(part.rgba, car, shell=part.rgba[3] < SEE_THROUGH, glass=part.kind == "sphere"),
+                contype=0,
+                conaffinity=0,
+            )
+        elif all(body in bodies for body, _ in part.points):
+            tendon = spec.add_tendon(name=f"{prefix}{part.name}", width=part.radius_m, rgba=_look(part.rgba, car))
+            for number, (body, point) in enumerate(part.points):
+                site = f"{prefix}{part.name}/{number}"
+                bodies[body].add_site(name=site, pos=point, group=4)
+                tendon.wrap_site(site)
+    _add_shadow(spec, prefix, solids, _GHOST_OPACITY if car.ghost else 1.0)
+
+
+def _look(
+    rgba: tuple[float, float, float, float], car: Car, *, shell: bool = False, glass: bool = False
+) -> tuple[float, float, float, float]:
+    r, g, b, a = rgba
+    if shell:
+        r, g, b = _GLASS if glass else _rgb(car.colour) if car.colour else (r, g, b)
+        a = car.shell_opacity * (_GLASS_OPACITY if glass else 1.0)
+    return (r, g, b, a * _GHOST_OPACITY if car.ghost else a)
+
+
+def _rgb(colour: str) -> tuple[float, float, float]:
+    """The three numbers of `#rrggbb`, 0 to 1."""
+    return int(colour[1:3], 16) / 255.0, int(colour[3:5], 16) / 255.0, int(colour[5:7], 16) / 255.0
+
+
+def _add_shadow(spec: mujoco.MjSpec, prefix: str, solids: Sequence[Primitive], opacity: float) -> None:
+    """Below the chassis, as long and wide as it; it turns with it, but stays on the road."""
+    body = spec.worldbody.add_body(name=f"{prefix}shadow", mocap=True)
+    hull = [solid for solid in solids if solid.body == CHASSIS]
+    if not hull:
+        return
+    low = np.min([np.subtract(solid.position_m, np.multiply(solid.size_m, 0.5)) for solid in hull], axis=0)
+    high = np.max([np.add(solid.position_m, np.multiply(solid.size_m, 0.5)) for solid in hull], axis=0)
+    for number, beyond in enumerate(_SHADOW_M):
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.0),
+            size=(0.5 * (high[0] - low[0]) + beyond, 0.5 * (high[1] - low[1]) + beyond, 0.02 + 0.003 * number),
+            rgba=(*_SHADOW[:3], _SHADOW[3] * opacity),
+            contype=0,
+            conaffinity=0,
+        )

@@ -1,0 +1,122 @@
+"""Where the bodies of a car are at any instant, between the poses of its recording."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import PlaybackError
+from activesteer.recording import Recording
+from activesteer.video.stage import CHASSIS
+
+Array = NDArray[np.float64]
+
+_STEADY_S: Final = 0.35
+"""Standard deviation of the window over which the direction of the camera is averaged [s]: it follows the car through
+a bend, but not its every twitch, which is then seen."""
+_WHEELBASE_M: Final = 2.7
+"""Of a car whose recording does not tell its own [m]."""
+
+
+class Track:
+    """Poses of a recording over time.
+
+    Attributes:
+        bodies: Names of the bodies.
+        start_s: Time of the first pose [s].
+        end_s: Time of the last one [s].
+    """
+
+    def __init__(self, recording: Recording, name: str) -> None:
+        """Takes the poses that are finite; a run that diverged ends with some that are not.
+
+        Args:
+            recording: The run.
+            name: What it is called in an error.
+
+        Raises:
+            PlaybackError: there are no poses of a car.
+        """
+        poses = recording.poses
+        self.bodies = poses.names
+        whole = np.isfinite(poses.positions_m).all(axis=(1, 2)) & np.isfinite(poses.quaternions).all(axis=(1, 2))
+        if CHASSIS not in poses.names or not whole.any():
+            msg = f"{name} has no poses of a car, so there is nothing to draw"
+            raise PlaybackError(msg)
+        self._time_s = poses.time_s[whole]
+        self._positions_m = poses.positions_m[whole]
+        self._quaternions = poses.quaternions[whole]
+        self.start_s, self.end_s = float(self._time_s[0]), float(self._time_s[-1])
+        w, x, y, z = self._quaternions[:, poses.names.index(CHASSIS)].T
+        self._heading_rad = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        self._steady_rad = _smooth(self._time_s, self._heading_rad)
+        car = recording.metadata.get("car")
+        self._middle_m = -0.5 * float(car.get("wheelbase_m", _WHEELBASE_M) if isinstance(car, dict) else _WHEELBASE_M)
+
+    def poses(self, time_s: float) -> tuple[Array, Array]:
+        """Poses at an instant; before the first it is the first, after the last the last.
+
+        Args:
+            time_s: The instant [s].
+
+        Returns:
+            Positions [m], shape (bodies, 3); orientations, w x y z, shape (bodies, 4).
+        """
+        last = len(self._time_s) - 1
+        after = min(max(int(np.searchsorted(self._time_s, time_s, side="right")), min(1, last)), last)
+        before = max(after - 1, 0)
+        span = self._time_s[after] - self._time_s[before]
+        share = min(max((time_s - self._time_s[before]) / span, 0.0), 1.0) if span > 0.0 else 0.0
+        positions = (1.0 - share) * self._positions_m[before] + share * self._positions_m[after]
+        # Between two poses the quickest, a wheel, turns by less than a radian: the chord is as good as the arc.
+        first, second = self._quaternions[before], self._quaternions[after]
+        sign = np.where(np.einsum("ij,ij->i", first, second) < 0.0, -1.0, 1.0)[:, None]
+        turned = (1.0 - share) * first + share * sign * second
+        return positions, turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+    def heading(self, time_s: float, *, steady: bool = False) -> float:
+        """Heading of the chassis at an instant [rad], left positive, turns counted; averaged where it is `steady`."""
+        return float(np.interp(time_s, self._time_s, self._steady_rad if steady else self._heading_rad))
+
+    def middle(self, time_s: float) -> Array:
+        """The point on the road below the middle between the axles [m], shape (3,)."""
+        positions, _ = self.poses(time_s)
+        heading = self.heading(time_s)
+        forward = np.array([np.cos(heading), np.sin(heading), 0.0])
+        return positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0) + self._middle_m * forward
+
+    def wheel_place(self, corner: str) -> Array:
+        """Centre of a wheel relative to the chassis, in its heading, when the recording starts [m], shape (3,).
+
+        Raises:
+            PlaybackError: there is no such wheel.
+        """
+        body = f"{corner}_wheel"
+        if body not in self.bodies:
+            msg = f"the recording has no body {body!r}; it has {', '.join(self.bodies)}"
+            raise PlaybackError(msg)
+        positions, _ = self.poses(self.start_s)
+        x, y, z = positions[self.bodies.index(body)] - positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0)
+        cos, sin = np.cos(self.heading(self.start_s)), np.sin(self.heading(self.start_s))
+        return np.array([cos * x + sin * y, -sin * x + cos * y, z])
+
+    def chassis(self, time_s: float) -> Array:
+        """The point on the road below the origin of the chassis [m], shape (3,)."""
+        positions, _ = self.poses(time_s)
+        return positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0)
+
+
+def _smooth(time_s: Array, values: Array) -> Array:
+    """A running mean with Gaussian weights, which shifts nothing in time; at both ends the values are continued."""
+    if len(time_s) < 2:
+        return values
+    step = float(np.median(np.diff(time_s)))
+    reach = round(4.0 * _STEADY_S / step)
+    offsets = np.arange(-reach, reach + 1) * step
+    weights = np.exp(-0.5 * (offsets / _STEADY_S) ** 2)
+    # Poses are evenly spaced but for the gaps of a damaged file.
+    even = np.arange(time_s[0] - reach * step, time_s[-1] + (reach + 1) * step, step)
+    averaged = np.convolve(np.interp(even, time_s, values), weights / weights.sum(), mode="same")
+    return np.asarray(np.interp(time_s, even, averaged), np.float64)

@@ -1,0 +1,53 @@
+"""The pages are built without a warning, and work without a network."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+LOADED = re.compile(
+    r"<(?:script|img|iframe)[^>]*\bsrc=[\"']?(?:https?:)?//|<link(?![^>]*canonical)[^>]*href=[\"']?(?:https?:)?//"
+)
+"""What a browser would fetch from elsewhere; links that somebody may follow are no part of it."""
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("mkdocs", reason="pip install '.[docs]' brings mkdocs")
+    folder = tmp_path_factory.mktemp("site")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
+        cwd=ROOT, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    return folder
+
+
+def test_pages_load_nothing_from_elsewhere(site: Path) -> None:
+    pages = list(site.rglob("*.html"))
+    assert len(pages) > 20
+    for page in pages:
+        found = LOADED.search(page.read_text(encoding="utf-8"))
+        assert found is None, f"{page.relative_to(site)}: {found and found[0]}"
+
+
+@pytest.mark.parametrize(
+    ("page", "name"),
+    [
+        ("runs", "activesteer.runner.simulate"),
+        ("runs", "activesteer.signals.Measurement"),
+        ("recordings", "activesteer.recording.recording.Recording.open"),
+        ("controllers", "activesteer.controllers.parameters.ControllerSetup"),
+        ("tyres", "activesteer.tyre.evaluation.MagicFormula.evaluate"),
+        ("errors", "activesteer.errors.ActiveSteerError"),
+    ],
+)
+def test_reference_has_what_users_call(site: Path, page: str, name: str) -> None:
+    assert f'id="{name}"' in (site / "reference" / f"{page}.html").read_text(encoding="utf-8")

@@ -1,0 +1,54 @@
+"""What the documentation has to say something about, and what it may weigh."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+import pytest
+
+from activesteer.cli import _parser
+from activesteer.maneuver import KINDS
+from activesteer.resources import list_maneuvers
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+MOST_BYTES = 1_500_000
+
+
+def commands() -> list[str]:
+    (actions,) = (it for it in _parser()._actions if isinstance(it, argparse._SubParsersAction))
+    return list(actions.choices)
+
+
+@pytest.mark.parametrize("name", list_maneuvers())
+def test_every_manoeuvre_has_a_section_with_its_picture(name: str) -> None:
+    page = (DOCS / "manoeuvres.md").read_text(encoding="utf-8")
+    section = re.search(rf"^### {name}\n(.*?)(?=^##|\Z)", page, re.MULTILINE | re.DOTALL)
+    assert section, f"docs/manoeuvres.md has no section {name}"
+    assert f"(pictures/manoeuvre_{name}.png)" in section[1], "python tools/make_doc_pictures.py makes it"
+    assert (DOCS / "pictures" / f"manoeuvre_{name}.png").is_file()
+
+
+def test_every_kind_of_manoeuvre_is_in_the_reference() -> None:
+    page = (DOCS / "reference" / "manoeuvres.md").read_text(encoding="utf-8")
+    assert not [kind for kind in KINDS if f"## {kind}\n" not in page]
+
+
+@pytest.mark.parametrize("command", commands())
+def test_every_command_is_in_the_list(command: str) -> None:
+    page = (DOCS / "commands.md").read_text(encoding="utf-8")
+    assert re.search(rf"^\| `{command}\b", page, re.MULTILINE), f"docs/commands.md does not list {command}"
+
+
+def test_every_page_is_in_the_navigation() -> None:
+    navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
+    pages = [page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")]
+    assert not [page for page in pages if f": {page}\n" not in navigation]
+
+
+def test_every_picture_is_shown_and_all_are_small() -> None:
+    shown = "".join(page.read_text(encoding="utf-8") for page in DOCS.rglob("*.md"))
+    pictures = [*DOCS.glob("pictures/*")]
+    assert not [picture.name for picture in pictures if f"pictures/{picture.name}" not in shown]
+    assert sum(picture.stat().st_size for picture in pictures) < MOST_BYTES

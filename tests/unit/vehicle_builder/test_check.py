@@ -1,0 +1,176 @@
+"""What the check says of good cars, and of cars with one thing wrong."""
+
+from __future__ import annotations
+
+import functools
+import re
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from activesteer.errors import ParameterError
+from activesteer.vehicle_builder import CheckReport, check_vehicle, new_vehicle
+from tests.unit.vehicle_builder.tables import COMPACT, WISHBONE, changed
+
+Damage = Callable[..., CheckReport]
+
+
+@functools.cache
+def compact() -> CheckReport:
+    return check_vehicle("compact")
+
+
+@pytest.fixture(scope="module")
+def good() -> Path:
+    """Folder of a car to be damaged in copies."""
+    return new_vehicle("car", COMPACT, Path(tempfile.mkdtemp()) / "car").folder
+
+
+@pytest.fixture
+def damaged(good: Path, tmp_path: Path) -> Damage:
+    """Checks a copy of the car in which one text of a file is another one."""
+
+    def check(file: str, *changes: tuple[str, str]) -> CheckReport:
+        folder = tmp_path / "car"
+        shutil.copytree(good, folder)
+        text = (folder / file).read_text()
+        for old, new in changes:
+            text, count = re.subn(old, new, text)
+            assert count > 0, old
+        (folder / file).write_text(text)
+        return check_vehicle(folder)
+
+    return check
+
+
+def test_the_compact_has_nothing_wrong() -> None:
+    assert [finding for finding in compact().findings if finding.level != "ok"] == []
+    assert len(compact().findings) > 60
+
+
+def test_a_made_car_has_nothing_wrong(tmp_path: Path) -> None:
+    report = check_vehicle(new_vehicle("saloon", WISHBONE, tmp_path / "saloon").vehicle_file)
+    assert [finding for finding in report.findings if finding.level != "ok"] == []
+
+
+def test_values_are_those_of_the_rig_and_of_the_standing_car() -> None:
+    assert compact()["front wheel rate"].value == "24.03 N/mm"
+    assert compact()["share of the weight in front"].value == "58.97 %"
+    assert compact()["rear wheel hop"].value == "13.86 Hz"
+
+
+def test_every_line_that_is_not_ok_says_what_to_do(damaged: Damage) -> None:
+    report = damaged("car.toml", (r"ratio = 15.83", "ratio = 12"))
+    bad = [finding for finding in report.findings if finding.level != "ok"]
+    assert [finding.what for finding in bad] == ["ratio in the vehicle file, against the measured one"]
+    assert all(finding.advice for finding in bad)
+    assert "activesteer" not in bad[0].value
+    assert bad[0].advice in report.table()
+
+
+def test_a_point_on_the_wrong_side(damaged: Damage) -> None:
+    report = damaged("front_axle.xml", (r'("fl_lca_front_inner" pos="-0.015) 0.365', r"\1 -0.365"))
+    assert report["points on the side of their wheel"].value == "no: fl_lca_front_inner"
+    assert report["right side is the left one with y negated"].level == "error"
+
+
+def test_one_side_edited_alone(damaged: Damage) -> None:
+    report = damaged("front_axle.xml", (r'("fl_lca_front_inner" pos="-0.015 0.365) 0.2055', r"\1 0.2155"))
+    assert report["points on the side of their wheel"].level == "ok"
+    assert report["right side is the left one with y negated"].value == "no: fl_lca_front_inner"
+    assert report["left against right in travel"].level == "error"
+
+
+def test_inner_and_outer_point_exchanged(damaged: Damage) -> None:
+    report = damaged(
+        "rear_axle.xml",
+        (r'(r[lr]_camber_link_inner" pos=")-2.7265 (-?)0.37 0.4615', r"\1-2.657 \g<2>0.665 0.47"),
+        (r'(r[lr]_camber_link_outer" pos=")-2.657 (-?)0.665 0.47', r"\1-2.7265 \g<2>0.37 0.4615"),
+    )
+    assert report["inner ends further in than outer ends"].value == "no: rl_camber_link"
+
+
+def test_links_that_pass_through_each_other(damaged: Damage) -> None:
+    # The toe link's inner end behind the spring link's: the two cross.
+    report = damaged(
+        "rear_axle.xml", (r'(r[lr]_toe_link_inner" pos=")-2.525 (-?)0.36 0.233', r"\1-2.9 \g<2>0.36 0.2123")
+    )
+    assert report["links that cross"].level == "warning"
+    assert "rl_spring_link and rl_toe_link" in report["links that cross"].value
+
+
+def test_a_missing_sensor_and_actuator_are_both_named(damaged: Damage) -> None:
+    report = damaged("car.xml", (r'<gyro name="cg_gyro" site="cg"/>', ""), (r'<motor name="rl_drive".*/>', ""))
+    told = {finding.what: finding for finding in report.findings if finding.level == "error"}
+    assert set(told) == {"sensor cg_gyro", "actuator rl_drive"}
+
+
+def test_a_link_without_an_end_does_not_compile(damaged: Damage) -> None:
+    report = damaged("rear_axle.xml", (r'<site name="rl_toe_link_inner".*/>', ""))
+    assert report.count("error") == 1
+    assert "rl_toe_link_inner" in report.findings[-1].advice
+
+
+def test_two_links_that_do_the_same(damaged: Damage) -> None:
+    report = damaged(
+        "rear_axle.xml",
+        (r'(r[lr]_trailing_upper_inner" pos=")-2.217 (-?)0.57 0.4535', r"\1-2.187 \g<2>0.6015 0.231"),
+        (r'(r[lr]_trailing_upper_outer" pos=")-2.597 (-?)0.655 0.465', r"\1-2.577 \g<2>0.67 0.175"),
+    )
+    assert report["rear links hold the wheel"].level == "error"
+    assert "2 ways to travel" in report["rear links hold the wheel"].advice
+
+
+def test_springs_of_the_wrong_length(damaged: Damage) -> None:
+    report = damaged("car.xml", (r'(stiffness="24200" springlength=)"0.164\d*"', r'\1"0.15"'))
+    finding = report["front wheel travel from the design position"]
+    assert finding.level == "warning"
+    assert float(finding.value.split()[0]) == pytest.approx(14.0, abs=1.0)
+
+
+def test_a_rack_that_steers_the_wrong_way(damaged: Damage) -> None:
+    report = damaged("car.xml", (r'axis="0 -1 0" range', 'axis="0 1 0" range'))
+    assert report["left turn of the steering wheel turns left"].level == "error"
+    assert report["steering ratio"].level == "error"
+
+
+def test_a_damper_that_pushes(damaged: Damage) -> None:
+    report = damaged("car.toml", (r"force_N = \[-1750", "force_N = [1750"))
+    assert report["front damper resists its motion"].level == "error"
+
+
+def test_bump_steer_of_a_tie_rod_at_the_wrong_height(tmp_path: Path) -> None:
+    table = changed(
+        WISHBONE, tmp_path, ("front.tie_rod_inner,   -200, 392,  320", "front.tie_rod_inner,   -200, 392,  296"),
+        ("front.tie_rod_outer,   -150, 708,  296", "front.tie_rod_outer,   -150, 742,  296"),
+    )  # fmt: skip
+    report = check_vehicle(new_vehicle("raw", table, tmp_path / "raw").folder)
+    bad = {finding.what for finding in report.findings if finding.level != "ok"}
+    assert bad == {"front bump steer, + toe-in", "Ackermann share at 20 deg"}
+    assert report.count("error") == 0
+
+
+def test_the_worked_example_says_what_the_check_says(tmp_path: Path) -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "own_car.md").read_text(encoding="utf-8")
+    report = check_vehicle(new_vehicle("saloon", WISHBONE, tmp_path / "saloon").folder)
+    for what in ("front bump steer, + toe-in", "Ackermann share at 20 deg"):
+        assert report[what].value in page
+    assert report.table().splitlines()[-1] in page
+
+
+def test_a_tyre_that_is_too_small(damaged: Damage, tmp_path: Path) -> None:
+    report = damaged(
+        "car.xml", (r'(name="chassis">\s+<freejoint.*/>\s+<!--.*-->\s+<inertial pos="[^"]*" mass=)"1269"', r'\1"2600"')
+    )
+    assert report["front highest valid load over the static load"].level == "warning"
+    assert report["mass that controllers know, against the model's"].level == "warning"
+
+
+def test_a_car_that_does_not_exist(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="did you mean 'compact'"):
+        check_vehicle("compakt")
+    with pytest.raises(ParameterError, match="no one vehicle file"):
+        check_vehicle(tmp_path)

@@ -1,0 +1,134 @@
+"""Tables: both ways of writing them, and everything that can be wrong said at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from activesteer.errors import ParameterError
+from activesteer.vehicle_builder import new_vehicle
+from activesteer.vehicle_builder.table import chosen_kinds, in_vehicle_axes, read_table
+from activesteer.vehicle_builder.table_checks import check_points
+from tests.unit.vehicle_builder.tables import COMPACT, WISHBONE, changed
+
+
+def problems(path: Path) -> str:
+    table, source = read_table(path)
+    with pytest.raises(ParameterError) as caught:
+        check_points(table, chosen_kinds(table), source)
+    return str(caught.value)
+
+
+def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
+    rows = tmp_path / "rows.csv"
+    rows.write_text(
+        "name,x,y,z\nunits,mm\nfront.wheel_centre, 0, 762.5, 297.2  # a point\nfront.spring_rate_Npm, 24200\n"
+        'front.links.tie_rod.stiffness_Npm, 1e6\nmass.inertia_kgm2, 530, 2100, 2200\nsource, "here, there"\n'
+    )
+    keys = tmp_path / "keys.toml"
+    keys.write_text(
+        'units = "mm"\nsource = "here, there"\n[front]\nspring_rate_Npm = 24200\n[front.points]\n'
+        "wheel_centre = [0, 762.5, 297.2]\n"
+        "[front.links.tie_rod]\nstiffness_Npm = 1e6\n[mass]\ninertia_kgm2 = [530, 2100, 2200]\n"
+    )
+    assert read_table(rows)[0] == read_table(keys)[0]
+
+
+def test_points_are_moved_to_metres_and_to_the_origin(tmp_path: Path) -> None:
+    path = tmp_path / "moved.csv"
+    path.write_text(
+        "units, mm\norigin, 1388, 0, -200\nfront.wheel_centre, 1388, 798, 130\nmass.chassis_cg, 0, 0, 200\n"
+    )
+    table = in_vehicle_axes(read_table(path)[0])
+    assert table.front.points["wheel_centre"] == pytest.approx((0.0, 0.798, 0.330))
+    assert table.mass.chassis_cg == pytest.approx((-1.388, 0.0, 0.4))
+
+
+def test_unknown_points_name_the_nearest_and_all_missing_ones_are_listed_at_once(tmp_path: Path) -> None:
+    path = changed(
+        COMPACT, tmp_path, ("lca_rear_inner =", "lca_reer_inner ="), ("strut_top =", "# "), ("toe_link_outer =", "# ")
+    )
+    told = problems(path)
+    assert "front.points.lca_reer_inner: a mcpherson axle has no such point; did you mean 'lca_rear_inner'" in told
+    assert "front.points: a mcpherson axle also needs strut_top, lca_rear_inner" in told
+    assert "rear.points: a five_link axle also needs toe_link_outer" in told
+
+
+def test_points_in_millimetres_where_metres_are_stated(tmp_path: Path) -> None:
+    told = problems(changed(COMPACT, tmp_path, ('units = "mm"', 'units = "m"')))
+    assert 'are all in mm? then write units = "mm"' in told
+
+
+def test_one_point_in_millimetres_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "one.csv"
+    text = WISHBONE.read_text().replace("units, mm", "units, m")
+    lines = []
+    for line in text.splitlines():
+        cells = line.split(",")
+        if line.startswith(("front.", "rear.")) and len(cells) == 4 and "uca_outer" not in line:
+            cells[1:] = [str(float(cell) / 1e3) for cell in cells[1:]]
+        lines.append(",".join(cells) if not line.startswith("#") else line)
+    path.write_text("\n".join(lines))
+    told = problems(path)
+    assert "front.points.uca_outer" in told
+    assert "are these in mm?" in told
+
+
+def test_metres_where_millimetres_are_stated(tmp_path: Path) -> None:
+    path = tmp_path / "small.csv"
+    path.write_text("units, mm\nfront.wheel_centre, 0, 0.762, 0.297\n")
+    assert "are they in m?" in problems(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "hint"),
+    [
+        ("spring_rate_Npm = 24200", "spring_rate_Npm = 24.2", "is it in N/mm? then write 24200"),
+        ("cg_height_m = 0.545", "cg_height_m = 545", "is it in mm? then write 0.545"),
+        ("rack_limit_m = 0.064", "rack_limit_m = 0.0064", "is no value of a road car"),
+    ],
+)
+def test_other_units_are_recognised(tmp_path: Path, old: str, new: str, hint: str) -> None:
+    assert hint in problems(changed(COMPACT, tmp_path, (old, new)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            "spring_rate_Npm = 24200",
+            "spring_rate_Npm = 24200\nwheel_rate_Npm = 24000",
+            "say the same; give one of them",
+        ),
+        ('spring_on = "knuckle"', 'spring_on = "spring_lnk"', "did you mean 'spring_link'"),
+        ("total_kg = 1430", "", "total_kg (of the whole car) or chassis_kg is needed"),
+        ("cg_height_m = 0.545", "", "with total_kg, front_share and cg_height_m are needed"),
+        ("[front.links.tie_rod]", "[front.links.tierod]", "did you mean 'tie_rod'"),
+        ("strut_top = [-87, 575, 860]", "strut_top = [-87, 575]", "front.points.strut_top: 2 numbers given"),
+    ],
+)
+def test_contradictions_are_told(tmp_path: Path, old: str, new: str, told: str) -> None:
+    assert told in problems(changed(COMPACT, tmp_path, (old, new)))
+
+
+def test_unknown_keys_name_file_line_and_nearest(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"compact.toml, line \d+: front.spring_rte_Npm.*spring_rate_Npm"):
+        read_table(changed(COMPACT, tmp_path, ("spring_rate_Npm = 24200", "spring_rte_Npm = 24200")))
+    with pytest.raises(ParameterError, match=r"wishbone.csv, line \d+: mass.totl_kg.*total_kg"):
+        read_table(changed(WISHBONE, tmp_path, ("mass.total_kg", "mass.totl_kg")))
+
+
+def test_a_suspension_that_does_not_exist(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="no rear suspension is named 'mcpherson'"):
+        new_vehicle("x", COMPACT, tmp_path / "x", rear="mcpherson")
+    with pytest.raises(ParameterError, match=r"ends in \.toml or \.csv"):
+        new_vehicle("x", tmp_path / "table.xlsx", tmp_path / "x")
+
+
+def test_another_origin_is_recognised_and_the_right_one_said(tmp_path: Path) -> None:
+    path = changed(WISHBONE, tmp_path, ("units, mm", "units, mm\norigin, 500, 0, 0"))
+    with pytest.raises(
+        ParameterError, match=r"vehicle coordinates begin on the road below the front axle.*origin = \[0, 0, -1"
+    ):
+        new_vehicle("x", path, tmp_path / "x")
