@@ -8,7 +8,7 @@ READY := $(VENV)/.ready-demo
 READY_DEV := $(VENV)/.ready-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all lint format wheel clean clean-kernels
+.PHONY: help demo test test-all lint format docs wheel clean clean-kernels
 
 help:  ## what there is
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 24
@@ -31,6 +31,9 @@ lint: $(READY_DEV)  ## ruff, pyright, import-linter
 format: $(READY_DEV)  ## format the code and mend what ruff can mend
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: $(READY_DEV)  ## build the documentation, in build/docs; a warning is an error
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 wheel: $(READY_DEV)  ## build dist/*.whl
 	$(BIN)/python -m build --wheel --no-isolation

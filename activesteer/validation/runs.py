@@ -102,11 +102,13 @@ def compare_run(run: str, ours: Table, reference: Table) -> list[Comparison]:
     Args:
         run: Its name.
         ours: Our columns; see `motion.reference_columns`.
-        reference: Those of the reference.
+        reference: Those of the reference; what lasts longer than ours is left out.
 
     Returns:
         The comparisons.
     """
+    together = reference["t"] <= ours["t"][-1]
+    reference = {column: values[together] for column, values in reference.items()}
     rows: list[Comparison] = []
     for trace in traces(ours, reference, (*QUANTITIES, _PITCH, _DECELERATION)):
         if trace.span >= trace.quantity.least_range:

@@ -49,7 +49,10 @@ class Settings:
         Raises:
             ParameterError: one is out of its range.
         """
-        for name, value, low, high in (("pictures a second", self.rate_hz, 1.0, 240.0), ("speed", self.speed, 0.01, 100.0)):
+        for name, value, low, high in (
+            ("pictures a second", self.rate_hz, 1.0, 240.0),
+            ("speed", self.speed, 0.01, 100.0),
+        ):
             if not low <= value <= high:
                 msg = f"{name}: is {value:g}, must be {low:g} to {high:g}"
                 raise ParameterError(msg)

@@ -24,7 +24,7 @@ LANGUAGES = frozenset({"python", "toml", "sh", "console", "text"})
 _FENCE = re.compile(r"\s*(`{3,})(.*)")
 _FILE = re.compile(r"# ([\w./-]+\.(?:py|toml))\s*\n")
 _NUMBER = re.compile(r"[-+]?\d+(?:\.(\d+))?")
-_COMMAND_OUTSIDE = re.compile(r"\s+(?:activesteer|python|pip|make) \S")
+_COMMAND_OUTSIDE = re.compile(r"\s+(?:\$ )?(?:activesteer|python|pip|make) \S")
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Command:
 
 
 def blocks(page: Path) -> list[Block]:
-    """All of a page; fails where a block has no language or one that nobody runs, or a command stands outside of one."""
+    """All of a page; fails where a block has no language or an unknown one, or a command stands outside of one."""
     found: list[Block] = []
     lines = page.read_text(encoding="utf-8").splitlines()
     start, fence, language = 0, "", ""

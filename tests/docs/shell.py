@@ -67,7 +67,7 @@ def _activesteer(words: list[str]) -> str:
     target = Path(words.pop()) if len(words) > 1 and words[-2] == ">" else None
     if target is not None:
         words.pop()
-    given = [match for word in words for match in (sorted(glob.glob(word)) or [word])]  # noqa: PTH207 - as a shell does
+    given = [match for word in words for match in (sorted(glob.glob(word)) or [word])]
     with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as told:
         try:
             status = main(given)

@@ -15,7 +15,6 @@ from tests.docs.blocks import Block, blocks
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
-RUNNABLE = frozenset({"python", "toml", "sh", "console"})
 
 
 def name(page: Path) -> str:
@@ -24,6 +23,13 @@ def name(page: Path) -> str:
 
 def with_blocks() -> list[Path]:
     return [page for page in PAGES if re.search(r"^\s*```(?:python|toml|sh|console)$", page.read_text(), re.MULTILINE)]
+
+
+@pytest.fixture(autouse=True)
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty folder, but for the examples that lie in a checkout."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
 
 
 def with_slow_commands() -> list[Path]:
@@ -59,16 +65,19 @@ def _do(block: Block, namespace: dict[str, object], *, slow: bool) -> None:
 
 
 @pytest.mark.parametrize("page", with_blocks(), ids=name)
-def test_page_does_what_it_says(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_page_does_what_it_says(page: Path) -> None:
     read(page, slow=False)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", with_slow_commands(), ids=name)
-def test_page_does_what_it_says_slowly(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_page_does_what_it_says_slowly(page: Path) -> None:
     read(page, slow=True)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_no_command_stands_outside_of_a_block_that_is_run(page: Path) -> None:
+    blocks(page)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)

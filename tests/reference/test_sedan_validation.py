@@ -135,7 +135,7 @@ def test_an_unknown_reference_names_those_that_exist(tmp_path) -> None:
 
 
 def test_toe_in_slows_the_coasting_car_by_what_its_side_forces_say(result: Validation) -> None:
-    """Side forces of toed-in wheels point backwards: sum of F_y sin(toe); nothing else slows this car but slip shifts."""
+    """Side forces of toed-in wheels point backwards: sum of F_y sin(toe); else only slip shifts slow this car."""
     run = result.runs["coast_80"]
     drag = sum(
         float((run[f"Fy_{c}"] * np.sin(run[f"delta_{c}"]) - run[f"Fx_{c}"]).mean()) for c in ("FL", "FR", "RL", "RR")

@@ -188,7 +188,8 @@ def _named(linear: _Linear) -> dict[str, Mode]:
         share = inertia * np.sum(np.abs(rows @ shapes) ** 2, axis=0) / energy
         if not share.size or share.max() < 0.1:
             if name.startswith("body"):
-                msg = f"kinematics and compliance rig: no mode of the standing car below {_FASTEST_HZ:g} Hz is its {name}"
+                where = f"of the standing car below {_FASTEST_HZ:g} Hz"
+                msg = f"kinematics and compliance rig: no mode {where} is its {name}"
                 raise ModelError(msg)
             # Hard dampers leave no oscillation of a wheel between spring and tyre.
             named[name] = Mode(math.nan, math.nan)

@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+import argparse
+
+import pytest
+
+from activesteer.commands.video import _size
+from tests.unit.playback.made_up import circle
+
+
+def refused(told, *texts: str) -> None:
+    assert told.status == 1
+    assert told.err.startswith("activesteer: ")
+    assert "Traceback" not in told.err
+    for text in texts:
+        assert text in told.err
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "run.mcap"
+    circle(0.3).save(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("words", "texts"),
+    [
+        (["-o", "a.avi"], ["a.avi: a video's name must end in .mp4 or .gif"]),
+        (["-o", "nowhere/a.gif"], ["cannot write nowhere/a.gif: there is no folder nowhere"]),
+        (["-o", "a.gif", "--fps", "0"], ["pictures a second: is 0, must be 1 to 240"]),
+        (["-o", "a.gif", "--speed", "-1"], ["speed: is -1, must be 0.01 to 100"]),
+        (["-o", "a.gif", "--compare", "none.mcap"], ["cannot read none.mcap"]),
+        (["-o", "a.gif", "--size", "4x4"], ["4 x 4 pixels", "16 to 8192"]),
+    ],
+)
+def test_video_that_cannot_be_made_is_refused_in_one_message(call, file, words, texts):
+    refused(call("video", file, *words), *texts)
+
+
+def test_video_compared_with_itself_is_refused(call, file):
+    refused(call("video", file, "--compare", file, "-o", "a.gif"), "it is the same file")
+
+
+def test_recording_without_a_car_is_no_film(call, file, tmp_path):
+    run = circle(0.3)
+    type(run)(run.channels, run.time_s, run.values).save(file)
+    refused(call("video", file, "-o", tmp_path / "a.gif"), "has no poses of a car")
+
+
+def test_size_is_width_and_height():
+    assert _size("1280x720") == (1280, 720)
+    with pytest.raises(argparse.ArgumentTypeError, match="one such as 1280x720"):
+        _size("big")
+
+
+def test_watch_without_a_display_says_so_and_what_to_do(call, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    refused(call("watch", "step_steer"), "there is no display to open a window on", "`activesteer video`")
+
+
+@pytest.mark.parametrize(
+    ("words", "texts"),
+    [
+        (["step_ster"], ["no manoeuvre is named 'step_ster'", "did you mean 'step_steer'"]),
+        (["step_steer", "--speed", "0"], ["--speed: is 0, must be 0.01 to 100"]),
+        (["step_steer", "--set", "road.mu"], ["KEY=VALUE is needed"]),
+    ],
+)
+def test_watch_says_what_is_wrong_before_it_looks_for_a_display(call, words, texts):
+    refused(call("watch", *words), *texts)

@@ -1,0 +1,144 @@
+"""Films of drives: what is on the pictures, and that the files hold them. Skipped where nothing can be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from activesteer.errors import PlaybackError
+from activesteer.recording import Recording
+from activesteer.video import Film, Settings, make_film
+from activesteer.video.offscreen import backend
+from tests.unit.video.films import decode, need_ffmpeg
+
+pytestmark = pytest.mark.render
+
+SIZE = (320, 240)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def canvas() -> None:
+    try:
+        backend()
+    except PlaybackError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def picture(drives: dict[str, Recording], folder: Path) -> Callable[..., np.ndarray]:
+    """A picture of an instant, and a file of it for a look."""
+
+    def shoot(time_s: float, *names: str, **settings) -> np.ndarray:
+        chosen = {name: drives[name] for name in names or ("ars",)}
+        with Film(chosen, Settings(size=SIZE, **settings)) as film:
+            pixels = film.picture(time_s)
+        Image.fromarray(pixels).save(folder / f"film-{'-'.join(chosen)}-{'-'.join(settings.values())}-{time_s}.png")
+        return pixels[20:180].astype(int)  # without the gauges
+
+    return shoot
+
+
+def share(pixels: np.ndarray, is_so: Callable[..., np.ndarray]) -> float:
+    return float(is_so(*np.moveaxis(pixels, 2, 0)).mean())
+
+
+def blue(r, g, b):
+    return (b > r + 50) & (b > g + 20) & (r < 90)
+
+
+def orange(r, g, b):
+    return (r > 150) & (r > b + 80) & (r > g + 40)
+
+
+def white(r, g, b):
+    return (r > 200) & (g > 200) & (b > 185)
+
+
+def test_chase_camera_shows_car_road_cones_and_sky(picture):
+    pixels = picture(2.0)
+    assert 0.02 < share(pixels, blue) < 0.4
+    middle = pixels[:, 110:210]
+    assert share(middle, blue) > 2 * share(pixels[:, :100], blue)
+    assert share(pixels, orange) > 0.0005
+    assert share(pixels, white) > 0.005
+    assert pixels[0, 5, 2] > pixels[120, 5, 2]  # sky is brighter and bluer than the road
+    assert pixels[-1].std() > 1.0  # the surface has a pattern
+
+
+def test_top_camera_shows_the_car_in_the_middle(picture):
+    pixels = picture(2.0, camera="top")
+    where = np.argwhere(blue(*np.moveaxis(pixels, 2, 0)))
+    assert 0.004 < len(where) / pixels[..., 0].size < 0.15
+    assert where.mean(axis=0) == pytest.approx([100.0, 160.0], abs=15)
+    long, wide = np.ptp(where[:, 1]), np.ptp(where[:, 0])
+    assert 1.5 < long / wide < 3.2  # seen from above, nose to the right
+
+
+def test_wheel_camera_shows_tyre_and_spring(picture):
+    for corner in ("fl", "rr"):
+        pixels = picture(2.0, camera="wheel", corner=corner)
+        # Black of the tyre, and the yellow of springs.
+        assert share(pixels, lambda r, g, b: (r < 60) & (g < 60) & (b < 75)) > 0.05
+        assert share(pixels, lambda r, g, b: (r > b + 50) & (g > b + 20) & (g < r)) > 0.002
+
+
+def test_motion_is_seen(picture):
+    before, after = picture(2.0), picture(2.04)
+    road = np.s_[100:160, :80]
+    assert np.abs(before[road] - after[road]).mean() > 0.5
+
+
+def test_other_car_is_a_ghost_where_it_is(drives, folder):
+    run = drives["ars"]
+    left = run.poses._replace(positions_m=run.poses.positions_m + np.array([0.0, 4.0, 0.0]))
+    other = Recording(run.channels, run.time_s, run.values, poses=left, scene=run.scene)
+    shown = []
+    for name, runs in (("alone", {"ars": run}), ("both", {"ars": run, "beside": other})):
+        with Film(runs, Settings(size=SIZE, camera="top")) as film:
+            shown.append(film.picture(8.0)[20:180].astype(int))
+        Image.fromarray(shown[-1].astype(np.uint8)).save(folder / f"film-ghost-{name}.png")
+    alone, both = shown
+    assert share(alone, orange) < 0.001 < share(both, orange)  # the first car, now in the colour of its system
+    # 240 pixels are 23 m, and left is up.
+    ghost = np.s_[100 - 48 : 100 - 34, 140:180]
+    assert np.abs(alone[ghost] - both[ghost]).mean() > 10
+    assert (both[ghost].max(axis=2) - both[ghost].min(axis=2)).mean() > 10  # tinted, the road is grey
+    elsewhere = np.s_[:40]
+    assert np.abs(alone[elsewhere] - both[elsewhere]).max() < 4
+
+
+def test_film_of_a_recording_read_from_a_file_is_the_same(drives, tmp_path):
+    path = tmp_path / "run.mcap"
+    drives["ars"].save(path)
+    pictures = []
+    for recording in (drives["ars"], Recording.open(path)):
+        with Film({"ars": recording}, Settings(size=SIZE)) as film:
+            pictures.append(film.picture(3.0).astype(int))
+    assert np.abs(pictures[0] - pictures[1]).mean() < 0.2
+
+
+@pytest.mark.parametrize("name", ["film.gif", "film.mp4"])
+def test_file_is_as_long_as_the_drive(drives, folder, name):
+    if name.endswith(".mp4"):
+        need_ffmpeg()
+    shares: list[float] = []
+    made = make_film({"ars": drives["ars"]}, folder / name, Settings(size=SIZE, rate_hz=10, speed=2.0), shares.append)
+    duration_s = drives["ars"].poses.time_s[-1] / 2.0
+    assert made.pictures / made.rate_hz == pytest.approx(duration_s, abs=0.15)
+    assert shares[-1] == 1.0
+    assert len(shares) == made.pictures
+    if name.endswith(".gif"):
+        with Image.open(folder / name) as gif:
+            assert gif.n_frames == made.pictures  # type: ignore[attr-defined]
+        return
+    film = decode(folder / name)
+    assert "10 fps" in film.about
+    assert film.pictures.shape[1:] == (SIZE[1], SIZE[0], 3)
+    assert len(film.pictures) == made.pictures
+    with Film({"ars": drives["ars"]}, Settings(size=SIZE, speed=2.0)) as same:
+        drawn = same.picture(2.0).astype(int)
+    assert np.abs(film.pictures[10].astype(int) - drawn).mean() < 6.0

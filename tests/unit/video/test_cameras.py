@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer.errors import ParameterError
+from activesteer.video.cameras import view
+from activesteer.video.track import Track
+from tests.unit.playback.made_up import RADIUS_M, SPEED_MPS, circle
+
+
+def eye(name: str, time_s: float, corner: str = "fl") -> tuple[np.ndarray, np.ndarray]:
+    """Where the camera is, and where it looks."""
+    camera = mujoco.MjvCamera()
+    view(name, Track(circle(), "circle"), corner).aim(camera, time_s)
+    azimuth, elevation = math.radians(camera.azimuth), math.radians(camera.elevation)
+    forward = np.array(
+        [math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)]
+    )
+    return camera.lookat - camera.distance * forward, forward
+
+
+def local(point: np.ndarray, time_s: float) -> np.ndarray:
+    """A point of the world, as the car sees it."""
+    yaw = SPEED_MPS / RADIUS_M * time_s
+    x, y = point[0] - RADIUS_M * math.sin(yaw), point[1] - RADIUS_M * (1.0 - math.cos(yaw))
+    return np.array([math.cos(yaw) * x + math.sin(yaw) * y, -math.sin(yaw) * x + math.cos(yaw) * y, point[2]])
+
+
+def test_chase_camera_is_behind_and_above_and_looks_ahead():
+    at, forward = eye("chase", 1.5)
+    x, y, z = local(at, 1.5)
+    assert -12.0 < x < -6.0
+    assert abs(y) < 0.5
+    assert 1.5 < z < 4.0
+    yaw = SPEED_MPS / RADIUS_M * 1.5
+    assert np.dot(forward, [math.cos(yaw), math.sin(yaw), 0.0]) > 0.9
+
+
+def test_top_camera_looks_straight_down_on_the_middle_of_the_car():
+    at, forward = eye("top", 1.5)
+    assert local(at, 1.5)[:2] == pytest.approx([-1.35, 0.0], abs=0.01)
+    assert forward == pytest.approx([0.0, 0.0, -1.0])
+
+
+@pytest.mark.parametrize("corner", ["fl", "fr", "rl", "rr"])
+def test_wheel_camera_sees_the_inner_side_of_its_wheel(corner):
+    at, _ = eye("wheel", 1.0, corner)
+    wheel = Track(circle(), "circle").wheel_place(corner)
+    x, y, _ = local(at, 1.0)
+    assert (x - wheel[0]) * (1 if corner[0] == "f" else -1) > 1.0  # from the end of the car
+    assert abs(y) < abs(wheel[1])
+    assert math.dist((x, y), wheel[:2]) < 2.5
+
+
+def test_unknown_names_are_told_with_those_that_exist():
+    track = Track(circle(), "circle")
+    with pytest.raises(ParameterError, match="no camera 'chse'; did you mean 'chase'"):
+        view("chse", track)
+    with pytest.raises(ParameterError, match="no corner 'lf'"):
+        view("wheel", track, "lf")

@@ -1,0 +1,51 @@
+"""What is said where nothing can be drawn; that something can be is tested with the marker `render`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from activesteer.errors import PlaybackError
+from activesteer.video import offscreen
+
+
+@pytest.fixture(autouse=True)
+def asked_anew(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    offscreen.backend.cache_clear()
+    yield
+    offscreen.backend.cache_clear()
+
+
+def test_missing_libraries_are_named_with_their_packages(monkeypatch):
+    monkeypatch.setattr(offscreen, "_TRY", "raise AttributeError('NoneType')")
+    monkeypatch.setattr(offscreen, "_loads", lambda _library: False)
+    monkeypatch.setattr(offscreen, "_platform_in_use", lambda: None)
+    with pytest.raises(PlaybackError) as told:
+        offscreen.backend()
+    for text in ("libEGL.so.1 is missing", "libOSMesa.so.8 is missing", "apt-get install libegl1", "libosmesa6"):
+        assert text in str(told.value)
+
+
+def test_what_a_driver_says_is_told(monkeypatch):
+    monkeypatch.setattr(offscreen, "_TRY", "raise RuntimeError('no such device.')")
+    monkeypatch.setattr(offscreen, "_loads", lambda _library: True)
+    monkeypatch.setattr(offscreen, "_platform_in_use", lambda: None)
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    with pytest.raises(PlaybackError, match=r"\(MUJOCO_GL=egl\): egl: RuntimeError: no such device\. ") as told:
+        offscreen.backend()
+    assert "osmesa" not in str(told.value)
+
+
+def test_driver_that_crashes_is_no_crash_here(monkeypatch):
+    monkeypatch.setattr(offscreen, "_TRY", "import os; os.abort()")
+    monkeypatch.setattr(offscreen, "_platform_in_use", lambda: None)
+    with pytest.raises(PlaybackError, match="egl: ended by signal 6; osmesa: ended by signal 6"):
+        offscreen.backend()
+
+
+def test_first_that_works_is_taken(monkeypatch):
+    monkeypatch.setattr(offscreen, "_TRY", "import sys; sys.exit(sys.argv[1] == 'egl')")
+    monkeypatch.setattr(offscreen, "_platform_in_use", lambda: None)
+    assert offscreen.backend() == "osmesa"

@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer.errors import PlaybackError
+from activesteer.recording import Primitive
+from activesteer.video import Car, Stage
+from activesteer.video.track import Track
+from tests.unit.playback.made_up import circle
+
+COURSE = {
+    "path": {"x_m": [0.0, 50.0, 100.0], "y_m": [0.0, 0.0, 20.0]},
+    "lanes": [{"name": "a", "start_x_m": 10.0, "end_x_m": 30.0, "right_y_m": -1.5, "left_y_m": 1.5}],
+    "cones": [[10.0, -1.5], [10.0, 1.5]],
+}
+
+
+def stage(*cars: Car, **more) -> Stage:
+    run = circle()
+    return Stage(cars or [Car(run.scene, run.poses.names)], **more)
+
+
+def test_bodies_are_where_they_are_put():
+    run = circle()
+    track, built = Track(run, "circle"), stage()
+    positions, quaternions = track.poses(1.0)
+    built.place(0, positions, quaternions)
+    built.update()
+    for number, body in enumerate(run.poses.names):
+        placed = built.data.body(f"0/{body}")
+        np.testing.assert_allclose(placed.xpos, positions[number], atol=1e-12)
+        assert abs(np.dot(placed.xquat, quaternions[number])) == pytest.approx(1.0)
+
+
+def test_links_run_from_body_to_body():
+    run = circle()
+    track, built = Track(run, "circle"), stage()
+    positions, quaternions = track.poses(2.0)
+    built.place(0, positions, quaternions)
+    built.update()
+    tendon = built.model.tendon("0/rl_arm").id
+    first = built.data.ten_wrapadr[tendon]
+    ends = built.data.wrap_xpos.reshape(-1, 3)[first : first + 2]
+    np.testing.assert_allclose(ends[1], positions[run.poses.names.index("rl_wheel")], atol=1e-9)
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(math.hypot(0.38, 0.05), abs=0.1)
+
+
+def test_shadow_turns_with_the_car_but_stays_on_the_road():
+    built = stage()
+    positions, quaternions = Track(circle(), "circle").poses(0.0)
+    up = positions + np.array([0.0, 0.0, 2.0])
+    rolled = np.array([0.9, 0.2, 0.0, 0.3])
+    quaternions = np.tile(rolled / np.linalg.norm(rolled), (len(quaternions), 1))
+    built.place(0, up, quaternions)
+    built.update()
+    shadow = built.data.body("0/shadow")
+    assert shadow.xpos[2] == 0.0
+    assert shadow.xmat.reshape(3, 3)[2] == pytest.approx([0.0, 0.0, 1.0])
+
+
+def test_ghost_is_clearer_than_the_car_and_has_its_own_colour():
+    run = circle()
+    built = stage(Car(run.scene, run.poses.names, "#ff0000"), Car(run.scene, run.poses.names, "#0000ff", ghost=True))
+    shells = []
+    for number in range(2):
+        body = built.model.body(f"{number}/chassis")
+        shells.append(built.model.geom_rgba[int(body.geomadr[0])])
+    assert shells[0] == pytest.approx([1.0, 0.0, 0.0, 1.0])
+    assert shells[1][:3] == pytest.approx([0.0, 0.0, 1.0])
+    assert shells[1][3] < 0.5
+
+
+def test_solids_have_the_size_of_the_recording():
+    parts = (
+        Primitive("chassis", "box", (4.0, 2.0, 1.0)),
+        Primitive("chassis", "cylinder", (0.6, 0.6, 0.2)),
+        Primitive("chassis", "sphere", (3.0, 2.0, 1.0)),
+        Primitive("nowhere", "box", (1.0, 1.0, 1.0)),
+    )
+    model = stage(Car(parts, ("chassis",))).model
+    first = int(model.body("0/chassis").geomadr[0])
+    assert model.body("0/chassis").geomnum[0] == 3
+    expected = [[2.0, 1.0, 0.5], [0.3, 0.1, 0.0], [1.5, 1.0, 0.5]]
+    np.testing.assert_allclose(model.geom_size[first : first + 3], expected)
+
+
+def test_course_has_its_cones_and_lanes():
+    bare, built = stage().model, stage(course=COURSE).model
+    meshes = built.geom_type == mujoco.mjtGeom.mjGEOM_MESH
+    assert meshes.sum() == 3 * 2  # three rings a cone
+    places = {tuple(np.round(place[:2], 6)) for place in built.geom_pos[meshes]}
+    assert places == {(10.0, -1.5), (10.0, 1.5)}
+    # Feet of the cones, four lines, and a dash of the path every 4 m of 104.
+    assert built.ngeom - bare.ngeom == 6 + 2 + 4 + 26
+
+
+def test_slippery_ground_looks_different():
+    def colour(**road) -> np.ndarray:
+        model = stage(road=road).model
+        texture = model.texture("road").id
+        start = model.tex_adr[texture]
+        return model.tex_data[start : start + 3 * 512 * 512].reshape(-1, 3).mean(axis=0)
+
+    assert colour(mu=0.1)[2] > colour(mu=0.9)[2] + 50
+    patch = {"start_m": 20.0, "end_m": 40.0, "mu": 0.2, "side": "left"}
+    split = stage(road={"mu": 0.9, "mu_right": 0.3, "patches": [patch]}).model
+    added = [split.geom_size[index] for index in range(split.ngeom) if split.geom_bodyid[index] == 0][1:]
+    assert len(added) == 2
+    assert added[1][0] == 10.0
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"course": {"lanes": [], "cones": []}},
+        {"course": {**COURSE, "lanes": [{"name": "a"}]}},
+        {"road": {"patches": [{"mu": 0.3}]}},
+    ],
+)
+def test_recording_that_cannot_be_drawn_says_so(more):
+    with pytest.raises(PlaybackError, match="cannot be drawn"):
+        stage(**more)
