@@ -49,7 +49,7 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.scenario import resolve
 
     controllers = options.controller or ["none"]
-    scenario = resolve(options.maneuver, options.vehicle, dict(_override(text) for text in options.overrides))
+    scenario = resolve(options.maneuver, options.vehicle, dict(parse_override(text) for text in options.overrides))
     # What is wrong with the last controller or the plot is said before the first run, not after it.
     for controller in controllers:
         load_controller(controller, scenario.controller_setup(DEFAULT_TIMESTEP_S))
@@ -114,7 +114,7 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[str]) -> li
     return paths
 
 
-def _override(text: str) -> tuple[str, Any]:
+def parse_override(text: str) -> tuple[str, Any]:
     """`key=value`, the value as in TOML; what is no TOML value is a text."""
     key, sign, value = text.partition("=")
     if not sign or not key:

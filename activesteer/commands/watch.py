@@ -42,7 +42,7 @@ def add_to(commands: Any) -> None:
 
 
 def _watch(options: argparse.Namespace) -> int:
-    from activesteer.commands.run import _override
+    from activesteer.commands.run import parse_override
     from activesteer.runner import prepared
     from activesteer.scenario import resolve
 
@@ -50,7 +50,7 @@ def _watch(options: argparse.Namespace) -> int:
         msg = f"--speed: is {options.speed:g}, must be 0.01 to 100"
         raise ParameterError(msg)
     # What is wrong with the manoeuvre is said wherever one is; only then is a window needed.
-    scenario = resolve(options.maneuver, options.vehicle, dict(_override(text) for text in options.overrides))
+    scenario = resolve(options.maneuver, options.vehicle, dict(parse_override(text) for text in options.overrides))
     check_display()
     with suppress(KeyboardInterrupt):  # a way to end it
         _show(prepared(scenario), options.controller, options.speed)
