@@ -210,4 +210,5 @@ def test_controllers_are_told_what_sensors_measure_and_nothing_else():
         "drive_torque_Nm",
         "brake",
         "limited",
+        "wheel_torques",
     }
