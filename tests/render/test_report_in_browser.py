@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -231,12 +232,10 @@ def test_plots_follow_the_width_of_the_window(open_page):
     figure = plot(page, "Yaw rate")
     page.set_viewport_size({"width": 900, "height": 900})
     # The page's policy allows no code from text, so that the browser cannot be told to wait: it is asked again.
-    for _ in range(50):
-        box = figure.locator(".uplot").bounding_box()
-        assert box
-        if box["width"] < 450:
-            break
+    deadline = time.monotonic() + 5.0
+    while (box := figure.locator(".uplot").bounding_box()) and box["width"] >= 450 and time.monotonic() < deadline:
         page.wait_for_timeout(100)
+    assert box
     assert box["width"] < 450
     assert box["x"] + box["width"] <= 900
     assert pixels(figure, RUN_COLOURS[2]) > 100
