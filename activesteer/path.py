@@ -84,16 +84,16 @@ class Path:
         """Arc length [m]."""
         return float(self.s_m[-1])
 
-    def at(self, s_m: float) -> tuple[float, float]:
-        """The point at an arc length, also before the beginning and beyond the end.
+    def at(self, s_m: Array) -> tuple[Array, Array]:
+        """Points at arc lengths, also before the beginning and beyond the end.
 
         Args:
-            s_m: Arc length [m].
+            s_m: Arc lengths [m], shape (k,).
 
         Returns:
-            World x and y [m].
+            World x and y [m], shape (k,) each.
         """
-        return point_at(s_m, *self.line)
+        return _points_at(s_m, *self._line)
 
     def nearest(self, x_m: float, y_m: float, around_m: float, window_m: float) -> float:
         """Arc length of the point of the path nearest to a point, looked for around a place where it was before.
@@ -107,18 +107,18 @@ class Path:
         Returns:
             Arc length [m]; below 0 or above the length where the path goes on straight.
         """
-        return nearest(x_m, y_m, around_m, window_m, *self.line)
+        return _nearest(x_m, y_m, around_m, window_m, *self._line)
 
     @cached_property
-    def line(self) -> tuple[float, Array, Array, float, float]:
+    def _line(self) -> tuple[float, Array, Array, float, float]:
         """What the kernels take: spacing [m], x and y of the points [m], headings at both ends [rad]."""
         spacing = self.length_m / (len(self.s_m) - 1)
         return spacing, self.x_m, self.y_m, float(self.heading_rad[0]), float(self.heading_rad[-1])
 
 
 @njit(cache=True, error_model="numpy")
-def point_at(s, spacing, xs, ys, heading_first, heading_last):
-    """`Path.at` for native code: linear between points, straight beyond the ends."""
+def _point_at(s, spacing, xs, ys, heading_first, heading_last):
+    """One point: linear between points, straight beyond the ends."""
     last = len(xs) - 1
     place = s / spacing
     if place <= 0.0:
@@ -132,13 +132,22 @@ def point_at(s, spacing, xs, ys, heading_first, heading_last):
 
 
 @njit(cache=True, error_model="numpy")
-def nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
-    """`Path.nearest` for native code."""
+def _points_at(s, spacing, xs, ys, heading_first, heading_last):
+    """`Path.at` as native code."""
+    x, y = np.empty(len(s)), np.empty(len(s))
+    for index in range(len(s)):
+        x[index], y[index] = _point_at(s[index], spacing, xs, ys, heading_first, heading_last)
+    return x, y
+
+
+@njit(cache=True, error_model="numpy")
+def _nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
+    """`Path.nearest` as native code."""
     count = math.ceil(2.0 * window / SPACING_M) + 1
     best, least, before, after = 0, math.inf, math.inf, math.inf
     previous = math.inf
     for index in range(count):
-        px, py = point_at(around - window + index * SPACING_M, spacing, xs, ys, heading_first, heading_last)
+        px, py = _point_at(around - window + index * SPACING_M, spacing, xs, ys, heading_first, heading_last)
         distance = (px - x) ** 2 + (py - y) ** 2
         if index == best + 1:
             after = distance

@@ -33,7 +33,7 @@ from activesteer.analysis.claims import SCENARIOS, SYSTEMS
 from activesteer.recording import Recording
 from activesteer.reproduction import worker_pool
 from activesteer.runner import prepared, run_scenario
-from activesteer.scenario import Scenario, resolve
+from activesteer.scenario import resolve
 
 RANGES: Final = {
     "desired_yaw_rate.max_lateral_acceleration_mps2": (7.8, 8.8),  # about what dry tyres transmit
@@ -70,11 +70,7 @@ def overrides(values: tuple[float, ...]) -> dict[str, float]:
 
 
 def _drive(scenario: str, system: str, changes: Mapping[str, Any]) -> Recording:
-    return run_scenario(_prepared(scenario, changes), system)
-
-
-def _prepared(scenario: str, changes: Mapping[str, Any]) -> Scenario:
-    return prepared(resolve(scenario, overrides=changes))
+    return run_scenario(prepared(resolve(scenario, overrides=changes)), system)
 
 
 _without: dict[str, Recording] = {}

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from activesteer.commands.arguments import add_vehicle
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError
 
@@ -25,7 +26,7 @@ def add_to(commands: Any) -> None:
         "--recordings", type=Path, metavar="DIR",
         help="recordings that `activesteer reproduce -o DIR` has made; where not given they are made now, in DIR/runs",
     )  # fmt: skip
-    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
+    add_vehicle(parser)
     parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one per processor)")
     parser.set_defaults(action=_figures)
 

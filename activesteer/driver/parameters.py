@@ -16,7 +16,7 @@ class DriverParameters:
     preview_s: Annotated[float, Range(0.2, 5.0)] = 1.3
     """How far ahead the driver looks [s]: 1.3 s in MacAdam (1981), who fitted lane changes of test drivers."""
     reaction_delay_s: Annotated[float, Range(0.0, 1.0)] = 0.2
-    """From seeing to acting [s]: 0.2 s in MacAdam (1981)."""
+    """From seeing to acting, in steps of 10 ms, the time between two looks [s]: 0.2 s in MacAdam (1981)."""
     neuromuscular_lag_s: Annotated[float, Range(0.0, 0.5)] = 0.1
     """First-order lag of arms and hands [s]: about 0.1 s in McRuer's crossover model (1967)."""
     steering_rate_limit_radps: Annotated[float, Range(0.1, 50.0)] = math.radians(900.0)

@@ -23,7 +23,7 @@ from scipy.linalg import expm
 
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
-from activesteer.path import Path, point_at
+from activesteer.path import Path
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 
 Array = NDArray[np.float64]
@@ -102,7 +102,8 @@ class PathPreviewDriver:
             self._decide(self._decided_rad[-1])
             return
         preview = self._preview(speed)
-        self._decide(self.robot.steering_ratio * _best_steering(along, *motion, *preview, *path.line))
+        ahead = path.at(along + speed * preview.times_s)
+        self._decide(self.robot.steering_ratio * _best_steering(*motion, *ahead, *preview[1:]))
 
     def _decide(self, steering_wheel_rad: float) -> None:
         """Puts an angle into the line; what stands at its head is what the hands now begin to do."""
@@ -143,20 +144,17 @@ class PathPreviewDriver:
 
 
 @njit(cache=True, error_model="numpy")
-def _best_steering(
-    along, x, y, yaw, speed, lateral_speed, yaw_rate, times, by_yaw_rate, by_sideslip, by_steering, spacing, xs, ys,
-    heading_first, heading_last,
-):  # fmt: skip
+def _best_steering(x, y, yaw, speed, lateral_speed, yaw_rate, ahead_x, ahead_y, by_yaw_rate, by_sideslip, by_steering):
     """Road-wheel angle held from now on that comes closest to the path, in the least squares sense [rad].
 
-    The arguments are where the car is on the path, the members of `Motion`, of `_Preview`, and of `Path.line`.
+    The arguments are the members of `Motion`, the points ahead [m], shape (n,), and the members of `_Preview` without
+    the times. It calls no native code of another file: what is kept on disk would not notice a change there.
     """
     cos, sin = math.cos(yaw), math.sin(yaw)
     sideslip = math.atan2(lateral_speed, speed)
     product, square = 0.0, 0.0
-    for index in range(len(times)):
-        px, py = point_at(along + speed * times[index], spacing, xs, ys, heading_first, heading_last)
-        wanted = cos * (py - y) - sin * (px - x)
+    for index in range(len(ahead_x)):
+        wanted = cos * (ahead_y[index] - y) - sin * (ahead_x[index] - x)
         missing = wanted - yaw_rate * by_yaw_rate[index] - sideslip * by_sideslip[index]
         product += missing * by_steering[index]
         square += by_steering[index] * by_steering[index]

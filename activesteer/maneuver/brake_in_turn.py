@@ -10,7 +10,7 @@ from typing import Annotated
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver
-from activesteer.maneuver.search import LEAST_SEARCH_SPEED_MPS, SteadyTurn
+from activesteer.maneuver.search import SteadyTurn, check_search_speed
 from activesteer.maneuver.step_steer import StepInput, StepSteer
 from activesteer.signals import Reference
 
@@ -77,12 +77,8 @@ class BrakeInTurn(Maneuver):
             end = brake.start_s + brake.rise_s
             msg = f"brake.start_s: the brake is pressed down at {end:g} s, but the run ends at {self.duration_s:g} s"
             raise ManeuverError(msg)
-        if turn.steering_wheel_rad is None and self.speed_mps < LEAST_SEARCH_SPEED_MPS:
-            msg = (
-                f"speed_kmh: is {3.6 * self.speed_mps:g} km/h; turn.lateral_acceleration_mps2 needs at least "
-                f"{3.6 * LEAST_SEARCH_SPEED_MPS:g} km/h, or give turn.steering_wheel_deg"
-            )
-            raise ManeuverError(msg)
+        if turn.steering_wheel_rad is None:
+            check_search_speed(self.speed_mps, "turn.lateral_acceleration_mps2", "turn.steering_wheel_deg")
 
     @property
     def search(self) -> SteadyTurn | None:

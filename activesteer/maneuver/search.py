@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from activesteer.errors import ManeuverError
+
 if TYPE_CHECKING:
     from activesteer.maneuver.base import Maneuver
     from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
@@ -12,6 +14,25 @@ if TYPE_CHECKING:
 
 LEAST_SEARCH_SPEED_MPS: Final = 30.0 / 3.6
 """Slower than this, lateral acceleration hardly depends on the steering wheel angle [m/s]."""
+
+
+def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
+    """A search needs a car that drives forwards, and not slowly.
+
+    Args:
+        speed_mps: Speed of the manoeuvre [m/s].
+        aim: Key that makes the search necessary.
+        amplitude: Key to give instead.
+
+    Raises:
+        ManeuverError: the speed is too low.
+    """
+    if speed_mps < LEAST_SEARCH_SPEED_MPS:
+        msg = (
+            f"speed_kmh: is {3.6 * speed_mps:g} km/h; {aim} needs at least {3.6 * LEAST_SEARCH_SPEED_MPS:g} km/h to be "
+            f"reached, or give {amplitude}"
+        )
+        raise ManeuverError(msg)
 
 
 class SteadyTurn(NamedTuple):

@@ -12,7 +12,7 @@ from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.choices import DRIVES, SIDES, check_choice
-from activesteer.maneuver.search import LEAST_SEARCH_SPEED_MPS, RampAngle
+from activesteer.maneuver.search import RampAngle, check_search_speed
 from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer, SlowRamp
 from activesteer.signals import Reference
 
@@ -83,12 +83,8 @@ class SineWithDwell(Maneuver):
                 f"evaluation needs 1.75 s more, {steer.completion_s + 1.75:.3g} s"
             )
             raise ManeuverError(msg)
-        if steer.steering_wheel_rad is None and self.speed_mps < LEAST_SEARCH_SPEED_MPS:
-            msg = (
-                f"speed_kmh: is {3.6 * self.speed_mps:g} km/h; steer.amplitude_factor needs at least "
-                f"{3.6 * LEAST_SEARCH_SPEED_MPS:g} km/h to reach 0.3 g, or give steer.steering_wheel_deg"
-            )
-            raise ManeuverError(msg)
+        if steer.steering_wheel_rad is None:
+            check_search_speed(self.speed_mps, "steer.amplitude_factor", "steer.steering_wheel_deg")
 
     @property
     def search(self) -> RampAngle | None:

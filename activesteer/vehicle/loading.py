@@ -81,9 +81,8 @@ def _friction(actuator: str, parameters: VehicleParameters) -> tuple[float, floa
     friction = parameters.friction
     if actuator == "rack_friction":
         return friction.rack_N, friction.rack_stiffness_Npm
-    return friction.front_damper_N if actuator.startswith(
-        "f"
-    ) else friction.rear_damper_N, friction.damper_stiffness_Npm
+    force = friction.front_damper_N if actuator.startswith("f") else friction.rear_damper_N
+    return force, friction.damper_stiffness_Npm
 
 
 def _load_chassis(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:

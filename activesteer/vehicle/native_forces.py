@@ -62,7 +62,7 @@ def _interpolate(x, xs, ys, count):
 
 
 @njit(inline="always", error_model="numpy")
-def _friction(block, mu, x, y):
+def _road_mu(block, mu, x, y):
     """Friction of the road at a place [m], world axes; `mu` where no area says otherwise."""
     if block[fb.AREAS_FELT] == 0.0:
         return mu
@@ -90,7 +90,7 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
         reach = xpos[3 * body + 2] * az / (ax * ax + ay * ay)
         contact_x = xpos[3 * body] + reach * ax
         contact_y = xpos[3 * body + 1] + reach * ay
-        mu = _friction(block, wheel[fb.W_MU], contact_x, contact_y)
+        mu = _road_mu(block, wheel[fb.W_MU], contact_x, contact_y)
         (
             fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, rate_z, radius, hx, hy, arm_x, arm_y, arm_z,
             limited, use,

@@ -74,13 +74,13 @@ def test_step_of_an_active_steering_gives_the_response_of_the_full_car(name, amp
 
 
 def test_step_steer_of_a_tenth_of_g_is_followed():
-    recording = run("step_steer", steer__steering_wheel_deg=9.0, duration_s=3.0)
+    # Without the friction of the rack, which the linear car is without: it lets the rack start a little late.
+    recording = run("step_steer", steer__steering_wheel_deg=9.0, duration_s=3.0, friction__rack_N=0.0)
     found = linear_response(recording, system())
     for output in OUTPUTS:
         most = np.abs(recording[output]).max()
-        # The first 10 ms of the lateral acceleration belong to modes above the cut-off, which answer at once here; then
-        # the rack, which the linear car has without friction, starts a little late.
-        allowed = 0.12 if output == "ay_mps2" else 0.05
+        # The first 10 ms of the lateral acceleration belong to modes above the cut-off, which answer at once here.
+        allowed = 0.1 if output == "ay_mps2" else 0.05
         assert found[output] == pytest.approx(recording[output], abs=allowed * most)
 
 

@@ -39,8 +39,9 @@ def test_heading_counts_on_beyond_half_a_turn() -> None:
 
 def test_it_goes_on_straight_at_both_ends() -> None:
     path = Path.through([0.0, 10.0, 20.0], [0.0, 10.0, 20.0])
-    assert path.at(-math.sqrt(2.0)) == pytest.approx((-1.0, -1.0))
-    assert path.at(path.length_m + math.sqrt(2.0)) == pytest.approx((21.0, 21.0))
+    x, y = path.at(np.array([-math.sqrt(2.0), path.length_m + math.sqrt(2.0)]))
+    assert x == pytest.approx([-1.0, 21.0])
+    assert y == pytest.approx([-1.0, 21.0])
 
 
 def test_the_nearest_point_is_found_between_the_samples() -> None:

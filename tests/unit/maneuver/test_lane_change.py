@@ -31,7 +31,7 @@ def least_distance_m(course: Course, width_m: float) -> float:
     """Least distance between the car's sides, at axles 1.3 m from its centre, and the edges of the lanes."""
     path = course.path
     s = np.arange(0.0, path.length_m, 0.02)
-    x, y = np.array([path.at(place) for place in s.tolist()]).T
+    x, y = path.at(s)
     heading = np.interp(s, path.s_m, path.heading_rad)
     distances = []
     for ahead in (1.3, -1.3):
