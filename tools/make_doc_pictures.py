@@ -23,10 +23,10 @@ from PIL import Image
 from activesteer.analysis.figures import BY_KIND, style, time_histories
 from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL, Panel
 from activesteer.analysis.frequency_response import frequency_response
-from activesteer.pictures import new_figure
+from activesteer.plotting import new_figure
 from activesteer.resources import list_maneuvers, models_dir
-from activesteer.runner import prepared, run_scenario
 from activesteer.scenario import resolve
+from activesteer.simulation.runner import prepared, run_scenario
 from activesteer.tyre import MagicFormula, load_tir
 
 if TYPE_CHECKING:

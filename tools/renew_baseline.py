@@ -66,7 +66,7 @@ def _rounded(value: float) -> float:
 
 def main() -> None:
     """Drives everything and writes the file."""
-    from activesteer.reproduction import reproduce  # noqa: PLC0415 - the tests import this module for its comparison
+    from activesteer.studies.reproduction import reproduce  # noqa: PLC0415 - the tests import this module for its comparison
 
     stored = json.loads(BASELINE.read_text(encoding="utf-8")) if BASELINE.exists() else {}
     with tempfile.TemporaryDirectory() as folder:

@@ -31,9 +31,9 @@ from scipy.stats import qmc
 
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS
 from activesteer.recording import Recording
-from activesteer.reproduction import worker_pool
-from activesteer.runner import prepared, run_scenario
 from activesteer.scenario import resolve
+from activesteer.simulation.runner import prepared, run_scenario
+from activesteer.studies.reproduction import worker_pool
 
 RANGES: Final = {
     "desired_yaw_rate.max_lateral_acceleration_mps2": (7.8, 8.8),  # about what dry tyres transmit

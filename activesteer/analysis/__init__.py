@@ -6,7 +6,7 @@
 - `claims`: what the paper says about the three systems, as checks, with a scorecard.
 - `tables`, `figures`, `linear_plots`: the same for reading and looking. The figures need matplotlib
   (`pip install 'activesteer[plot]'`).
-- `linearise`: the linear car; it belongs to `activesteer.linearisation` and is only offered here.
+- `linearise`: the linear car; it belongs to `activesteer.studies.linearisation` and is only offered here.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def linearise(
     overrides: Mapping[str, Any] | None = None,
     **options: Any,
 ) -> control.StateSpace:
-    """The car linearised about driving straight on; see `activesteer.linearisation.linearise`.
+    """The car linearised about driving straight on; see `activesteer.studies.linearisation.linearise`.
 
     Args:
         vehicle: Name, path, or table of a vehicle.
@@ -36,4 +36,6 @@ def linearise(
         **options: As there.
     """
     # Found when it is called: a car is live state, which this package must not depend on. Users look for it here.
-    return importlib.import_module("activesteer.linearisation").linearise(vehicle, speed_mps, overrides, **options)
+    return importlib.import_module("activesteer.studies.linearisation").linearise(
+        vehicle, speed_mps, overrides, **options
+    )

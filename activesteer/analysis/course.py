@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
-from activesteer.lane import Lane
+from activesteer.road.lane import Lane
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from activesteer.analysis.frequency_response import OUTPUTS, frequency_response
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS
 from activesteer.errors import ParameterError
-from activesteer.pictures import new_figure, save
+from activesteer.plotting import new_figure, save
 
 if TYPE_CHECKING:
     import control

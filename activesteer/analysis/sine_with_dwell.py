@@ -41,8 +41,8 @@ PEAK_PROMINENCE: Final = 0.02
 INSTANTS_S: Final = (1.0, 1.75)
 """Times after the completion of steer at which the yaw rate is compared with its peak [s]."""
 DISPLACEMENT_TIME_S: Final = 1.07
-"""Time after the beginning of steer at which the lateral displacement is taken [s]; FMVSS 126 asks for 1.83 m there, of a
-car up to 3500 kg and from 5 A on."""
+"""Time after the beginning of steer at which the lateral displacement is taken [s]; FMVSS 126 asks for 1.83 m there,
+of a car up to 3500 kg and from 5 A on."""
 RATIO_LIMITS: Final = (0.35, 0.20)
 """Largest ratios allowed at `INSTANTS_S`."""
 

@@ -21,7 +21,7 @@ def add_to(commands: Any) -> None:
 
 
 def _bench(options: argparse.Namespace) -> int:
-    from activesteer.bench import bench, bench_tyre
+    from activesteer.studies.benchmark import bench, bench_tyre
 
     if options.rounds < 1:
         msg = f"--rounds {options.rounds}: at least 1 is needed"
@@ -45,7 +45,7 @@ _KEY_METRICS: Final = (
 
 def _maneuvers(*, as_json: bool) -> int:
     from activesteer.analysis.tables import comparison
-    from activesteer.bench import bench_maneuvers
+    from activesteer.studies.benchmark import bench_maneuvers
 
     rows = bench_maneuvers()
     if as_json:

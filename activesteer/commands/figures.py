@@ -32,7 +32,7 @@ def add_to(commands: Any) -> None:
 
 
 def _figures(options: argparse.Namespace) -> int:
-    from activesteer.reproduction import recordings_in, reproduce
+    from activesteer.studies.reproduction import recordings_in, reproduce
 
     if options.recordings is not None:
         recordings = recordings_in(options.recordings)
@@ -70,7 +70,7 @@ def draw_all(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle:
     """
     from activesteer.analysis.figures import FORMATS, figure_2
     from activesteer.analysis.figures import draw_all as draw_runs
-    from activesteer.pictures import save
+    from activesteer.plotting import save
     from activesteer.rigs import kinematics_compliance
     from activesteer.rigs.kc import rear_camber_figure
 
@@ -94,8 +94,8 @@ def models_beside(run: Recording) -> dict[str, dict[str, NDArray[np.float64]]]:
         Name of the model -> channel -> values over the time of the run.
     """
     from activesteer.controllers import SingleTrackParameters
-    from activesteer.identification import single_track_response
-    from activesteer.linearisation import linear_response, linearise
+    from activesteer.studies.identification import single_track_response
+    from activesteer.studies.linearisation import linear_response, linearise
 
     maneuver, vehicle = run.metadata["maneuver"], run.metadata["vehicle"]
     single_track = SingleTrackParameters(**vehicle["single_track"])

@@ -20,8 +20,8 @@ def add_to(commands: Any) -> None:
 
 
 def _identify(options: argparse.Namespace) -> int:
-    from activesteer.identification import identify, write_single_track
     from activesteer.resources import find_vehicle
+    from activesteer.studies.identification import identify, write_single_track
 
     def progress(test: str) -> None:
         if not options.json:

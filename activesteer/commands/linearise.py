@@ -22,7 +22,7 @@ def add_to(commands: Any) -> None:
 
 
 def _linearise(options: argparse.Namespace) -> int:
-    from activesteer.linearisation import eigenvalue_table, linear_car, linear_cars
+    from activesteer.studies.linearisation import eigenvalue_table, linear_car, linear_cars
 
     car = linear_car(options.vehicle, options.speed_kmh / 3.6)
     print(f"{options.vehicle} at {options.speed_kmh:g} km/h")

@@ -12,7 +12,7 @@ from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 
 if TYPE_CHECKING:
-    from activesteer.reproduction import Reproduction
+    from activesteer.studies.reproduction import Reproduction
 
 _DEFAULT_FOLDER: Final = Path("runs")
 
@@ -37,7 +37,7 @@ def add_to(commands: Any) -> None:
 def _reproduce(options: argparse.Namespace) -> int:
     if options.robustness:
         return _robustness(options)
-    from activesteer.reproduction import reproduce
+    from activesteer.studies.reproduction import reproduce
 
     with ProgressBar("reproduce", quiet=options.json) as bar:
 
@@ -89,7 +89,7 @@ def _report(result: Reproduction, folder: Path) -> Path | None:
 
 
 def _robustness(options: argparse.Namespace) -> int:
-    from activesteer.reproduction import robustness
+    from activesteer.studies.reproduction import robustness
 
     with ProgressBar("robustness", quiet=options.json) as bar:
         table = robustness(

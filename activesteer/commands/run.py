@@ -45,8 +45,8 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.analysis.tables import comparison
     from activesteer.controllers import load_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
-    from activesteer.runner import prepared, run_scenario
     from activesteer.scenario import resolve
+    from activesteer.simulation.runner import prepared, run_scenario
 
     controllers = options.controller or ["none"]
     scenario = resolve(options.maneuver, options.vehicle, dict(parse_override(text) for text in options.overrides))

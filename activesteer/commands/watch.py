@@ -43,8 +43,8 @@ def add_to(commands: Any) -> None:
 
 def _watch(options: argparse.Namespace) -> int:
     from activesteer.commands.run import parse_override
-    from activesteer.runner import prepared
     from activesteer.scenario import resolve
+    from activesteer.simulation.runner import prepared
 
     if not 0.01 <= options.speed <= 100.0:
         msg = f"--speed: is {options.speed:g}, must be 0.01 to 100"
@@ -60,9 +60,9 @@ def _watch(options: argparse.Namespace) -> int:
 def _show(scenario: Any, controller: str, speed: float) -> None:
     import mujoco.viewer
 
-    from activesteer.live import Pacer, drive, stage_for
     from activesteer.scenario import describe
-    from activesteer.simulation import Simulation
+    from activesteer.simulation.live_view import Pacer, drive, stage_for
+    from activesteer.simulation.simulation import Simulation
 
     simulation = Simulation(scenario, controller)
     course = scenario.maneuver.course

@@ -5,7 +5,7 @@ from activesteer.controllers.loading import BUILT_IN, Controller, load_controlle
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
-from activesteer.controllers.single_track import SingleTrack, SingleTrackParameters
+from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
 __all__ = [
     "BUILT_IN",

@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from activesteer.controllers.parameters import DesiredYawRateParameters
-from activesteer.controllers.single_track import SingleTrack
+from activesteer.theory.single_track import SingleTrack
 
 MIN_SPEED_MPS: Final = 3.0
 """Below this speed active steering rests, and the friction limit of the desired yaw rate rises no further [m/s]."""

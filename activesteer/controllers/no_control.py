@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from activesteer.controllers.desired_yaw_rate import DesiredYawRate
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.controllers.single_track import SingleTrack
 from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from activesteer.theory.single_track import SingleTrack
 
 
 class NoControl:

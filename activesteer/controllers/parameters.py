@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from activesteer.config import Range
-from activesteer.controllers.single_track import SingleTrackParameters
+from activesteer.theory.single_track import SingleTrackParameters
 
 _NotNegative = Annotated[float, Range(0.0)]
 

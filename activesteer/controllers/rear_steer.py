@@ -7,8 +7,8 @@ import math
 from activesteer.controllers.corrector import Corrector, decide
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
 from activesteer.controllers.parameters import ControllerSetup, RearSteerParameters
-from activesteer.controllers.single_track import SingleTrack
 from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from activesteer.theory.single_track import SingleTrack
 
 
 class RearPrediction:

@@ -23,7 +23,7 @@ from scipy.linalg import expm
 
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
-from activesteer.path import Path
+from activesteer.road.path import Path
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 
 Array = NDArray[np.float64]

@@ -1,6 +1,5 @@
 """Manoeuvres: TOML files that say what is asked of the driver, on which road, and for how long."""
 
-from activesteer.lane import Lane
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.constant_radius import ConstantRadius
@@ -14,6 +13,7 @@ from activesteer.maneuver.sine_with_dwell import SineWithDwell
 from activesteer.maneuver.slalom import Slalom
 from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
 from activesteer.maneuver.step_steer import StepSteer
+from activesteer.road.lane import Lane
 
 __all__ = [
     "KINDS",

@@ -9,7 +9,7 @@ from typing import Annotated
 from activesteer.config import Range
 from activesteer.maneuver.course import Course
 from activesteer.maneuver.search import Search
-from activesteer.road import Road
+from activesteer.road.road import Road
 from activesteer.signals import Reference
 
 Speed = Annotated[float, Range(-20.0, 100.0)]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from activesteer.lane import Lane
-from activesteer.path import Path
+from activesteer.road.lane import Lane
+from activesteer.road.path import Path
 
 
 class Course(NamedTuple):

@@ -13,7 +13,7 @@ from activesteer.maneuver.along_course import AlongCourse
 from activesteer.maneuver.course import Course
 from activesteer.maneuver.csv_table import find_csv
 from activesteer.maneuver.path_points import check_points, read_csv
-from activesteer.path import Path
+from activesteer.road.path import Path
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from activesteer.lane import Lane
+from activesteer.road.lane import Lane
 
 STANDARDS: Final = ("iso_3888_1", "iso_3888_2")
 """Standards that a course can be laid out by."""

@@ -12,13 +12,13 @@ import numpy as np
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
-from activesteer.lane import Lane
 from activesteer.maneuver.along_course import AlongCourse, Width, known_width
 from activesteer.maneuver.choices import SIDES, check_choice
 from activesteer.maneuver.course import Course
 from activesteer.maneuver.iso_3888 import STANDARDS, cones, lanes
 from activesteer.maneuver.least_jerk import Bound, least_jerk
-from activesteer.path import Path
+from activesteer.road.lane import Lane
+from activesteer.road.path import Path
 
 _AXLES_M: Final = (1.3, -1.3)
 """Where a car of 2.6 m wheelbase has its axles, ahead of its centre [m]: there its sides keep the margin."""

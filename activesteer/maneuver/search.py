@@ -29,8 +29,8 @@ def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
     """
     if speed_mps < LEAST_SEARCH_SPEED_MPS:
         msg = (
-            f"speed_kmh: is {3.6 * speed_mps:g} km/h; {aim} needs at least {3.6 * LEAST_SEARCH_SPEED_MPS:g} km/h to be "
-            f"reached, or give {amplitude}"
+            f"speed_kmh: is {3.6 * speed_mps:g} km/h; {aim} needs at least {3.6 * LEAST_SEARCH_SPEED_MPS:g} km/h, or "
+            f"give {amplitude}"
         )
         raise ManeuverError(msg)
 

@@ -14,7 +14,7 @@ from activesteer.errors import ManeuverError
 from activesteer.maneuver.along_course import AlongCourse, Width, known_width
 from activesteer.maneuver.choices import SIDES, check_choice
 from activesteer.maneuver.course import Course
-from activesteer.path import Path
+from activesteer.road.path import Path
 
 _SAMPLE_M: Final = 0.5
 

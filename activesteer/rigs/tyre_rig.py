@@ -19,8 +19,8 @@ from activesteer.errors import ParameterError
 from activesteer.rigs.tyre_rig_model import compile_rig
 from activesteer.rigs.wheel_motion import Motion, RigForces, Vector, stacked, turned
 from activesteer.tyre.evaluation import MagicFormula
+from activesteer.tyre.kernels.vertical import effective_rolling_radius
 from activesteer.tyre.tyre_parameters import Side, TyreParameters
-from activesteer.tyre.vertical import effective_rolling_radius
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_forces import install_native_forces
 from activesteer.vehicle.parameters import TyreFitment

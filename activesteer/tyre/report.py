@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from activesteer.tyre.diagnostics import remarks
 from activesteer.tyre.evaluation import MagicFormula
-from activesteer.tyre.remarks import remarks
 from activesteer.tyre.tyre_parameters import TyreParameters
 
 _BAR_PA: Final = 1e5

@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.tyre import parameters as index
-from activesteer.tyre.coefficients import BY_NAME, COEFFICIENTS
 from activesteer.tyre.conventions import TyreConventions
+from activesteer.tyre.file.coefficients import BY_NAME, COEFFICIENTS
+from activesteer.tyre.kernels import parameter_index as index
 
 DEFAULT_PRESSURE_PA = 220_000.0
 DEFAULT_LONGITUDINAL_STIFFNESS_NPM = 300_000.0

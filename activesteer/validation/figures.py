@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from activesteer.pictures import new_figure
+from activesteer.plotting import new_figure
 from activesteer.validation.kinematics import Curves
 from activesteer.validation.reference import Table
 from activesteer.validation.runs import QUANTITIES, RMS_TOLERANCE, traces

@@ -12,9 +12,9 @@ import numpy as np
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
-from activesteer.road import Road
-from activesteer.runner import prepared, run_scenario
+from activesteer.road.road import Road
 from activesteer.scenario import resolve
+from activesteer.simulation.runner import prepared, run_scenario
 from activesteer.validation.comparison import Comparison, to_json
 from activesteer.validation.kinematics import Curves, compare_kinematics
 from activesteer.validation.motion import reference_columns

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.runner import simulate
+from activesteer.simulation.runner import simulate
 from activesteer.validation.motion import reference_columns
 from activesteer.validation.reference import ReferenceData
 

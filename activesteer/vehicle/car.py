@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.errors import ModelError, SimulationDiverged
-from activesteer.road import Road
+from activesteer.road.road import Road
 from activesteer.signals import DriverCommand, Measurement, Motion, SteerCommand, WheelTorques
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb

@@ -11,8 +11,8 @@ import numpy as np
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError, nearest_names
-from activesteer.road import Road
-from activesteer.tyre import parameters as tyre_index
+from activesteer.road.road import Road
+from activesteer.tyre.kernels import parameter_index as tyre_index
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, DamperCurve, VehicleParameters

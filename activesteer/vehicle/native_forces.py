@@ -20,8 +20,8 @@ from numba import carray, cfunc, njit, types
 
 import activesteer.tyre
 from activesteer.errors import ModelError
-from activesteer.tyre.contact import tyre_on_road
-from activesteer.tyre.parameters import PARAMETER_COUNT as TYRE_PARAMETERS
+from activesteer.tyre.kernels.contact import tyre_on_road
+from activesteer.tyre.kernels.parameter_index import PARAMETER_COUNT as TYRE_PARAMETERS
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.dry_friction import friction_rate
 from activesteer.vehicle.engine_layout import EngineLayout, measure_engine_layout
@@ -266,7 +266,7 @@ def _source_fingerprint() -> str:
     digest = hashlib.sha256(f"{numba.__version__} {mujoco.__version__}".encode())
     here = Path(__file__).parent
     own = (here / name for name in ("force_block.py", "native_memory.py", "dry_friction.py"))
-    sources = [*own, *Path(activesteer.tyre.__file__).parent.glob("*.py")]
+    sources = [*own, *Path(activesteer.tyre.__file__).parent.rglob("*.py")]
     for source in sorted(sources):
         digest.update(source.read_bytes())
     return digest.hexdigest()

@@ -13,7 +13,7 @@ import mujoco
 
 from activesteer.errors import ParameterError, TyreFileError, nearest_names
 from activesteer.resources import models_dir
-from activesteer.tyre.tir import load_tir
+from activesteer.tyre.file.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle_builder.completion import DEFAULT_TYRE, check_origin, complete
 from activesteer.vehicle_builder.design import Assumption, Car, Log

@@ -21,8 +21,8 @@ from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar
 from activesteer.scenario import resolve
+from activesteer.tyre.kernels.vertical import deflection_under_load, vertical_force
 from activesteer.tyre.tyre_parameters import TyreParameters
-from activesteer.tyre.vertical import deflection_under_load, vertical_force
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.parameters import Friction
 from activesteer.vehicle_builder.completion import rack_per_steer_m

@@ -41,7 +41,7 @@ def test_pages_load_nothing_from_elsewhere(site: Path) -> None:
 @pytest.mark.parametrize(
     ("page", "name"),
     [
-        ("runs", "activesteer.runner.simulate"),
+        ("runs", "activesteer.simulation.runner.simulate"),
         ("runs", "activesteer.signals.Measurement"),
         ("recordings", "activesteer.recording.recording.Recording.open"),
         ("controllers", "activesteer.controllers.parameters.ControllerSetup"),

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 import activesteer
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
-from activesteer.recorder import Recorder
 from activesteer.recording import Recording
 from activesteer.scenario import Scenario, resolve
-from activesteer.simulation import Simulation
+from activesteer.simulation.recorder import Recorder
+from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle import Vehicle
 
 STEP_DEG = 36.5

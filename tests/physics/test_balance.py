@@ -12,8 +12,8 @@ import activesteer
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
-from activesteer.tyre.magic_formula import magic_formula
-from activesteer.tyre.parameters import INFLPRES
+from activesteer.tyre.kernels.magic_formula import magic_formula
+from activesteer.tyre.kernels.parameter_index import INFLPRES
 from activesteer.vehicle.force_block import USERDATA_PER_WHEEL
 from tests.physics.runs import COAST_OR_BRAKE, car, corners, in_the_corner, last, mass_kg, run, step_steer
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.simulation import Simulation
+from activesteer.simulation.simulation import Simulation
 from tests.physics.runs import STEP_DEG, go_on, in_the_corner, step_steer, step_steer_scenario
 
 SYSTEMS = ("none", "ars", "afs")

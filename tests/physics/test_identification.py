@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from activesteer.controllers import SingleTrackParameters
-from activesteer.identification import (
+from activesteer.scenario import resolve
+from activesteer.studies.identification import (
     CONSTANT_SPEED_TESTS,
     RADIUS_TEST,
     Identification,
     identify,
     identify_single_track,
 )
-from activesteer.scenario import resolve
 from tests.physics.runs import run
 
 DEGPG = math.degrees(9.81)

@@ -19,7 +19,7 @@ from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.rigs.kc.held_car import Case, HeldCar
-from activesteer.road import Road
+from activesteer.road.road import Road
 from activesteer.scenario import resolve
 from activesteer.vehicle import Vehicle
 from tests.physics.rigid_links import FRONT_LINKS, REAR_LINKS, Pose, RigidCorner

@@ -12,7 +12,10 @@ import pytest
 import activesteer.analysis
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.errors import ParameterError
-from activesteer.linearisation import (
+from activesteer.scenario import resolve
+from activesteer.signals import SteerCommand
+from activesteer.simulation.simulation import Simulation
+from activesteer.studies.linearisation import (
     INPUTS,
     OUTPUTS,
     LinearCar,
@@ -22,9 +25,6 @@ from activesteer.linearisation import (
     linear_response,
     linearise,
 )
-from activesteer.scenario import resolve
-from activesteer.signals import SteerCommand
-from activesteer.simulation import Simulation
 from tests.physics.runs import go_on, last, run
 
 SPEED_MPS = 80.0 / 3.6

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from activesteer.controllers.single_track import SingleTrack
 from activesteer.scenario import resolve
+from activesteer.theory.single_track import SingleTrack
 from tests.physics.runs import last, run
 
 TENTH_G_MPS2 = 0.981

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from activesteer.recording import Recording
-from activesteer.runner import run_scenario
 from activesteer.scenario import resolve
+from activesteer.simulation.runner import run_scenario
 from tests.render.headless import Headless, ViewerDied
 
 

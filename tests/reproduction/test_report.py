@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from activesteer import reproduction
 from activesteer.analysis.claims.scorecard import CLAIM_IDS
 from activesteer.cli import main
-from activesteer.reproduction import Reproduction
+from activesteer.studies import reproduction
+from activesteer.studies.reproduction import Reproduction
 
 
 def test_reproduce_writes_a_report_of_all_runs(

@@ -15,7 +15,7 @@ from activesteer.analysis.figures import theory, time_histories, tracks
 from activesteer.analysis.figures.step_steer import figure_2, figure_11, step_steer_figure
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import ParameterError, RecordingError
-from activesteer.pictures import save
+from activesteer.plotting import save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

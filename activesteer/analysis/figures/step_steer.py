@@ -15,7 +15,7 @@ from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP,
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS
 from activesteer.errors import RecordingError
-from activesteer.pictures import new_figure, save
+from activesteer.plotting import new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import ParameterError
-from activesteer.pictures import new_figure
+from activesteer.plotting import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,7 +13,7 @@ from activesteer.analysis.figures import style
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import RecordingError
-from activesteer.pictures import new_figure
+from activesteer.plotting import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

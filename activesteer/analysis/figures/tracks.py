@@ -12,7 +12,7 @@ from activesteer.analysis import track
 from activesteer.analysis.course import Course, read_course
 from activesteer.analysis.figures import style
 from activesteer.analysis.source import RecordingLike
-from activesteer.pictures import new_figure
+from activesteer.plotting import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from activesteer.pictures import new_figure, save_all
+from activesteer.plotting import new_figure, save_all
 from activesteer.rigs.kc.definitions import Axle
 from activesteer.rigs.kc.metrics_kinematics import roll_angle_rad
 from activesteer.rigs.kc.metrics_steering import mean_steer_rad, ratio_curve

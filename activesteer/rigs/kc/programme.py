@@ -15,10 +15,10 @@ from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
 from activesteer.rigs.kc.modes import Modes, modes
 from activesteer.rigs.kc.steering_axis import SteeringAxis, steering_axis
 from activesteer.rigs.kc.sweep import INWARDS, Sweep, run
-from activesteer.tyre import parameters as tyre_index
-from activesteer.tyre.relaxation import carcass_stiffnesses
+from activesteer.tyre.kernels import parameter_index as tyre_index
+from activesteer.tyre.kernels.relaxation import carcass_stiffnesses
+from activesteer.tyre.kernels.vertical import deflection_under_load, vertical_force
 from activesteer.tyre.tyre_parameters import TyreParameters
-from activesteer.tyre.vertical import deflection_under_load, vertical_force
 from activesteer.vehicle import Vehicle, VehicleParameters
 from activesteer.vehicle import force_block as fb
 

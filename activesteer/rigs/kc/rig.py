@@ -14,7 +14,7 @@ from activesteer.rigs.kc import metrics_kinematics, metrics_compliance, metrics_
 from activesteer.rigs.kc.programme import measure
 from activesteer.rigs.kc.result import KcResult, evaluated
 from activesteer.rigs.kc.targets import load_targets
-from activesteer.road import Road
+from activesteer.road.road import Road
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.parameters import Friction

@@ -7,8 +7,8 @@ import pytest
 
 from activesteer.analysis.figures import BY_SCENARIO, draw_all, figure_for, theory, time_histories, tracks
 from activesteer.controllers.corrector import tolerance
-from activesteer.controllers.single_track import SingleTrack, SingleTrackParameters
 from activesteer.errors import ParameterError, RecordingError
+from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 from tests.unit.analysis.made_up import (
     COMPLETION_S,
     LANES,

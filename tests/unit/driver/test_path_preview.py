@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.driver import LOOK_INTERVAL_S, DriverParameters, OpenLoopDriver, PathPreviewDriver, SpeedHold
-from activesteer.path import Path
+from activesteer.road.path import Path
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 
 RATIO, LOCK_RAD, TIMESTEP_S = 16.0, 8.0, 0.001

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from activesteer.runner import run_scenario
 from activesteer.scenario import resolve
+from activesteer.simulation.runner import run_scenario
 
 
 @pytest.fixture(scope="session")

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ParameterError
-from activesteer.tyre import MagicFormula, load_tir, parameters
+from activesteer.tyre import MagicFormula, load_tir
 from activesteer.tyre.conventions import TyreConventions
+from activesteer.tyre.kernels import parameter_index as parameters
 from activesteer.tyre.tyre_parameters import TyreParameters
 from tests.unit.tyre.tyres import TYRES
 

@@ -11,9 +11,9 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.tyre import MagicFormula, TyreParameters
-from activesteer.tyre.bench import bench
+from activesteer.tyre.benchmark import bench
+from activesteer.tyre.diagnostics import remarks
 from activesteer.tyre.figures import draw, envelope
-from activesteer.tyre.remarks import remarks
 from activesteer.tyre.report import describe, key_figures, size
 from tests.reference.tyre_tables import read_coefficients
 from tests.unit.tyre.tyres import TYRES, tyre

@@ -11,10 +11,10 @@ import pytest
 
 from activesteer.errors import SimulationDiverged
 from activesteer.recording import Recording
-from activesteer.runner import run_scenario
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, SteerCommand
-from activesteer.simulation import Simulation
+from activesteer.simulation.runner import run_scenario
+from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle import Vehicle
 
 SPOILED_S = 1.2345

@@ -10,7 +10,7 @@ import pytest
 
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, SteerCommand
-from activesteer.simulation import Simulation
+from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle.local_state import LocalState
 
 ROLLING = {"kind": "open_loop", "speed_kmh": 80, "duration_s": 1.0, "settle_s": 0.5}

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from activesteer.conventions import CORNERS
-from activesteer.road import Road, RoadPatch
-from activesteer.tyre.magic_formula import steady_state
-from activesteer.tyre.parameters import FZMAX
+from activesteer.road.road import Road, RoadPatch
+from activesteer.tyre.kernels.magic_formula import steady_state
+from activesteer.tyre.kernels.parameter_index import FZMAX
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb
 from tests.unit.vehicle.cars import record, scenario, tilted_and_moving

@@ -1,0 +1,1 @@
+"""The road and what lies on it: surfaces, paths, lanes, courses."""

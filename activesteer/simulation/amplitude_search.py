@@ -1,0 +1,139 @@
+"""How far the steering wheel must be turned: found by driving the control-free car, before a manoeuvre is run.
+
+Every controller is then given the same input. What was found is kept for the process, by everything that it depends on.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from activesteer.config import to_table
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.search import RampAngle, Search, SteadyTurn
+from activesteer.maneuver.step_steer import StepSteer
+from activesteer.scenario import Scenario
+from activesteer.simulation.recorder import Recorder
+from activesteer.simulation.simulation import Simulation
+
+_TOLERANCE: Final = 5e-4
+"""Relative error of the lateral acceleration at which the search for a steady turn ends."""
+_RUNS: Final = 8
+_STEADY_S: Final = 0.5
+"""Length of the end of a run of that search over which the steady state is taken [s]."""
+_FIT: Final = (1.0 / 3.0, 1.25)
+"""Range of the line through a slow ramp, in shares of what is asked for: 0.1 to 0.375 g for 0.3 g (FMVSS 126)."""
+_CHUNK_S: Final = 0.25
+"""How often it is looked whether a ramp has come far enough [s]."""
+_ROUNDED_RAD: Final = math.radians(0.1)
+"""FMVSS 126 rounds A to 0.1 deg, which also makes it the same on every machine."""
+
+_found: dict[tuple[object, ...], float] = {}
+
+
+def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
+    """The steering wheel angle that a manoeuvre asks to be found.
+
+    Args:
+        scenario: Car and tyres; its manoeuvre is the one that asks.
+        search: What it asks for.
+        timestep_s: Step of the simulation [s].
+
+    Returns:
+        Steering wheel angle [rad].
+
+    Raises:
+        ManeuverError: no angle gives what is asked for.
+    """
+    probed = replace(scenario, maneuver=search.probe)
+    tables = [to_table(probed.maneuver), search.lateral_acceleration_mps2, to_table(probed.car), timestep_s]
+    models = sorted(item for item in scenario.files.items() if item[0].startswith(("mjcf/", "tyres/")))
+    key = (json.dumps(tables, sort_keys=True), scenario.mjcf, *models)
+    if key not in _found:
+        if isinstance(search, RampAngle):
+            _found[key] = _ramp_angle(probed, search, timestep_s)
+        else:
+            _found[key] = _steady_turn(probed, search, timestep_s)
+    return _found[key]
+
+
+def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> float:
+    """Secant search over whole step steers."""
+    wanted = search.lateral_acceleration_mps2
+    if wanted == 0.0:
+        return 0.0
+    probe = search.probe
+    simulation = Simulation(scenario, "none", timestep_s)
+    start = simulation.save_state()
+    car, speed = scenario.car.single_track, max(probe.speed_mps, 1.0)
+    wheelbase = car.cg_to_front_m + car.cg_to_rear_m
+    # First guess: Ackermann angle with the understeer of a usual car, some 2.5 deg per g.
+    angle = scenario.car.steering.ratio * wanted * (wheelbase / speed**2 + 0.0044)
+    tried: list[tuple[float, float]] = []
+    for _ in range(_RUNS):
+        reached = _steady_acceleration(simulation, probe.with_amplitude(angle), start)
+        if abs(reached / wanted - 1.0) < _TOLERANCE:
+            return angle
+        tried.append((angle, reached))
+        if len(tried) == 1:
+            angle *= wanted / reached if reached * wanted > 0.0 else 1.2
+        else:
+            (a0, r0), (a1, r1) = tried[-2:]
+            if r1 == r0:
+                break
+            angle = a1 + (wanted - r1) * (a1 - a0) / (r1 - r0)
+    best = min(tried, key=lambda pair: abs(pair[1] - wanted))
+    msg = (
+        f"{probe.name}: no steering wheel angle found that gives {wanted:.3g} m/s2 in the control-free car; the "
+        f"closest was {np.degrees(best[0]):.1f} deg with {best[1]:.3g} m/s2: is the road too slippery "
+        f"(road.mu {probe.road.mu:g})?"
+    )
+    raise ManeuverError(msg)
+
+
+def _steady_acceleration(simulation: Simulation, maneuver: StepSteer, start: Any) -> float:
+    simulation.restore_state(start)
+    simulation.maneuver = maneuver
+    recorder = Recorder(simulation.vehicle, simulation.steps)
+    simulation.run(recorder)
+    ay = _rows(recorder, "ay_mps2")
+    return float(ay[-round(_STEADY_S / simulation.vehicle.timestep_s) :].mean())
+
+
+def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> float:
+    """The line through lateral acceleration over steering wheel angle, at the acceleration asked for.
+
+    The model is its own mirror image, so that one side stands for both.
+    """
+    wanted, probe = search.lateral_acceleration_mps2, search.probe
+    low, high = (share * wanted for share in _FIT)
+    simulation = Simulation(scenario, "none", timestep_s)
+    recorder = Recorder(simulation.vehicle, simulation.steps)
+    chunk, left = round(_CHUNK_S / timestep_s), simulation.steps
+    # A little further than the line goes, so that all of it is settled.
+    ay = np.zeros(1)
+    while left > 0 and ay[-1] < 1.05 * high:
+        simulation.advance(min(chunk, left), recorder)
+        left -= chunk
+        ay = _rows(recorder, "ay_mps2")
+    wheel = _rows(recorder, "steering_wheel_rad")
+    if ay.max() < high:
+        msg = (
+            f"{probe.name}: the control-free car reaches {ay.max():.3g} m/s2 with {np.degrees(wheel.max()):.0f} deg at "
+            f"the steering wheel, but {high:.3g} m/s2 ({high / GRAVITY_MPS2:.3g} g) are needed: is the road too "
+            f"slippery (road.mu {probe.road.mu:g})? Give the amplitude instead (steering_wheel_deg)"
+        )
+        raise ManeuverError(msg)
+    line = slice(int(np.argmax(ay > low)), int(np.argmax(ay > high)))
+    slope, offset = np.polynomial.Polynomial.fit(wheel[line], ay[line], 1).convert().coef[::-1]
+    return round((wanted - offset) / slope / _ROUNDED_RAD) * _ROUNDED_RAD
+
+
+def _rows(recorder: Recorder, name: str) -> np.ndarray:
+    column = [channel.name for channel in recorder.channels].index(name)
+    return recorder.result()[1][:, column]

@@ -1,0 +1,196 @@
+"""A drive while it happens: the simulation, held to the pace of a clock, and the stage on which it is seen."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Any, Final, NamedTuple, Protocol
+
+from activesteer.simulation.appearance import scene_of
+from activesteer.simulation.simulation import Simulation
+from activesteer.video import Car, Stage
+from activesteer.video.gauges import in_words
+
+FRAME_S: Final = 0.016
+"""Least time from one picture to the next [s]: a screen shows 60 a second."""
+_MOST_S: Final = 0.1
+"""Most time from one picture to the next [s]: where drawing or simulating takes longer, the drive becomes slower
+than the clock, instead of ever more jerky."""
+_TURN_S: Final = 0.4
+"""Time constant with which the camera turns after the car [s]."""
+_STILL_MPS: Final = 1.0
+"""Below it the direction of motion says nothing [m/s]."""
+
+
+class Viewer(Protocol):
+    """What of MuJoCo's passive viewer is used here."""
+
+    cam: Any
+
+    def is_running(self) -> bool:
+        """Whether its window is still open."""
+        ...
+
+    def lock(self) -> AbstractContextManager[Any]:
+        """Held while what it draws is changed."""
+        ...
+
+    def sync(self) -> None:
+        """Shows what is there now."""
+        ...
+
+    def set_texts(self, texts: Any) -> None:
+        """Shows text over the picture: font, place, left column, right column; `None` for the usual ones."""
+        ...
+
+
+class Pacer:
+    """Holds simulated time to the time of a clock."""
+
+    def __init__(
+        self,
+        speed: float = 1.0,
+        clock: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], object] = time.sleep,
+    ) -> None:
+        """Takes the clock, which starts with the first picture.
+
+        Args:
+            speed: Simulated seconds that pass in one of the clock.
+            clock: Tells the time [s].
+            sleep: Waits for a time [s].
+        """
+        self._speed, self._clock, self._sleep = speed, clock, sleep
+        self._start_s: float | None = None
+        self.lost_s = 0.0
+        """How much longer the drive has taken than it should have [s of the clock]."""
+
+    def next(self, shown_s: float) -> float:
+        """Waits, if need be, until the next picture is due.
+
+        Args:
+            shown_s: Instant that the last picture showed [s].
+
+        Returns:
+            The instant that the next one is to show [s]: the one that the clock has come to, or a little before it
+            where that would be too large a leap. The clock then waits.
+        """
+        now_s = self._clock()
+        if self._start_s is None:
+            self._start_s = now_s - shown_s / self._speed
+        passed_s = now_s - self._start_s - shown_s / self._speed
+        if passed_s < FRAME_S:
+            self._sleep(FRAME_S - passed_s)
+            passed_s = FRAME_S
+        elif passed_s > _MOST_S:
+            self._start_s += passed_s - _MOST_S
+            self.lost_s += passed_s - _MOST_S
+            passed_s = _MOST_S
+        return shown_s + passed_s * self._speed
+
+
+class Driven(NamedTuple):
+    """How a drive went that somebody watched.
+
+    Attributes:
+        simulated_s: How far it came [s].
+        pictures: How many pictures were shown.
+        finished: Whether it came to its end before the window was closed.
+    """
+
+    simulated_s: float
+    pictures: int
+    finished: bool
+
+
+def stage_for(simulation: Simulation, course: Any = None, road: Any = None) -> Stage:
+    """The stage for a simulation's car.
+
+    Args:
+        simulation: The simulation.
+        course: Lanes, cones and path, as in the metadata of a recording.
+        road: The road, likewise.
+
+    Raises:
+        PlaybackError: the car cannot be drawn.
+    """
+    vehicle = simulation.vehicle
+    return Stage([Car(scene_of(vehicle.model), vehicle.body_names)], course, road)
+
+
+def drive(simulation: Simulation, stage: Stage, viewer: Viewer, pacer: Pacer) -> Driven:
+    """Drives a manoeuvre from its beginning to its end, or until the window is closed, and shows it.
+
+    The engine that simulates and the model that is drawn are two: whatever is done in the window, such as pulling at
+    the car or pausing, does not reach the simulation.
+
+    Args:
+        simulation: The simulation, at its beginning.
+        stage: Where its car is the only one.
+        viewer: The viewer of the stage.
+        pacer: Holds the pace.
+
+    Raises:
+        ActiveSteerError: the run failed.
+    """
+    vehicle, timestep_s = simulation.vehicle, simulation.vehicle.timestep_s
+    follow = _Follow(simulation)
+    done = pictures = 0
+    while viewer.is_running():
+        now_s = done * timestep_s
+        viewer.set_texts((None, None, *_texts(simulation, now_s)))
+        # All in one: a picture drawn between would have the camera of one instant and the car of another.
+        with viewer.lock():
+            stage.place(0, vehicle.data.xpos[1:], vehicle.data.xquat[1:])
+            stage.update()
+            follow(viewer.cam, now_s)
+            viewer.sync()
+        pictures += 1
+        if done >= simulation.steps:
+            return Driven(now_s, pictures, finished=True)
+        target = round(pacer.next(now_s) / timestep_s)
+        steps = max(1, min(target, simulation.steps) - done)
+        simulation.advance(steps)
+        done += steps
+    return Driven(done * timestep_s, pictures, finished=False)
+
+
+class _Follow:
+    """Moves the camera along with the car; from which side and how far away stays in the hands of who watches."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._heading_rad: float | None = None
+        self._time_s = 0.0
+
+    def __call__(self, camera: Any, time_s: float) -> None:
+        motion = self._simulation.vehicle.motion()
+        if self._heading_rad is None:
+            self._heading_rad = motion.yaw_rad
+            camera.distance, camera.elevation, camera.azimuth = 9.0, -17.0, math.degrees(motion.yaw_rad)
+        turn = math.remainder(motion.yaw_rad - self._heading_rad, math.tau) * -math.expm1(
+            (self._time_s - time_s) / _TURN_S
+        )
+        self._heading_rad += turn
+        self._time_s = time_s
+        camera.azimuth += math.degrees(turn)
+        camera.lookat[:] = motion.x_m, motion.y_m, 0.5
+
+
+def _texts(simulation: Simulation, time_s: float) -> tuple[str, str]:
+    """Names and values, a line for each."""
+    vehicle = simulation.vehicle
+    measured, motion = vehicle.measure(), vehicle.motion()
+    moving = motion.speed_mps > _STILL_MPS
+    sideslip = math.atan2(motion.lateral_speed_mps, motion.speed_mps) if moving else 0.0
+    lines = [
+        ("time", f"{in_words(time_s, 2)} s"),
+        ("speed", f"{in_words(3.6 * measured.speed_mps, 1)} km/h"),
+        ("steering wheel", f"{in_words(math.degrees(measured.steering_wheel_rad), 0)} deg"),
+        ("sideslip", f"{in_words(math.degrees(sideslip), 1)} deg"),
+        ("rear steer", f"{in_words(math.degrees(measured.rear_steer_rad), 2)} deg"),
+        ("added at front", f"{in_words(math.degrees(measured.superposition_rad), 2)} deg"),
+    ]
+    return "\n".join(name for name, _ in lines), "\n".join(value for _, value in lines)

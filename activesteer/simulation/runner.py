@@ -1,0 +1,205 @@
+"""One run from its inputs to a recording: `simulate`, and the same with a file written on the way."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import platform
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from activesteer.analysis.metrics import metrics
+from activesteer.controllers.loading import user_file
+from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.errors import ActiveSteerError, RecordingError
+from activesteer.recording import McapWriter, Recording, ScenePart
+from activesteer.scenario import FileOrTable, Scenario, describe, resolve
+from activesteer.signals import Channel
+from activesteer.simulation.amplitude_search import amplitude
+from activesteer.simulation.appearance import scene_of
+from activesteer.simulation.recorder import Recorder, channels_of
+from activesteer.simulation.simulation import Simulation
+from activesteer.version import __version__
+
+
+def simulate(
+    maneuver: FileOrTable,
+    controller: str = "none",
+    vehicle: FileOrTable = "compact",
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    timestep_s: float = DEFAULT_TIMESTEP_S,
+) -> Recording:
+    """Drives a manoeuvre and returns what happened.
+
+    Args:
+        maneuver: Name, path, or table of a manoeuvre.
+        controller: `none`, `ars`, `afs`, or a user's own as `my_file.py:MyController`.
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key -> value, as `{"speed_kmh": 100, "road.mu": 0.4, "controllers.ars.limit_deg": 2}`.
+        timestep_s: Step of engine, driver and controller [s].
+
+    Returns:
+        The recording, with metrics.
+
+    Raises:
+        ActiveSteerError: an input is wrong, or the run failed; a failed run's recording is the error's `recording`.
+    """
+    return run_scenario(prepared(resolve(maneuver, vehicle, overrides), timestep_s), controller, timestep_s=timestep_s)
+
+
+def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scenario:
+    """The scenario with everything known that must be found by driving first: how far the steering wheel is turned.
+
+    Args:
+        scenario: A scenario.
+        timestep_s: Step of the simulation [s].
+
+    Returns:
+        A scenario that can be run with any controller, always with the same input.
+
+    Raises:
+        ManeuverError: no amplitude gives what is asked for.
+    """
+    search = scenario.maneuver.search
+    if search is None:
+        return scenario
+    return dataclasses.replace(scenario, maneuver=search.accept(amplitude(scenario, search, timestep_s)))
+
+
+def run_scenario(
+    scenario: Scenario,
+    controller: str = "none",
+    *,
+    path: Path | None = None,
+    timestep_s: float = DEFAULT_TIMESTEP_S,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Runs a prepared scenario, and writes the recording while it runs where a path is given.
+
+    Args:
+        scenario: What to run; see `prepared`.
+        controller: Name or file of the controller.
+        path: MCAP file to write.
+        timestep_s: Step of the simulation [s].
+        progress: Called about every simulated second with the share that is done, 0 to 1.
+
+    Returns:
+        The recording, with metrics; where the run cannot be evaluated, as when it is too short, there are none and
+        the metadata's `metrics_error` says why.
+
+    Raises:
+        ActiveSteerError: the run failed. What was recorded until then is in the file, and in the error's `recording`.
+    """
+    simulation = Simulation(scenario, controller, timestep_s)
+    context = RunContext.of(scenario, controller, simulation)
+    outcome: dict[str, Any] = {"complete": True}
+    failure: ActiveSteerError | None = None
+    # Whatever else goes wrong, the writer ends its file, marked as incomplete.
+    with context.writer(path) if path is not None else nullcontext() as writer:
+        recorder = Recorder(simulation.vehicle, simulation.steps, writer)
+        try:
+            _drive(simulation, recorder, progress)
+        except ActiveSteerError as error:
+            failure = error
+            outcome = {"complete": False, "error": f"{type(error).__name__}: {error}"}
+        except BaseException:
+            recorder.flush()
+            raise
+        time_s, values, poses = recorder.result()
+        recording = Recording(
+            recorder.channels,
+            time_s,
+            values,
+            poses=poses,
+            metadata=context.metadata | outcome,
+            attachments=context.files,
+            scene=context.scene,
+        )
+        if failure is None:
+            outcome |= _evaluate(recording)
+        if writer is not None:
+            writer.close(outcome | {"metrics": recording.metrics})
+    if failure is not None:
+        failure.recording = recording
+        saved = f"; what was recorded until then is in {path}" if path is not None else ""
+        failure.add_note(f"controller {controller}: {len(recording)} steps were made{saved}")
+        raise failure
+    return recording
+
+
+def _evaluate(recording: Recording) -> dict[str, str]:
+    """Puts the metrics into a recording; returns what there is to say where that cannot be done."""
+    try:
+        recording.metrics.update(metrics(recording))
+    except RecordingError as error:
+        problem = {"metrics_error": str(error)}
+        recording.metadata.update(problem)
+        return problem
+    return {}
+
+
+class RunContext(NamedTuple):
+    """What goes into a recording beside its rows: all that is needed to make the run again.
+
+    Attributes:
+        channels: The table of channels.
+        body_names: Bodies whose poses are recorded.
+        metadata: Resolved parameters, versions.
+        files: Manoeuvre, vehicle, model and tyre files, and a user's own controller.
+        scene: What the car looks like.
+    """
+
+    channels: tuple[Channel, ...]
+    body_names: tuple[str, ...]
+    metadata: dict[str, Any]
+    files: dict[str, bytes]
+    scene: tuple[ScenePart, ...]
+
+    @classmethod
+    def of(cls, scenario: Scenario, controller: str, simulation: Simulation) -> RunContext:
+        """Collects it."""
+        vehicle = simulation.vehicle
+        metadata = {
+            "controller": controller,
+            **describe(scenario),
+            "car": vehicle.dimensions(),
+            "timestep_s": vehicle.timestep_s,
+            "versions": _versions(),
+        }
+        if (course := scenario.maneuver.course) is not None:
+            metadata["course"] = course.describe()
+        files = scenario.files | user_file(controller)
+        return cls(channels_of(vehicle), vehicle.body_names, metadata, files, scene_of(vehicle.model))
+
+    def writer(self, path: Path) -> McapWriter:
+        """A file that rows can be written to.
+
+        Raises:
+            RecordingError: the file cannot be written.
+        """
+        return McapWriter(path, self.channels, self.body_names, self.metadata, self.files, self.scene)
+
+
+def _drive(simulation: Simulation, recorder: Recorder, progress: Callable[[float], None] | None) -> None:
+    if progress is None:
+        simulation.run(recorder)
+        return
+    steps, chunk = simulation.steps, round(1.0 / simulation.vehicle.timestep_s)
+    for done in range(0, steps, chunk):
+        simulation.advance(min(chunk, steps - done), recorder)
+        progress(min(1.0, (done + chunk) / steps))
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    found = {"activesteer": __version__, "python": platform.python_version(), "platform": platform.platform()}
+    for package in ("mujoco", "numpy", "numba"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found

@@ -1,0 +1,1 @@
+"""Many runs, or what is found out about a car by driving it."""

@@ -1,0 +1,208 @@
+"""Where the time of a step goes. All figures come from one run, interleaved, so that their ratios mean something."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import mujoco
+
+from activesteer.analysis.claims import SCENARIOS, SYSTEMS
+from activesteer.scenario import Scenario, resolve
+from activesteer.simulation.recorder import Recorder
+from activesteer.simulation.runner import RunContext, prepared, run_scenario
+from activesteer.simulation.simulation import Simulation
+from activesteer.tyre.benchmark import bench as tyre_bench
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
+
+_ROUNDS: Final = 5
+"""Every figure is the best of this many rounds: what disturbs a machine only ever makes it slower."""
+_CALLS: Final = 5000
+_CONTROLLER: Final = "ars"
+"""The dearest of the built-in controllers."""
+
+
+def bench(rounds: int = _ROUNDS) -> dict[str, float]:
+    """Measures one step at five stages, and the blocks of the loop one by one.
+
+    Args:
+        rounds: How often everything is measured; the best counts.
+
+    Returns:
+        Microseconds per step: `bare_step_us` (the engine with the same model, without tyres), `plant_step_us` (with
+        tyres, dampers, actuators), `closed_loop_step_us` (and manoeuvre, driver, controller, every channel recorded in
+        memory), `path_following_step_us` (the same in a slalom, with a driver who looks at a path), `with_file_step_us`
+        (the step steer written as MCAP); the ratios of the last three to the first; real-time factors; and `*_us` for
+        each block of the loop.
+    """
+    scenario, along_path = prepared(resolve("step_steer")), resolve("slalom")
+    with tempfile.TemporaryDirectory() as folder:
+        stages: dict[str, Callable[[], float]] = {
+            "bare_step_us": lambda: _bare(scenario),
+            "plant_step_us": lambda: _plant(scenario),
+            "closed_loop_step_us": lambda: _closed_loop(scenario),
+            "path_following_step_us": lambda: _closed_loop(along_path),
+            "with_file_step_us": lambda: _with_file(scenario, Path(folder) / "bench.mcap"),
+        }
+        best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
+    step_us = 1e6 * Simulation(scenario).vehicle.timestep_s
+    best["closed_loop_to_bare_ratio"] = best["closed_loop_step_us"] / best["bare_step_us"]
+    best["path_following_to_bare_ratio"] = best["path_following_step_us"] / best["bare_step_us"]
+    best["with_file_to_bare_ratio"] = best["with_file_step_us"] / best["bare_step_us"]
+    best["real_time_factor"] = step_us / best["closed_loop_step_us"]
+    best["real_time_factor_with_file"] = step_us / best["with_file_step_us"]
+    return best | _blocks(scenario)
+
+
+def bench_maneuvers() -> list[dict[str, Any]]:
+    """Drives the paper's scenarios with its three systems, without files, one after the other in this process.
+
+    Returns:
+        For each run `maneuver`, `controller`, `simulated_s` (the settling before the recording included), `wall_s`
+        (everything from building the car to the metrics), `real_time_factor`, and `metrics`.
+    """
+    rows = []
+    for name in SCENARIOS:
+        scenario = prepared(resolve(name))
+        for system in SYSTEMS:
+            start = time.perf_counter()
+            recording = run_scenario(scenario, system)
+            wall_s = time.perf_counter() - start
+            simulated_s = scenario.maneuver.settle_s + scenario.maneuver.duration_s
+            rows.append(
+                {
+                    "maneuver": name,
+                    "controller": system,
+                    "simulated_s": simulated_s,
+                    "wall_s": wall_s,
+                    "real_time_factor": simulated_s / wall_s,
+                    "metrics": recording.metrics,
+                }
+            )
+    return rows
+
+
+def _interleaved(stages: dict[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
+    results: dict[str, list[float]] = {name: [] for name in stages}
+    for _ in range(rounds):
+        for name, measure in stages.items():
+            results[name].append(measure())
+    return results
+
+
+def _per_step_us(function: Callable[[], object], steps: int) -> float:
+    start = time.perf_counter()
+    function()
+    return (time.perf_counter() - start) / steps * 1e6
+
+
+def _bare(scenario: Scenario) -> float:
+    """The engine alone: same model, same start, no callbacks.
+
+    What the callbacks would apply at the start is applied as a constant force, so that the car stays near where it is:
+    falling, with its springs at their stops, it would be another problem for the engine's solver.
+    """
+    simulation = Simulation(scenario, _CONTROLLER)
+    model, data, steps = simulation.vehicle.model, simulation.vehicle.data, simulation.steps
+    mujoco.mj_forward(model, data)
+    carried = data.qfrc_passive.copy()
+    remove_native_forces()
+    try:
+        mujoco.mj_forward(model, data)
+        data.qfrc_applied[:] = carried - data.qfrc_passive
+        return _per_step_us(lambda: _repeat(mujoco.mj_step, model, data, steps), steps)
+    finally:
+        install_native_forces()
+
+
+def _plant(scenario: Scenario) -> float:
+    simulation = Simulation(scenario, _CONTROLLER)
+    model, data, steps = simulation.vehicle.model, simulation.vehicle.data, simulation.steps
+    return _per_step_us(lambda: _repeat(mujoco.mj_step, model, data, steps), steps)
+
+
+def _repeat(step: Callable[..., object], model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> None:
+    for _ in range(steps):
+        step(model, data)
+
+
+def _closed_loop(scenario: Scenario) -> float:
+    simulation = Simulation(scenario, _CONTROLLER)
+    recorder = Recorder(simulation.vehicle, simulation.steps)
+
+    def run() -> None:
+        simulation.run(recorder)
+        recorder.flush()
+
+    return _per_step_us(run, simulation.steps)
+
+
+def _with_file(scenario: Scenario, path: Path) -> float:
+    """The run as the command line makes it, less what a run of no length costs: building, settling, opening."""
+    simulation = Simulation(scenario, _CONTROLLER)
+    with RunContext.of(scenario, _CONTROLLER, simulation).writer(path) as writer:
+        recorder = Recorder(simulation.vehicle, simulation.steps, writer)
+        start = time.perf_counter()
+        simulation.run(recorder)
+        recorder.flush()
+        writer.close()
+        return (time.perf_counter() - start) / simulation.steps * 1e6
+
+
+def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
+    """What the tyres cost: one evaluation of the front tyre, and all four in the engine.
+
+    Args:
+        rounds: How often everything is measured; the best counts.
+
+    Returns:
+        What `activesteer.tyre.benchmark` measures, and `four_tyres_us`: microseconds that four tyres with contact,
+        relaxation and the application of their forces add to the engine's passive forces, in the same state.
+    """
+    scenario = resolve("straight_line")
+    simulation = Simulation(scenario)
+    model, data = simulation.vehicle.model, simulation.vehicle.data
+    numbers = model.numeric_data
+    count = int(numbers[-fb.TRAILER_SIZE]) + fb.N_WHEELS
+    wheels = numbers[count]
+    with_tyres: list[float] = []
+    without: list[float] = []
+    for _ in range(rounds):
+        for measured, present in ((with_tyres, wheels), (without, 0.0)):
+            numbers[count] = present
+            measured.append(_per_step_us(lambda: _repeat(mujoco.mj_passive, model, data, _CALLS), _CALLS))
+    return tyre_bench(scenario.tyres[0], rounds) | {"four_tyres_us": min(with_tyres) - min(without)}
+
+
+def _blocks(scenario: Scenario) -> dict[str, float]:
+    """Each block of the loop on its own, in the order of the data."""
+    simulation = Simulation(scenario, _CONTROLLER)
+    maneuver, driver, controller, vehicle = (
+        simulation.maneuver,
+        simulation.driver,
+        simulation.controller,
+        simulation.vehicle,
+    )
+    recorder = Recorder(vehicle, _CALLS)
+    measurement = vehicle.measure()
+    reference = maneuver.reference(0.6)
+    command = driver.step(reference, measurement)
+    steer = controller.step(command, measurement)
+    blocks: dict[str, Callable[[], object]] = {
+        "maneuver_us": lambda: maneuver.reference(0.6),
+        "driver_us": lambda: driver.step(reference, measurement),
+        "controller_us": lambda: controller.step(command, measurement),
+        "vehicle_us": lambda: vehicle.step(command, steer),
+        "measurement_us": vehicle.measure,
+        "recorder_us": lambda: recorder.record(command, steer),
+    }
+    return {name: _per_step_us(lambda block=block: _call(block, _CALLS), _CALLS) for name, block in blocks.items()}
+
+
+def _call(block: Callable[[], object], count: int) -> None:
+    for _ in range(count):
+        block()

@@ -1,0 +1,271 @@
+"""The paper, reproduced: five scenarios by three steering systems, recorded, and what is claimed of them checked.
+
+Runs are independent of each other, so they are spread over processes. Each writes its own file; the scorecard is made
+from the files, not from what the processes hold.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Scorecard, scorecard
+from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
+from activesteer.recording import Recording, check_target
+from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.simulation.runner import prepared, run_scenario
+from activesteer.simulation.simulation import Simulation
+
+Progress = Callable[[str, int, int], None]
+"""Called with what was finished, how many runs are, and how many there are in all."""
+
+
+@dataclass
+class Reproduction:
+    """What came of it.
+
+    Attributes:
+        paths: Scenario -> system -> MCAP file.
+        failures: (scenario, system) -> why that run ended early; what it recorded until then is in its file.
+        scorecard: Claims of the scenarios whose three runs are complete.
+    """
+
+    paths: dict[str, dict[str, Path]] = field(default_factory=dict)
+    failures: dict[tuple[str, str], str] = field(default_factory=dict)
+    scorecard: Scorecard = field(default_factory=lambda: scorecard([]))
+
+    @property
+    def exit_status(self) -> int:
+        """0 where every run is complete and every claim passed or is known not to come out, else 1."""
+        return 1 if self.failures else self.scorecard.exit_status
+
+    def recordings(self) -> dict[str, dict[str, Recording]]:
+        """The complete runs, opened; scenario -> system -> recording."""
+        return {
+            scenario: {system: Recording.open(path) for system, path in systems.items()}
+            for scenario, systems in self.paths.items()
+            if all((scenario, system) not in self.failures for system in systems)
+        }
+
+
+def reproduce(
+    folder: str | os.PathLike[str],
+    vehicle: FileOrTable = "compact",
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Reproduction:
+    """Drives all five scenarios with all three systems and checks the paper's claims.
+
+    With more than one job the runs are made in processes of their own, started afresh: a script that calls this needs
+    the usual `if __name__ == "__main__":`.
+
+    Args:
+        folder: Where the recordings go, as SCENARIO-SYSTEM.mcap; made where it does not exist.
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key -> value, for all runs; see `simulate`.
+        jobs: Number of processes; that of the processors where not given.
+        progress: Called after every run.
+
+    Returns:
+        Files and scorecard.
+
+    Raises:
+        ActiveSteerError: an input is wrong. A run that fails ends no other run; it is told in `failures`.
+    """
+    target = Path(folder)
+    scenarios = {name: resolve(name, vehicle, overrides) for name in SCENARIOS}
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        msg = f"cannot make the folder {target}: {reason.strerror}"
+        raise ParameterError(msg) from reason
+    result = Reproduction({name: {system: _path(target, name, system) for system in SYSTEMS} for name in scenarios})
+    for systems in result.paths.values():
+        for path in systems.values():
+            check_target(path)
+    total = len(scenarios) * len(SYSTEMS)
+    for done, (name, system, problem) in enumerate(_drive(scenarios, result.paths, jobs), 1):
+        if problem:
+            result.failures[name, system] = problem
+        if progress is not None:
+            progress(f"{name} {system}" + (" FAILED" if problem else ""), done, total)
+    claims = [claim for name, runs in result.recordings().items() for claim in SCENARIOS[name](runs)]
+    result.scorecard = scorecard(claims, _name_of(scenarios))
+    return result
+
+
+def recordings_in(folder: str | os.PathLike[str]) -> dict[str, dict[str, Recording]]:
+    """The recordings that `reproduce` left in a folder; scenario -> system -> recording, where all three are there.
+
+    Raises:
+        RecordingError: there are none, or one cannot be read.
+    """
+    found: dict[str, dict[str, Recording]] = {}
+    for name in SCENARIOS:
+        paths = {system: _path(Path(folder), name, system) for system in SYSTEMS}
+        if all(path.is_file() for path in paths.values()):
+            found[name] = {system: Recording.open(path) for system, path in paths.items()}
+    if not found:
+        msg = f"{folder} holds no runs of {', '.join(SCENARIOS)}; make them with `activesteer reproduce -o {folder}`"
+        raise RecordingError(msg)
+    return found
+
+
+def _path(folder: Path, scenario: str, system: str) -> Path:
+    return folder / f"{scenario}-{system}.mcap"
+
+
+def _name_of(scenarios: Mapping[str, Scenario]) -> str:
+    return next(iter(scenarios.values())).car.name
+
+
+class _Outcome(NamedTuple):
+    scenario: str
+    system: str
+    problem: str
+
+
+def _drive(
+    scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
+) -> Iterator[_Outcome]:
+    """Makes all runs and tells each as it ends; what a search must find first is found once for the three systems."""
+    with worker_pool(jobs) as pool:
+        searches = {pool.submit(prepared, scenario): name for name, scenario in scenarios.items()}
+        runs: dict[Future[Any], tuple[str, str]] = {}
+        while searches or runs:
+            finished, _ = wait([*searches, *runs], return_when=FIRST_COMPLETED)
+            for future in finished:
+                if future in searches:
+                    name = searches.pop(future)
+                    try:
+                        scenario = future.result()
+                    except ActiveSteerError as error:
+                        yield from (_Outcome(name, system, str(error)) for system in SYSTEMS)
+                        continue
+                    runs |= {
+                        pool.submit(_run, scenario, system, paths[name][system]): (name, system) for system in SYSTEMS
+                    }
+                else:
+                    name, system = runs.pop(future)
+                    yield _Outcome(name, system, str(future.result()))
+
+
+def _run(scenario: Scenario, system: str, path: Path) -> str:
+    """One run in a process of its own; returns what went wrong."""
+    try:
+        run_scenario(scenario, system, path=path)
+    except ActiveSteerError as error:
+        return "; ".join([str(error), *getattr(error, "__notes__", [])])
+    return ""
+
+
+@contextlib.contextmanager
+def worker_pool(jobs: int | None = None) -> Iterator[ProcessPoolExecutor]:
+    """Processes that share nothing with this one, started afresh: the engine's callbacks belong to a process.
+
+    Where the work ends early, by an error or Ctrl-C, what has not begun is not begun; what runs is ended properly.
+
+    Args:
+        jobs: How many; as many as there are processors where not given.
+
+    Raises:
+        ParameterError: fewer than one.
+    """
+    if jobs is not None and jobs < 1:
+        msg = f"--jobs {jobs}: at least 1 is needed"
+        raise ParameterError(msg)
+    # Ctrl-C reaches every process of a terminal; this one decides.
+    ignore = (signal.SIGINT, signal.SIG_IGN)
+    spawn = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(jobs or os.cpu_count() or 1, spawn, initializer=signal.signal, initargs=ignore)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+class _Car(NamedTuple):
+    """What a change of load is measured by."""
+
+    mass_kg: float
+    chassis_mass_kg: float
+    cg_height_m: float
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> _Car:
+        vehicle = Simulation(scenario).vehicle
+        chassis = vehicle.model.body("chassis")
+        cg = vehicle.data.site("cg").xpos
+        return cls(float(vehicle.model.body_subtreemass[chassis.id]), float(chassis.mass[0]), float(cg[2]))
+
+    def mass(self, share: float) -> dict[str, Any]:
+        """The whole car's mass changed by a share of itself; it is the chassis that gets heavier."""
+        return {"vehicle.load.mass_factor": 1.0 + share * self.mass_kg / self.chassis_mass_kg}
+
+    def cg_height(self, share: float) -> dict[str, Any]:
+        """The whole car's centre of gravity higher by a share; it is the chassis' that is moved."""
+        return {"vehicle.load.cg_height_change_m": share * self.cg_height_m * self.mass_kg / self.chassis_mass_kg}
+
+
+_VARIATIONS: Final[dict[str, Callable[[_Car, Scenario], dict[str, Any]]]] = {
+    "as is": lambda car, scenario: {},
+    "mass -10 %": lambda car, scenario: car.mass(-0.1),
+    "mass +10 %": lambda car, scenario: car.mass(0.1),
+    "CG height -5 %": lambda car, scenario: car.cg_height(-0.05),
+    "CG height +5 %": lambda car, scenario: car.cg_height(0.05),
+    "mu -0.05": lambda car, scenario: {"maneuver.road.mu": scenario.maneuver.road.mu - 0.05},
+    "mu +0.05": lambda car, scenario: {"maneuver.road.mu": scenario.maneuver.road.mu + 0.05},
+    "speed -3 km/h": lambda car, scenario: {"maneuver.speed_mps": scenario.maneuver.speed_mps - 3.0 / 3.6},
+    "speed +3 km/h": lambda car, scenario: {"maneuver.speed_mps": scenario.maneuver.speed_mps + 3.0 / 3.6},
+}
+"""What is varied, one at a time: overrides by what the variation is called."""
+
+
+def robustness(
+    vehicle: FileOrTable = "compact", *, jobs: int | None = None, progress: Progress | None = None
+) -> dict[str, dict[str, bool]]:
+    """Checks every claim again with another mass, centre of gravity, friction and speed, one changed at a time.
+
+    Args:
+        vehicle: Name, path, or table of a vehicle.
+        jobs: Number of processes; that of the processors where not given.
+        progress: Called after every scenario of every variation.
+
+    Returns:
+        Claim -> variation -> whether it holds; `as is` is the car unchanged.
+
+    Raises:
+        ActiveSteerError: an input is wrong, or a run failed.
+    """
+    scenarios = {name: resolve(name, vehicle) for name in SCENARIOS}
+    car = _Car.of(next(iter(scenarios.values())))
+    tasks = [
+        (label, name, vary(car, scenario))
+        for label, vary in _VARIATIONS.items()
+        for name, scenario in scenarios.items()
+    ]
+    table: dict[str, dict[str, bool]] = {}
+    with worker_pool(jobs) as pool:
+        futures = {pool.submit(_claims_of, name, vehicle, changes): (label, name) for label, name, changes in tasks}
+        while futures:
+            for future in wait(futures, return_when=FIRST_COMPLETED).done:
+                label, name = futures.pop(future)
+                for claim in future.result():
+                    table.setdefault(claim.id, {})[label] = claim.passed
+                if progress is not None:
+                    progress(f"{label}: {name}", len(tasks) - len(futures), len(tasks))
+    return {claim: {label: found[label] for label in _VARIATIONS} for claim, found in sorted(table.items())}
+
+
+def _claims_of(name: str, vehicle: FileOrTable, changes: Mapping[str, Any]) -> list[Claim]:
+    scenario = prepared(resolve(name, vehicle, changes))
+    return SCENARIOS[name]({system: run_scenario(scenario, system) for system in SYSTEMS})

@@ -1,0 +1,1 @@
+"""Formulas that need no multibody car: known to controllers, driver, figures and identification alike."""

@@ -1,0 +1,1 @@
+"""Tyre property files: reading, writing, and what their coefficients mean."""

@@ -1,0 +1,55 @@
+"""What every key of a .tir file means: its section, default, quantity and meaning. One line a coefficient.
+
+The columns of a line are: key, default, quantity, meaning. A default of `!` means that the file has to give the key;
+`-` means that it may be absent and that something else stands in for it (`parameters.parameter_array` says what).
+The quantity decides how `[UNITS]` of a file is applied; `1` is a pure number.
+
+Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, appendix 3; the names are those of the TNO/Siemens MF-Tyre
+and the MSC PAC2002 property files.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from activesteer.tyre.file.coefficient_table import TABLE
+
+
+class Coefficient(NamedTuple):
+    """One key of a .tir file.
+
+    Attributes:
+        name: Key as in the file, upper case.
+        section: Section that the writer puts it in.
+        default: Value in SI where the file does not give it; None where another quantity stands in.
+        required: Whether a file without the key is refused.
+        quantity: Kind of quantity, as in `units.DIMENSIONS`; `1` is a pure number.
+        meaning: One line.
+    """
+
+    name: str
+    section: str
+    default: float | None
+    required: bool
+    quantity: str
+    meaning: str
+
+
+def _parse(table: str) -> tuple[Coefficient, ...]:
+    """Turn the table into records, in its order."""
+    section, rows = "", []
+    for line in table.strip().splitlines():
+        if line.startswith("["):
+            section = line.strip("[]")
+            continue
+        name, default, quantity, meaning = line.split(maxsplit=3)
+        value = None if default in ("!", "-") else float(default)
+        rows.append(Coefficient(name, section, value, default == "!", quantity, meaning))
+    return tuple(rows)
+
+
+COEFFICIENTS: tuple[Coefficient, ...] = _parse(TABLE)
+"""Every numeric key that the package knows, in the order of the parameter array."""
+
+BY_NAME: dict[str, Coefficient] = {coefficient.name: coefficient for coefficient in COEFFICIENTS}
+"""The same, by key."""

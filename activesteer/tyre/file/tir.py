@@ -1,0 +1,153 @@
+"""Reads .tir tyre property files: MF 5.2, 6.0, 6.1, 6.2 and PAC2002, into SI.
+
+Nothing in a file is executed, and nothing is sized by what it claims; whatever is wrong ends in a `TyreFileError`
+that names the file, the line, the key, the value and what is allowed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from activesteer.errors import ParameterError, TyreFileError
+from activesteer.tyre.file.coefficients import BY_NAME
+from activesteer.tyre.file.syntax import Entry, parse, read_text
+from activesteer.tyre.file.units import BASE_UNITS, si_factor
+from activesteer.tyre.tyre_parameters import Side, TyreParameters
+
+ALIASES: dict[str, str] = {
+    "IP": "INFLPRES",
+    "IP_NOM": "NOMPRES",
+    "QFZ1": "Q_FZ1",
+    "QFZ2": "Q_FZ2",
+    "QFZ3": "Q_FZ3",
+    "QPFZ1": "PFZ1",
+    "QV1": "Q_V1",
+    "QV2": "Q_V2",
+    "QRE0": "Q_RE0",
+    "QFCX1": "Q_FCX",
+    "QFCY1": "Q_FCY",
+    "QPZ1": "PPZ1",
+    "LFZ0": "LFZO",
+    "LKYA": "LKY",
+    "PECPC1": "PECP1",
+    "FITTYPE": "FITTYP",
+}
+"""Names that other programs give to the same coefficients (PAC2002, and LFZ0 written with a zero)."""
+
+_PAC2002_FITTYP = 6.0
+
+
+def load_tir(path: str | Path, mounted: Side | None = None, *, slip_tangent: bool = False) -> TyreParameters:
+    """Read a tyre property file.
+
+    Args:
+        path: The .tir file.
+        mounted: Side of the vehicle that the tyre is mounted on; None is the side that the file is for.
+        slip_tangent: Whether alpha* = tan(alpha) and gamma* = sin(gamma); else the angles themselves.
+
+    Returns:
+        The coefficients in SI and radians.
+
+    Raises:
+        TyreFileError: the file cannot be read, a line cannot be understood, or a value is missing or not allowed.
+    """
+    path = Path(path)
+    return tir_from_text(read_text(path), path, mounted, slip_tangent=slip_tangent)
+
+
+def tir_from_text(
+    text: str, source: Path, mounted: Side | None = None, *, slip_tangent: bool = False
+) -> TyreParameters:
+    """Read a tyre property file that is in memory already; see `load_tir`. The source is the name in messages."""
+    syntax = parse(text, str(source))
+    units = _units(syntax.entries, source)
+    lines: dict[str, Entry] = {}
+    texts: dict[tuple[str, str], str] = {}
+    unused: dict[tuple[str, str], float] = {}
+    for entry in syntax.entries:
+        if entry.section == "UNITS":
+            continue
+        name = ALIASES.get(entry.key, entry.key)
+        if name in BY_NAME:
+            _place(lines, name, entry, source)
+        elif isinstance(entry.value, str):
+            texts[entry.section, entry.key] = entry.value
+        else:
+            unused[entry.section, entry.key] = entry.value
+    values: dict[str, float] = {}
+    for name, entry in lines.items():
+        if isinstance(entry.value, str):
+            raise TyreFileError(f"{source}, line {entry.line}: {entry.key} = {entry.value[:60]!r}, expected a number")
+        values[name] = entry.value * si_factor(BY_NAME[name].quantity, units)
+    words = {key: word for (_, key), word in texts.items()}
+    if "FITTYP" not in values:
+        values["FITTYP"] = _version_without_fittyp(words, source)
+    side = _side(words, source)
+    try:
+        return TyreParameters(values, source, side, mounted or side, slip_tangent, texts, unused, syntax.tables)
+    except ParameterError as error:
+        raise TyreFileError(_with_line(str(error), lines)) from error
+
+
+def _place(lines: dict[str, Entry], name: str, entry: Entry, source: Path) -> None:
+    """Keep one entry per coefficient: that of its own section before others; two different ones are an error."""
+    before = lines.get(name)
+    if before is None or before.value == entry.value:
+        lines[name] = entry
+        return
+    home = BY_NAME[name].section
+    at_home = (before.section == home, entry.section == home)
+    if at_home[0] == at_home[1]:
+        raise TyreFileError(
+            f"{source}, line {entry.line}: {entry.key} = {entry.value} contradicts line {before.line}, "
+            f"where it is {before.value}"
+        )
+    if at_home[1]:
+        lines[name] = entry
+
+
+def _units(entries: tuple[Entry, ...], source: Path) -> dict[str, float]:
+    """Size in SI of the units that the file states."""
+    sizes: dict[str, float] = {}
+    for entry in entries:
+        if entry.section != "UNITS" or entry.key not in BASE_UNITS:
+            continue
+        known = BASE_UNITS[entry.key]
+        word = str(entry.value).lower()
+        if word not in known:
+            raise TyreFileError(
+                f"{source}, line {entry.line}: {entry.key} = {str(entry.value)[:60]!r} in [UNITS], "
+                f"allowed are {', '.join(known)}"
+            )
+        sizes[entry.key] = known[word]
+    return sizes
+
+
+def _version_without_fittyp(words: Mapping[str, str], source: Path) -> float:
+    """PAC2002 files state no FITTYP; files of other tyre models are refused."""
+    model = words.get("PROPERTY_FILE_FORMAT", "PAC2002").upper()
+    if not model.startswith(("PAC2002", "USER", "MF")):
+        raise TyreFileError(
+            f"{source}: PROPERTY_FILE_FORMAT = {model[:60]!r} is not a Magic Formula that can be read here; "
+            "allowed are PAC2002 and files with FITTYP 5, 6, 21, 52, 60, 61 or 62"
+        )
+    return _PAC2002_FITTYP
+
+
+def _side(words: Mapping[str, str], source: Path) -> Side:
+    """Side of the vehicle that the file is for; a symmetric tyre counts as a left one."""
+    side = words.get("TYRESIDE", "LEFT").upper()
+    if side == "RIGHT":
+        return "RIGHT"
+    if side not in ("LEFT", "SYMMETRIC", "SYM", "UNKNOWN", ""):
+        raise TyreFileError(f"{source}: TYRESIDE = {side[:60]!r}, allowed are 'LEFT', 'RIGHT' and 'SYMMETRIC'")
+    return "LEFT"
+
+
+def _with_line(message: str, lines: Mapping[str, Entry]) -> str:
+    """Add the line of the coefficient that a message is about."""
+    for name, entry in lines.items():
+        if f": {name} = " in message:
+            return message.replace(f": {name} = ", f", line {entry.line}: {name} = ", 1)
+    return message

@@ -1,0 +1,1 @@
+"""Formulas of the tyre, compiled, on plain floats."""

@@ -1,0 +1,92 @@
+"""Weighting of the pure forces at combined slip, compiled, on plain floats.
+
+Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, equations 4.E50 to 4.E67.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from activesteer.tyre.kernels import parameter_index as c
+
+
+@njit(cache=True, error_model="numpy")
+def _cosine_formula(b: float, c_: float, e: float, x: float) -> float:
+    """cos(C atan(Bx - E(Bx - atan Bx))) with E not above 1."""
+    e = min(e, 1.0)
+    bx = b * x
+    return math.cos(c_ * math.atan(bx - e * (bx - math.atan(bx))))
+
+
+@njit(cache=True, error_model="numpy")
+def longitudinal_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) -> float:
+    """G_xalpha: what the slip angle leaves of the longitudinal force (4.E50 to 4.E57)."""
+    b = (p[c.RBX1] + p[c.RBX3] * gamma_s * gamma_s) * math.cos(math.atan(p[c.RBX2] * kappa)) * p[c.LXAL]
+    e = p[c.REX1] + p[c.REX2] * dfz
+    s_h = p[c.RHX1]
+    return _cosine_formula(b, p[c.RCX1], e, alpha_s + s_h) / _cosine_formula(b, p[c.RCX1], e, s_h)
+
+
+@njit(cache=True, error_model="numpy")
+def lateral_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) -> float:
+    """G_ykappa: what the longitudinal slip leaves of the lateral force (4.E58 to 4.E65)."""
+    slope = p[c.RBY1] + p[c.RBY4] * gamma_s * gamma_s
+    b = slope * math.cos(math.atan(p[c.RBY2] * (alpha_s - p[c.RBY3]))) * p[c.LYKA]
+    e = p[c.REY1] + p[c.REY2] * dfz
+    s_h = p[c.RHY1] + p[c.RHY2] * dfz
+    return _cosine_formula(b, p[c.RCY1], e, kappa + s_h) / _cosine_formula(b, p[c.RCY1], e, s_h)
+
+
+@njit(cache=True, error_model="numpy")
+def slip_induced_side_force(
+    p, dfz: float, kappa: float, alpha_s: float, gamma_s: float, mu_fz: float, z2: float
+) -> float:
+    """S_Vykappa: the lateral force [N] that longitudinal slip induces (4.E66, 4.E67); mu_fz is mu_y F_z [N]."""
+    d = mu_fz * (p[c.RVY1] + p[c.RVY2] * dfz + p[c.RVY3] * gamma_s) * math.cos(math.atan(p[c.RVY4] * alpha_s)) * z2
+    return d * math.sin(p[c.RVY5] * math.atan(p[c.RVY6] * kappa)) * p[c.LVYKA]
+
+
+@njit(cache=True, error_model="numpy")
+def friction_ellipse(
+    p, fz: float, dfz: float, d: float, kappa: float, alpha_s: float, fx0: float, fy0: float, dx: float, dy: float,
+    k_x: float, k_y: float, s_hy: float, s_vy: float, lmux: float,
+):  # fmt: skip
+    """What combined slip leaves of both pure forces: an ellipse, divided by the ratio of the shifted slips.
+
+    Args:
+        p: Parameter array.
+        fz: Load [N].
+        dfz: Load relative to the nominal one, less 1.
+        d: Rolling direction.
+        kappa: Longitudinal slip.
+        alpha_s: Slip angle alpha*.
+        fx0: Longitudinal force at pure slip [N].
+        fy0: Lateral force at pure slip [N].
+        dx: Peak D_x [N].
+        dy: Peak D_y [N].
+        k_x: Slip stiffness [N].
+        k_y: Cornering stiffness [N/rad].
+        s_hy: Horizontal shift of the lateral force.
+        s_vy: Vertical shift of the lateral force [N].
+        lmux: Longitudinal friction scale.
+
+    Returns:
+        Factors of the longitudinal and of the lateral force, 0 to 1.
+
+    Source: the friction ellipse of MSC's PAC2002 (without its weights), as in Project Chrono's ChPac02Tire:
+    F_x = F_x0 / sqrt(1 + (mu_x t / mu_ymax)^2), F_y = F_y0 / sqrt(1 + (mu_y / (t mu_xmax))^2) with the ratio of the
+    shifted slips t = |alpha_c| / |kappa_c|.
+    """
+    s_hx = (p[c.PHX1] + p[c.PHX2] * dfz) * p[c.LHX] * d
+    shifted = p[c.LMUX] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmux
+    s_vx = fz * (p[c.PVX1] + p[c.PVX2] * dfz) * p[c.LVX] * shifted * d
+    along = abs(kappa + s_hx + s_vx / k_x)
+    across = abs(math.sin(alpha_s + s_hy + s_vy / k_y))
+    # Multiplied out: either slip may vanish.
+    x, used_x = along * dy, across * abs(fx0 - s_vx)
+    y, used_y = across * dx, along * abs(fy0 - s_vy)
+    g_x = x / math.sqrt(x * x + used_x * used_x) if used_x > 0.0 else 1.0
+    g_y = y / math.sqrt(y * y + used_y * used_y) if used_y > 0.0 else 1.0
+    return g_x, g_y

@@ -1,0 +1,298 @@
+"""One wheel on the road: contact kinematics, slip with relaxation, standstill, and the Magic Formula.
+
+Pure functions of the state. The three relaxation states of a tyre are the deflections of its contact patch against the
+rim: `deflection_x_m` along and `deflection_y_m` across the wheel's heading [m], and `deflection_z_rad`, the twist about
+the normal of the road (Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 8.6, the restricted fully non-linear
+model; the twist in the same form over half the contact length a):
+
+    d(u)/dt = -V_sx - |V_x| u / sigma_kappa        kappa' = u / sigma_kappa
+    d(v)/dt =  V_sy - |V_x| v / sigma_alpha        tan(alpha') = v / sigma_alpha      (ISO-W sign of alpha)
+    d(w)/dt =  psi_dot - |V_x| w / a               phi' = w / a                       (turn slip)
+
+The turn slip enters the formula at low speed only, where steering twists the patch (parking); it fades out with the
+other standstill terms, so that at speed the formula is the usual one without turn slip.
+
+Three additions make them usable from standstill to any speed:
+
+* The rates are mean values over the step, exact for slip speeds held within it, and the forces belong to its end.
+  Nothing gets stiff when sigma becomes small, and at rest the tyre is a spring, not an amplifier.
+* At low speed the deflection stops growing where the contact patch slides as a whole (the "wind-up" of Pacejka, eq.
+  8.125 ff.): |V_x| is replaced by max(|V_x|, |V_s| / slip_limit), at rest with one |V_s| / slip_limit for both axes, so
+  that a sliding tyre pulls against its sliding. Above `low_speed_mps` the slip limit is that of the tyre file, for each
+  axis by itself, so that the formula's steady state is reached exactly within its range of validity.
+* At low speed a viscous term acts beside the spring (Pacejka, eq. 8.129: k_Vlow), faded out by a cosine. It enters as a
+  slip, so that the friction limit bounds it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from numba import njit
+
+from activesteer.tyre.kernels import parameter_index as prm
+from activesteer.tyre.kernels.limits import limit_flags
+from activesteer.tyre.kernels.magic_formula import slip_stiffnesses, steady_state
+from activesteer.tyre.kernels.relaxation import relaxation_lengths
+from activesteer.tyre.kernels.vertical import (
+    bottoming_force,
+    contact_patch,
+    effective_rolling_radius,
+    free_radius,
+    vertical_force_loaded,
+)
+
+_MIN_RELAXATION_LENGTH_M: Final = 0.02
+"""About a tread block: keeps the slip defined when the load vanishes."""
+_LIFTED_DECAY_PER_S: Final = 20.0
+"""How fast the deflection of a lifted tyre decays [1/s]: a carcass rings down within some tenths of a second."""
+_SLIDING_TO_LINEAR: Final = 3.0
+"""Slip of full sliding over slip at which the linear force would reach the friction limit: 3 for a brush model."""
+_SLIDING_TWIST_RAD: Final = 0.12
+"""Twist at which the whole patch slides about its middle [rad]: parking torques level off after some 5 to 8 degrees."""
+_NO_TURN_SLIP_1PM: Final = 1e-12
+"""Stands for no turn slip where the formula with turn slip is meant; zero would choose the formula without it."""
+_SMALLEST_SLIP_LIMIT: Final = 0.01
+"""Slip that a deflection may stand for at least, whatever the range of a tyre file."""
+_MOST_LOAD_STEPS: Final = 8
+_CAUTIOUS: Final = 0.1
+"""What is left of the load where a step of its search would lift the tyre."""
+_LOAD_TOLERANCE: Final = 1e-9
+"""How closely the load has to agree with the horizontal forces that soften the tyre, relative to the load."""
+
+
+class WheelForces(NamedTuple):
+    """Forces of one tyre and what they came from, ISO-W frame at the contact point."""
+
+    fx_N: float
+    fy_N: float
+    fz_N: float
+    mx_Nm: float
+    my_Nm: float
+    mz_Nm: float
+    slip_ratio: float
+    slip_angle_rad: float
+    inclination_rad: float
+    deflection_x_rate_mps: float
+    deflection_y_rate_mps: float
+    deflection_z_rate_radps: float
+    loaded_radius_m: float
+    heading_x: float
+    heading_y: float
+    arm_x_m: float
+    arm_y_m: float
+    arm_z_m: float
+    limited: float
+    friction_use: float
+
+
+@njit(cache=True, error_model="numpy")
+def _mean_decay(x):
+    """Mean of exp(-t) over t from 0 to x: what is left, over a step, of the rate at its beginning."""
+    return -math.expm1(-x) / x if x > 1e-9 else 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _low_speed_slip_limit(file_limit, sliding_slip, share):
+    """Slip at which the deflection stops growing: where the tyre slides at rest, the file's limit when rolling."""
+    return file_limit + (min(sliding_slip, file_limit) - file_limit) * share
+
+
+@njit(cache=True, error_model="numpy")
+def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
+    p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn, gamma, u, v, w
+):
+    """Forces, slips, rates of the relaxation states, whether a limit is exceeded, friction used, at a load above zero.
+
+    The arguments are those of `tyre_on_road`, with the load [N], the velocities of the contact point along and across
+    the heading [m/s], the spin and the yaw rate of the wheel plane [rad/s], the camber [rad] and the relaxation states.
+    """
+    vsx = vx - spin * effective_rolling_radius(p, fz, spin, pressure_Pa)
+    limit_x = max(p[prm.KPUMAX] if vsx < 0.0 else -p[prm.KPUMIN], _SMALLEST_SLIP_LIMIT)
+    limit_y = max(math.tan(min(p[prm.ALPMAX] if vsy > 0.0 else -p[prm.ALPMIN], 1.5)), _SMALLEST_SLIP_LIMIT)
+    speed = abs(vx)
+    share = 0.0
+    damping_slip_x = 0.0
+    damping_slip_y = 0.0
+    if speed < low_speed_mps:
+        share = 0.5 * (1.0 + math.cos(math.pi * speed / low_speed_mps))
+        stiffness_x, stiffness_y = slip_stiffnesses(p, fz, gamma, pressure_Pa, mu)
+        stiffness_x = abs(stiffness_x)
+        stiffness_y = abs(stiffness_y)
+        sliding = _SLIDING_TO_LINEAR * mu / p[prm.REFERENCE_FRICTION] * fz
+        limit_x = _low_speed_slip_limit(limit_x, sliding / stiffness_x, share)
+        limit_y = _low_speed_slip_limit(limit_y, sliding / stiffness_y, share)
+        damping_slip_x = -low_speed_damping_Nspm * share * vsx / stiffness_x
+        damping_slip_y = low_speed_damping_Nspm * share * vsy / stiffness_y
+
+    sigma_x, sigma_y = relaxation_lengths(p, fz, gamma, pressure_Pa)
+    if p[prm.RELAXATION_OFF] != 0.0:
+        sigma_x *= share
+        sigma_y *= share
+    sigma_x = max(sigma_x, _MIN_RELAXATION_LENGTH_M)
+    sigma_y = max(sigma_y, _MIN_RELAXATION_LENGTH_M)
+    sliding_x = abs(vsx) / limit_x
+    sliding_y = abs(vsy) / limit_y
+    if share > 0.0:
+        # A patch that slides as a whole is dragged along the direction of sliding, so one rate serves both deflections.
+        together = share * math.sqrt(sliding_x * sliding_x + sliding_y * sliding_y)
+        sliding_x = (1.0 - share) * sliding_x + together
+        sliding_y = (1.0 - share) * sliding_y + together
+    rolling = speed + p[prm.SPEED_OFFSET]
+    carry_x = max(rolling, sliding_x)
+    carry_y = max(rolling, sliding_y)
+    rate_x = (-vsx - carry_x * u / sigma_x) * _mean_decay(timestep_s * carry_x / sigma_x)
+    rate_y = (vsy - carry_y * v / sigma_y) * _mean_decay(timestep_s * carry_y / sigma_y)
+    half_length = max(0.5 * contact_patch(p, fz, pressure_Pa)[0], _MIN_RELAXATION_LENGTH_M)
+    carry_z = max(speed, abs(turn) * half_length / _SLIDING_TWIST_RAD)
+    rate_z = (turn - carry_z * w / half_length) * _mean_decay(timestep_s * carry_z / half_length)
+    kappa = (u + timestep_s * rate_x) / sigma_x + damping_slip_x
+    alpha = math.atan((v + timestep_s * rate_y) / sigma_y + damping_slip_y)
+
+    # Where the wind-up limit of a rolling tyre holds the deflection, the slip that it should have is out of range.
+    limited = 0.0
+    held = speed >= low_speed_mps and (carry_x > rolling or carry_y > rolling)
+    if held or limit_flags(p, fz, kappa, alpha, gamma, pressure_Pa) != 0:
+        limited = 1.0
+    # Camber works by the path that the tread takes through the patch of a rolling tyre: at rest there is none.
+    gamma *= 1.0 - share
+    fx, fy, mx, my, mz, mu_x, mu_y = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, 0.0)[:7]
+    if share > 0.0:
+        # The formula with turn slip treats camber differently, even without any: the two are blended, never switched.
+        turn_slip = (w + timestep_s * rate_z) / half_length
+        if turn_slip == 0.0:
+            turn_slip = _NO_TURN_SLIP_1PM
+        twisted = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, turn_slip)
+        fx += share * (twisted[0] - fx)
+        fy += share * (twisted[1] - fy)
+        mx += share * (twisted[2] - mx)
+        my += share * (twisted[3] - my)
+        mz += share * (twisted[4] - mz)
+    # Beyond the range of the file the formula gives the forces of its greatest load.
+    load = min(fz, p[prm.FZMAX])
+    use = math.hypot(fx / (mu_x * load), fy / (mu_y * load))
+    return fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use
+
+
+@njit(cache=True, error_model="numpy")
+def _load(p, deflection, spin, pressure_Pa, damping_N, fx, fy, gamma):
+    """Load [N] under horizontal forces; the damper adds or takes at most what the spring carries."""
+    elastic = vertical_force_loaded(p, deflection, spin, pressure_Pa, fx, fy, gamma)
+    elastic += bottoming_force(p, deflection, spin)
+    # So the load is continuous where the tyre touches down or lifts off, and the road never pulls.
+    return elastic + min(max(damping_N, -elastic), elastic)
+
+
+@njit(cache=True, error_model="numpy")
+def tyre_on_road(
+    p,
+    mu,
+    pressure_Pa,
+    low_speed_mps,
+    low_speed_damping_Nspm,
+    timestep_s,
+    centre_height_m,
+    axis_x,
+    axis_y,
+    axis_z,
+    velocity_x_mps,
+    velocity_y_mps,
+    velocity_z_mps,
+    spin_x_radps,
+    spin_y_radps,
+    spin_z_radps,
+    deflection_x_m,
+    deflection_y_m,
+    deflection_z_rad,
+):
+    """Forces of a tyre on the plane road z = 0 and the rates of its relaxation states.
+
+    Args:
+        p: Tyre parameters, shape (PARAMETER_COUNT,); it knows the side that the tyre is mounted on.
+        mu: Friction of the road relative to the one of the tyre file [-].
+        pressure_Pa: Inflation pressure [Pa].
+        low_speed_mps: Speed below which the standstill terms fade in [m/s].
+        low_speed_damping_Nspm: Viscous coefficient of the contact patch at rest [N s/m].
+        timestep_s: Step of the integrator [s].
+        centre_height_m: Height of the wheel centre above the road [m].
+        axis_x: Unit vector of the spin axis, pointing to the left side of the car, world frame.
+        axis_y: Its y component.
+        axis_z: Its z component.
+        velocity_x_mps: Velocity of the wheel centre, world frame [m/s].
+        velocity_y_mps: Its y component.
+        velocity_z_mps: Its z component.
+        spin_x_radps: Angular velocity of the wheel, its spin included, world frame [rad/s].
+        spin_y_radps: Its y component.
+        spin_z_radps: Its z component.
+        deflection_x_m: Relaxation state along the heading [m].
+        deflection_y_m: Relaxation state across the heading [m].
+        deflection_z_rad: Relaxation state about the normal of the road [rad].
+
+    Returns:
+        The members of `WheelForces` in their order. `heading_x`, `heading_y` is the unit vector of the wheel's heading
+        in the road plane; `arm_..._m` leads from the wheel centre to the contact point, world frame;
+        `limited` is 1.0 where a limit of validity of the tyre file is exceeded; `friction_use` is the share of the
+        available friction that the forces take, sqrt((F_x / mu_x F_z)^2 + (F_y / mu_y F_z)^2) with the peak
+        coefficients of the file at this load, camber and pressure on this road. It exceeds 1 by as much as the file's
+        shifts and its weights of combined slip let the forces do so.
+    """
+    horizontal = math.sqrt(axis_x * axis_x + axis_y * axis_y)
+    heading_x = axis_y / horizontal
+    heading_y = -axis_x / horizontal
+    gamma = math.atan2(axis_z, horizontal)
+    loaded_radius = centre_height_m / horizontal
+    # From the centre straight down in the wheel plane: -(n - (n.s) s) / |n - (n.s) s| times the loaded radius.
+    arm_x = loaded_radius * axis_z * axis_x / horizontal
+    arm_y = loaded_radius * axis_z * axis_y / horizontal
+    arm_z = -centre_height_m
+
+    spin = spin_x_radps * axis_x + spin_y_radps * axis_y + spin_z_radps * axis_z
+    # What turns the wheel plane, without the spin itself; it moves the contact point across the heading.
+    turn_x = spin_x_radps - spin * axis_x
+    turn_y = spin_y_radps - spin * axis_y
+    turn_z = spin_z_radps - spin * axis_z
+    contact_x = velocity_x_mps + turn_y * arm_z - turn_z * arm_y
+    contact_y = velocity_y_mps + turn_z * arm_x - turn_x * arm_z
+    vx = velocity_x_mps * heading_x + velocity_y_mps * heading_y
+    vsy = contact_y * heading_x - contact_x * heading_y
+    if p[prm.SLIP_AT_CENTRE] != 0.0:
+        vsy = velocity_y_mps * heading_x - velocity_x_mps * heading_y
+
+    deflection = free_radius(p, spin) - loaded_radius
+    axis_z_rate = turn_x * axis_y - turn_y * axis_x
+    closing = -(velocity_z_mps / horizontal + centre_height_m * axis_z * axis_z_rate / horizontal**3)
+    damping = p[prm.VERTICAL_DAMPING] * closing
+    fz = _load(p, deflection, spin, pressure_Pa, damping, 0.0, 0.0, gamma)
+    if fz <= 0.0:
+        decay = -_LIFTED_DECAY_PER_S
+        return (
+            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gamma, decay * deflection_x_m, decay * deflection_y_m,
+            decay * deflection_z_rad, loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, 0.0, 0.0,
+        )  # fmt: skip
+
+    fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use = _rolling_tyre(
+        p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn_z, gamma,
+        deflection_x_m, deflection_y_m, deflection_z_rad,
+    )  # fmt: skip
+    if p[prm.Q_FCX] != 0.0 or p[prm.Q_FCY] != 0.0:
+        # Horizontal forces soften the tyre, and the load makes the horizontal forces: a secant search for both.
+        fz_before = fz
+        step = _load(p, deflection, spin, pressure_Pa, damping, fx, fy, gamma) - fz
+        fz = fz + step if fz + step > 0.0 else _CAUTIOUS * fz
+        for _ in range(_MOST_LOAD_STEPS):
+            fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use = _rolling_tyre(
+                p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn_z, gamma,
+                deflection_x_m, deflection_y_m, deflection_z_rad,
+            )  # fmt: skip
+            missing = _load(p, deflection, spin, pressure_Pa, damping, fx, fy, gamma) - fz
+            if abs(missing) <= _LOAD_TOLERANCE * fz or missing == step:
+                break
+            fz_next = fz + missing * (fz - fz_before) / (step - missing)
+            fz_before = fz
+            step = missing
+            fz = fz_next if fz_next > 0.0 else _CAUTIOUS * fz
+    return (
+        fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, rate_z,
+        loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, limited, use,
+    )  # fmt: skip

@@ -1,0 +1,228 @@
+"""The Magic Formula: forces and moments of a tyre in steady state, one compiled kernel for every caller.
+
+Inputs and outputs are in ISO-W axes at the contact point, SI and radians: alpha > 0 gives F_y < 0, kappa > 0 drives,
+gamma > 0 inclines the wheel about +x, M_y < 0 rolls forward. Slip is taken against the speed's absolute value.
+
+`p` is the parameter array of `parameters`. Inputs outside the ranges of the file are evaluated at the limit
+(`limits.limit_flags` says which); a load below the smallest valid one scales the forces of that load down to zero.
+
+Below the speed VXLOW everything that depends on the rolling direction (shifts, trail, rolling resistance) fades with
+a sine through zero at rest, so that the forces are continuous through standstill; the forces due to slip do not fade,
+because there slip is the deflection of the contact patch (see `relaxation`).
+
+A division by zero gives inf or nan, as in numpy, and no exception: the kernels run inside the engine's callbacks, where
+nothing could catch one, and the state's guard there finds what is not finite.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from activesteer.tyre.kernels import parameter_index as c
+from activesteer.tyre.kernels.combined_slip import (
+    friction_ellipse,
+    lateral_weight,
+    longitudinal_weight,
+    slip_induced_side_force,
+)
+from activesteer.tyre.kernels.moments import (
+    SMALLEST_FRICTION,
+    aligning_moment,
+    overturning_moment,
+    rolling_resistance_moment,
+)
+from activesteer.tyre.kernels.pure_slip import (
+    MF52,
+    cornering_stiffness,
+    lateral_force,
+    longitudinal_force,
+    longitudinal_stiffness,
+)
+from activesteer.tyre.kernels.relaxation import relaxation_lengths
+from activesteer.tyre.kernels.turn_slip import turn_slip_factors
+from activesteer.tyre.kernels.vertical import effective_rolling_radius, vertical_force
+
+__all__ = [
+    "clamp",
+    "effective_rolling_radius",
+    "magic_formula",
+    "relative_pressure",
+    "relaxation_lengths",
+    "rolling_direction",
+    "slip_stiffnesses",
+    "steady_state",
+    "vertical_force",
+]
+
+
+@njit(cache=True, error_model="numpy")
+def rolling_direction(p, vx_mps: float) -> float:
+    """1 rolling forward, -1 backward, a sine between them below VXLOW."""
+    low = p[c.VXLOW]
+    if vx_mps >= low:
+        return 1.0
+    if vx_mps <= -low:
+        return -1.0
+    return math.sin(0.5 * math.pi * vx_mps / low)
+
+
+@njit(cache=True, error_model="numpy")
+def clamp(x: float, low: float, high: float) -> float:
+    """The value, or the limit that it exceeds."""
+    return min(max(x, low), high)
+
+
+@njit(cache=True, error_model="numpy")
+def relative_pressure(p, pressure_Pa: float) -> float:
+    """Pressure over the nominal one, less 1."""
+    return clamp(pressure_Pa, p[c.PRESMIN], p[c.PRESMAX]) / p[c.NOMPRES] - 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def steady_state(
+    p, fz: float, kappa: float, alpha: float, gamma: float, pressure: float, vx: float, mu: float, turn_slip: float
+):
+    """Everything that one evaluation knows.
+
+    Args:
+        p: Parameter array.
+        fz: Load [N].
+        kappa: Longitudinal slip.
+        alpha: Slip angle [rad].
+        gamma: Camber [rad].
+        pressure: Inflation pressure [Pa].
+        vx: Speed along the heading [m/s].
+        mu: Friction of the road relative to that of the file.
+        turn_slip: Yaw rate over speed [1/m], positive to the left; MF 6.x only.
+
+    Returns:
+        F_x, F_y, M_x, M_y, M_z, then peak friction mu_x and mu_y, trail [m], residual moment [Nm],
+        slip stiffness K_xkappa [N] and cornering stiffness K_yalpha [N/rad].
+    """
+    if not fz > 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    load = clamp(fz, p[c.FZMIN], p[c.FZMAX])
+    scale = min(fz / load, 1.0)
+    fz = load
+    side = p[c.SIDE]
+    kappa = clamp(kappa, p[c.KPUMIN], p[c.KPUMAX])
+    alpha = side * clamp(alpha, p[c.ALPMIN], p[c.ALPMAX])
+    gamma = side * clamp(gamma, p[c.CAMMIN], p[c.CAMMAX])
+    if p[c.CAMBER_OFF] != 0.0:
+        gamma = 0.0
+    mu = mu / p[c.REFERENCE_FRICTION]
+    pressure = clamp(pressure, p[c.PRESMIN], p[c.PRESMAX])
+    fz0 = p[c.LFZO] * p[c.FNOMIN]
+    dfz = (fz - fz0) / fz0
+    dpi = relative_pressure(p, pressure)
+    d = rolling_direction(p, vx)
+    tan_alpha = math.tan(alpha)
+    alpha_s, gamma_s = alpha, gamma
+    if p[c.SLIP_TANGENT] != 0.0:
+        alpha_s, gamma_s = tan_alpha, math.sin(gamma)
+    lmux, lmuy = p[c.LMUX] * mu, p[c.LMUY] * mu
+    mf52 = p[c.MF_VERSION] == MF52
+    gamma_x, gamma_y, gamma_z = gamma, gamma_s, gamma_s
+    if mf52:
+        gamma_x, gamma_y, gamma_z = gamma * p[c.LGAX], gamma_s * p[c.LGAY], gamma_s * p[c.LGAZ]
+
+    # On a slippery road the pure forces reach their peaks at smaller slips; the weights have to follow, else both peaks
+    # are there at once and the resultant exceeds the friction (similarity method, Pacejka 2012, section 4.2).
+    similar = max(mu, SMALLEST_FRICTION)
+    kappa_m, alpha_m = kappa / similar, alpha_s / similar
+    g_y = lateral_weight(p, dfz, kappa_m, alpha_m, gamma_s)
+    z0, z1, z2, z3, z4, z5, z6, z7, z8 = 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
+    if turn_slip != 0.0 and not mf52:
+        z0, z1, z2, z3, z4, z5, z6, z7, z8 = turn_slip_factors(
+            p, fz, dfz, dpi, kappa, tan_alpha, gamma, gamma_s, pressure, vx, lmuy, g_y, side * turn_slip
+        )
+    fx0, mu_x, k_x = longitudinal_force(p, fz, dfz, dpi, kappa, gamma_x, lmux, d, z1)
+    fy0, mu_y, k_y, b_y, c_y, s_hy, s_vy = lateral_force(p, fz, dfz, dpi, alpha_s, gamma_y, lmuy, d, z0, z2, z3, z4)
+    kappa_z, lmu_z = kappa, p[c.LMUY] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmuy
+    if p[c.FRICTION_ELLIPSE] != 0.0:
+        g_x, g_y = friction_ellipse(
+            p, fz, dfz, d, kappa, alpha_s, fx0, fy0, mu_x * fz, mu_y * fz, k_x, k_y, s_hy, s_vy, lmux
+        )
+        # The moment knows longitudinal slip only by the side force that is left.
+        kappa_z = 0.0
+    else:
+        g_x = longitudinal_weight(p, dfz, kappa_m, alpha_m, gamma_s)
+    fx = g_x * fx0
+    fy = g_y * fy0
+    fy_trail = fy
+    if not mf52:
+        # The trail acts on the force without camber and turn slip, weighted with camber (4.E74).
+        fy_trail = g_y * lateral_force(p, fz, dfz, dpi, alpha_s, 0.0, lmuy, d, 1.0, 1.0, 1.0, 1.0)[0]
+    fy += slip_induced_side_force(p, dfz, kappa, alpha_s, gamma_s, mu_y * fz, z2)
+
+    mx = overturning_moment(p, fz, fy, gamma, dpi)
+    my = rolling_resistance_moment(p, fz, fx, gamma, pressure, vx, d)
+    mz, trail, residual = aligning_moment(
+        p, fz, dfz, dpi, kappa_z, alpha_s, gamma_z, gamma, vx, tan_alpha, lmu_z, d, k_x, k_y, b_y, c_y, s_hy, s_vy,
+        fx, fy, fy_trail, z0, z2, z5, z6, z7, z8,
+    )  # fmt: skip
+    mirrored = side * scale
+    return (
+        scale * fx, mirrored * fy, mirrored * mx, scale * my, mirrored * mz,
+        mu_x, mu_y, trail, mirrored * residual, scale * k_x, scale * k_y,
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def magic_formula(
+    p, fz_N: float, kappa: float, alpha_rad: float, gamma_rad: float, pressure_Pa: float, vx_mps: float, mu: float
+):
+    """Forces and moments of the tyre at the contact point in steady state.
+
+    Args:
+        p: Parameter array, float64, shape (PARAMETER_COUNT,).
+        fz_N: Load [N]; zero or less gives no forces.
+        kappa: Longitudinal slip -V_sx/|V_x|, positive drives; -1 is a locked wheel.
+        alpha_rad: Slip angle atan(V_sy/|V_x|) [rad].
+        gamma_rad: Camber [rad], positive about +x.
+        pressure_Pa: Inflation pressure [Pa].
+        vx_mps: Speed of the contact point along the wheel's heading [m/s].
+        mu: Friction of the road relative to that of the file; multiplies LMUX and LMUY, and narrows the curves of
+            combined slip accordingly.
+
+    Returns:
+        F_x [N], F_y [N], M_x [Nm], M_y [Nm], M_z [Nm] in ISO-W axes.
+
+    Validity: the ranges of the file; outside them the value at the limit.
+    Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 4.3.2.
+    """
+    r = steady_state(p, fz_N, kappa, alpha_rad, gamma_rad, pressure_Pa, vx_mps, mu, 0.0)
+    return r[0], r[1], r[2], r[3], r[4]
+
+
+@njit(cache=True, error_model="numpy")
+def slip_stiffnesses(p, fz_N: float, gamma_rad: float, pressure_Pa: float, mu: float):
+    """Slopes of the forces at zero slip.
+
+    Args:
+        p: Parameter array.
+        fz_N: Load [N].
+        gamma_rad: Camber [rad].
+        pressure_Pa: Inflation pressure [Pa].
+        mu: Friction of the road; without influence on the slopes, kept so that all kernels are called alike.
+
+    Returns:
+        Slip stiffness K_xkappa [N], > 0, and cornering stiffness K_yalpha [N/rad], < 0 in ISO-W axes.
+
+    Source: Pacejka 2012, 4.E15 and 4.E25.
+    """
+    if not fz_N > 0.0:
+        return 0.0, 0.0
+    load = clamp(fz_N, p[c.FZMIN], p[c.FZMAX])
+    scale = min(fz_N / load, 1.0)
+    dfz = load / (p[c.LFZO] * p[c.FNOMIN]) - 1.0
+    dpi = relative_pressure(p, pressure_Pa)
+    gamma = clamp(gamma_rad, p[c.CAMMIN], p[c.CAMMAX])
+    if p[c.MF_VERSION] == MF52:
+        gamma *= p[c.LGAY]
+    if p[c.SLIP_TANGENT] != 0.0:
+        gamma = math.sin(gamma)
+    k_x = longitudinal_stiffness(p, load, dfz, dpi)
+    return scale * k_x, scale * cornering_stiffness(p, load, gamma, dpi)

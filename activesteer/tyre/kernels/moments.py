@@ -1,0 +1,130 @@
+"""Overturning, rolling resistance and aligning moment, compiled, on plain floats.
+
+Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, equations 4.E31 to 4.E49 and 4.E68 to 4.E78, with the
+corrections that the property files need: in the overturning moment the square stands on the arc tangent's argument, and
+A_mu is 1. For MF 5.2: 2nd ed. 2006, section 4.3.2.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from activesteer.tyre.kernels import parameter_index as c
+from activesteer.tyre.kernels.pure_slip import EPSILON, MF52
+
+SMALLEST_FRICTION = 1e-6
+"""Friction scale below which slopes that are divided by it stay as they are."""
+
+
+@njit(cache=True, error_model="numpy")
+def overturning_moment(p, fz: float, fy: float, gamma: float, dpi: float) -> float:
+    """Overturning moment M_x [Nm] (4.E69, corrected)."""
+    r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
+    if p[c.MF_VERSION] == MF52:
+        return r0 * fz * (p[c.QSX1] * p[c.LVMX] - p[c.QSX2] * gamma + p[c.QSX3] * fy / fz0) * p[c.LMX]
+    mixed = p[c.QSX4] * math.cos(p[c.QSX5] * math.atan((p[c.QSX6] * fz / fz0) ** 2))
+    mixed *= math.sin(p[c.QSX7] * gamma + p[c.QSX8] * math.atan(p[c.QSX9] * fy / fz0))
+    sum_ = p[c.QSX1] * p[c.LVMX] - p[c.QSX2] * gamma * (1.0 + p[c.PPMX1] * dpi) + p[c.QSX3] * fy / fz0
+    sum_ += mixed + p[c.QSX10] * math.atan(p[c.QSX11] * fz / fz0) * gamma
+    added = fy * (p[c.QSX13] + p[c.QSX14] * abs(gamma)) - fz * p[c.QSX12] * gamma * abs(gamma)
+    return r0 * p[c.LMX] * (fz * sum_ + added)
+
+
+@njit(cache=True, error_model="numpy")
+def rolling_resistance_moment(p, fz: float, fx: float, gamma: float, pressure: float, vx: float, d: float) -> float:
+    """Rolling resistance moment M_y [Nm], negative when rolling forward (4.E70)."""
+    r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
+    speed = abs(vx) / p[c.LONGVL]
+    sum_ = p[c.QSY1] + p[c.QSY2] * d * fx / fz0 + p[c.QSY3] * speed + p[c.QSY4] * speed**4
+    if p[c.MF_VERSION] == MF52:
+        return -r0 * fz * sum_ * p[c.LMY] * d
+    sum_ += (p[c.QSY5] + p[c.QSY6] * fz / fz0) * gamma * gamma
+    load = (fz / fz0) ** p[c.QSY7] * (pressure / p[c.NOMPRES]) ** p[c.QSY8]
+    return -r0 * fz0 * sum_ * load * p[c.LMY] * d
+
+
+@njit(cache=True, error_model="numpy")
+def _equivalent_slip(alpha: float, stiffness_ratio_kappa: float) -> float:
+    """Slip angle that stands for combined slip, with the sign of alpha (4.E77, 4.E78)."""
+    tangent = math.tan(alpha)
+    size = math.atan(math.sqrt(tangent * tangent + stiffness_ratio_kappa * stiffness_ratio_kappa))
+    return math.copysign(size, alpha)
+
+
+@njit(cache=True, error_model="numpy")
+def aligning_moment(
+    p, fz: float, dfz: float, dpi: float, kappa: float, alpha_s: float, gamma_s: float, gamma: float, vx: float,
+    tan_alpha: float, lmu: float, d: float, k_x: float, k_y: float, b_y: float, c_y: float, s_hy: float, s_vy: float,
+    fx: float, fy: float, fy_trail: float, z0: float, z2: float, z5: float, z6: float, z7: float, z8: float,
+):  # fmt: skip
+    """Aligning moment at combined slip (4.E31 to 4.E49, 4.E71 to 4.E78).
+
+    Args:
+        p: Parameter array.
+        fz: Load [N], > 0.
+        dfz: Load relative to the nominal one, less 1.
+        dpi: Pressure relative to the nominal one, less 1.
+        kappa: Longitudinal slip.
+        alpha_s: Slip angle alpha*.
+        gamma_s: Camber gamma*.
+        gamma: Camber [rad].
+        vx: Speed along the wheel's heading [m/s].
+        tan_alpha: Tangent of the slip angle.
+        lmu: Lateral friction scale.
+        d: Rolling direction.
+        k_x: Slip stiffness [N].
+        k_y: Cornering stiffness [N/rad].
+        b_y: Stiffness factor of the lateral force.
+        c_y: Shape factor of the lateral force.
+        s_hy: Horizontal shift of the lateral force.
+        s_vy: Vertical shift of the lateral force [N].
+        fx: Longitudinal force [N].
+        fy: Lateral force [N].
+        fy_trail: Lateral force that acts through the trail [N].
+        z0: Turn slip factor.
+        z2: Turn slip factor.
+        z5: Turn slip factor.
+        z6: Turn slip factor.
+        z7: Turn slip factor.
+        z8: Turn slip factor.
+
+    Returns:
+        Aligning moment [Nm], pneumatic trail [m], residual moment [Nm].
+    """
+    r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
+    k_ya = k_y + math.copysign(EPSILON, k_y)
+    speed = abs(vx)
+    cos_alpha = speed / (speed * math.sqrt(1.0 + tan_alpha * tan_alpha) + EPSILON)
+    stiffness = p[c.LKY] / max(lmu, SMALLEST_FRICTION)
+    size = abs(gamma_s)
+    gamma_z = gamma * p[c.LGAZ] if p[c.MF_VERSION] == MF52 else gamma
+
+    alpha_t = alpha_s + (p[c.QHZ1] + p[c.QHZ2] * dfz) * d + (p[c.QHZ3] + p[c.QHZ4] * dfz) * gamma_s
+    alpha_r = alpha_s + s_hy + s_vy / k_ya
+    slip = k_x / k_ya * kappa
+    alpha_t_eq = _equivalent_slip(alpha_t, slip)
+    alpha_r_eq = _equivalent_slip(alpha_r, slip)
+
+    b_t = (p[c.QBZ1] + p[c.QBZ2] * dfz + p[c.QBZ3] * dfz * dfz) * stiffness
+    b_t *= 1.0 + p[c.QBZ4] * gamma_z + p[c.QBZ5] * abs(gamma_z)
+    c_t = p[c.QCZ1]
+    d_t = fz * r0 / (p[c.LFZO] * fz0) * (p[c.QDZ1] + p[c.QDZ2] * dfz) * (1.0 - p[c.PPZ1] * dpi) * p[c.LTR] * d
+    d_t *= (1.0 + p[c.QDZ3] * gamma_z + p[c.QDZ4] * gamma_z * gamma_z) * z5
+    curve = (p[c.QEZ4] + p[c.QEZ5] * gamma_s) * 2.0 / math.pi * math.atan(b_t * c_t * alpha_t)
+    e_t = min((p[c.QEZ1] + p[c.QEZ2] * dfz + p[c.QEZ3] * dfz * dfz) * (1.0 + curve), 1.0)
+    bt = b_t * alpha_t_eq
+    trail = d_t * math.cos(c_t * math.atan(bt - e_t * (bt - math.atan(bt)))) * cos_alpha
+    if p[c.TRAIL_BY_SCALED_LOAD] == 0.0:
+        trail *= p[c.LFZO]
+
+    b_r = (p[c.QBZ9] * stiffness + p[c.QBZ10] * b_y * c_y) * z6
+    d_r = (p[c.QDZ6] + p[c.QDZ7] * dfz) * p[c.LRES] * z2
+    camber = (p[c.QDZ8] + p[c.QDZ9] * dfz) * (1.0 + p[c.PPZ2] * dpi) + (p[c.QDZ10] + p[c.QDZ11] * dfz) * size
+    d_r += camber * gamma_s * p[c.LKZC] * z0
+    d_r = fz * r0 * d_r * lmu * d * math.cos(alpha_s) + z8 - 1.0
+    residual = d_r * math.cos(z7 * math.atan(b_r * alpha_r_eq))
+
+    arm = r0 * (p[c.SSZ1] + p[c.SSZ2] * fy / fz0 + (p[c.SSZ3] + p[c.SSZ4] * dfz) * gamma) * p[c.LS]
+    return -trail * fy_trail + residual + arm * fx, trail, residual

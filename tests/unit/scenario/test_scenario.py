@@ -1,0 +1,252 @@
+"""Manoeuvre, vehicle and overrides put together, and a run made again from its own recording."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import activesteer
+from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError, TyreFileError
+from activesteer.maneuver import StepSteer
+from activesteer.resources import find_vehicle, list_maneuvers, list_vehicles, models_dir
+from activesteer.scenario import describe, resolve
+from activesteer.simulation.runner import prepared
+
+SHORT = {"duration_s": 0.2, "settle_s": 0.0, "steer.start_s": 0.05, "steer.steering_wheel_deg": 20}
+
+
+@pytest.fixture
+def vehicle(tmp_path):
+    """A vehicle file like the shipped one, with changes."""
+
+    def write(*changes: tuple[str, str]) -> Path:
+        text = find_vehicle("compact").read_text()
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new, 1)
+        path = tmp_path / "mine.toml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("maneuver", list_maneuvers())
+@pytest.mark.parametrize("car", list_vehicles())
+def test_everything_that_is_shipped_resolves(maneuver, car):
+    scenario = resolve(maneuver, car)
+    assert scenario.maneuver.name == maneuver
+    assert scenario.maneuver.title
+    assert scenario.car.name == car
+
+
+def test_step_steer_is_the_one_of_the_paper():
+    maneuver = resolve("step_steer").maneuver
+    assert isinstance(maneuver, StepSteer)
+    assert maneuver.speed_mps == pytest.approx(80.0 / 3.6)
+    assert maneuver.road.mu == 0.9
+    assert maneuver.steer.lateral_acceleration_mps2 == pytest.approx(0.4 * 9.81)
+    assert maneuver.steer.rate_radps > math.radians(200.0)
+
+
+def test_overrides_reach_manoeuvre_and_vehicle_in_any_unit():
+    scenario = resolve(
+        "step_steer",
+        overrides={
+            "speed_kmh": 72,
+            "road.mu": 0.4,
+            "maneuver.title": "slow",
+            "controllers.ars.limit_deg": 2,
+            "vehicle.driver.speed_gain_Nmspm": 1000.0,
+            "load.mass_factor": 1.1,
+        },
+    )
+    assert scenario.maneuver.speed_mps == pytest.approx(20.0)
+    assert scenario.maneuver.road.mu == 0.4
+    assert scenario.maneuver.title == "slow"
+    assert scenario.car.controllers.ars.limit_rad == pytest.approx(math.radians(2.0))
+    assert scenario.car.driver.speed_gain_Nmspm == 1000.0
+    assert scenario.car.load.mass_factor == 1.1
+    assert scenario.maneuver.road.mu == 0.4
+    assert scenario.controller_setup(0.002).mu == 0.4
+
+
+def test_overrides_may_come_from_numpy():
+    overrides = {"speed_kmh": np.int64(72), "road.mu": np.float32(0.5)}
+    scenario = resolve("step_steer", overrides=overrides)
+    assert scenario.maneuver.speed_mps == pytest.approx(20.0)
+    assert json.loads(json.dumps(describe(scenario)))["overrides"] == {"speed_kmh": 72, "road.mu": 0.5}
+
+
+def test_override_replaces_a_whole_table():
+    scenario = resolve("standstill", overrides={"brake": {"time_s": [0.0], "pedal": [0.5]}})
+    assert scenario.maneuver.reference(0.0).brake == 0.5
+
+
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        ("road.mue", r"override road\.mue: neither manoeuvre nor vehicle has such a key; did you mean 'road\.mu'"),
+        ("sped_kmh", r"override sped_kmh: .*did you mean .*'speed_kmh'"),
+        ("controllers.asr.limit_deg", r"did you mean .*'controllers\.ars\.limit_deg'"),
+        ("maneuver.sped_kmh", r"override maneuver\.sped_kmh: sped_kmh: there is no such key; did you mean 'speed_kmh'"),
+        ("vehicle.tyres.frnt", r"override vehicle\.tyres\.frnt: frnt: there is no such key; did you mean 'front'"),
+        ("name", r"override name: both manoeuvre and vehicle have this key; say maneuver\.name or vehicle\.name"),
+        ("speed_kmh.x", r"speed_kmh is a value, not a table"),
+    ],
+)
+def test_override_of_a_key_that_does_not_exist_is_answered(key, told):
+    with pytest.raises(ParameterError, match=told):
+        resolve("step_steer", overrides={key: 1})
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        ("road.mu", "wet", r"^override road\.mu: 'wet' is not a number"),
+        ("speed_kmh", 500, r"^override speed_kmh: 500 is out of range; allowed is -72 to 360"),
+        (
+            "controllers.ars.limit_deg",
+            20,
+            r"^override controllers\.ars\.limit_deg: 20 is out of range; allowed is 0 to 10",
+        ),
+        ("tyres.front", "none.tir", r"^override tyres\.front: there is no file 'none\.tir' in models/tyres"),
+    ],
+)
+def test_wrong_value_of_an_override_is_not_blamed_on_the_file(key, value, told):
+    with pytest.raises(ActiveSteerError, match=told):
+        resolve("step_steer", overrides={key: value})
+
+
+def test_missing_tyre_file_is_answered_with_file_key_and_neighbours(vehicle):
+    path = vehicle(('front = "compact_205_55R16.tir"', 'front = "compact_205_55R17.tir"'))
+    with pytest.raises(
+        TyreFileError,
+        match=r"^mine\.toml, line \d+: tyres\.front: there is no file 'compact_205_55R17\.tir' in models/tyres; "
+        r"did you mean 'compact_205_55R16\.tir'",
+    ):
+        resolve("standstill", path)
+
+
+def test_broken_tyre_file_is_answered_with_its_name(vehicle, tmp_path):
+    tyre = tmp_path / "broken.tir"
+    tyre.write_text("[MODEL]\nFITTYP = round\n")
+    with pytest.raises(TyreFileError, match=r"broken\.tir"):
+        resolve("standstill", vehicle(('rear = "compact_205_55R16.tir"', f'rear = "{tyre}"')))
+
+
+def test_missing_model_is_answered_with_file_and_key(vehicle):
+    with pytest.raises(
+        ModelError, match=r"^mine\.toml, line \d+: mjcf: there is no file 'compact/compct\.xml' in .*mjcf; "
+    ):
+        resolve("standstill", vehicle(("compact/compact.xml", "compact/compct.xml")))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("</mujoco>", "<no_such_thing/></mujoco>", "no_such_thing"),
+        ("</mujoco>", "", "XML"),
+        ('name="chassis"', 'name="hull"', "chassis"),
+        ('name="cg_gyro"', 'name="cg_gyros"', r"no sensor 'cg_gyro'; did you mean 'cg_gyros'"),
+    ],
+)
+def test_bad_model_is_answered_with_its_file(vehicle, tmp_path, old, new, told):
+    folder = tmp_path / "car"
+    shutil.copytree(models_dir() / "mjcf" / "compact", folder)
+    model = folder / "compact.xml"
+    text = model.read_text()
+    assert old in text
+    model.write_text(text.replace(old, new))
+    with pytest.raises(ModelError, match=rf"compact\.xml(.|\n)*{told}"):
+        activesteer.simulate("standstill", vehicle=vehicle(("compact/compact.xml", str(model))))
+
+
+def test_bad_vehicle_file_is_answered_with_file_key_and_line(vehicle):
+    with pytest.raises(ParameterError, match=r"^mine\.toml, line \d+: steering\.ratoi: .*did you mean 'ratio'"):
+        resolve("standstill", vehicle(("ratio =", "ratoi =")))
+    with pytest.raises(ParameterError, match=r"mine\.toml: no valid TOML"):
+        resolve("standstill", vehicle(("[tyres]", "[tyres")))
+
+
+def test_bad_maneuver_file_is_answered_with_file_key_and_line(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('kind = "open_loop"\nspeed_kmh = "fast"\nduration_s = 1.0\n')
+    with pytest.raises(ManeuverError, match=r"^mine\.toml, line 2: speed_kmh: 'fast' is not a number"):
+        resolve(path)
+
+
+def test_file_name_names_the_maneuver(tmp_path):
+    path = tmp_path / "roll_out.toml"
+    path.write_text('kind = "open_loop"\nspeed_kmh = 30\nduration_s = 1.0\n')
+    assert resolve(path).maneuver.name == "roll_out"
+
+
+def test_files_are_kept_for_the_recording():
+    files = resolve("step_steer").files
+    for name in ("maneuver.toml", "vehicle.toml", "mjcf/compact/compact.xml", "tyres/compact_205_55R16.tir"):
+        assert files[name]
+
+
+@pytest.mark.parametrize("maneuver", list_maneuvers())
+def test_described_scenario_resolves_to_itself(maneuver):
+    scenario = resolve(maneuver, overrides={"road.mu": 0.5})
+    table = json.loads(json.dumps(describe(scenario)))
+    again = resolve(table["maneuver"], table["vehicle"])
+    assert (again.maneuver, again.car, again.mjcf) == (scenario.maneuver, scenario.car, scenario.mjcf)
+    assert [tyre.array.tolist() for tyre in again.tyres] == [tyre.array.tolist() for tyre in scenario.tyres]
+
+
+@pytest.mark.parametrize("controller", ["none", "ars", "afs"])
+def test_run_made_again_from_its_recording_is_bit_identical(controller, tmp_path):
+    first = activesteer.simulate("step_steer", controller, overrides=SHORT | {"controllers.ars.limit_deg": 1.5})
+    first.save(tmp_path / "run.mcap")
+    known = activesteer.Recording.open(tmp_path / "run.mcap").metadata
+    again = activesteer.simulate(
+        known["maneuver"], known["controller"], known["vehicle"], timestep_s=known["timestep_s"]
+    )
+    assert len(again) == 200
+    assert np.array_equal(again.values, first.values)
+    assert np.array_equal(again.poses.positions_m, first.poses.positions_m)
+
+
+def search(**overrides: Any) -> float:
+    keys = {"settle_s": 0.5} | {key.replace("__", "."): value for key, value in overrides.items()}
+    maneuver = prepared(resolve("step_steer", overrides=keys)).maneuver
+    assert isinstance(maneuver, StepSteer)
+    assert maneuver.steer.steering_wheel_rad is not None
+    return maneuver.steer.steering_wheel_rad
+
+
+def test_amplitude_does_not_depend_on_how_long_the_maneuver_is():
+    assert search(duration_s=1.0) == search(duration_s=5.0)
+
+
+def test_amplitude_to_the_right_is_that_to_the_left():
+    left, right = search(steer__lateral_acceleration_g=0.2), search(steer__lateral_acceleration_g=-0.2)
+    assert left > 0.1
+    assert right == pytest.approx(-left, rel=1e-6)
+
+
+def test_aim_that_the_road_does_not_allow_is_answered():
+    with pytest.raises(ManeuverError, match=r"no steering wheel angle found that gives 7\.85 m/s2.*road\.mu 0\.3"):
+        search(road__mu=0.3, steer__lateral_acceleration_g=0.8)
+
+
+def test_model_and_tyre_beside_the_vehicle_file_come_before_the_shipped_ones(vehicle, monkeypatch, tmp_path):
+    file = vehicle()
+    own_model = file.parent / "compact"
+    shutil.copytree(models_dir() / "mjcf" / "compact", own_model)
+    own_tyre = Path(shutil.copy(models_dir() / "tyres" / "compact_205_55R16.tir", file.parent))
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    scenario = resolve("standstill", file)
+    assert scenario.mjcf == own_model / "compact.xml"
+    assert scenario.tyres[0].source == own_tyre

@@ -1,0 +1,149 @@
+"""The recorder: rows, blocks and poses of a run, in memory and in a file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from activesteer.conventions import CORNERS
+from activesteer.recording import McapWriter, Recording
+from activesteer.scenario import resolve
+from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.simulation.recorder import BLOCK_INTERVAL_S, CONTROL_CHANNELS, POSE_INTERVAL_S, Recorder, channels_of
+from activesteer.simulation.simulation import Simulation
+
+BLOCK_ROWS = round(BLOCK_INTERVAL_S / 0.001)
+KEYS = {"settle_s": 0.0, "duration_s": 5.0, "steer.start_s": 0.01, "steer.steering_wheel_deg": 40}
+PROMISED = """
+    x_m y_m yaw_rad roll_rad pitch_rad vx_mps vy_mps speed_mps yaw_rate_radps ax_mps2 ay_mps2 sideslip_rad
+    front_axle_x_m front_axle_y_m steering_wheel_rad steering_wheel_demand_rad front_steer_rad superposition_rad
+    rear_steer_rad yaw_rate_desired_radps controller_saturated
+"""
+AT_EACH_WHEEL = """
+    tyre_fx_N tyre_fy_N tyre_fz_N tyre_mz_Nm slip_ratio slip_angle_rad inclination_rad wheel_speed_radps travel_m
+"""
+COMMAND = DriverCommand(0.3, 0.02, 150.0, 0.25, limited=True)
+STEER = SteerCommand(-0.01, 0.003, 0.2, 0.004, -0.014, True)
+
+
+def simulation(controller: str = "ars", timestep_s: float = 0.001) -> Simulation:
+    return Simulation(resolve("step_steer", overrides=KEYS), controller, timestep_s)
+
+
+def column(recorder: Recorder, name: str) -> np.ndarray:
+    return recorder.result()[1][:, [channel.name for channel in recorder.channels].index(name)]
+
+
+def test_every_channel_is_named_once_and_ends_in_its_unit():
+    channels = channels_of(simulation().vehicle)
+    names = [channel.name for channel in channels]
+    assert len(set(names)) == len(names)
+    suffixes = {
+        "rad": "_rad", "rad/s": "_radps", "m": "_m", "m/s": "_mps", "m/s2": "_mps2", "N": "_N", "Nm": "_Nm",
+    }  # fmt: skip
+    for channel in channels:
+        assert channel.meaning
+        if channel.unit in suffixes:
+            assert channel.name.endswith(suffixes[channel.unit]), channel
+
+
+def test_channels_that_the_interface_promises_are_there():
+    names = {channel.name for channel in channels_of(simulation().vehicle)}
+    promised = {*PROMISED.split(), *(f"{corner}_{name}" for corner in CORNERS for name in AT_EACH_WHEEL.split())}
+    assert not promised - names
+
+
+def test_commands_are_recorded_as_they_were_given():
+    simulated = simulation()
+    recorder = Recorder(simulated.vehicle, 3)
+    recorder.record(COMMAND, STEER)
+    values = [column(recorder, channel.name)[0] for channel in CONTROL_CHANNELS]
+    assert values == [0.02, 150.0, 0.25, 1.0, -0.01, 0.003, 0.2, 0.004, -0.014, 1.0]
+
+
+def test_first_row_is_the_start_and_rows_are_a_step_apart():
+    simulated = simulation()
+    speed = simulated.vehicle.measure().speed_mps
+    recorder = Recorder(simulated.vehicle, 50)
+    simulated.advance(50, recorder)
+    time_s, values, _ = recorder.result()
+    assert time_s == pytest.approx(0.001 * np.arange(50), abs=1e-15)
+    assert values.shape == (50, len(recorder.channels))
+    assert column(recorder, "speed_mps")[0] == pytest.approx(speed, abs=1e-3)
+    assert abs(column(recorder, "x_m")[0]) < 1e-6
+    along = column(recorder, "vx_mps") * np.cos(column(recorder, "yaw_rad")) - column(recorder, "vy_mps") * np.sin(
+        column(recorder, "yaw_rad")
+    )
+    # Positions and velocities of the same instants: the trapezoidal rule holds between them.
+    assert np.diff(column(recorder, "x_m")) == pytest.approx(0.0005 * (along[1:] + along[:-1]), rel=1e-4)
+
+
+def test_rows_do_not_depend_on_when_they_are_flushed():
+    count = BLOCK_ROWS + 300
+    whole, often = simulation(), simulation()
+    first, second = Recorder(whole.vehicle, count), Recorder(often.vehicle, count)
+    whole.advance(count, first)
+    for part in (1, 299, BLOCK_ROWS - 1, 1):
+        often.advance(part, second)
+        second.flush()
+    for one, other in zip(first.result()[:2], second.result()[:2], strict=True):
+        assert np.array_equal(one, other)
+    for one, other in zip(first.result()[2], second.result()[2], strict=True):
+        assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("timestep_s", [0.001, 0.0005])
+def test_poses_are_taken_every_ten_milliseconds(timestep_s):
+    simulated = simulation(timestep_s=timestep_s)
+    steps = round(0.105 / timestep_s)
+    recorder = Recorder(simulated.vehicle, steps)
+    simulated.advance(steps, recorder)
+    _, _, poses = recorder.result()
+    assert poses.time_s == pytest.approx(POSE_INTERVAL_S * np.arange(11), abs=1e-12)
+    assert poses.positions_m.shape == (11, len(poses.names), 3)
+    assert "chassis" in poses.names
+    assert np.linalg.norm(poses.quaternions, axis=2) == pytest.approx(1.0, abs=1e-9)
+    travelled = poses.positions_m[-1, poses.names.index("chassis"), 0] - poses.positions_m[0, 0, 0]
+    assert travelled == pytest.approx(0.1 * 22.2, rel=0.01)
+
+
+def test_run_that_stops_early_has_the_rows_so_far():
+    simulated = simulation()
+    recorder = Recorder(simulated.vehicle, 5000)
+    simulated.advance(123, recorder)
+    time_s, values, poses = recorder.result()
+    assert (len(time_s), len(values), len(poses.time_s)) == (123, 123, 13)
+    assert np.isfinite(values).all()
+
+
+def test_nothing_recorded_is_nothing():
+    time_s, values, poses = Recorder(simulation().vehicle, 10).result()
+    assert (len(time_s), len(values), len(poses.time_s)) == (0, 0, 0)
+
+
+def test_whole_blocks_are_in_the_file_while_the_run_goes_on(tmp_path):
+    driven, again = simulation(), simulation()
+    path = tmp_path / "run.mcap"
+    with McapWriter(path, channels_of(driven.vehicle), driven.vehicle.body_names) as writer:
+        driven.advance(3 * BLOCK_ROWS + 10, Recorder(driven.vehicle, 5000, writer))
+        # The last block may still be on its way: the writer has a thread of its own.
+        so_far = Recording.open(path)
+        assert len(so_far) >= 2 * BLOCK_ROWS
+        assert so_far.metadata["complete"] is False
+    kept = Recording.open(path)
+    assert len(kept) == 3 * BLOCK_ROWS
+    memory = Recorder(again.vehicle, 3 * BLOCK_ROWS)
+    again.advance(3 * BLOCK_ROWS, memory)
+    # Single precision in the file where the channel says so.
+    assert np.allclose(kept.values, memory.result()[1], rtol=1e-7, atol=1e-30)
+
+
+def test_yaw_angle_of_a_recording_does_not_depend_on_the_one_before():
+    simulated = simulation()
+    before = simulated.save_state()
+    # As at the end of a run that has turned round more than once.
+    simulated.vehicle.channels._last_yaw_rad = 7.0
+    recorder = Recorder(simulated.vehicle, 3)
+    simulated.restore_state(before)
+    simulated.advance(3, recorder)
+    assert np.abs(column(recorder, "yaw_rad")).max() < 0.1
