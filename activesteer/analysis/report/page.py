@@ -70,8 +70,8 @@ def report_page(recordings: Mapping[str, Recording]) -> str:
         common=_common(groups),
         version=escape(__version__),
         styles=_asset("uPlot.min.css") + _asset("page.css"),
-        # Inside a script element, nothing but `</` ends it.
-        data=json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
+        # Inside a script element `</script` ends it, and `<!--<script` makes the browser look for the end elsewhere.
+        data=json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
         library=_asset("uPlot.iife.min.js"),
         licence=escape(" ".join(_asset("uPlot.LICENSE").split())),
         script=_asset("page.js"),

@@ -235,6 +235,15 @@ def test_text_of_a_recording_cannot_become_markup():
     Page(page)
 
 
+def test_no_text_of_a_recording_opens_anything_inside_the_data():
+    """`<!--<script>` keeps a browser from finding the end of the element, and every plot goes missing."""
+    page = report_page({"a.mcap": recording_of(step_steer(), "x:<!--<script>")})
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    assert found
+    assert "<" not in found[1]
+    assert data_of(page)[0]["runs"][0]["name"] == "<!--<script>"
+
+
 def test_run_that_did_not_end_properly_is_marked():
     run = recording_of(step_steer(), complete=False, error="SimulationDiverged: too much", overrides={"road.mu": 0.4})
     words = Page(report_page({"a.mcap": run})).words
