@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.files import make_folder, replacing, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,10 +41,11 @@ def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterEr
     Raises:
         ActiveSteerError: it cannot be written; of class `error`.
     """
-    try:
-        figure.savefig(path, dpi=150)
-    except (OSError, ValueError) as reason:
-        raise error(f"the plot {path} cannot be written: {reason}") from reason
+    with replacing(path, error) as part:
+        try:
+            figure.savefig(part, dpi=150)
+        except ValueError as reason:  # an ending that is no format of matplotlib's
+            raise error(f"cannot write {shown(path)}: {reason}") from reason
     return path
 
 
@@ -61,13 +63,5 @@ def save_all(pictures: Mapping[str, Callable[[T], Figure]], subject: T, folder: 
     Raises:
         ParameterError: matplotlib is not installed, or a file cannot be written.
     """
-    directory = Path(folder)
-    paths = []
-    for name, draw in pictures.items():
-        figure = draw(subject)
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-        except OSError as reason:
-            raise ParameterError(f"the plot {directory / name}.png cannot be written: {reason}") from reason
-        paths.append(save(figure, directory / f"{name}.png"))
-    return paths
+    directory = make_folder(folder, ParameterError)
+    return [save(draw(subject), directory / f"{name}.png") for name, draw in pictures.items()]

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from activesteer.errors import ParameterError
+from activesteer.files import make_folder
 
 _LOCUS_KMH: Final = (40.0, 60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 """Speeds of the root locus [km/h]."""
@@ -31,11 +32,7 @@ def _linearise(options: argparse.Namespace) -> int:
         return 0
     from activesteer.analysis.linear_plots import draw_bode, draw_root_locus
 
-    try:
-        options.output.mkdir(parents=True, exist_ok=True)
-    except OSError as reason:
-        msg = f"-o {options.output}: cannot make the folder: {reason.strerror}"
-        raise ParameterError(msg) from reason
+    make_folder(options.output, ParameterError)
     speeds = [speed / 3.6 for speed in _LOCUS_KMH]
     label = f"{options.speed_kmh:g} km/h"
     print(f"figure: {draw_bode({label: car.state_space()}, options.output / 'bode.png')}")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError
+from activesteer.files import make_folder
 
 if TYPE_CHECKING:
     from activesteer.analysis.claims import Scorecard
@@ -103,11 +104,7 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[str]) -> li
         folder, paths = output.parent, [output]
     else:
         folder, paths = output, [output / f"{maneuver}-{label}.mcap" for label in labels]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as reason:
-        msg = f"-o {output}: cannot make the folder {folder}: {reason.strerror}"
-        raise ParameterError(msg) from reason
+    make_folder(folder, ParameterError)
     # Before the first run, not before the last.
     for path in paths:
         check_target(path)

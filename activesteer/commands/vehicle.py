@@ -93,13 +93,9 @@ def _check(options: argparse.Namespace) -> int:
 
 def _keyframe(options: argparse.Namespace) -> int:
     from activesteer.errors import ParameterError
+    from activesteer.files import write_text
     from activesteer.vehicle_builder.keyframe import keyframe_xml
 
     text, path = keyframe_xml(options.vehicle)
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as reason:
-        msg = f"cannot write {path}: {reason}; copy the vehicle to a place of your own"
-        raise ParameterError(msg) from reason
-    print(path)
+    print(write_text(path, text, ParameterError))
     return 0

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from activesteer.errors import RecordingError
+from activesteer.files import replacing
 from activesteer.recording.format import metadata_texts
 
 if TYPE_CHECKING:
@@ -143,9 +144,6 @@ def _metadata(recording: Recording) -> str:
 
 def _written(path: str | os.PathLike[str], write: Callable[[Path], object]) -> Path:
     target = Path(path)
-    try:
-        write(target)
-    except OSError as error:
-        message = f"cannot write {target}: {error.strerror or error}"
-        raise RecordingError(message) from None
+    with replacing(target, RecordingError) as part:
+        write(part)
     return target

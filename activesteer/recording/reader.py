@@ -22,6 +22,7 @@ from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from activesteer.errors import RecordingError
+from activesteer.files import reading
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.format import (
     FORMAT_RECORD,
@@ -132,11 +133,8 @@ def read_mcap(path: Path) -> Contents:
     Raises:
         RecordingError: the file cannot be opened, is no MCAP file or none of ours, or is damaged before its first row.
     """
-    try:
+    with reading(path, RecordingError):
         data = path.read_bytes()
-    except OSError as error:
-        message = f"cannot read {path}: {error.strerror or error}"
-        raise RecordingError(message) from None
     raw = _records(path, data)
     try:
         return _decode(raw)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from activesteer.errors import RecordingError
+from activesteer.files import reading, writing
 from activesteer.recording.arrays import nanoseconds, shaped
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.container import McapFile
@@ -283,12 +284,8 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
     if not overwrite:
         message = f"cannot write {path}: it exists already"
         raise RecordingError(message)
-    try:
-        with path.open("rb") as stream:
-            ours = is_recording_start(stream.read(_START_BYTES))
-    except OSError as error:
-        message = f"cannot write {path}: it exists already, and cannot be read: {error.strerror}"
-        raise RecordingError(message) from None
+    with reading(path, RecordingError), path.open("rb") as stream:
+        ours = is_recording_start(stream.read(_START_BYTES))
     if not ours:
         message = f"cannot write {path}: it exists already and is no recording of activesteer; delete it, or choose "
         raise RecordingError(message + "another name")
@@ -296,8 +293,5 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
 
 def _open(path: Path, *, overwrite: bool) -> BinaryIO:
     check_target(path, overwrite=overwrite)
-    try:
+    with writing(path, RecordingError):
         return path.open("wb" if overwrite else "xb")
-    except OSError as error:
-        message = f"cannot write {path}: {error.strerror}"
-        raise RecordingError(message) from None

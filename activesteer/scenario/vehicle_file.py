@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from activesteer.errors import ParameterError
+from activesteer.files import write_text
 
 _NOTE: Final = "# Written by `"
 """How the line begins that says where the values come from; an older one of these is replaced."""
@@ -71,11 +72,7 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
     if {**before, table: None} != {**after, table: None} or kept.items() - after[table].items():
         msg = f"{vehicle_file}: the table [{table}] is not written as one key a line; write it so, or edit it by hand"
         raise ParameterError(msg)
-    try:
-        vehicle_file.write_text(written, encoding="utf-8")
-    except OSError as reason:
-        msg = f"cannot write {vehicle_file}: {reason}; copy the vehicle file to a place of your own"
-        raise ParameterError(msg) from reason
+    write_text(vehicle_file, written, ParameterError)
 
 
 def _is_header(line: str, name: str | None = None) -> bool:

@@ -18,6 +18,7 @@ from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Scorecard, scorecard
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
+from activesteer.files import make_folder
 from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation.runner import prepared, run_scenario
@@ -81,13 +82,8 @@ def reproduce(
     Raises:
         ActiveSteerError: an input is wrong. A run that fails ends no other run; it is told in `failures`.
     """
-    target = Path(folder)
     scenarios = {name: resolve(name, vehicle, overrides) for name in SCENARIOS}
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as reason:
-        msg = f"cannot make the folder {target}: {reason.strerror}"
-        raise ParameterError(msg) from reason
+    target = make_folder(folder, ParameterError)
     result = Reproduction({name: {system: _path(target, name, system) for system in SYSTEMS} for name in scenarios})
     for systems in result.paths.values():
         for path in systems.values():

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from activesteer.errors import ParameterError
+from activesteer.files import make_folder, write_text
 from activesteer.validation.comparison import Comparison
 from activesteer.validation.figures import RUN_FIGURES, as_svg, sweep_figure
 from activesteer.validation.programme import Validation
@@ -38,13 +39,8 @@ def write_page(result: Validation, path: Path, studies: Mapping[str, list[Respon
         ParameterError: matplotlib is not installed, or the file cannot be written.
     """
     text = page(result, studies or {})
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as reason:
-        msg = f"cannot write {path}: {reason}"
-        raise ParameterError(msg) from reason
-    return path
+    make_folder(path.parent, ParameterError)
+    return write_text(path, text, ParameterError)
 
 
 def page(result: Validation, studies: Mapping[str, list[Response]]) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
+from activesteer.files import make_folder, replacing, write_text
 from activesteer.road.road import Road
 from activesteer.scenario import resolve
 from activesteer.simulation.runner import prepared, run_scenario
@@ -124,13 +125,9 @@ def write_json(result: Validation, path: Path) -> Path:
     Raises:
         ParameterError: it cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(to_json(result.comparisons), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    except OSError as reason:
-        msg = f"cannot write {path}: {reason}"
-        raise ParameterError(msg) from reason
-    return path
+    make_folder(path.parent, ParameterError)
+    text = json.dumps(to_json(result.comparisons), indent=2, allow_nan=False)
+    return write_text(path, text + "\n", ParameterError)
 
 
 def write_runs(result: Validation, folder: Path) -> list[Path]:
@@ -146,17 +143,14 @@ def write_runs(result: Validation, folder: Path) -> list[Path]:
     Raises:
         ParameterError: a file cannot be written.
     """
+    make_folder(folder, ParameterError)
     paths = []
     for run, table in result.runs.items():
         path = folder / f"{run}.csv"
         t = table["t"]
         every = max(1, round(_WRITTEN_EVERY_S / float(t[1] - t[0])))
         rows = np.column_stack(list(table.values()))[::every]
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            np.savetxt(path, rows, fmt="%.8g", delimiter=",", header=",".join(table), comments="")
-        except OSError as reason:
-            msg = f"cannot write {path}: {reason}"
-            raise ParameterError(msg) from reason
+        with replacing(path, ParameterError) as part:
+            np.savetxt(part, rows, fmt="%.8g", delimiter=",", header=",".join(table), comments="")
         paths.append(path)
     return paths

@@ -12,6 +12,7 @@ from pathlib import Path
 import mujoco
 
 from activesteer.errors import ParameterError, TyreFileError, nearest_names
+from activesteer.files import writing
 from activesteer.resources import models_dir
 from activesteer.tyre.file.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
@@ -99,11 +100,8 @@ def new_vehicle(
         shutil.copyfile(table_path, made / f"table{table_path.suffix.lower()}")
         readme = readme_text(car, trimmed, f"table{table_path.suffix.lower()}")
         (made / "README.md").write_text(readme, encoding="utf-8")
-        try:
+        with writing(target, ParameterError):
             shutil.copytree(made, target, dirs_exist_ok=True)
-        except OSError as reason:
-            msg = f"cannot write {target}: {reason}"
-            raise ParameterError(msg) from reason
     return NewVehicle(target, target / f"{name}.toml", tuple(car.assumptions), trimmed)
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from activesteer.errors import ParameterError, PlaybackError
+from activesteer.files import writing
 
 Pixels = NDArray[np.uint8]
 
@@ -172,11 +173,8 @@ class _Gif:
         self._pictures: list[Image.Image] = []
 
     def __enter__(self) -> Self:
-        try:
+        with writing(self._path, PlaybackError):
             self._part.open("wb").close()
-        except OSError as reason:
-            msg = f"cannot write {self._path}: {reason.strerror or reason}"
-            raise PlaybackError(msg) from None
         return self
 
     def write(self, pixels: Pixels) -> None:

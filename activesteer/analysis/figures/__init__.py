@@ -15,6 +15,7 @@ from activesteer.analysis.figures import theory, time_histories, tracks
 from activesteer.analysis.figures.step_steer import figure_2, figure_11, step_steer_figure
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import ParameterError, RecordingError
+from activesteer.files import make_folder
 from activesteer.plotting import save
 
 if TYPE_CHECKING:
@@ -84,11 +85,7 @@ def draw_all(recordings: Mapping[str, Mapping[str, RecordingLike]], folder: str 
     scenarios = {name: recordings[name] for name in BY_SCENARIO if recordings.get(name)}
     if not scenarios:
         raise ParameterError(f"there is no recording to draw; figures are made of {', '.join(BY_SCENARIO)}")
-    directory = Path(folder)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as reason:
-        raise ParameterError(f"cannot make the folder {directory}: {reason.strerror}") from reason
+    directory = make_folder(folder, ParameterError)
     any_run = next(iter(next(iter(scenarios.values())).values()))
     paths = []
     for name, show in OF_ANY_RUN.items():

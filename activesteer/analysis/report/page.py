@@ -17,6 +17,7 @@ from activesteer.analysis.report.judgement import Judgement, judge
 from activesteer.analysis.report.parameters import rows
 from activesteer.analysis.report.runs import Group, entry, groups_of
 from activesteer.errors import ParameterError
+from activesteer.files import write_text
 from activesteer.recording import Recording
 from activesteer.version import __version__
 
@@ -37,13 +38,7 @@ def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[st
         ParameterError: there is no recording, or the file cannot be written.
         RecordingError: a recording has no rows.
     """
-    target = Path(path)
-    page = report_page(recordings)
-    try:
-        target.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise ParameterError(f"the report {target} cannot be written: {error.strerror or error}") from error
-    return target
+    return write_text(path, report_page(recordings), ParameterError)
 
 
 def report_page(recordings: Mapping[str, Recording]) -> str:

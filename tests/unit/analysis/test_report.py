@@ -257,7 +257,7 @@ def test_wrong_input_is_answered(tmp_path: Path):
     empty = Recording([Channel("ay_mps2", "m/s2", "", "vehicle")], [], np.empty((0, 1)))
     with pytest.raises(RecordingError, match=r"a\.mcap has no rows"):
         report_page({"a.mcap": empty})
-    with pytest.raises(ParameterError, match=r"the report .*nowhere.*: No such file"):
+    with pytest.raises(ParameterError, match=r"cannot write .*nowhere.*: No such file"):
         write_report(sines(), tmp_path / "nowhere" / "report.html")
     next(iter(sines().values())).save(tmp_path / "a.mcap")
     with pytest.raises(ParameterError, match=r"a\.mcap is named twice"):

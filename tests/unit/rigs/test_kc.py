@@ -163,7 +163,7 @@ def test_pictures_are_drawn(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     (tmp_path / "file").write_text("")
-    with pytest.raises(ParameterError, match="cannot be written"):
+    with pytest.raises(ParameterError, match="cannot make the folder"):
         draw(compact(), tmp_path / "file")
 
 

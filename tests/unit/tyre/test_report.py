@@ -133,7 +133,7 @@ def test_a_tyre_with_narrow_ranges_is_drawn(tmp_path: Path) -> None:
 
 def test_a_folder_that_cannot_be_made_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(ParameterError, match="cannot be written"):
+    with pytest.raises(ParameterError, match="cannot make the folder"):
         draw(tyre(), tmp_path / "file")
 
 

@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from activesteer.errors import ParameterError, PlaybackError
+from activesteer.files import make_folder, reading, replacing, shown, write_text, writing
+
+
+@pytest.mark.parametrize("there", [None, "before"])
+def test_text_is_written_and_nothing_else_is_left(tmp_path: Path, there: str | None) -> None:
+    path = tmp_path / "page.html"
+    if there is not None:
+        path.write_text(there)
+        path.chmod(0o640)
+    assert write_text(path, "später", ParameterError) == path
+    assert path.read_text(encoding="utf-8") == "später"
+    assert os.listdir(tmp_path) == ["page.html"]
+    if there is not None:
+        assert path.stat().st_mode & 0o777 == 0o640
+
+
+def test_what_fails_halfway_leaves_what_was_there(tmp_path: Path) -> None:
+    path = tmp_path / "page.html"
+    path.write_text("before")
+
+    def fail(reason: BaseException) -> None:
+        with replacing(path, PlaybackError) as part:
+            part.write_text("half")
+            raise reason
+
+    with pytest.raises(PlaybackError, match=r"cannot write .*page\.html: No space left"):
+        fail(OSError(28, "No space left on device"))
+    with pytest.raises(KeyboardInterrupt):
+        fail(KeyboardInterrupt())
+    assert path.read_text() == "before"
+    assert os.listdir(tmp_path) == ["page.html"]
+
+
+def test_link_stays_a_link_and_its_file_is_replaced(tmp_path: Path) -> None:
+    real, link = tmp_path / "real.txt", tmp_path / "link.txt"
+    real.write_text("before")
+    link.symlink_to(real)
+    write_text(link, "after", ParameterError)
+    assert link.is_symlink()
+    assert real.read_text() == "after"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, which is Linux's")
+def test_full_disk_is_an_error_of_ours() -> None:
+    with pytest.raises(ParameterError, match="cannot write /dev/full: No space left on device"):
+        write_text("/dev/full", "text", ParameterError)
+
+
+@pytest.mark.parametrize("name", ["missing/page.html", ".", "a" * 300, "zero\0byte"])
+def test_what_cannot_be_written_is_named_in_one_short_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ParameterError) as raised:
+        write_text(name, "text", ParameterError)
+    assert str(raised.value).startswith(f"cannot write {name[:8]}" if "\0" not in name else "cannot write zero")
+    assert len(str(raised.value)) < 300
+    assert str(raised.value).isprintable()
+
+
+def test_folder_is_made_and_a_file_in_its_place_is_an_error(tmp_path: Path) -> None:
+    assert make_folder(tmp_path / "a" / "b", ParameterError).is_dir()
+    (tmp_path / "file").touch()
+    with pytest.raises(ParameterError, match=r"cannot make the folder .*file.in: Not a directory"):
+        make_folder(tmp_path / "file" / "in", ParameterError)
+    with pytest.raises(ParameterError, match=r"cannot make the folder .*file: File exists"):
+        make_folder(tmp_path / "file", ParameterError)
+
+
+def test_only_what_the_system_refuses_becomes_an_error_of_ours(tmp_path: Path) -> None:
+    with pytest.raises(PlaybackError, match=r"cannot read .*missing: No such file"), reading("missing", PlaybackError):
+        (tmp_path / "missing").read_bytes()
+    with pytest.raises(ZeroDivisionError), writing("any", PlaybackError):
+        raise ZeroDivisionError
+
+
+def test_path_is_shown_without_what_a_terminal_would_obey() -> None:
+    assert shown("a\x1b[2Jb\nc") == "a\\x1b[2Jb\\nc"
+    assert shown(os.fsdecode(b"a\xffb")) == "a\\udcffb"
+    assert len(shown("x" * 5000)) == 200
