@@ -5,7 +5,10 @@ They are named tuples because they are made every millisecond: a frozen dataclas
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from activesteer.road.path import Path
 
 
 class Channel(NamedTuple):
@@ -49,6 +52,7 @@ class Reference(NamedTuple):
         curvature_1pm: Curvature to drive [1/m], left positive; where given, the driver finds the steering wheel angle.
         rack_m: Rack position asked for [m], positive steers left; where given, it stands for the steering wheel angle.
         wheel_torques: Torques of the wheels; where given, they stand for drive and brake.
+        path: Path of the centre of gravity to follow; where given, the driver finds the steering wheel angle.
     """
 
     steering_wheel_rad: float
@@ -58,6 +62,7 @@ class Reference(NamedTuple):
     curvature_1pm: float | None = None
     rack_m: float | None = None
     wheel_torques: WheelTorques | None = None
+    path: Path | None = None
 
 
 class DriverCommand(NamedTuple):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from activesteer.driver.base import DriverSetup
 from activesteer.driver.speed_hold import SpeedHold
 from activesteer.errors import ManeuverError
-from activesteer.signals import DriverCommand, Measurement, Reference
+from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 
 
 class OpenLoopDriver:
@@ -35,12 +36,19 @@ class OpenLoopDriver:
         self._limit_rad = steering_wheel_limit_rad
         self._rack_per_steering_wheel_m = rack_per_steering_wheel_m
 
-    def step(self, reference: Reference, measurement: Measurement) -> DriverCommand:
+    @classmethod
+    def from_vehicle(cls, setup: DriverSetup) -> OpenLoopDriver:
+        """Makes the driver for a car."""
+        speed_hold = SpeedHold(setup.parameters, setup.max_torque_Nm, setup.engine_brake_torque_Nm, setup.timestep_s)
+        return cls(speed_hold, setup.steering_ratio, setup.steering_wheel_limit_rad, setup.rack_per_steering_wheel_m)
+
+    def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:
         """What the driver does now.
 
         Args:
             reference: What is asked.
             measurement: What the car's sensors say.
+            motion: Not used.
 
         Returns:
             The command.

@@ -31,7 +31,7 @@ LateralModel = Callable[[float], tuple[Array, Array]]
 """Speed [m/s] -> system matrix (2, 2) and input matrix (2, k) of a model with the states yaw rate [rad/s] and sideslip
 angle [rad], whose first input is the front steer angle [rad]."""
 
-LOOK_INTERVAL_S: Final = 0.01
+PREVIEW_INTERVAL_S: Final = 0.01
 """Time between two looks at the road [s]; short beside the delay and the lag that follow."""
 _POINTS: Final = 12
 """Points on the path ahead at which the distance counts."""
@@ -67,36 +67,32 @@ class PathPreviewDriver:
     """
 
     def __init__(
-        self, robot: OpenLoopDriver, path: Path, model: LateralModel, parameters: DriverParameters, timestep_s: float
+        self, robot: OpenLoopDriver, model: LateralModel, parameters: DriverParameters, timestep_s: float
     ) -> None:
         """Takes its parts.
 
         Args:
             robot: Limits the steering wheel angle and holds the speed.
-            path: Path of the centre of gravity.
             model: The car as the driver knows it.
             parameters: The driver.
             timestep_s: Time between two steps [s].
         """
         self.robot = robot
-        self._path = path
         self._model = model
         self._preview_s = parameters.preview_s
         self._previews: dict[int, _Preview] = {}
         lag_s = parameters.neuromuscular_lag_s
         self._share = 1.0 - math.exp(-timestep_s / lag_s) if lag_s > 0.0 else 1.0
         self._most_change_rad = parameters.steering_rate_limit_radps * timestep_s
-        self._decided_rad = deque([0.0] * (round(parameters.reaction_delay_s / LOOK_INTERVAL_S) + 1))
+        self._decided_rad = deque([0.0] * (round(parameters.reaction_delay_s / PREVIEW_INTERVAL_S) + 1))
         self._wheel_rad = 0.0
         self._along_m = 0.0
+        self._preview_every_steps = max(1, round(PREVIEW_INTERVAL_S / timestep_s))
+        self._steps = 0
 
-    def look(self, motion: Motion) -> None:
-        """Looks at the road ahead and decides on a steering wheel angle; to be called every `LOOK_INTERVAL_S`.
-
-        Args:
-            motion: Where the car is and how it moves.
-        """
-        path, speed = self._path, motion.speed_mps
+    def _update_preview(self, path: Path, motion: Motion) -> None:
+        """Looks at the road ahead and decides on a steering wheel angle."""
+        speed = motion.speed_mps
         along = self._along_m = path.nearest(motion.x_m, motion.y_m, self._along_m, _WINDOW_M)
         if speed < _LEAST_SPEED_MPS:
             self._decide(self._decided_rad[-1])
@@ -110,16 +106,20 @@ class PathPreviewDriver:
         self._decided_rad.append(steering_wheel_rad)
         self._decided_rad.popleft()
 
-    def step(self, reference: Reference, measurement: Measurement) -> DriverCommand:
+    def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:
         """What the driver does now.
 
         Args:
-            reference: The speed that is asked for; its steering is not looked at.
+            reference: The path and the speed that are asked for; without a path he goes on as decided before.
             measurement: What the car's sensors say.
+            motion: Where the car is and how it moves; looked at every `PREVIEW_INTERVAL_S`.
 
         Returns:
             The command.
         """
+        if self._steps % self._preview_every_steps == 0 and reference.path is not None:
+            self._update_preview(reference.path, motion)
+        self._steps += 1
         change = self._share * (self._decided_rad[0] - self._wheel_rad)
         most = self._most_change_rad
         limited = True

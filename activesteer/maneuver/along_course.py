@@ -60,11 +60,15 @@ class AlongCourse(Maneuver):
         """Lays out the course; done once."""
 
     def reference(self, time_s: float) -> Reference:
-        """The speed; where to go the driver sees on the path."""
+        """The path and the speed."""
         return self._reference
 
     @cached_property
     def _reference(self) -> Reference:
+        return self.settling_reference()._replace(path=self.course.path)
+
+    def settling_reference(self) -> Reference:
+        """Straight ahead at the speed of the manoeuvre: the path begins where the recording does."""
         return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
 
 

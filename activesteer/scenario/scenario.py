@@ -12,7 +12,7 @@ import numpy as np
 
 from activesteer.config import Source, build, key_paths, merged, read_toml, to_table
 from activesteer.controllers import ControllerParameters, ControllerSetup, SingleTrackParameters
-from activesteer.driver import DriverParameters
+from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ModelError, ParameterError, TyreFileError, nearest_names
 from activesteer.maneuver import Maneuver, build_maneuver, filled_from_csv, maneuver_class
 from activesteer.resources import find_maneuver, find_vehicle, models_dir
@@ -60,6 +60,14 @@ class Scenario:
         return ControllerSetup(
             self.car.single_track, self.car.controllers, self.car.steering.ratio, self.maneuver.road.mu, timestep_s
         )
+
+    def driver_setup(self, timestep_s: float, rack_per_steering_wheel_m: float | None) -> DriverSetup:
+        """What drivers may know."""
+        car = self.car
+        return DriverSetup(
+            car.single_track, car.driver, car.steering.ratio, car.steering.steering_wheel_limit_rad,
+            rack_per_steering_wheel_m, car.powertrain.max_torque_Nm, car.powertrain.engine_brake_torque_Nm, timestep_s,
+        )  # fmt: skip
 
 
 _PARTS: Final = ("maneuver", "vehicle")

@@ -188,16 +188,15 @@ def _blocks(scenario: Scenario) -> dict[str, float]:
         simulation.vehicle,
     )
     recorder = Recorder(vehicle, _CALLS)
-    measurement = vehicle.measure()
+    measurement, motion = vehicle.measure(), vehicle.motion()
     reference = maneuver.reference(0.6)
-    command = driver.step(reference, measurement)
+    command = driver.step(reference, measurement, motion)
     steer = controller.step(command, measurement)
     blocks: dict[str, Callable[[], object]] = {
         "maneuver_us": lambda: maneuver.reference(0.6),
-        "driver_us": lambda: driver.step(reference, measurement),
+        "driver_us": lambda: driver.step(reference, measurement, motion),
         "controller_us": lambda: controller.step(command, measurement),
         "vehicle_us": lambda: vehicle.step(command, steer),
-        "measurement_us": vehicle.measure,
         "recorder_us": lambda: recorder.record(command, steer),
     }
     return {name: _per_step_us(lambda block=block: _call(block, _CALLS), _CALLS) for name, block in blocks.items()}

@@ -198,12 +198,18 @@ class Vehicle:
         site = self.data.site_xpos[self.model.site("cg").id]
         return float(site[0]), float(site[1])
 
-    def step(self, command: DriverCommand, steer: SteerCommand) -> None:
+    def step(self, command: DriverCommand, steer: SteerCommand) -> tuple[Measurement, Motion]:
         """Applies the commands and advances the engine by one step.
 
         Args:
             command: What the driver does.
             steer: What the controller adds.
+
+        Returns:
+            What the sensors then say, and where the car is; see `measure` and `motion`.
+
+        Raises:
+            SimulationDiverged: the speed is not finite or beyond all reason.
         """
         ctrl = self._ctrl
         ctrl[self._steering_wheel] = command.steering_wheel_rad
@@ -221,6 +227,7 @@ class Vehicle:
         if command.wheel_torques is not None:
             self._apply_torques(command.wheel_torques)
         mujoco.mj_step(self.model, self.data)
+        return self.measure(), self.motion()
 
     def _apply_torques(self, torques: WheelTorques) -> None:
         """Torques of the wheels, one by one: drive torques at once, without the lag of the engine."""

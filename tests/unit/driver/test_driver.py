@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from activesteer.driver import DriverParameters, OpenLoopDriver, SpeedHold
-from activesteer.signals import Measurement, Reference
+from activesteer.signals import Measurement, Motion, Reference
 
 MASS_KG, RADIUS_M = 1400.0, 0.31
+MOTION = Motion(0.0, 0.0, 0.0, 20.0, 0.0, 0.0)
 
 
 def speed_hold(timestep_s: float = 0.001) -> SpeedHold:
@@ -73,7 +74,7 @@ def test_reset_forgets_the_trim():
 
 
 def test_driver_turns_the_steering_wheel_as_asked():
-    command = driver().step(Reference(0.8, 20.0, 0.0, True), at(20.0))
+    command = driver().step(Reference(0.8, 20.0, 0.0, True), at(20.0), MOTION)
     assert command.steering_wheel_rad == 0.8
     assert command.front_steer_rad == pytest.approx(0.05)
     assert command.brake == 0.0
@@ -81,17 +82,17 @@ def test_driver_turns_the_steering_wheel_as_asked():
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_steering_wheel_stops_at_its_lock(side):
-    command = driver().step(Reference(side * 9.0, 20.0, 0.0, True), at(20.0))
+    command = driver().step(Reference(side * 9.0, 20.0, 0.0, True), at(20.0), MOTION)
     assert command.steering_wheel_rad == side * 8.0
     assert command.front_steer_rad == side * 0.5
     assert command.limited
-    assert not driver().step(Reference(side * 7.0, 20.0, 0.0, True), at(20.0)).limited
+    assert not driver().step(Reference(side * 7.0, 20.0, 0.0, True), at(20.0), MOTION).limited
 
 
 def test_driver_holds_speed_only_where_asked_and_presses_the_brake():
     asked = driver()
-    assert asked.step(Reference(0.0, 21.0, 0.0, True), at(20.0)).drive_torque_Nm > 0.0
-    command = asked.step(Reference(0.0, 21.0, 0.6, False), at(20.0))
+    assert asked.step(Reference(0.0, 21.0, 0.0, True), at(20.0), MOTION).drive_torque_Nm > 0.0
+    command = asked.step(Reference(0.0, 21.0, 0.6, False), at(20.0), MOTION)
     assert command.drive_torque_Nm == 0.0
     assert command.brake == 0.6
 
@@ -99,10 +100,10 @@ def test_driver_holds_speed_only_where_asked_and_presses_the_brake():
 def test_driver_starts_anew_after_braking():
     used = driver()
     for _ in range(3000):
-        used.step(Reference(0.0, 21.0, 0.0, True), at(20.5))
-    used.step(Reference(0.0, 21.0, 0.6, False), at(20.0))
+        used.step(Reference(0.0, 21.0, 0.0, True), at(20.5), MOTION)
+    used.step(Reference(0.0, 21.0, 0.6, False), at(20.0), MOTION)
     held = Reference(0.0, 20.0, 0.0, True)
-    assert used.step(held, at(19.9)).drive_torque_Nm == driver().step(held, at(19.9)).drive_torque_Nm
+    assert used.step(held, at(19.9), MOTION).drive_torque_Nm == driver().step(held, at(19.9), MOTION).drive_torque_Nm
 
 
 def test_reversing_car_is_driven_backwards_and_braked_forwards_by_the_engine():

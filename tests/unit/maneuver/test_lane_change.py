@@ -99,9 +99,11 @@ def test_course_is_the_same_every_time():
     assert np.array_equal(first.y_m, again.y_m)
 
 
-def test_driver_is_asked_for_the_speed_only():
-    reference = change().reference(3.0)
-    assert reference == change().settling_reference()
+def test_driver_is_asked_for_speed_and_path_and_while_the_car_settles_for_speed_only():
+    maneuver = change()
+    reference = maneuver.reference(3.0)
+    assert reference.path is maneuver.course.path
+    assert reference._replace(path=None) == maneuver.settling_reference()
     assert reference.speed_mps == pytest.approx(80.0 / 3.6)
     assert reference.hold_speed
     assert reference.steering_wheel_rad == 0.0

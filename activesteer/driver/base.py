@@ -1,0 +1,55 @@
+"""What the simulation asks of a driver, and what a driver may know of his car."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from activesteer.driver.parameters import DriverParameters
+from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+from activesteer.theory.single_track import SingleTrackParameters
+
+
+class Driver(Protocol):
+    """What a driver must have: one method, called once every step of the simulation.
+
+    A driver who acts less often counts the steps (`DriverSetup.timestep_s`) and repeats the last command in between.
+    """
+
+    def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:
+        """What the driver does now.
+
+        Args:
+            reference: What the manoeuvre asks for.
+            measurement: What the car's sensors say.
+            motion: Where the car is and how it moves, as the driver sees it.
+
+        Returns:
+            The command for the next step.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class DriverSetup:
+    """What a driver gets when he is made.
+
+    Attributes:
+        single_track: The car as a single-track model sees it, without control.
+        parameters: Gains and limits from the vehicle file.
+        steering_ratio: Steering wheel angle over road-wheel angle [-].
+        steering_wheel_limit_rad: Lock angle of the steering wheel [rad].
+        rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None where there is no rack.
+        max_torque_Nm: Most drive torque, all wheels together [N m].
+        engine_brake_torque_Nm: Most braking torque of the engine, positive [N m].
+        timestep_s: Time between two steps [s].
+    """
+
+    single_track: SingleTrackParameters
+    parameters: DriverParameters
+    steering_ratio: float
+    steering_wheel_limit_rad: float
+    rack_per_steering_wheel_m: float | None
+    max_torque_Nm: float
+    engine_brake_torque_Nm: float
+    timestep_s: float
