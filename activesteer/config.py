@@ -1,10 +1,12 @@
 """TOML tables into frozen dataclasses: every key known, every value of the right type and within its range.
 
-A field's type is its check: `float`, `int`, `bool`, `str`, tuples of floats, a nested dataclass, a dict or a tuple of
-nested dataclasses, or one of these `| None`. An element of a tuple has its number for a key: `road.patches.0.mu` is the
-`mu` of the first [[road.patches]]. A range is written `Annotated[float, Range(low, high)]`. Inside, everything is SI
-and radians; in a file a key may carry an edge unit instead: `speed_kmh` fills `speed_mps`, `angle_deg` fills
-`angle_rad`.
+A field's type is its check: `float`, `int`, `bool`, `str`, a `Literal` of some words, tuples of floats, a nested
+dataclass, a dict or a tuple of nested dataclasses, or one of these `| None`. An element of a tuple has its number for a
+key: `road.patches.0.mu` is the `mu` of the first [[road.patches]]. A range is written
+`Annotated[float, Range(low, high)]`. Inside, everything is SI and radians; in a file a key may carry an edge unit
+instead: `speed_kmh` fills `speed_mps`, `angle_deg` fills `angle_rad`.
+
+A class may name, in `KEY_HINTS`, keys that people look for in vain, and what to say to them.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
-from activesteer.errors import ActiveSteerError, ParameterError, nearest_names
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
 
 T = TypeVar("T")
 
@@ -27,22 +30,28 @@ _EDGE_UNITS: Final = {
     "_deg": ("_rad", math.pi / 180.0),
     "_degps": ("_radps", math.pi / 180.0),
     "_kmh": ("_mps", 1.0 / 3.6),
-    "_g": ("_mps2", 9.81),
+    "_g": ("_mps2", GRAVITY_MPS2),
 }
 """Suffix of a key in a file -> suffix of the field it fills, and the factor."""
+
+
+_MAX_NUMBER: Final = 1e12
+"""Beyond this no number of a file has a meaning, in whatever unit."""
+_MAX_TEXT: Final = 1000
+"""Longest text [characters]."""
 
 
 class Range(NamedTuple):
     """Allowed range of a number, both ends included."""
 
-    low: float = -math.inf
-    high: float = math.inf
+    low: float = -_MAX_NUMBER
+    high: float = _MAX_NUMBER
 
     def __str__(self) -> str:
-        """As it is said in an error message."""
-        if math.isinf(self.high):
+        """As it is said in an error message; an end that was not given is not named, in whatever unit."""
+        if self.high > 0.1 * _MAX_NUMBER:
             return f"at least {self.low:g}"
-        if math.isinf(self.low):
+        if self.low < -0.1 * _MAX_NUMBER:
             return f"at most {self.high:g}"
         return f"{self.low:g} to {self.high:g}"
 
@@ -63,15 +72,38 @@ class Source:
     error: type[ActiveSteerError] = ParameterError
     overridden: frozenset[str] = frozenset()
 
-    def fail(self, path: Sequence[str], problem: str) -> ActiveSteerError:
-        """An error that says where and what."""
+    def fail(self, path: Sequence[str], problem: str, value: object = None, allowed: Any = None) -> ActiveSteerError:
+        """An error that says where and what.
+
+        Args:
+            path: Keys that lead to what is wrong.
+            problem: What is wrong with it, in words.
+            value: What was given.
+            allowed: What may be given: a range, or names.
+
+        Returns:
+            The error, to be raised.
+        """
         key = ".".join(path)
-        if any(key == other or key.startswith(other + ".") for other in self.overridden):
-            return self.error(f"override {key}: {problem}")
+        overridden = any(key == other or key.startswith(other + ".") for other in self.overridden)
         # What stands in an inline table or a list has no line of its own.
         line = next((found for end in range(len(path), 0, -1) if (found := self._line_of(path[:end]))), None)
-        where = f"{self.name}, line {line}" if line else self.name
-        return self.error(f"{where}: {key}: {problem}" if key else f"{where}: {problem}")
+        return self.error(
+            problem, file=self.name, line=line, key=key or None, value=value, allowed=allowed, overridden=overridden
+        )
+
+    def placed(self, path: Sequence[str], reason: ActiveSteerError) -> ActiveSteerError:
+        """The same error with the place that a check, which knows no file, could not know.
+
+        Args:
+            path: Keys that lead to the table that was checked.
+            reason: The error of the check; its key is one inside that table.
+
+        Returns:
+            The error, to be raised.
+        """
+        inner = reason.key.split(".") if reason.key else ()
+        return self.fail((*path, *inner), reason.problem, reason.value, reason.allowed)
 
     def _line_of(self, path: Sequence[str]) -> int | None:
         """Line of a key, found in the text: tomllib does not keep it."""
@@ -136,13 +168,13 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
         ActiveSteerError: a key is unknown, missing or given twice, or a value is wrong.
     """
     hints = typing.get_type_hints(cls, include_extras=True)
-    fields = {field.name: field for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    fields = _fields(cls)
     values: dict[str, Any] = {}
     for key, raw in table.items():
+        where = (*path, str(key))
         name, factor = _field_of(key, fields)
-        where = (*path, key)
         if name is None:
-            raise source.fail(where, f"there is no such key; {nearest_names(key, _names_in_file(fields))}")
+            raise _no_such_key(cls, source, where)
         if name in values:
             first = next(other for other in table if _field_of(other, fields)[0] == name)
             raise source.fail(where, f"{first} and {key} are the same in two units; give one of them")
@@ -152,14 +184,16 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
             continue
         if field.default_factory is not dataclasses.MISSING:
             continue
-        raise source.fail(path, f"the key {' or '.join(_spellings(name))} is missing")
+        raise source.fail((*path, name), f"the key {' or '.join(_spellings(name))} is missing")
     try:
         return cls(**values)
     except ActiveSteerError as reason:  # from the class's own checks, which know no file
-        raise source.fail(path, str(reason)) from reason
+        raise source.placed(path, reason) from reason
 
 
-def merged(cls: type, table: Mapping[str, Any], path: Sequence[str], value: object, source: Source) -> dict[str, Any]:
+def merged(
+    cls: type, table: Mapping[str, Any], path: Sequence[str], value: object, source: Source, above: Sequence[str] = ()
+) -> dict[str, Any]:
     """The table with one key replaced, whatever unit it is written in.
 
     Args:
@@ -168,19 +202,22 @@ def merged(cls: type, table: Mapping[str, Any], path: Sequence[str], value: obje
         path: Keys that lead to the one to replace.
         value: What to put there.
         source: For error messages.
+        above: Keys that lead to the table.
 
     Returns:
         A new table.
 
     Raises:
-        ActiveSteerError: there is no such key.
+        ActiveSteerError: there is no such key, or one above it is no table.
     """
-    hints = typing.get_type_hints(cls)
-    fields = {field.name: field for field in dataclasses.fields(cls)}
+    where = (*above, path[0])
+    if not isinstance(table, Mapping):
+        raise source.fail(above, f"is {shown(table)}, which is no table and has no {path[0]}", table)
+    hints, fields = typing.get_type_hints(cls), _fields(cls)
     key, rest = path[0], path[1:]
     name, _ = _field_of(key, fields)
     if name is None:
-        raise source.fail((key,), f"there is no such key; {nearest_names(key, _names_in_file(fields))}")
+        raise _no_such_key(cls, source, where)
     result = dict(table)
     if not rest:
         for present in table:
@@ -188,28 +225,41 @@ def merged(cls: type, table: Mapping[str, Any], path: Sequence[str], value: obje
                 del result[present]
         result[key] = value
         return result
-    inner = _dataclass_in(hints[name])
-    if inner is None and (element := _element_of(hints[name])) is not None:
-        elements = list(result.get(key, ()))
-        number = int(rest[0]) if rest[0].isdecimal() else len(elements)
-        if number >= len(elements):
-            numbers = f"0 to {len(elements) - 1}" if elements else "none: the list is empty"
-            raise source.fail(path, f"there is no element {rest[0]!r} of {key}; there are {numbers}")
-        elements[number] = merged(element, elements[number], rest[1:], value, source) if rest[1:] else value
-        result[key] = elements
-        return result
-    if inner is None and typing.get_origin(hints[name]) is dict:
-        inner = typing.get_args(hints[name])[1]
-        branch = dict(result.get(key, {}))
+    hint = hints[name]
+    if (inner := _dataclass_in(hint)) is not None:
+        result[key] = merged(inner, result.get(key, {}), rest, value, source, where)
+    elif (element := _element_of(hint)) is not None:
+        result[key] = _merged_list(element, result.get(key, ()), rest, value, source, where)
+    elif typing.get_origin(hint) is dict:
+        item, branch = typing.get_args(hint)[1], result.get(key, {})
+        if not isinstance(branch, Mapping):
+            raise source.fail(where, f"is {shown(branch)}, which is no table", branch)
         if rest[0] not in branch or len(rest) == 1:
-            raise source.fail(path, f"there is no such key; {nearest_names(rest[0], branch)}")
-        branch[rest[0]] = merged(inner, branch[rest[0]], rest[1:], value, source)
-        result[key] = branch
-        return result
-    if inner is None:
-        raise source.fail(path, f"{key} is a value, not a table")
-    result[key] = merged(inner, result.get(key, {}), rest, value, source)
+            problem = f"there is no such key; {nearest_names(rest[0], branch)}"
+            raise source.fail((*where, *rest), problem, rest[0], sorted(branch))
+        below = merged(item, branch[rest[0]], rest[1:], value, source, (*where, rest[0]))
+        result[key] = {**branch, rest[0]: below}
+    else:
+        raise source.fail((*where, *rest), f"{key} is a value, not a table")
     return result
+
+
+def _merged_list(
+    element: type, given: Any, rest: Sequence[str], value: object, source: Source, where: Sequence[str]
+) -> list[Any]:
+    """A list of tables with one of them, or a key of it, replaced."""
+    if not isinstance(given, (list, tuple)):
+        raise source.fail(where, f"is {shown(given)}, which is no list", given)
+    elements = list(given)
+    numbers = [str(number) for number in range(len(elements))]
+    if rest[0] not in numbers:
+        known = f"0 to {len(elements) - 1}" if elements else "none: the list is empty"
+        problem = f"there is no element {shown(rest[0])} of {where[-1]}; there are {known}"
+        raise source.fail((*where, *rest), problem, rest[0], numbers)
+    number = int(rest[0])
+    below = (*where, rest[0])
+    elements[number] = merged(element, elements[number], rest[1:], value, source, below) if rest[1:] else value
+    return elements
 
 
 def key_paths(cls: type, prefix: str = "") -> list[str]:
@@ -223,6 +273,26 @@ def key_paths(cls: type, prefix: str = "") -> list[str]:
         else:
             paths += [prefix + spelling for spelling in _spellings(field.name)]
     return paths
+
+
+def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:
+    """Keys with the names of the fields in place of other units: `speed_kmh` becomes `speed_mps`."""
+    if not path:
+        return ()
+    name, _ = _field_of(path[0], _fields(cls))
+    if name is None:
+        return tuple(path)
+    hint, rest = typing.get_type_hints(cls)[name], path[1:]
+    if (inner := _dataclass_in(hint)) is not None:
+        return (name, *field_path(inner, rest))
+    if (inner := _element_of(hint)) is not None and rest:
+        return (name, rest[0], *field_path(inner, rest[1:]))
+    return (name, *rest)
+
+
+def key_hint(cls: type, key: str) -> str | None:
+    """What a class says to those who look for a key that it does not have."""
+    return getattr(cls, "KEY_HINTS", {}).get(key)
 
 
 def to_table(value: Any) -> Any:
@@ -240,6 +310,31 @@ def to_table(value: Any) -> Any:
     return value
 
 
+def parse_value(text: str) -> Any:
+    """A value as TOML writes it; what is no TOML value is a text.
+
+    Raises:
+        ParameterError: it is nested too deeply, or has a number of too many digits.
+    """
+    try:
+        table = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text
+    except (RecursionError, ValueError) as reason:
+        raise ParameterError(f"{shown(text)} is nested too deeply, or a number with too many digits") from reason
+    return table["value"] if len(table) == 1 else text
+
+
+def _no_such_key(cls: type, source: Source, path: Sequence[str]) -> ActiveSteerError:
+    names = _names_in_file(_fields(cls))
+    help_ = key_hint(cls, path[-1]) or nearest_names(path[-1], names)
+    return source.fail(path, f"there is no such key; {help_}", allowed=names)
+
+
+def _fields(cls: type) -> dict[str, dataclasses.Field[Any]]:
+    return {field.name: field for field in dataclasses.fields(cls)}
+
+
 def _spellings(name: str) -> list[str]:
     edges = [name[: -len(si)] + edge for edge, (si, _) in _EDGE_UNITS.items() if name.endswith(si)]
     return [name, *edges]
@@ -249,7 +344,9 @@ def _names_in_file(fields: Mapping[str, Any]) -> list[str]:
     return [spelling for name in fields for spelling in _spellings(name)]
 
 
-def _field_of(key: str, fields: Mapping[str, Any]) -> tuple[str | None, float]:
+def _field_of(key: object, fields: Mapping[str, Any]) -> tuple[str | None, float]:
+    if not isinstance(key, str):
+        return None, 1.0
     if key in fields:
         return key, 1.0
     for edge, (si, factor) in _EDGE_UNITS.items():
@@ -283,60 +380,73 @@ def _element_of(hint: Any) -> type | None:
 
 def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[str]) -> Any:
     """One value, checked against its type hint."""
-    limits = None
+    limits = Range()
     if typing.get_origin(hint) is typing.Annotated:
         hint, *notes = typing.get_args(hint)
-        limits = next((note for note in notes if isinstance(note, Range)), None)
+        limits = next((note for note in notes if isinstance(note, Range)), limits)
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         if raw is None:
             return None
         hint = next(option for option in typing.get_args(hint) if option is not type(None))
-        return _convert(hint if limits is None else typing.Annotated[hint, limits], raw, factor, source, path)
+        return _convert(typing.Annotated[hint, limits], raw, factor, source, path)
     origin = typing.get_origin(hint)
     if isinstance(hint, type) and dataclasses.is_dataclass(hint):
         if not isinstance(raw, Mapping):
-            raise source.fail(path, f"{raw!r} is no table; a table [{'.'.join(path)}] is needed")
+            raise source.fail(path, f"{shown(raw)} is no table; a table [{'.'.join(path)}] is needed", raw)
         return build(hint, raw, source, path)
     if origin is dict:
         if not isinstance(raw, Mapping):
-            raise source.fail(path, f"{raw!r} is no table")
+            raise source.fail(path, f"{shown(raw)} is no table", raw)
         item = typing.get_args(hint)[1]
-        return {key: _convert(item, value, 1.0, source, (*path, key)) for key, value in raw.items()}
+        return {key: _convert(item, value, 1.0, source, (*path, str(key))) for key, value in raw.items()}
     if origin is tuple:
         return _elements(hint, raw, factor, limits, source, path)
     return _scalar(hint, raw, factor, limits, source, path)
 
 
 def _elements(
-    hint: Any, raw: Any, factor: float, limits: Range | None, source: Source, path: Sequence[str]
+    hint: Any, raw: Any, factor: float, limits: Range, source: Source, path: Sequence[str]
 ) -> tuple[Any, ...]:
     """A list of numbers, or of tables."""
     element = _element_of(hint)
     if not isinstance(raw, (list, tuple)):
         wanted = "no list of numbers" if element is None else f"no list; tables [[{'.'.join(path)}]] are needed"
-        raise source.fail(path, f"{raw!r} is {wanted}")
+        raise source.fail(path, f"{shown(raw)} is {wanted}", raw)
     if element is not None:
         return tuple(_convert(element, value, 1.0, source, (*path, str(number))) for number, value in enumerate(raw))
-    item = typing.get_args(hint)[0]
-    if limits is not None:
-        item = typing.Annotated[item, limits]
+    item = typing.Annotated[typing.get_args(hint)[0], limits]
     return tuple(_convert(item, value, factor, source, path) for value in raw)
 
 
-def _scalar(hint: Any, raw: Any, factor: float, limits: Range | None, source: Source, path: Sequence[str]) -> Any:
+def _word(words: Sequence[str], raw: Any, source: Source, path: Sequence[str]) -> str:
+    if raw not in list(words):
+        known = ", ".join(repr(word) for word in words[:-1])
+        raise source.fail(path, f"is {shown(raw)}; allowed are {known} and {words[-1]!r}", raw, words)
+    return raw
+
+
+def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, path: Sequence[str]) -> Any:
+    if typing.get_origin(hint) is typing.Literal:
+        return _word(typing.get_args(hint), raw, source, path)
     wanted = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}[hint]
     good = isinstance(raw, hint) or (hint is float and isinstance(raw, int))
     if not good or (isinstance(raw, bool) and hint is not bool):
-        raise source.fail(path, f"{raw!r} is not {wanted}")
+        raise source.fail(path, f"{shown(raw)} is not {wanted}", raw, hint)
+    if isinstance(raw, str) and (len(raw) > _MAX_TEXT or not raw.isprintable()):
+        raise source.fail(path, f"{shown(raw)} is not {_MAX_TEXT} characters, at most, that can be printed", raw)
     if hint in (bool, str):
         return raw
+    number: Any = raw
     try:
-        value = raw * factor if factor != 1.0 else hint(raw)
+        value = number * factor if factor != 1.0 else hint(number)
     except OverflowError:  # a whole number too large for a float
         value = math.inf
     if not math.isfinite(value):
-        raise source.fail(path, f"{raw!r} is not finite")
-    if limits is not None and not limits.low <= value <= limits.high:
-        shown = Range(limits.low / factor, limits.high / factor)
-        raise source.fail(path, f"{raw!r} is out of range; allowed is {shown}")
+        raise source.fail(path, f"{shown(raw)} is not finite", raw, limits)
+    if abs(value) > _MAX_NUMBER:
+        problem = f"{shown(raw)} is larger than anything of a car; allowed is at most {_MAX_NUMBER:g}"
+        raise source.fail(path, problem, raw, limits)
+    if not limits.low <= value <= limits.high:
+        allowed = Range(limits.low / factor, limits.high / factor)
+        raise source.fail(path, f"{shown(raw)} is out of range; allowed is {allowed}", raw, allowed)
     return value

@@ -59,7 +59,7 @@ def test_speed_follows_its_table():
         ({"brake": {"time_s": [], "pedal": []}}, r"brake: has 0 times and 0 values; .* at least one"),
         ({"speed": {"time_s": [0, 2, 2], "speed_kmh": [0, 1, 2]}}, r"speed\.time_s: does not increase from 2 to 2 s"),
         ({"brake": {"time_s": [0], "pedal": [1.5]}}, r"brake\.pedal: 1\.5 is out of range; allowed is 0 to 1"),
-        ({"speed": {"time_s": [0]}}, r"speed: the key speed_mps or speed_kmh is missing"),
+        ({"speed": {"time_s": [0]}}, r"speed\.speed_mps: the key speed_mps or speed_kmh is missing"),
     ],
 )
 def test_wrong_table_is_answered_with_file_and_key(keys, told):

@@ -59,7 +59,7 @@ def test_areas_come_in_the_order_in_which_they_count(tmp_path: Path) -> None:
         ('"left"', '"lft"', r"line 4: patches\.0: side: is 'lft'; did you mean 'left'"),
         ("mu = 0.6", "mu = 0.0", r"line 13: patches\.1\.mu: 0\.0 is out of range; allowed is 0\.01 to 2"),
         ("mu = 0.6", "frction = 1", r"line 13: patches\.1\.frction: there is no such key"),
-        ("start_m = 40\n", "", r"line 10: patches\.1: the key start_m is missing"),
+        ("start_m = 40\n", "", r"line 10: patches\.1\.start_m: the key start_m is missing"),
         ("mu_right = 0.5", "mu_right = 7", r"line 2: mu_right: 7 is out of range; allowed is 0\.01 to 2"),
     ],
 )
