@@ -17,10 +17,10 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from activesteer.compilation import compiled
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
 from activesteer.road.path import Path
@@ -143,12 +143,12 @@ class PathPreviewDriver:
         return found
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _best_steering(x, y, yaw, speed, lateral_speed, yaw_rate, ahead_x, ahead_y, by_yaw_rate, by_sideslip, by_steering):
     """Road-wheel angle held from now on that comes closest to the path, in the least squares sense [rad].
 
     The arguments are the members of `Motion`, the points ahead [m], shape (n,), and the members of `_Preview` without
-    the times. It calls no native code of another file: what is kept on disk would not notice a change there.
+    the times.
     """
     cos, sin = math.cos(yaw), math.sin(yaw)
     sideslip = math.atan2(lateral_speed, speed)

@@ -9,10 +9,10 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
+from activesteer.compilation import compiled
 from activesteer.errors import ManeuverError
 
 Array = NDArray[np.float64]
@@ -116,7 +116,7 @@ class Path:
         return spacing, self.x_m, self.y_m, float(self.heading_rad[0]), float(self.heading_rad[-1])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _point_at(s, spacing, xs, ys, heading_first, heading_last):
     """One point: linear between points, straight beyond the ends."""
     last = len(xs) - 1
@@ -131,7 +131,7 @@ def _point_at(s, spacing, xs, ys, heading_first, heading_last):
     return xs[index] + share * (xs[index + 1] - xs[index]), ys[index] + share * (ys[index + 1] - ys[index])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _points_at(s, spacing, xs, ys, heading_first, heading_last):
     """`Path.at` as native code."""
     x, y = np.empty(len(s)), np.empty(len(s))
@@ -140,7 +140,7 @@ def _points_at(s, spacing, xs, ys, heading_first, heading_last):
     return x, y
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
     """`Path.nearest` as native code."""
     count = math.ceil(2.0 * window / SPACING_M) + 1

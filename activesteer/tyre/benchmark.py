@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-from numba import njit
 
+from activesteer.compilation import compiled
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.kernels.magic_formula import magic_formula
 from activesteer.tyre.tyre_parameters import TyreParameters
@@ -18,7 +18,7 @@ _ROUNDS: Final = 5
 """Every figure is the best of this many rounds: what disturbs a machine only ever makes it slower."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _scalar_calls(p, count, pressure_Pa):
     """The sum of all five outputs of `count` scalar calls, each with inputs of its own."""
     total = 0.0

@@ -26,13 +26,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from activesteer.compilation import compiled
 
 _SLOW = 1e-4
 """Speed over the vibration's below which the error function is its tangent."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def friction_rate(
     deflection_m: float, speed_mps: float, vibration_mps: float, slip_m: float, timestep_s: float
 ) -> float:

@@ -10,15 +10,12 @@ scalar product of its motion axis (`cdof`, about the centre of mass of the tree)
 
 from __future__ import annotations
 
-import hashlib
-from pathlib import Path
 from typing import Any, Final
 
 import mujoco
-import numba
-from numba import carray, cfunc, njit, types
+from numba import carray, types
 
-import activesteer.tyre
+from activesteer.compilation import compiled_callback, inlined
 from activesteer.errors import ModelError
 from activesteer.tyre.kernels.contact import tyre_on_road
 from activesteer.tyre.kernels.parameter_index import PARAMETER_COUNT as TYRE_PARAMETERS
@@ -30,7 +27,7 @@ from activesteer.vehicle.native_memory import array_at, f64_pointer, word
 _MARKER: Final = fb.MARKER
 
 
-@njit(inline="always", error_model="numpy")
+@inlined
 def _our_block(model, m_count, m_numbers):
     """The block of a model of ours, or an empty array."""
     count = word(model + m_count)
@@ -40,7 +37,7 @@ def _our_block(model, m_count, m_numbers):
     return numbers[int(numbers[count - 2]) :]
 
 
-@njit(inline="always", error_model="numpy")
+@inlined
 def _apply(qfrc, cdof, chain, fx, fy, fz, tx, ty, tz):
     """Adds J^T w for a wrench about the tree's centre of mass."""
     for index in range(chain.size):
@@ -52,7 +49,7 @@ def _apply(qfrc, cdof, chain, fx, fy, fz, tx, ty, tz):
         )  # fmt: skip
 
 
-@njit(inline="always", error_model="numpy")
+@inlined
 def _interpolate(x, xs, ys, count):
     """Piecewise linear curve, continued with the slope of its ends."""
     index = 1
@@ -61,7 +58,7 @@ def _interpolate(x, xs, ys, count):
     return ys[index - 1] + (x - xs[index - 1]) * (ys[index] - ys[index - 1]) / (xs[index] - xs[index - 1])
 
 
-@njit(inline="always", error_model="numpy")
+@inlined
 def _road_mu(block, mu, x, y):
     """Friction of the road at a place [m], world axes; `mu` where no area says otherwise."""
     if block[fb.AREAS_FELT] == 0.0:
@@ -74,7 +71,7 @@ def _road_mu(block, mu, x, y):
     return mu
 
 
-@njit(inline="always", error_model="numpy")
+@inlined
 def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc):
     for index in range(int(block[fb.N_WHEELS])):
         wheel = block[int(block[fb.WHEELS_START]) + index * fb.WHEEL_SIZE :]
@@ -151,7 +148,7 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
         )
 
 
-@njit(inline="always", error_model="numpy")
+@inlined
 def _dampers(block, ten_velocity, jacobian, userdata, qfrc):
     first_slot = int(block[fb.N_WHEELS]) * fb.USERDATA_PER_WHEEL
     for index in range(int(block[fb.N_DAMPERS])):
@@ -168,7 +165,7 @@ def _dampers(block, ten_velocity, jacobian, userdata, qfrc):
             qfrc[int(damper[fb.D_CHAIN + entry])] += jacobian[row + entry] * force
 
 
-@njit(inline="always", error_model="numpy")
+@inlined
 def _drag(block, xpos, xmat, com, cvel, cdof, qfrc):
     """Aerodynamic drag: against the velocity of the pressure point, in the plane of the road."""
     body = int(block[fb.CHASSIS_BODY])
@@ -188,22 +185,20 @@ def _drag(block, xpos, xmat, com, cvel, cdof, qfrc):
     _apply(qfrc, cdof, chain, fx, fy, 0.0, -pz * fy, pz * fx, px * fy - py * fx)
 
 
-def _make_callbacks(layout: EngineLayout, fingerprint: str) -> tuple[Any, Any]:
+def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any]:
     """Compiles the two callbacks, or loads them from numba's cache.
 
-    The offsets and the fingerprint are closure variables on purpose: numba makes those part of the cache key, so that
-    another MuJoCo version or a change in the functions called here cannot run stale machine code.
+    The offsets are closure variables on purpose: numba makes those part of the cache key.
     """
     (
         m_count, m_timestep, m_numbers, d_qvel, d_act, d_ctrl, d_userdata, d_xpos, d_xmat, d_com, d_cdof, d_ten_j,
         d_ten_velocity, d_cvel, d_qfrc,
     ) = layout  # fmt: skip
-    key = int(fingerprint[:12], 16)
 
-    @cfunc(types.void(types.intp, types.intp), cache=True, error_model="numpy")
+    @compiled_callback(types.void, types.intp, types.intp)
     def passive(model, data):
         block = _our_block(model, m_count, m_numbers)
-        if block.size == 0 or key == 0:
+        if block.size == 0:
             return
         bodies = int(block[fb.N_BODIES])
         dofs = int(block[fb.N_DOFS])
@@ -222,10 +217,10 @@ def _make_callbacks(layout: EngineLayout, fingerprint: str) -> tuple[Any, Any]:
         _dampers(block, ten_velocity, jacobian, userdata, qfrc)
         _drag(block, xpos, xmat, com, cvel, cdof, qfrc)
 
-    @cfunc(types.double(types.intp, types.intp, types.intc), cache=True, error_model="numpy")
+    @compiled_callback(types.double, types.intp, types.intp, types.intc)
     def actuator_rate(model, data, actuator):
         block = _our_block(model, m_count, m_numbers)
-        if block.size == 0 or key == 0:
+        if block.size == 0:
             return 0.0
         entry = block[int(block[fb.ACTUATORS_START]) + actuator * fb.ACTUATOR_SIZE :]
         kind = entry[fb.A_KIND]
@@ -261,17 +256,6 @@ def _make_callbacks(layout: EngineLayout, fingerprint: str) -> tuple[Any, Any]:
     return passive, actuator_rate
 
 
-def _source_fingerprint() -> str:
-    """Changes with any source that is compiled into the callbacks, and with numba's and MuJoCo's version."""
-    digest = hashlib.sha256(f"{numba.__version__} {mujoco.__version__}".encode())
-    here = Path(__file__).parent
-    own = (here / name for name in ("force_block.py", "native_memory.py", "dry_friction.py"))
-    sources = [*own, *Path(activesteer.tyre.__file__).parent.rglob("*.py")]
-    for source in sorted(sources):
-        digest.update(source.read_bytes())
-    return digest.hexdigest()
-
-
 _installed: list[Any] = []
 """The callbacks as the engine sees them; kept for the life of the process, since the engine holds bare pointers."""
 
@@ -294,7 +278,7 @@ def install_native_forces() -> None:
             )
             raise ModelError(msg)
     if not _installed:
-        compiled = _make_callbacks(measure_engine_layout(), _source_fingerprint())
+        compiled = _make_callbacks(measure_engine_layout())
         _installed.extend(callback.ctypes for callback in compiled)
     for (_, present, install), ours in zip(slots, _installed, strict=True):
         if present is None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba import carray, njit, types
+from numba import carray, types
 from numba.extending import intrinsic
+
+from activesteer.compilation import inlined
 
 
 def _pointer_to(numba_type: types.Type) -> Any:
@@ -28,13 +30,13 @@ word_pointer = _pointer_to(types.intp)
 """Address (intp) -> pointer to a machine word."""
 
 
-@njit(inline="always")
+@inlined
 def word(address):
     """The machine word at an address."""
     return word_pointer(address)[0]
 
 
-@njit(inline="always")
+@inlined
 def array_at(struct, offset, size):
     """The float64 array whose pointer stands `offset` bytes into a struct, as a 1-D view of `size` elements."""
     return carray(f64_pointer(word(struct + offset)), (size,))

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from activesteer.compilation import compiled
 from activesteer.tyre.kernels import parameter_index as c
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _cosine_formula(b: float, c_: float, e: float, x: float) -> float:
     """cos(C atan(Bx - E(Bx - atan Bx))) with E not above 1."""
     e = min(e, 1.0)
@@ -20,7 +19,7 @@ def _cosine_formula(b: float, c_: float, e: float, x: float) -> float:
     return math.cos(c_ * math.atan(bx - e * (bx - math.atan(bx))))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def longitudinal_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) -> float:
     """G_xalpha: what the slip angle leaves of the longitudinal force (4.E50 to 4.E57)."""
     b = (p[c.RBX1] + p[c.RBX3] * gamma_s * gamma_s) * math.cos(math.atan(p[c.RBX2] * kappa)) * p[c.LXAL]
@@ -29,7 +28,7 @@ def longitudinal_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: fl
     return _cosine_formula(b, p[c.RCX1], e, alpha_s + s_h) / _cosine_formula(b, p[c.RCX1], e, s_h)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def lateral_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) -> float:
     """G_ykappa: what the longitudinal slip leaves of the lateral force (4.E58 to 4.E65)."""
     slope = p[c.RBY1] + p[c.RBY4] * gamma_s * gamma_s
@@ -39,7 +38,7 @@ def lateral_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) 
     return _cosine_formula(b, p[c.RCY1], e, kappa + s_h) / _cosine_formula(b, p[c.RCY1], e, s_h)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def slip_induced_side_force(
     p, dfz: float, kappa: float, alpha_s: float, gamma_s: float, mu_fz: float, z2: float
 ) -> float:
@@ -48,7 +47,7 @@ def slip_induced_side_force(
     return d * math.sin(p[c.RVY5] * math.atan(p[c.RVY6] * kappa)) * p[c.LVYKA]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def friction_ellipse(
     p, fz: float, dfz: float, d: float, kappa: float, alpha_s: float, fx0: float, fy0: float, dx: float, dy: float,
     k_x: float, k_y: float, s_hy: float, s_vy: float, lmux: float,

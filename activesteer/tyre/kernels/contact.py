@@ -29,8 +29,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from numba import njit
-
+from activesteer.compilation import compiled
 from activesteer.tyre.kernels import parameter_index as prm
 from activesteer.tyre.kernels.limits import limit_flags
 from activesteer.tyre.kernels.magic_formula import slip_stiffnesses, steady_state
@@ -87,19 +86,19 @@ class WheelForces(NamedTuple):
     friction_use: float
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _mean_decay(x):
     """Mean of exp(-t) over t from 0 to x: what is left, over a step, of the rate at its beginning."""
     return -math.expm1(-x) / x if x > 1e-9 else 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _low_speed_slip_limit(file_limit, sliding_slip, share):
     """Slip at which the deflection stops growing: where the tyre slides at rest, the file's limit when rolling."""
     return file_limit + (min(sliding_slip, file_limit) - file_limit) * share
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn, gamma, u, v, w
 ):
@@ -175,7 +174,7 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     return fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _load(p, deflection, spin, pressure_Pa, damping_N, fx, fy, gamma):
     """Load [N] under horizontal forces; the damper adds or takes at most what the spring carries."""
     elastic = vertical_force_loaded(p, deflection, spin, pressure_Pa, fx, fy, gamma)
@@ -184,7 +183,7 @@ def _load(p, deflection, spin, pressure_Pa, damping_N, fx, fy, gamma):
     return elastic + min(max(damping_N, -elastic), elastic)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def tyre_on_road(
     p,
     mu,

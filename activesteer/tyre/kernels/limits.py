@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from enum import IntFlag
 
-from numba import njit
-
+from activesteer.compilation import compiled
 from activesteer.tyre.kernels import parameter_index as c
 
 
@@ -21,7 +20,7 @@ class Limit(IntFlag):
     PRESSURE = 32
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def limit_flags(p, fz_N: float, kappa: float, alpha_rad: float, gamma_rad: float, pressure_Pa: float) -> int:
     """Sum of the `Limit` values that apply; a load of zero is a lifted wheel and no violation.
 

@@ -18,8 +18,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from activesteer.compilation import compiled
 from activesteer.tyre.kernels import parameter_index as c
 from activesteer.tyre.kernels.combined_slip import (
     friction_ellipse,
@@ -57,7 +56,7 @@ __all__ = [
 ]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def rolling_direction(p, vx_mps: float) -> float:
     """1 rolling forward, -1 backward, a sine between them below VXLOW."""
     low = p[c.VXLOW]
@@ -68,19 +67,19 @@ def rolling_direction(p, vx_mps: float) -> float:
     return math.sin(0.5 * math.pi * vx_mps / low)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def clamp(x: float, low: float, high: float) -> float:
     """The value, or the limit that it exceeds."""
     return min(max(x, low), high)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def relative_pressure(p, pressure_Pa: float) -> float:
     """Pressure over the nominal one, less 1."""
     return clamp(pressure_Pa, p[c.PRESMIN], p[c.PRESMAX]) / p[c.NOMPRES] - 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def steady_state(
     p, fz: float, kappa: float, alpha: float, gamma: float, pressure: float, vx: float, mu: float, turn_slip: float
 ):
@@ -170,7 +169,7 @@ def steady_state(
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def magic_formula(
     p, fz_N: float, kappa: float, alpha_rad: float, gamma_rad: float, pressure_Pa: float, vx_mps: float, mu: float
 ):
@@ -197,7 +196,7 @@ def magic_formula(
     return r[0], r[1], r[2], r[3], r[4]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def slip_stiffnesses(p, fz_N: float, gamma_rad: float, pressure_Pa: float, mu: float):
     """Slopes of the forces at zero slip.
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from activesteer.compilation import compiled
 from activesteer.tyre.kernels import parameter_index as c
 from activesteer.tyre.kernels.pure_slip import EPSILON, MF52
 
@@ -18,7 +17,7 @@ SMALLEST_FRICTION = 1e-6
 """Friction scale below which slopes that are divided by it stay as they are."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def overturning_moment(p, fz: float, fy: float, gamma: float, dpi: float) -> float:
     """Overturning moment M_x [Nm] (4.E69, corrected)."""
     r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
@@ -32,7 +31,7 @@ def overturning_moment(p, fz: float, fy: float, gamma: float, dpi: float) -> flo
     return r0 * p[c.LMX] * (fz * sum_ + added)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def rolling_resistance_moment(p, fz: float, fx: float, gamma: float, pressure: float, vx: float, d: float) -> float:
     """Rolling resistance moment M_y [Nm], negative when rolling forward (4.E70)."""
     r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
@@ -45,7 +44,7 @@ def rolling_resistance_moment(p, fz: float, fx: float, gamma: float, pressure: f
     return -r0 * fz0 * sum_ * load * p[c.LMY] * d
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _equivalent_slip(alpha: float, stiffness_ratio_kappa: float) -> float:
     """Slip angle that stands for combined slip, with the sign of alpha (4.E77, 4.E78)."""
     tangent = math.tan(alpha)
@@ -53,7 +52,7 @@ def _equivalent_slip(alpha: float, stiffness_ratio_kappa: float) -> float:
     return math.copysign(size, alpha)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def aligning_moment(
     p, fz: float, dfz: float, dpi: float, kappa: float, alpha_s: float, gamma_s: float, gamma: float, vx: float,
     tan_alpha: float, lmu: float, d: float, k_x: float, k_y: float, b_y: float, c_y: float, s_hy: float, s_vy: float,

@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from activesteer.compilation import compiled
 from activesteer.tyre.kernels import parameter_index as c
 
 EPSILON = 1e-6
@@ -21,13 +20,13 @@ EPSILON = 1e-6
 MF52 = 52.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def guarded(x: float) -> float:
     """Move a denominator away from zero, in the direction of its own sign."""
     return x + EPSILON if x >= 0.0 else x - EPSILON
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def sine_formula(b: float, c_: float, d: float, e: float, x: float) -> float:
     """D sin(C atan(Bx - E(Bx - atan Bx))) with E not above 1 (equation 4.E9)."""
     e = min(e, 1.0)
@@ -35,20 +34,20 @@ def sine_formula(b: float, c_: float, d: float, e: float, x: float) -> float:
     return d * math.sin(c_ * math.atan(bx - e * (bx - math.atan(bx))))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def sign(x: float) -> float:
     """-1, 0 or 1."""
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def longitudinal_stiffness(p, fz: float, dfz: float, dpi: float) -> float:
     """Slip stiffness K_xkappa [N] (4.E15)."""
     pressure = 1.0 + p[c.PPX1] * dpi + p[c.PPX2] * dpi * dpi
     return fz * (p[c.PKX1] + p[c.PKX2] * dfz) * math.exp(p[c.PKX3] * dfz) * pressure * p[c.LKX]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def cornering_stiffness(p, fz: float, gamma_s: float, dpi: float) -> float:
     """Cornering stiffness K_yalpha [N/rad] without turn slip, negative for a tyre in ISO-W axes (4.E25)."""
     fz0 = p[c.LFZO] * p[c.FNOMIN]
@@ -57,7 +56,7 @@ def cornering_stiffness(p, fz: float, gamma_s: float, dpi: float) -> float:
     return peak * math.sin(p[c.PKY4] * math.atan(fz / load))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def longitudinal_force(
     p, fz: float, dfz: float, dpi: float, kappa: float, gamma: float, lmu: float, d: float, z1: float
 ):
@@ -90,7 +89,7 @@ def longitudinal_force(
     return sine_formula(b_x, c_x, d_x, e_x, kappa_x) + s_v, mu, k_x
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def lateral_force(
     p, fz: float, dfz: float, dpi: float, alpha_s: float, gamma_s: float, lmu: float, d: float,
     z0: float, z2: float, z3: float, z4: float,

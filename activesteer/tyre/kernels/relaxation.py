@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from activesteer.compilation import compiled
 from activesteer.tyre.kernels import parameter_index as c
 from activesteer.tyre.kernels.pure_slip import cornering_stiffness, longitudinal_stiffness
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def carcass_stiffnesses(p, fz_N: float, pressure_Pa: float):
     """Longitudinal and lateral stiffness of the carcass [N/m] at a load [N] and a pressure [Pa] (equations 17, 18)."""
     dfz = fz_N / (p[c.LFZO] * p[c.FNOMIN]) - 1.0
@@ -24,7 +23,7 @@ def carcass_stiffnesses(p, fz_N: float, pressure_Pa: float):
     return p[c.LONGITUDINAL_STIFFNESS] * along, p[c.LATERAL_STIFFNESS] * across
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def relaxation_lengths(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
     """Relaxation lengths of longitudinal and lateral slip [m], >= 0.
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from activesteer.compilation import compiled
 from activesteer.tyre.kernels.limits import limit_flags
 from activesteer.tyre.kernels.magic_formula import steady_state
 from activesteer.tyre.kernels.relaxation import relaxation_lengths
@@ -21,7 +20,7 @@ ROLLING_COLUMNS = (
 )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def evaluate_rows(p, inputs, forces, flags) -> None:
     """Evaluate `steady_state` and `limit_flags` for every row.
 
@@ -40,7 +39,7 @@ def evaluate_rows(p, inputs, forces, flags) -> None:
         flags[i] = limit_flags(p, fz, kappa, alpha, gamma, pressure)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def rolling_rows(p, inputs, forces, rolling) -> None:
     """Relaxation lengths, radii and contact patch for every row.
 

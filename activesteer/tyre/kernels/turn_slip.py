@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from activesteer.compilation import compiled
 from activesteer.tyre.kernels import parameter_index as c
 from activesteer.tyre.kernels.pure_slip import EPSILON, cornering_stiffness, guarded
 from activesteer.tyre.kernels.vertical import effective_rolling_radius
@@ -19,7 +18,7 @@ _MOST_TURN_SLIP = 1e6
 """Turn slip times radius beyond which the factors have long reached their limits."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def rolling_speed(p, fz: float, kappa: float, pressure: float, vx: float):
     """Rotational speed [rad/s] and effective radius [m] of a wheel with a given slip, which depend on each other."""
     radius = p[c.UNLOADED_RADIUS]
@@ -34,7 +33,7 @@ def rolling_speed(p, fz: float, kappa: float, pressure: float, vx: float):
     return omega, radius
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def turn_slip_factors(
     p, fz: float, dfz: float, dpi: float, kappa: float, tan_alpha: float, gamma: float, gamma_s: float,
     pressure: float, vx: float, lmuy: float, g_y: float, turn_slip: float,

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from activesteer.compilation import compiled
 from activesteer.tyre.kernels import parameter_index as c
 
 MF62 = 62.0
@@ -18,21 +17,21 @@ _SOFTEST = 0.1
 """What horizontal forces leave of the vertical stiffness at least; real tyres stay above 0.8."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def stiffness_pressure_factor(p, pressure_Pa: float) -> float:
     """What the inflation pressure makes of the vertical stiffness (equation 5)."""
     pressure = min(max(pressure_Pa, p[c.PRESMIN]), p[c.PRESMAX])
     return 1.0 + p[c.PFZ1] * (pressure / p[c.NOMPRES] - 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def free_radius(p, omega_radps: float) -> float:
     """Radius of the rotating, unloaded tyre [m] at a rotational speed [rad/s] (equation 1)."""
     speed = omega_radps * p[c.UNLOADED_RADIUS] / p[c.LONGVL]
     return p[c.UNLOADED_RADIUS] * (p[c.Q_RE0] + p[c.Q_V1] * speed * speed)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def effective_rolling_radius(p, fz_N: float, omega_radps: float, pressure_Pa: float) -> float:
     """Effective rolling radius [m], forward speed over rotational speed of a wheel that rolls freely (equation 7).
 
@@ -51,7 +50,7 @@ def effective_rolling_radius(p, fz_N: float, omega_radps: float, pressure_Pa: fl
     return free_radius(p, omega_radps) - fz0 / stiffness * curve
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _softening(p, omega: float, fx: float, fy: float) -> float:
     """What speed and horizontal forces make of the vertical stiffness (equation 2)."""
     r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
@@ -59,7 +58,7 @@ def _softening(p, omega: float, fx: float, fy: float) -> float:
     return max(1.0 + p[c.Q_V2] * abs(omega) * r0 / p[c.LONGVL] - x * x - y * y, _SOFTEST)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def vertical_force_loaded(
     p, deflection_m: float, omega_radps: float, pressure_Pa: float, fx_N: float, fy_N: float, gamma_rad: float
 ) -> float:
@@ -106,7 +105,7 @@ def vertical_force_loaded(
     return max(soft * stiffness_pressure_factor(p, pressure_Pa) * (q1 * rho + p[c.Q_FZ2] * rho * rho) * fz0, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def bottoming_force(p, deflection_m: float, omega_radps: float) -> float:
     """Additional vertical force [N] once the tyre is pressed onto the rim.
 
@@ -119,7 +118,7 @@ def bottoming_force(p, deflection_m: float, omega_radps: float) -> float:
     return p[c.BOTTOM_STIFF] * max(deflection_m - room, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def vertical_force(p, deflection_m: float, omega_radps: float, pressure_Pa: float) -> float:
     """Elastic vertical force [N] of a tyre without horizontal forces and camber, with bottoming on the rim.
 
@@ -133,7 +132,7 @@ def vertical_force(p, deflection_m: float, omega_radps: float, pressure_Pa: floa
     return elastic + bottoming_force(p, deflection_m, omega_radps)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def deflection_under_load(
     p, fz_N: float, omega_radps: float, pressure_Pa: float, fx_N: float, fy_N: float, gamma_rad: float
 ) -> float:
@@ -162,7 +161,7 @@ def deflection_under_load(
     return 0.5 * (low + high)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def contact_patch(p, fz_N: float, pressure_Pa: float):
     """Length and width of the contact patch [m] (equations 9 and 10).
 

@@ -1,0 +1,176 @@
+"""Compiling to native code, and keeping what was compiled: numba's decorators, with a key that holds the content.
+
+numba keeps compiled functions on disk and compiles again when the file of a function changes; it does not notice a
+change in another file whose functions or constants were compiled in, nor another version of the engine. Here the key is
+the content of the file and of every file of the package that it imports, directly or not, with the versions of numba,
+llvmlite, numpy and mujoco. Where the files lie is numba's choice: `NUMBA_CACHE_DIR`, `__pycache__` beside the source,
+the user's cache; where none of them can be written, every start compiles anew.
+
+The logger `activesteer` says when compiling begins (INFO) and when nothing can be kept (WARNING), each once.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import inspect
+import logging
+import re
+from collections.abc import Callable, Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Final
+
+from numba import njit, types
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
+from numba.core.ccallback import CFunc
+from numba.core.dispatcher import Dispatcher
+
+_VERSIONS: Final = ("numba", "llvmlite", "numpy", "mujoco")
+_KEPT: Final = 4
+"""Compiled states of a function that are kept: some branches and versions that are worked on in turn."""
+_IMPORT: Final = re.compile(r"^\s*(?:from\s+([\w.]+)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+([\w.]+))", re.MULTILINE)
+_LOGGER: Final = logging.getLogger("activesteer")
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """Decorator: the function as native code, compiled at its first call and kept on disk.
+
+    Division by zero gives what IEEE 754 says, as in numpy; it does not raise.
+    """
+    dispatcher = njit(error_model="numpy")(function)
+    if isinstance(dispatcher, Dispatcher):  # not so where numba is switched off
+        dispatcher._cache = _cache_of(function)
+    return dispatcher
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Decorator: native code that becomes part of each compiled function that calls it."""
+    return njit(inline="always", error_model="numpy")(function)
+
+
+def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[Callable[..., Any]], CFunc]:
+    """Decorator: the function as a C function that the engine can call, compiled now and kept on disk.
+
+    Args:
+        result: Type that it returns.
+        arguments: Types of its arguments.
+    """
+
+    def decorate(function: Callable[..., Any]) -> CFunc:
+        callback = CFunc(function, (arguments, result), locals={}, options={"error_model": "numpy"})
+        callback._cache = _cache_of(function)
+        callback.compile()
+        return callback
+
+    return decorate
+
+
+class _ContentCache(FunctionCache):
+    """numba's cache of one function, under a name that holds the content of all its sources."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._stem = self._impl.filename_base
+        key = content_key(Path(inspect.getfile(function)))
+        self._cache_file = IndexDataCacheFile(self._cache_path, f"{self._stem}-{key[:16]}", key)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        found = super().load_overload(sig, target_context)
+        if found is None:
+            _say_compiling()
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        # A full disk is no reason not to run what is already compiled.
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+            kept = sorted(Path(self._cache_path).glob(f"{self._stem}-*.nbi"), key=lambda index: index.stat().st_mtime)
+            for index in kept[:-_KEPT]:
+                for file in index.parent.glob(f"{index.stem}.*"):
+                    file.unlink(missing_ok=True)
+
+
+def _cache_of(function: Callable[..., Any]) -> Any:
+    try:
+        return _ContentCache(function)
+    except (RuntimeError, OSError):
+        # numba found no folder that can be written, or there are no sources.
+        _say_uncached()
+        return NullCache()
+
+
+@functools.cache
+def _say_compiling() -> None:
+    _LOGGER.info("compiling native code, which is kept for the next time: some 15 s")
+
+
+@functools.cache
+def _say_uncached() -> None:
+    _LOGGER.warning(
+        "no folder to keep compiled code in, every start compiles anew (some 15 s): set NUMBA_CACHE_DIR to one that "
+        "can be written"
+    )
+
+
+def content_key(source: Path) -> str:
+    """What identifies the code compiled from a file: all sources behind it, and the versions of what compiles them.
+
+    Args:
+        source: A file of a package.
+
+    Returns:
+        A hexadecimal digest.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    package = source.parent
+    while (package.parent / "__init__.py").is_file():
+        package = package.parent
+    found: set[Path] = set()
+    left = [source]
+    while left:
+        file = left.pop()
+        if file not in found:
+            found.add(file)
+            left.extend(_imported(file, package))
+    digest = hashlib.sha256(_versions().encode())
+    for file in sorted(found):
+        digest.update(f"\n{file.relative_to(package)}\n".encode())
+        digest.update(_content(file))
+    return digest.hexdigest()
+
+
+@functools.cache
+def _versions() -> str:
+    installed = {}
+    for package in _VERSIONS:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            installed[package] = metadata.version(package)
+    return repr(installed)
+
+
+@functools.cache
+def _content(file: Path) -> bytes:
+    return file.read_bytes()
+
+
+@functools.cache
+def _imported(file: Path, package: Path) -> tuple[Path, ...]:
+    """The files of the package that a file imports from."""
+    return tuple(_imports(_content(file).decode(), package))
+
+
+def _imports(text: str, package: Path) -> Iterator[Path]:
+    for origin, names, whole in _IMPORT.findall(text):
+        parts = (origin or whole).split(".")
+        if parts[0] != package.name:
+            continue
+        place = package.joinpath(*parts[1:])
+        for name in re.findall(r"(\w+)(?:\s+as\s+\w+)?", names) or [""]:
+            # A name is a module of its own, or something in the module that it is imported from.
+            module = (place / f"{name}.py", place / name / "__init__.py")
+            files = (*module, place.with_suffix(".py"), place / "__init__.py")
+            yield from [file for file in files if file.is_file()][:1]

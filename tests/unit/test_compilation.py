@@ -1,0 +1,137 @@
+"""Compiled code that is kept on disk belongs to the sources as they are now, wherever it is kept."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import activesteer
+from activesteer import compilation, resources
+
+_PACKAGE = Path(activesteer.__file__).parent
+
+_CALL = """
+import logging
+logging.basicConfig(format="%(levelname)s", level=logging.INFO)
+from {package}.outer import outer
+print(outer(2.0))
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A package whose compiled function calls another file's and uses a third one's constant."""
+    folder = tmp_path / "sources" / "gearbox"
+    (folder / "inner").mkdir(parents=True)
+    (folder / "__init__.py").write_text("")
+    (folder / "inner" / "__init__.py").write_text("")
+    (folder / "numbers.py").write_text("FACTOR = 3.0\n")
+    (folder / "inner" / "function.py").write_text(
+        "from activesteer.compilation import compiled\n@compiled\ndef inner(x):\n    return x + 1.0\n"
+    )
+    (folder / "outer.py").write_text(
+        "from activesteer.compilation import compiled\n"
+        "from gearbox import numbers as n\n"
+        "from gearbox.inner.function import (\n    inner,\n)\n"
+        "@compiled\ndef outer(x):\n    return n.FACTOR * inner(x)\n"
+    )
+    return folder
+
+
+def _run(code: str, sources: Path, **environment: str) -> tuple[str, str]:
+    """What a fresh interpreter prints and logs that finds the sources first."""
+    found = {"PYTHONPATH": os.pathsep.join((str(sources), str(_PACKAGE.parent))), **environment}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=sources,
+        env={**os.environ, **found},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip(), done.stderr.strip()
+
+
+@pytest.mark.parametrize("kept_in", ["NUMBA_CACHE_DIR", "source", "XDG_CACHE_HOME"])
+def test_an_edit_in_a_file_that_was_compiled_in_counts(package: Path, tmp_path: Path, kept_in: str) -> None:
+    if kept_in == "XDG_CACHE_HOME":
+        # No folder can be made where a file stands, whoever one is: numba goes on to the user's cache.
+        for folder in (package, package / "inner"):
+            (folder / "__pycache__").write_text("")
+    environment = {"NUMBA_CACHE_DIR": "", "PYTHONDONTWRITEBYTECODE": "1"}
+    if kept_in != "source":
+        environment[kept_in] = str(tmp_path / "kept")
+    call = _CALL.format(package=package.name)
+    assert _run(call, package.parent, **environment) == ("9.0", "INFO")
+    assert _run(call, package.parent, **environment) == ("9.0", "")
+    assert list(tmp_path.rglob("outer.outer-*.nbi"))
+    (package / "numbers.py").write_text("FACTOR = 4.0\n")
+    assert _run(call, package.parent, **environment)[0] == "12.0"
+    function = package / "inner" / "function.py"
+    function.write_text(function.read_text().replace("1.0", "2.0"))
+    assert _run(call, package.parent, **environment)[0] == "16.0"
+
+
+def test_an_edit_in_the_formula_of_a_tyre_counts(tmp_path: Path) -> None:
+    shutil.copytree(_PACKAGE, tmp_path / _PACKAGE.name, ignore=shutil.ignore_patterns("__pycache__"))
+    tyre = next((resources.models_dir() / "tyres").glob("*.tir"))
+    call = (
+        "from activesteer.tyre import load_tir\n"
+        "from activesteer.tyre.kernels.magic_formula import slip_stiffnesses\n"
+        f"print(slip_stiffnesses(load_tir({str(tyre)!r}).array, 4000.0, 0.0, 2.2e5, 1.0)[1])"
+    )
+    before, _ = _run(call, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "kept"))
+    edited = tmp_path / _PACKAGE.name / "tyre" / "kernels" / "pure_slip.py"
+    text = edited.read_text()
+    head, name, body = text.partition("def cornering_stiffness(")
+    assert name
+    edited.write_text(head + name + body.replace("return ", "return 2.0 * ", 1))
+    after, _ = _run(call, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "kept"))
+    assert float(after) == pytest.approx(2.0 * float(before))
+
+
+def test_another_version_of_the_engine_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = _PACKAGE / "vehicle" / "native_forces.py"
+    before = compilation.content_key(source)
+    assert compilation.content_key(source) == before
+    assert "mujoco" in compilation._versions()
+    assert "numba" in compilation._versions()
+    monkeypatch.setattr(compilation, "_versions", lambda: "others")
+    assert compilation.content_key(source) != before
+
+
+def test_without_a_folder_that_can_be_written_it_runs_and_says_so_once(package: Path, tmp_path: Path) -> None:
+    for folder in (package, package / "inner"):
+        (folder / "__pycache__").write_text("")
+    (tmp_path / "file").write_text("")
+    nowhere = str(tmp_path / "file" / "folder")
+    printed, logged = _run(
+        _CALL.format(package=package.name),
+        package.parent,
+        NUMBA_CACHE_DIR=nowhere,
+        XDG_CACHE_HOME=nowhere,
+        HOME=nowhere,
+    )
+    assert printed == "9.0"
+    assert logged.split() == ["WARNING"]
+
+
+def test_only_some_states_of_a_function_are_kept(package: Path, tmp_path: Path) -> None:
+    for factor in range(compilation._KEPT + 2):
+        (package / "numbers.py").write_text(f"FACTOR = {factor}.0\n")
+        _run(_CALL.format(package=package.name), package.parent, NUMBA_CACHE_DIR=str(tmp_path / "kept"))
+    assert len(list(tmp_path.rglob("outer.outer-*.nbi"))) == compilation._KEPT
+    assert len(list(tmp_path.rglob("outer.outer-*.nbc"))) == compilation._KEPT
+
+
+def test_all_native_code_of_the_package_is_made_in_one_place() -> None:
+    words = re.compile(r"\b(njit|jit|cfunc|guvectorize|vectorize)\b")
+    found = [file for file in _PACKAGE.rglob("*.py") if words.search(file.read_text())]
+    assert found == [_PACKAGE / "compilation.py"]
