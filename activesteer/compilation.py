@@ -39,7 +39,7 @@ def compiled(function: Callable[..., Any]) -> Any:
 
     Division by zero gives what IEEE 754 says, as in numpy; it does not raise.
     """
-    dispatcher = njit(error_model="numpy")(function)
+    dispatcher: Any = njit(error_model="numpy")(function)
     if isinstance(dispatcher, Dispatcher):  # not so where numba is switched off
         dispatcher._cache = _cache_of(function)
     return dispatcher
@@ -59,7 +59,7 @@ def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[C
     """
 
     def decorate(function: Callable[..., Any]) -> CFunc:
-        callback = CFunc(function, (arguments, result), locals={}, options={"error_model": "numpy"})
+        callback: Any = CFunc(function, (arguments, result), locals={}, options={"error_model": "numpy"})
         callback._cache = _cache_of(function)
         callback.compile()
         return callback
