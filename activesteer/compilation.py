@@ -22,10 +22,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
-from numba import njit, types
+from numba import config, njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.ccallback import CFunc
-from numba.core.dispatcher import Dispatcher
 
 _VERSIONS: Final = ("numba", "llvmlite", "numpy", "mujoco")
 _KEPT: Final = 4
@@ -40,7 +39,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     Division by zero gives what IEEE 754 says, as in numpy; it does not raise.
     """
     dispatcher: Any = njit(error_model="numpy")(function)
-    if isinstance(dispatcher, Dispatcher):  # not so where numba is switched off
+    if not config.DISABLE_JIT:
         dispatcher._cache = _cache_of(function)
     return dispatcher
 
