@@ -22,7 +22,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
-from numba import config, njit, types
+from numba import njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.ccallback import CFunc
 
@@ -39,7 +39,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     Division by zero gives what IEEE 754 says, as in numpy; it does not raise.
     """
     dispatcher: Any = njit(error_model="numpy")(function)
-    if not config.DISABLE_JIT:
+    if hasattr(dispatcher, "enable_caching"):  # a plain function where numba is switched off
         dispatcher._cache = _cache_of(function)
     return dispatcher
 
