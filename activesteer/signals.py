@@ -5,6 +5,7 @@ They are named tuples because they are made every millisecond: a frozen dataclas
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -45,22 +46,24 @@ class Reference(NamedTuple):
     """What the manoeuvre asks of the driver at one instant.
 
     Attributes:
-        steering_wheel_rad: Steering wheel angle asked for [rad], left positive.
-        speed_mps: Speed to hold [m/s].
-        brake: Brake pedal position, 0 to 1.
-        hold_speed: Whether the drive holds `speed_mps`; where False the car coasts.
-        curvature_1pm: Curvature to drive [1/m], left positive; where given, the driver finds the steering wheel angle.
-        rack_m: Rack position asked for [m], positive steers left; where given, it stands for the steering wheel angle.
+        steering_wheel_demand_rad: Steering wheel angle asked for [rad], left positive.
+        speed_demand_mps: Speed to hold [m/s].
+        brake_pedal: Brake pedal position, 0 to 1.
+        hold_speed: Whether the drive holds `speed_demand_mps`; where False the car coasts.
+        curvature_demand_1pm: Curvature to drive [1/m], left positive; where given, the driver finds the
+            steering wheel angle.
+        rack_demand_m: Rack position asked for [m], positive steers left; where given, it stands for the steering wheel
+            angle.
         wheel_torques: Torques of the wheels; where given, they stand for drive and brake.
         path: Path of the centre of gravity to follow; where given, the driver finds the steering wheel angle.
     """
 
-    steering_wheel_rad: float
-    speed_mps: float
-    brake: float
+    steering_wheel_demand_rad: float
+    speed_demand_mps: float
+    brake_pedal: float
     hold_speed: bool
-    curvature_1pm: float | None = None
-    rack_m: float | None = None
+    curvature_demand_1pm: float | None = None
+    rack_demand_m: float | None = None
     wheel_torques: WheelTorques | None = None
     path: Path | None = None
 
@@ -69,20 +72,21 @@ class DriverCommand(NamedTuple):
     """What the driver does.
 
     Attributes:
-        steering_wheel_rad: Steering wheel angle demanded [rad], left positive.
-        front_steer_rad: The same at the road wheel: divided by the overall steering ratio [rad].
-        drive_torque_Nm: Torque at the driven wheels together [Nm]; negative is engine braking.
-        brake: Brake pedal position, 0 to 1.
-        limited: Whether the lock of the steering or a limit of the engine is active.
+        steering_wheel_demand_rad: Steering wheel angle demanded [rad], left positive.
+        drive_torque_demand_Nm: Torque at the driven wheels together [Nm]; negative is engine braking.
+        brake_pedal: Brake pedal position, 0 to 1.
+        saturated: Whether the lock of the steering or a limit of the engine is active.
         wheel_torques: Torques of the wheels; where given, they stand for drive and brake.
+        front_steer_demand_rad: Steering wheel angle demanded, divided by the overall steering ratio: the angle at the
+            road wheel [rad]. A driver of one's own leaves it out; the simulation fills it in.
     """
 
-    steering_wheel_rad: float
-    front_steer_rad: float
-    drive_torque_Nm: float
-    brake: float
-    limited: bool = False
+    steering_wheel_demand_rad: float = 0.0
+    drive_torque_demand_Nm: float = 0.0
+    brake_pedal: float = 0.0
+    saturated: bool = False
     wheel_torques: WheelTorques | None = None
+    front_steer_demand_rad: float = math.nan
 
 
 class Measurement(NamedTuple):
@@ -135,16 +139,16 @@ class SteerCommand(NamedTuple):
     """What a controller asks of the steering actuators, with its intermediate results for the recording.
 
     Attributes:
-        rear_steer_rad: Rear wheel angle demanded [rad], left positive.
-        superposition_rad: Angle to add at the front road wheels [rad], left positive.
+        rear_steer_demand_rad: Rear wheel angle demanded [rad], left positive.
+        superposition_demand_rad: Angle to add at the front road wheels [rad], left positive.
         yaw_rate_desired_radps: Yaw rate that the controller steers for [rad/s].
         prediction_rad: Feed-forward part [rad].
         correction_rad: Feedback part [rad].
         saturated: Whether a limit of the controller is active.
     """
 
-    rear_steer_rad: float = 0.0
-    superposition_rad: float = 0.0
+    rear_steer_demand_rad: float = 0.0
+    superposition_demand_rad: float = 0.0
     yaw_rate_desired_radps: float = 0.0
     prediction_rad: float = 0.0
     correction_rad: float = 0.0

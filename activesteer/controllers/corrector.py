@@ -100,12 +100,12 @@ class Corrector:
         self._integral_rad = 0.0
         self._filtered_radps: float | None = None
 
-    def step(self, error_radps: float, limited: int = 0) -> float:
+    def step(self, error_radps: float, saturated: int = 0) -> float:
         """Signed angle of the corrector; of the sign of the error where P acts alone.
 
         Args:
             error_radps: Desired less actual yaw rate [rad/s].
-            limited: Whether a limit is active: 1 where a larger angle would be cut off, -1 where a smaller one would
+            saturated: Whether a limit is active: 1 where a larger angle would be cut off, -1 where a smaller one would
                 be, 0 elsewhere. The integral then moves the other way only.
 
         Returns:
@@ -114,7 +114,7 @@ class Corrector:
         activity = tolerance(error_radps, self._off_radps, self._full_radps)
         angle = self._proportional_gain_s * error_radps
         if self._integral_share:
-            if limited * error_radps <= 0.0:
+            if saturated * error_radps <= 0.0:
                 self._integral_rad += self._integral_share * error_radps * activity
             angle += self._integral_rad
         if self._derivative_share_s:

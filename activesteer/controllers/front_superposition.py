@@ -23,7 +23,7 @@ class FrontSuperposition:
         self._desired = desired
         self._corrector = Corrector(parameters.corrector, timestep_s)
         self._limit_rad = parameters.limit_rad
-        self._limited = 0
+        self._saturated = 0
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> FrontSuperposition:
@@ -43,17 +43,17 @@ class FrontSuperposition:
         Returns:
             The angle to add at the front wheels.
         """
-        desired = self._desired.step(command.front_steer_rad, measurement.speed_mps)
+        desired = self._desired.step(command.front_steer_demand_rad, measurement.speed_mps)
         if measurement.speed_mps < MIN_SPEED_MPS:
             self._corrector.reset()
-            self._limited = 0
+            self._saturated = 0
             return SteerCommand(yaw_rate_desired_radps=desired)
         yaw_rate = measurement.yaw_rate_radps
-        feedback = self._corrector.step(desired - yaw_rate, self._limited)
+        feedback = self._corrector.step(desired - yaw_rate, self._saturated)
         angle = correction = decide(yaw_rate, feedback).front * abs(feedback)
-        self._limited = 0
+        self._saturated = 0
         if angle > self._limit_rad:
-            angle, self._limited = self._limit_rad, 1
+            angle, self._saturated = self._limit_rad, 1
         elif angle < -self._limit_rad:
-            angle, self._limited = -self._limit_rad, -1
-        return SteerCommand(0.0, angle, desired, 0.0, correction, self._limited != 0)
+            angle, self._saturated = -self._limit_rad, -1
+        return SteerCommand(0.0, angle, desired, 0.0, correction, self._saturated != 0)

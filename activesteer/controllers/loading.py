@@ -146,7 +146,10 @@ def _told(error: Exception) -> str:
 def is_sane(steer: SteerCommand) -> bool:
     """Whether both angles are finite and within reason; quick, because it is asked every step."""
     try:
-        return -_MOST_RAD <= steer.rear_steer_rad <= _MOST_RAD and -_MOST_RAD <= steer.superposition_rad <= _MOST_RAD
+        return (
+            -_MOST_RAD <= steer.rear_steer_demand_rad <= _MOST_RAD
+            and -_MOST_RAD <= steer.superposition_demand_rad <= _MOST_RAD
+        )
     except (TypeError, ValueError):  # no number, or an array of several
         return False
 
@@ -170,7 +173,7 @@ def check_command(steer: object, name: str) -> None:
             raise ControllerError(msg)
     if is_sane(steer):
         return
-    for key in ("rear_steer_rad", "superposition_rad"):
+    for key in ("rear_steer_demand_rad", "superposition_demand_rad"):
         value = getattr(steer, key)
         if not -_MOST_RAD <= value <= _MOST_RAD:
             msg = (

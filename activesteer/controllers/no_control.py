@@ -23,5 +23,5 @@ class NoControl:
 
     def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:
         """No angles; the desired yaw rate for the recording."""
-        desired = self._desired.step(command.front_steer_rad, measurement.speed_mps)
+        desired = self._desired.step(command.front_steer_demand_rad, measurement.speed_mps)
         return SteerCommand(yaw_rate_desired_radps=desired)

@@ -71,7 +71,7 @@ class RearSteer:
         self._corrector = Corrector(parameters.corrector, timestep_s)
         self._prediction_gain = parameters.prediction_gain
         self._limit_rad = parameters.limit_rad
-        self._limited = 0
+        self._saturated = 0
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> RearSteer:
@@ -95,20 +95,20 @@ class RearSteer:
             The rear angle demanded, with its parts.
         """
         speed = measurement.speed_mps
-        desired = self._desired.step(command.front_steer_rad, speed)
+        desired = self._desired.step(command.front_steer_demand_rad, speed)
         if speed < MIN_SPEED_MPS:
             self._corrector.reset()
-            self._limited = 0
+            self._saturated = 0
             return SteerCommand(yaw_rate_desired_radps=desired)
         yaw_rate = measurement.yaw_rate_radps
-        prediction = self._prediction_gain * self._prediction.step(command.front_steer_rad, speed)
+        prediction = self._prediction_gain * self._prediction.step(command.front_steer_demand_rad, speed)
         # The rear wheels turn against the corrector's angle, and so does their limit.
-        feedback = self._corrector.step(desired - yaw_rate, -self._limited)
+        feedback = self._corrector.step(desired - yaw_rate, -self._saturated)
         correction = decide(yaw_rate, feedback).rear * abs(feedback)
         angle = prediction + correction
-        self._limited = 0
+        self._saturated = 0
         if angle > self._limit_rad:
-            angle, self._limited = self._limit_rad, 1
+            angle, self._saturated = self._limit_rad, 1
         elif angle < -self._limit_rad:
-            angle, self._limited = -self._limit_rad, -1
-        return SteerCommand(angle, 0.0, desired, prediction, correction, self._limited != 0)
+            angle, self._saturated = -self._limit_rad, -1
+        return SteerCommand(angle, 0.0, desired, prediction, correction, self._saturated != 0)

@@ -45,13 +45,13 @@ class ConstantRadiusDriver:
         Returns:
             The command.
         """
-        curvature = reference.curvature_1pm
+        curvature = reference.curvature_demand_1pm
         if curvature is None:
             return self.robot.step(reference, measurement, motion)
         robot = self.robot
         angle = robot.steering_ratio * self._wheelbase_m * (curvature + self._correction_1pm)
         command = robot.turn(angle, reference, measurement)
-        if command.steering_wheel_rad == angle and measurement.speed_mps > _LEAST_SPEED_MPS:
+        if command.steering_wheel_demand_rad == angle and measurement.speed_mps > _LEAST_SPEED_MPS:
             error = curvature - measurement.yaw_rate_radps / measurement.speed_mps
             self._correction_1pm += self._share * error
         return command

@@ -56,12 +56,12 @@ class OpenLoopDriver:
         Raises:
             ManeuverError: a rack position is asked for and the car has no rack.
         """
-        if reference.rack_m is None:
-            return self.turn(reference.steering_wheel_rad, reference, measurement)
+        if reference.rack_demand_m is None:
+            return self.turn(reference.steering_wheel_demand_rad, reference, measurement)
         if self._rack_per_steering_wheel_m is None:
             msg = "steering.rack_m: the car has no rack that its steering wheel drives; give steering_wheel_rad"
             raise ManeuverError(msg)
-        return self.turn(reference.rack_m / self._rack_per_steering_wheel_m, reference, measurement)
+        return self.turn(reference.rack_demand_m / self._rack_per_steering_wheel_m, reference, measurement)
 
     def turn(self, angle: float, reference: Reference, measurement: Measurement) -> DriverCommand:
         """The same with another steering wheel angle than that of the reference.
@@ -74,17 +74,17 @@ class OpenLoopDriver:
         Returns:
             The command.
         """
-        limited = False
+        saturated = False
         if angle > self._limit_rad:
-            angle, limited = self._limit_rad, True
+            angle, saturated = self._limit_rad, True
         elif angle < -self._limit_rad:
-            angle, limited = -self._limit_rad, True
+            angle, saturated = -self._limit_rad, True
         if reference.hold_speed:
-            torque = self.speed_hold.step(reference.speed_mps, measurement.speed_mps)
-            limited = limited or self.speed_hold.saturated
+            torque = self.speed_hold.step(reference.speed_demand_mps, measurement.speed_mps)
+            saturated = saturated or self.speed_hold.saturated
         else:
             self.speed_hold.reset()
             torque = 0.0
         return DriverCommand(
-            angle, angle / self.steering_ratio, torque, reference.brake, limited, reference.wheel_torques
+            angle, torque, reference.brake_pedal, saturated, reference.wheel_torques, angle / self.steering_ratio
         )

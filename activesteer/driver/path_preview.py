@@ -122,17 +122,17 @@ class PathPreviewDriver:
         self._steps += 1
         change = self._share * (self._decided_rad[0] - self._wheel_rad)
         most = self._most_change_rad
-        limited = True
+        saturated = True
         if change > most:
             change = most
         elif change < -most:
             change = -most
         else:
-            limited = False
+            saturated = False
         wheel = self._wheel_rad + change
         command = self.robot.turn(wheel, reference, measurement)
-        self._wheel_rad = command.steering_wheel_rad
-        return command._replace(limited=True) if limited else command
+        self._wheel_rad = command.steering_wheel_demand_rad
+        return command._replace(saturated=True) if saturated else command
 
     def _preview(self, speed_mps: float) -> _Preview:
         """The model's answers at a speed; kept, because a run has few speeds."""

@@ -41,6 +41,6 @@ class StandardDriver:
         """What the driver does now; see `Driver`."""
         if reference.path is not None:
             return self._path.step(reference, measurement, motion)
-        if reference.curvature_1pm is not None:
+        if reference.curvature_demand_1pm is not None:
             return self._constant_radius.step(reference, measurement, motion)
         return self._open_loop.step(reference, measurement, motion)

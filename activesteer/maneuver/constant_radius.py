@@ -58,4 +58,4 @@ class ConstantRadius(Maneuver):
         curvature = 0.5 * (1.0 - math.cos(math.pi * share)) / circle.radius_m
         rising_s = max(time_s - circle.entry_s, 0.0)
         speed = min(self.speed_mps + rising_s * circle.acceleration_mps2, circle.end_speed_mps)
-        return Reference(0.0, speed, 0.0, hold_speed=True, curvature_1pm=curvature)
+        return Reference(0.0, speed, 0.0, hold_speed=True, curvature_demand_1pm=curvature)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Final
 
 import numpy as np
@@ -19,18 +20,36 @@ A killed process loses less than two blocks, a second: the one that it fills, an
 POSE_INTERVAL_S: Final = 0.01
 """Time between two recorded poses of all bodies [s]."""
 
-CONTROL_CHANNELS: Final = (
-    Channel("front_steer_demand_rad", "rad", "the driver's demand at the road wheel", "control"),
-    Channel("drive_torque_demand_Nm", "Nm", "drive torque demanded, all wheels together", "control"),
-    Channel("brake_pedal", "", "brake pedal position, 0 to 1", "control"),
-    Channel("driver_limited", "", "1 where the steering is at its lock or the engine at its limit", "control"),
-    Channel("rear_steer_demand_rad", "rad", "rear angle that the controller demands", "control"),
-    Channel("superposition_demand_rad", "rad", "angle that the controller adds at the front wheels", "control"),
-    Channel("yaw_rate_desired_radps", "rad/s", "yaw rate that the controller steers for", "control"),
-    Channel("prediction_rad", "rad", "feed-forward part of the controller's angle", "control"),
-    Channel("correction_rad", "rad", "feedback part of the controller's angle", "control"),
-    Channel("controller_saturated", "", "1 where a limit of the controller is active", "control"),
-)
+_DRIVER_CHANNELS: Final = {
+    "front_steer_demand_rad": Channel(
+        "front_steer_demand_rad", "rad", "the driver's demand at the road wheel", "control"
+    ),
+    "drive_torque_demand_Nm": Channel(
+        "drive_torque_demand_Nm", "Nm", "drive torque demanded, all wheels together", "control"
+    ),
+    "brake_pedal": Channel("brake_pedal", "", "brake pedal position, 0 to 1", "control"),
+    "saturated": Channel(
+        "driver_saturated", "", "1 where the steering is at its lock or the engine at its limit", "control"
+    ),
+}
+"""Field of `DriverCommand` -> its channel."""
+_CONTROLLER_CHANNELS: Final = {
+    "rear_steer_demand_rad": Channel(
+        "rear_steer_demand_rad", "rad", "rear angle that the controller demands", "control"
+    ),
+    "superposition_demand_rad": Channel(
+        "superposition_demand_rad", "rad", "angle that the controller adds at the front wheels", "control"
+    ),
+    "yaw_rate_desired_radps": Channel(
+        "yaw_rate_desired_radps", "rad/s", "yaw rate that the controller steers for", "control"
+    ),
+    "prediction_rad": Channel("prediction_rad", "rad", "feed-forward part of the controller's angle", "control"),
+    "correction_rad": Channel("correction_rad", "rad", "feedback part of the controller's angle", "control"),
+    "saturated": Channel("controller_saturated", "", "1 where a limit of the controller is active", "control"),
+}
+"""Field of `SteerCommand` -> its channel."""
+CONTROL_CHANNELS: Final = (*_DRIVER_CHANNELS.values(), *_CONTROLLER_CHANNELS.values())
+_driver_row, _controller_row = attrgetter(*_DRIVER_CHANNELS), attrgetter(*_CONTROLLER_CHANNELS)
 
 
 class Recorder:
@@ -81,11 +100,7 @@ class Recorder:
         row = count - self._flushed
         for rows, live in self._copies:
             rows[row] = live
-        self._control[row] = (
-            command.front_steer_rad, command.drive_torque_Nm, command.brake, command.limited, steer.rear_steer_rad,
-            steer.superposition_rad, steer.yaw_rate_desired_radps, steer.prediction_rad, steer.correction_rad,
-            steer.saturated,
-        )  # fmt: skip
+        self._control[row] = (*_driver_row(command), *_controller_row(steer))
         if count % self._pose_every == 0:
             pose = count // self._pose_every
             self._positions[pose] = self._xpos

@@ -44,7 +44,7 @@ class StepMap:
         """The state after the step, as a difference from the reference."""
         self.local.write(x)
         steering_wheel, rear, added = (float(value) for value in u)
-        command = DriverCommand(steering_wheel, 0.0, self.torque_Nm + more_torque_Nm, 0.0)
+        command = DriverCommand(steering_wheel, self.torque_Nm + more_torque_Nm)
         self.vehicle.step(command, SteerCommand(rear, added))
         return self.local.read()
 

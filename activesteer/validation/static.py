@@ -58,7 +58,7 @@ def compare_static(vehicle: Vehicle, data: ReferenceData) -> list[Comparison]:
 
 def _rolling(vehicle: Vehicle, speed_mps: float) -> dict[str, float]:
     vehicle.start(speed_mps)
-    straight, nothing = DriverCommand(0.0, 0.0, 0.0, 0.0), SteerCommand()
+    straight, nothing = DriverCommand(), SteerCommand()
     with engine_warnings_held():
         for _ in range(round(_ROLLING_S / vehicle.timestep_s)):
             vehicle.step(straight, nothing)

@@ -212,18 +212,18 @@ class Vehicle:
             SimulationDiverged: the speed is not finite or beyond all reason.
         """
         ctrl = self._ctrl
-        ctrl[self._steering_wheel] = command.steering_wheel_rad
-        ctrl[self._superposition] = steer.superposition_rad * self._ratio
+        ctrl[self._steering_wheel] = command.steering_wheel_demand_rad
+        ctrl[self._superposition] = steer.superposition_demand_rad * self._ratio
         left, right = self._rear
-        ctrl[left] = ctrl[right] = steer.rear_steer_rad
-        if command.drive_torque_Nm != self._drive_torque_Nm:
-            self._drive_torque_Nm = torque = command.drive_torque_Nm
+        ctrl[left] = ctrl[right] = steer.rear_steer_demand_rad
+        if command.drive_torque_demand_Nm != self._drive_torque_Nm:
+            self._drive_torque_Nm = torque = command.drive_torque_demand_Nm
             for index, share in self._drives:
                 ctrl[index] = share * torque
-        if command.brake != self._brake:
-            self._brake = command.brake
+        if command.brake_pedal != self._brake:
+            self._brake = command.brake_pedal
             for index, torque in self._brakes:
-                ctrl[index] = command.brake * torque
+                ctrl[index] = command.brake_pedal * torque
         if command.wheel_torques is not None:
             self._apply_torques(command.wheel_torques)
         mujoco.mj_step(self.model, self.data)

@@ -76,8 +76,8 @@ def test_two_files_with_a_class_of_the_same_name_are_answered(call, controller):
     ("body", "text"),
     [
         ("return None if self.steps > 1000 else SteerCommand()", "step returned None"),
-        ("return SteerCommand(float('nan') if self.steps > 1000 else 0.0)", "rear_steer_rad = nan"),
-        ("return SteerCommand(superposition_rad=3.0 if self.steps > 1000 else 0.0)", "radians, not degrees"),
+        ("return SteerCommand(float('nan') if self.steps > 1000 else 0.0)", "rear_steer_demand_rad = nan"),
+        ("return SteerCommand(superposition_demand_rad=3.0 if self.steps > 1000 else 0.0)", "radians, not degrees"),
         (
             "return SteerCommand(1.0 / (1001 - self.steps) if self.steps > 1000 else 0.0)",
             "step raised ZeroDivisionError",

@@ -173,7 +173,7 @@ def _stays(vehicle: Vehicle) -> Iterator[Finding]:
     try:
         with engine_warnings_held():
             for _ in range(_STEPS):
-                vehicle.step(DriverCommand(0.0, 0.0, 0.0, 0.0), SteerCommand())
+                vehicle.step(DriverCommand(), SteerCommand())
         speed = float(np.abs(vehicle.data.qvel[:6]).max())
         warned = int(sum(warning.number for warning in vehicle.data.warning))
     except SimulationDiverged:

@@ -35,7 +35,7 @@ def setup(*, gains: ControllerParameters | None = None, mu: float = 1.0, **car: 
 
 def steering(front_steer_rad: float) -> DriverCommand:
     """A driver who does nothing but steer."""
-    return DriverCommand(16.0 * front_steer_rad, front_steer_rad, 0.0, 0.0)
+    return DriverCommand(16.0 * front_steer_rad, front_steer_demand_rad=front_steer_rad)
 
 
 def measured(yaw_rate_radps: float, speed_mps: float = 25.0) -> Measurement:

@@ -118,9 +118,9 @@ def test_integral_does_not_wind_up_at_a_limit_but_comes_back_from_it(side):
     block = corrector(proportional_gain_s=0.0, integral_gain=2.0)
     before = block.step(side * 0.06)
     for _ in range(1000):
-        assert block.step(side * 0.06, limited=side) == before
+        assert block.step(side * 0.06, saturated=side) == before
     # An error to the other side takes the angle away from the limit: that must work while the limit is active.
-    after = [block.step(-side * 0.06, limited=side) for _ in range(3)]
+    after = [block.step(-side * 0.06, saturated=side) for _ in range(3)]
     assert side * before > side * after[0] > side * after[1] > side * after[2]
 
 

@@ -38,8 +38,8 @@ def controller(**corrector: float) -> FrontSuperposition:
 def test_superposition_turns_the_front_wheels_by_the_decision_table(front, yaw_rate, sign):
     block = controller(proportional_gain_s=0.05)
     steer = held(block, steering(front), measured(yaw_rate))
-    assert math.copysign(1, steer.superposition_rad) == sign
-    assert steer.rear_steer_rad == steer.prediction_rad == 0.0
+    assert math.copysign(1, steer.superposition_demand_rad) == sign
+    assert steer.rear_steer_demand_rad == steer.prediction_rad == 0.0
 
 
 def test_superposed_angle_is_gain_times_tolerated_error():
@@ -47,8 +47,8 @@ def test_superposed_angle_is_gain_times_tolerated_error():
     for count in range(200):
         steer = block.step(steering(0.01 * math.sin(0.02 * count)), measured(0.03))
         error = steer.yaw_rate_desired_radps - 0.03
-        assert steer.superposition_rad == pytest.approx(0.1 * error * tolerance(error, 0.01, 0.06), rel=1e-12)
-        assert steer.correction_rad == steer.superposition_rad
+        assert steer.superposition_demand_rad == pytest.approx(0.1 * error * tolerance(error, 0.01, 0.06), rel=1e-12)
+        assert steer.correction_rad == steer.superposition_demand_rad
 
 
 def test_front_and_rear_answer_the_same_error_with_opposite_angles(rng):
@@ -58,7 +58,7 @@ def test_front_and_rear_answer_the_same_error_with_opposite_angles(rng):
     for angle, yaw_rate in 0.1 * rng.standard_normal((500, 2)):
         ahead = front.step(steering(angle), measured(yaw_rate))
         behind = rear.step(steering(angle), measured(yaw_rate))
-        assert ahead.superposition_rad == -behind.rear_steer_rad
+        assert ahead.superposition_demand_rad == -behind.rear_steer_demand_rad
         assert ahead.saturated == behind.saturated
         saturated += ahead.saturated
     assert 0 < saturated < 500
@@ -68,7 +68,7 @@ def test_front_and_rear_answer_the_same_error_with_opposite_angles(rng):
 def test_angle_stops_at_the_limit_and_says_so(side):
     block = controller(proportional_gain_s=1.0)
     steer = block.step(steering(0.0), measured(side * 0.5))
-    assert steer.superposition_rad == -side * LIMIT_RAD
+    assert steer.superposition_demand_rad == -side * LIMIT_RAD
     assert steer.saturated is True
     assert block.step(steering(0.0), measured(side * 0.04)).saturated is False
 
@@ -87,9 +87,9 @@ def test_superposition_rests_below_three_metres_per_second():
     block = controller(proportional_gain_s=1.0)
     for speed_mps in (2.9, 0.0, -5.0):
         steer = block.step(steering(0.3), measured(0.5, speed_mps))
-        assert steer.superposition_rad == steer.correction_rad == 0.0
+        assert steer.superposition_demand_rad == steer.correction_rad == 0.0
         assert not steer.saturated
-    assert block.step(steering(0.3), measured(0.5, 3.1)).superposition_rad != 0.0
+    assert block.step(steering(0.3), measured(0.5, 3.1)).superposition_demand_rad != 0.0
 
 
 def test_no_control_turns_nothing_and_tells_the_same_desired_yaw_rate():

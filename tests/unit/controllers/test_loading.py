@@ -49,11 +49,11 @@ def test_users_controller_is_made_and_asked(write):
         """
         class Mine:
             def step(self, command, measurement):
-                return SteerCommand(rear_steer_rad=-0.1 * command.front_steer_rad)
+                return SteerCommand(rear_steer_demand_rad=-0.1 * command.front_steer_demand_rad)
         """
     )
     controller = load_controller(f"{path}:Mine", setup())
-    assert controller.step(steering(0.2), measured(0.0)) == SteerCommand(rear_steer_rad=-0.1 * 0.2)
+    assert controller.step(steering(0.2), measured(0.0)) == SteerCommand(rear_steer_demand_rad=-0.1 * 0.2)
 
 
 def test_users_controller_may_ask_for_the_car(write):
@@ -161,13 +161,16 @@ def test_class_without_step_is_answered(write):
         ("None", r"step returned None; an activesteer\.SteerCommand is needed"),
         ("0.1", r"step returned 0\.1; an activesteer\.SteerCommand is needed"),
         ("(0.1, 0.0, 0.0, 0.0, 0.0, False)", r"step returned \(0\.1, .*SteerCommand is needed"),
-        ("SteerCommand(math.nan)", r"step returned rear_steer_rad = nan; a finite angle of at most 1 rad"),
-        ("SteerCommand(math.inf)", r"step returned rear_steer_rad = inf; a finite angle"),
-        ("SteerCommand(3.0)", r"step returned rear_steer_rad = 3\.0; .*radians, not degrees"),
-        ("SteerCommand(superposition_rad=-2.5)", r"step returned superposition_rad = -2\.5; .*radians, not degrees"),
-        ("SteerCommand('left')", r"step returned rear_steer_rad = 'left'; a number is needed"),
-        ("SteerCommand(None)", r"step returned rear_steer_rad = None; a number is needed"),
-        ("SteerCommand(np.zeros(2))", r"step returned rear_steer_rad = array.*; a number is needed"),
+        ("SteerCommand(math.nan)", r"step returned rear_steer_demand_rad = nan; a finite angle of at most 1 rad"),
+        ("SteerCommand(math.inf)", r"step returned rear_steer_demand_rad = inf; a finite angle"),
+        ("SteerCommand(3.0)", r"step returned rear_steer_demand_rad = 3\.0; .*radians, not degrees"),
+        (
+            "SteerCommand(superposition_demand_rad=-2.5)",
+            r"step returned superposition_demand_rad = -2\.5; .*radians, not degrees",
+        ),
+        ("SteerCommand('left')", r"step returned rear_steer_demand_rad = 'left'; a number is needed"),
+        ("SteerCommand(None)", r"step returned rear_steer_demand_rad = None; a number is needed"),
+        ("SteerCommand(np.zeros(2))", r"step returned rear_steer_demand_rad = array.*; a number is needed"),
         ("SteerCommand(0.0, 0.0, None)", r"step returned yaw_rate_desired_radps = None; a number is needed"),
         ("SteerCommand(saturated='no')", r"step returned saturated = 'no'; a number is needed"),
         ("1 / 0", r"step raised ZeroDivisionError: .*\(mine\.py, line 7\)"),
@@ -205,10 +208,10 @@ def test_controllers_are_told_what_sensors_measure_and_nothing_else():
     }
     assert set(Measurement._fields) == allowed
     assert set(DriverCommand._fields) == {
-        "steering_wheel_rad",
-        "front_steer_rad",
-        "drive_torque_Nm",
-        "brake",
-        "limited",
+        "steering_wheel_demand_rad",
+        "front_steer_demand_rad",
+        "drive_torque_demand_Nm",
+        "brake_pedal",
+        "saturated",
         "wheel_torques",
     }

@@ -86,8 +86,8 @@ def test_single_track_car_with_prediction_does_not_slip_sideways():
 def test_correction_turns_the_rear_wheels_by_the_decision_table(front, yaw_rate, sign):
     block = controller(proportional_gain_s=0.05)
     steer = held(block, steering(front), measured(yaw_rate))
-    assert math.copysign(1, steer.rear_steer_rad) == sign
-    assert steer.superposition_rad == 0.0
+    assert math.copysign(1, steer.rear_steer_demand_rad) == sign
+    assert steer.superposition_demand_rad == 0.0
     assert not steer.saturated
 
 
@@ -101,18 +101,18 @@ def test_rear_angle_is_prediction_less_gain_times_tolerated_error():
         expected = 0.6 * prediction.step(front, 25.0)
         assert steer.prediction_rad == pytest.approx(expected, rel=1e-12)
         assert steer.correction_rad == pytest.approx(-0.1 * error * tolerance(error, 0.01, 0.06), rel=1e-12)
-        assert steer.rear_steer_rad == pytest.approx(steer.prediction_rad + steer.correction_rad, rel=1e-12)
+        assert steer.rear_steer_demand_rad == pytest.approx(steer.prediction_rad + steer.correction_rad, rel=1e-12)
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_angle_stops_at_the_limit_and_says_so(side):
     block = controller(proportional_gain_s=1.0)
     steer = block.step(steering(0.0), measured(side * 0.5))
-    assert steer.rear_steer_rad == side * LIMIT_RAD
+    assert steer.rear_steer_demand_rad == side * LIMIT_RAD
     assert steer.saturated is True
     assert steer.correction_rad == pytest.approx(side * 0.5, rel=1e-12)
     steer = block.step(steering(0.0), measured(side * 0.04))
-    assert abs(steer.rear_steer_rad) < LIMIT_RAD
+    assert abs(steer.rear_steer_demand_rad) < LIMIT_RAD
     assert steer.saturated is False
 
 
@@ -133,23 +133,25 @@ def test_integral_can_leave_a_limit_that_the_prediction_holds():
     steer = held(block, steering(0.1), measured(0.5, speed_mps=5.0), steps=3000)
     assert steer.prediction_rad < -LIMIT_RAD
     assert steer.correction_rad > 0.1
-    assert steer.rear_steer_rad > -LIMIT_RAD
+    assert steer.rear_steer_demand_rad > -LIMIT_RAD
 
 
 def test_rear_steering_rests_below_three_metres_per_second():
     block = controller(prediction_gain=1.0, proportional_gain_s=1.0)
     for speed_mps in (2.9, 0.0, -5.0):
         steer = block.step(steering(0.3), measured(0.5, speed_mps))
-        assert steer.rear_steer_rad == steer.prediction_rad == steer.correction_rad == 0.0
+        assert steer.rear_steer_demand_rad == steer.prediction_rad == steer.correction_rad == 0.0
         assert not steer.saturated
-    assert block.step(steering(0.3), measured(0.5, 3.1)).rear_steer_rad != 0.0
+    assert block.step(steering(0.3), measured(0.5, 3.1)).rear_steer_demand_rad != 0.0
 
 
 def test_rest_clears_the_integral():
     block = controller(proportional_gain_s=0.0, integral_gain=1.0)
     used = held(block, steering(0.0), measured(0.3), steps=100)
     block.step(steering(0.0), measured(0.3, 1.0))
-    assert block.step(steering(0.0), measured(0.3)).rear_steer_rad == pytest.approx(used.rear_steer_rad / 100, rel=1e-9)
+    assert block.step(steering(0.0), measured(0.3)).rear_steer_demand_rad == pytest.approx(
+        used.rear_steer_demand_rad / 100, rel=1e-9
+    )
 
 
 def test_left_and_right_are_mirrored_to_the_bit(rng):
@@ -167,7 +169,7 @@ def test_car_that_does_as_asked_is_left_alone():
     block = controller(prediction_gain=0.0)
     wanted = 0.01 * MODEL.yaw_rate_gain(25.0)
     steer = held(block, steering(0.01), measured(wanted))
-    assert steer.rear_steer_rad == 0.0
+    assert steer.rear_steer_demand_rad == 0.0
 
 
 def test_gains_of_the_vehicle_file_are_used():
@@ -176,4 +178,4 @@ def test_gains_of_the_vehicle_file_are_used():
         gains, ars=replace(gains.ars, prediction_gain=0.0, corrector=CorrectorParameters(proportional_gain_s=0.02))
     )
     steer = RearSteer.from_vehicle(setup(gains=stronger)).step(steering(0.0), measured(0.4))
-    assert steer.rear_steer_rad == pytest.approx(0.02 * 0.4, rel=1e-12)
+    assert steer.rear_steer_demand_rad == pytest.approx(0.02 * 0.4, rel=1e-12)

@@ -29,14 +29,14 @@ def asked(curvature_1pm: float | None) -> Reference:
 @pytest.mark.parametrize("curvature_1pm", [0.01, -0.02])
 def test_first_angle_is_that_of_ackermann(curvature_1pm):
     command = driver().step(asked(curvature_1pm), turning(0.0), MOTION)
-    assert command.steering_wheel_rad == pytest.approx(RATIO * WHEELBASE_M * curvature_1pm)
+    assert command.steering_wheel_demand_rad == pytest.approx(RATIO * WHEELBASE_M * curvature_1pm)
 
 
 @pytest.mark.parametrize("curvature_1pm", [0.01, -0.02])
 def test_understeer_is_steered_away(curvature_1pm):
     block, driven = driver(), 0.0
     for _ in range(6000):
-        angle = block.step(asked(curvature_1pm), turning(driven), MOTION).steering_wheel_rad
+        angle = block.step(asked(curvature_1pm), turning(driven), MOTION).steering_wheel_demand_rad
         driven += (angle / RATIO / WHEELBASE_M / UNDERSTEER - driven) * STEP_S / 0.1
     assert driven == pytest.approx(curvature_1pm, rel=1e-3)
 
@@ -45,7 +45,7 @@ def test_nothing_is_integrated_at_the_stop_of_the_steering_wheel():
     block = driver()
     for _ in range(5000):
         block.step(asked(0.5), turning(0.0), MOTION)
-    assert block.step(asked(0.01), turning(0.01), MOTION).steering_wheel_rad < 0.2 * LOCK_RAD
+    assert block.step(asked(0.01), turning(0.01), MOTION).steering_wheel_demand_rad < 0.2 * LOCK_RAD
 
 
 def test_car_at_rest_gives_no_correction():
@@ -53,8 +53,8 @@ def test_car_at_rest_gives_no_correction():
     for _ in range(5000):
         block.step(asked(0.01), turning(0.0, speed_mps=0.0), MOTION)
     command = block.step(asked(0.01), turning(0.0, speed_mps=0.0), MOTION)
-    assert command.steering_wheel_rad == pytest.approx(RATIO * WHEELBASE_M * 0.01)
+    assert command.steering_wheel_demand_rad == pytest.approx(RATIO * WHEELBASE_M * 0.01)
 
 
 def test_without_a_curvature_the_angle_asked_for_is_turned():
-    assert driver().step(asked(None), turning(0.0), MOTION).steering_wheel_rad == 0.5
+    assert driver().step(asked(None), turning(0.0), MOTION).steering_wheel_demand_rad == 0.5

@@ -75,26 +75,26 @@ def test_reset_forgets_the_trim():
 
 def test_driver_turns_the_steering_wheel_as_asked():
     command = driver().step(Reference(0.8, 20.0, 0.0, True), at(20.0), MOTION)
-    assert command.steering_wheel_rad == 0.8
-    assert command.front_steer_rad == pytest.approx(0.05)
-    assert command.brake == 0.0
+    assert command.steering_wheel_demand_rad == 0.8
+    assert command.front_steer_demand_rad == pytest.approx(0.05)
+    assert command.brake_pedal == 0.0
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_steering_wheel_stops_at_its_lock(side):
     command = driver().step(Reference(side * 9.0, 20.0, 0.0, True), at(20.0), MOTION)
-    assert command.steering_wheel_rad == side * 8.0
-    assert command.front_steer_rad == side * 0.5
-    assert command.limited
-    assert not driver().step(Reference(side * 7.0, 20.0, 0.0, True), at(20.0), MOTION).limited
+    assert command.steering_wheel_demand_rad == side * 8.0
+    assert command.front_steer_demand_rad == side * 0.5
+    assert command.saturated
+    assert not driver().step(Reference(side * 7.0, 20.0, 0.0, True), at(20.0), MOTION).saturated
 
 
 def test_driver_holds_speed_only_where_asked_and_presses_the_brake():
     asked = driver()
-    assert asked.step(Reference(0.0, 21.0, 0.0, True), at(20.0), MOTION).drive_torque_Nm > 0.0
+    assert asked.step(Reference(0.0, 21.0, 0.0, True), at(20.0), MOTION).drive_torque_demand_Nm > 0.0
     command = asked.step(Reference(0.0, 21.0, 0.6, False), at(20.0), MOTION)
-    assert command.drive_torque_Nm == 0.0
-    assert command.brake == 0.6
+    assert command.drive_torque_demand_Nm == 0.0
+    assert command.brake_pedal == 0.6
 
 
 def test_driver_starts_anew_after_braking():
@@ -103,7 +103,10 @@ def test_driver_starts_anew_after_braking():
         used.step(Reference(0.0, 21.0, 0.0, True), at(20.5), MOTION)
     used.step(Reference(0.0, 21.0, 0.6, False), at(20.0), MOTION)
     held = Reference(0.0, 20.0, 0.0, True)
-    assert used.step(held, at(19.9), MOTION).drive_torque_Nm == driver().step(held, at(19.9), MOTION).drive_torque_Nm
+    assert (
+        used.step(held, at(19.9), MOTION).drive_torque_demand_Nm
+        == driver().step(held, at(19.9), MOTION).drive_torque_demand_Nm
+    )
 
 
 def test_reversing_car_is_driven_backwards_and_braked_forwards_by_the_engine():

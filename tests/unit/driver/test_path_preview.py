@@ -42,7 +42,7 @@ def command_of(block: PathPreviewDriver, motion: Motion, path: Path = STRAIGHT) 
 
 def answer_to(block: PathPreviewDriver, motion: Motion, seconds: float) -> list[float]:
     """Steering wheel angles while the driver sees the same all the time."""
-    return [command_of(block, motion).steering_wheel_rad for _ in range(round(seconds / TIMESTEP_S))]
+    return [command_of(block, motion).steering_wheel_demand_rad for _ in range(round(seconds / TIMESTEP_S))]
 
 
 def drive(path: Path, speed_mps: float, seconds: float, parameters: DriverParameters | None = None) -> np.ndarray:
@@ -52,7 +52,7 @@ def drive(path: Path, speed_mps: float, seconds: float, parameters: DriverParame
     state, x, y, yaw, rows = np.zeros(2), 0.0, 0.0, 0.0, []
     for _ in range(round(seconds / TIMESTEP_S)):
         lateral = speed_mps * math.tan(state[1])
-        wheel = command_of(block, Motion(x, y, yaw, speed_mps, lateral, state[0]), path).steering_wheel_rad
+        wheel = command_of(block, Motion(x, y, yaw, speed_mps, lateral, state[0]), path).steering_wheel_demand_rad
         x += TIMESTEP_S * (speed_mps * math.cos(yaw) - lateral * math.sin(yaw))
         y += TIMESTEP_S * (speed_mps * math.sin(yaw) + lateral * math.cos(yaw))
         yaw += TIMESTEP_S * state[0]
@@ -89,7 +89,7 @@ def test_the_rate_limit_is_kept_and_told() -> None:
     block = driver(parameters=known)
     angles = answer_to(block, seen(y_m=5.0), 0.5)
     assert np.abs(np.diff(angles)).max() == pytest.approx(2.0 * TIMESTEP_S)
-    assert command_of(block, seen(y_m=5.0)).limited
+    assert command_of(block, seen(y_m=5.0)).saturated
 
 
 def test_the_lock_is_kept() -> None:
@@ -116,5 +116,5 @@ def test_almost_at_rest_he_holds_the_wheel() -> None:
     block = driver()
     answer_to(block, seen(y_m=1.0), 1.0)
     slow = seen(y_m=-3.0, speed_mps=1.0)
-    held = command_of(block, slow).steering_wheel_rad
+    held = command_of(block, slow).steering_wheel_demand_rad
     assert answer_to(block, slow, 0.5)[-1] == pytest.approx(held, rel=1e-3)

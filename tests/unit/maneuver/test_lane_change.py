@@ -104,10 +104,10 @@ def test_driver_is_asked_for_speed_and_path_and_while_the_car_settles_for_speed_
     reference = maneuver.reference(3.0)
     assert reference.path is maneuver.course.path
     assert reference._replace(path=None) == maneuver.settling_reference()
-    assert reference.speed_mps == pytest.approx(80.0 / 3.6)
+    assert reference.speed_demand_mps == pytest.approx(80.0 / 3.6)
     assert reference.hold_speed
-    assert reference.steering_wheel_rad == 0.0
-    assert reference.curvature_1pm is None
+    assert reference.steering_wheel_demand_rad == 0.0
+    assert reference.curvature_demand_1pm is None
 
 
 def test_lanes_are_made_for_the_car_unless_the_file_says_otherwise():

@@ -27,7 +27,7 @@ def dwell(**keys: Any) -> SineWithDwell:
 
 
 def angles_deg(maneuver: SineWithDwell, times_s: Any) -> list[float]:
-    return [math.degrees(maneuver.reference(float(time_s)).steering_wheel_rad) for time_s in times_s]
+    return [math.degrees(maneuver.reference(float(time_s)).steering_wheel_demand_rad) for time_s in times_s]
 
 
 @pytest.mark.parametrize(("direction", "sign"), [("left", 1.0), ("right", -1.0)])

@@ -22,7 +22,7 @@ PROMISED = """
 AT_EACH_WHEEL = """
     tyre_fx_N tyre_fy_N tyre_fz_N tyre_mz_Nm slip_ratio slip_angle_rad inclination_rad wheel_speed_radps travel_m
 """
-COMMAND = DriverCommand(0.3, 0.02, 150.0, 0.25, limited=True)
+COMMAND = DriverCommand(0.3, 150.0, 0.25, saturated=True, front_steer_demand_rad=0.02)
 STEER = SteerCommand(-0.01, 0.003, 0.2, 0.004, -0.014, True)
 
 

@@ -88,7 +88,7 @@ def test_rear_hinges_stop_at_three_degrees(name: str, side: float) -> None:
 def test_the_commands_reach_their_actuators() -> None:
     vehicle = standing()
     ratio = vehicle.parameters.steering.ratio
-    vehicle.step(DriverCommand(0.3, 0.3 / ratio, 800.0, 0.25), SteerCommand(0.01, 0.02))
+    vehicle.step(DriverCommand(0.3, 800.0, 0.25), SteerCommand(0.01, 0.02))
     ctrl = vehicle.data.ctrl
     brakes = vehicle.parameters.brakes
     assert ctrl[actuator(vehicle, "steering_wheel")] == 0.3

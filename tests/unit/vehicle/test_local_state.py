@@ -22,7 +22,7 @@ def local() -> LocalState:
 
 
 def step(local: LocalState) -> None:
-    local.vehicle.step(DriverCommand(0.02, 0.0, 100.0, 0.0), SteerCommand(0.001, 0.0))
+    local.vehicle.step(DriverCommand(0.02, 100.0), SteerCommand(0.001, 0.0))
 
 
 def test_what_was_written_is_read(local, rng):
