@@ -191,6 +191,15 @@ class McapWriter:
         if poses:
             self._last_pose_ns = int(pose_ns[-1])
 
+    def flush(self) -> Path:
+        """Wait until all blocks are in the file; return its path.
+
+        Raises:
+            RecordingError: a block could not be written.
+        """
+        self._await(0)
+        return self.path
+
     def close(self, metadata: Mapping[str, object] | None = None) -> None:
         """Write what is known after the run, and end the file. Closing twice does nothing.
 

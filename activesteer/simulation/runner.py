@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.metrics import metrics
 from activesteer.controllers.loading import user_file
@@ -23,6 +23,10 @@ from activesteer.simulation.appearance import scene_of
 from activesteer.simulation.recorder import Recorder, channels_of
 from activesteer.simulation.simulation import Simulation
 from activesteer.version import __version__
+
+MAX_KEPT_VALUES: Final = 2**25
+"""Values of a run that stay in memory beside its file, 256 MiB: some three minutes. Those of a longer run are read from
+the file where they are needed, so that its memory does not grow with its length."""
 
 
 def simulate(
@@ -89,7 +93,8 @@ def run_scenario(
 
     Returns:
         The recording, with metrics; where the run cannot be evaluated, as when it is too short, there are none and
-        the metadata's `metrics_error` says why.
+        the metadata's `metrics_error` says why. That of a run too long for memory (`MAX_KEPT_VALUES`) reads from the
+        file, which holds most channels to 32 bit.
 
     Raises:
         ActiveSteerError: the run failed. What was recorded until then is in the file, and in the error's `recording`.
@@ -100,25 +105,20 @@ def run_scenario(
     failure: ActiveSteerError | None = None
     # Whatever else goes wrong, the writer ends its file, marked as incomplete.
     with context.writer(path) if path is not None else nullcontext() as writer:
-        recorder = Recorder(simulation.vehicle, simulation.steps, writer)
+        keep = writer is None or simulation.steps * len(context.channels) <= MAX_KEPT_VALUES
+        recorder = Recorder(simulation.vehicle, simulation.steps, writer, keep=keep)
         try:
             _drive(simulation, recorder, progress)
+            recorder.flush()
         except ActiveSteerError as error:
             failure = error
             outcome = {"complete": False, "error": f"{type(error).__name__}: {error}"}
+            recorder.flush(checked=False)
         except BaseException:
-            recorder.flush()
+            recorder.flush(checked=False)
             raise
-        time_s, values, poses = recorder.result()
-        recording = Recording(
-            recorder.channels,
-            time_s,
-            values,
-            poses=poses,
-            metadata=context.metadata | outcome,
-            attachments=context.files,
-            scene=context.scene,
-        )
+        recording = context.recording(recorder) if keep or writer is None else Recording.open(writer.flush())
+        recording.metadata |= outcome
         if failure is None:
             outcome |= _evaluate(recording)
         if writer is not None:
@@ -174,6 +174,13 @@ class RunContext(NamedTuple):
             metadata["course"] = course.describe()
         files = scenario.files | user_file(controller)
         return cls(channels_of(vehicle), vehicle.body_names, metadata, files, scene_of(vehicle.model))
+
+    def recording(self, recorder: Recorder) -> Recording:
+        """What a recorder that keeps all rows has taken."""
+        time_s, values, poses = recorder.result()
+        return Recording(
+            self.channels, time_s, values, poses=poses, metadata=self.metadata, attachments=self.files, scene=self.scene
+        )
 
     def writer(self, path: Path) -> McapWriter:
         """A file that rows can be written to.

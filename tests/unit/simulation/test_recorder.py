@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from activesteer.conventions import CORNERS
+from activesteer.errors import SimulationDiverged
 from activesteer.recording import McapWriter, Recording
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, SteerCommand
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S, CONTROL_CHANNELS, POSE_INTERVAL_S, Recorder, channels_of
+from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation
+from activesteer.vehicle.channels import ChannelMap
 
 BLOCK_ROWS = round(BLOCK_INTERVAL_S / 0.001)
 KEYS = {"settle_s": 0.0, "duration_s": 5.0, "steer.start_s": 0.01, "steer.steering_wheel_deg": 40}
@@ -147,3 +152,52 @@ def test_yaw_angle_of_a_recording_does_not_depend_on_the_one_before():
     simulated.restore_state(before)
     simulated.advance(3, recorder)
     assert np.abs(column(recorder, "yaw_rad")).max() < 0.1
+
+
+def test_file_of_a_run_is_the_same_where_only_a_block_stays_in_memory(tmp_path):
+    count = 2 * BLOCK_ROWS + 123
+    kept, dropped = simulation(), simulation()
+    for driven, keep in ((kept, True), (dropped, False)):
+        with McapWriter(tmp_path / f"{keep}.mcap", channels_of(driven.vehicle), driven.vehicle.body_names) as writer:
+            recorder = Recorder(driven.vehicle, 5000, writer, keep=keep)
+            driven.advance(count, recorder)
+            assert len(recorder._values) == (5000 if keep else BLOCK_ROWS)
+            recorder.flush()
+    assert (tmp_path / "True.mcap").read_bytes() == (tmp_path / "False.mcap").read_bytes()
+
+
+def test_run_too_long_for_memory_gives_what_its_file_holds(tmp_path, monkeypatch):
+    scenario = resolve("step_steer", overrides=KEYS | {"duration_s": 0.7})
+    short = run_scenario(scenario, "ars", path=tmp_path / "short.mcap")
+    monkeypatch.setattr("activesteer.simulation.runner.MAX_KEPT_VALUES", 0)
+    long = run_scenario(scenario, "ars", path=tmp_path / "long.mcap")
+    assert np.allclose(long.values, short.values, rtol=1e-7, atol=1e-30)
+    assert np.array_equal(long.poses.positions_m, short.poses.positions_m)
+    assert long.metrics == pytest.approx(short.metrics, rel=1e-6)
+    assert long.metadata == short.metadata
+    assert long.attachments == short.attachments
+    assert Recording.open(tmp_path / "long.mcap").metrics == long.metrics
+
+
+@pytest.mark.parametrize("keep_values", [0, 2**25])
+def test_recorded_value_that_is_not_finite_ends_the_run_with_its_name(tmp_path, monkeypatch, keep_values):
+    """The state alone may stay finite for a whole run while a tyre records nonsense."""
+    scenario = resolve("step_steer", overrides=KEYS)
+    monkeypatch.setattr("activesteer.simulation.runner.MAX_KEPT_VALUES", keep_values)
+    evaluate = ChannelMap.evaluate
+
+    def damaged(self: ChannelMap, rows: Any, out: np.ndarray) -> None:
+        evaluate(self, rows, out)
+        column = [channel.name for channel in self.channels].index("rl_tyre_mz_Nm")
+        if out[0, 0] > 20.0:
+            out[100, column] = np.nan
+
+    monkeypatch.setattr(ChannelMap, "evaluate", damaged)
+    path = tmp_path / "run.mcap"
+    with pytest.raises(SimulationDiverged, match=r"rl_tyre_mz_Nm is nan at 1\.100 s") as caught:
+        run_scenario(scenario, "ars", path=path)
+    saved = Recording.open(path)
+    assert len(saved) == len(caught.value.recording) == 3 * BLOCK_ROWS
+    assert saved.metadata["complete"] is False
+    assert saved.metadata["error"] == "SimulationDiverged: rl_tyre_mz_Nm is nan at 1.100 s"
+    assert np.flatnonzero(np.isnan(saved["rl_tyre_mz_Nm"])).tolist() == [1100]
