@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.course import Car, Course
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS
+from activesteer.road.course import CONE_RADIUS_M, Course
+from activesteer.road.footprint import Footprint
 
 Array = NDArray[np.float64]
 
-FRONT_OVERHANG_M: Final = 0.85
-"""From the front axle to the front end of the body; usual for the class, as recordings do not give it [m]."""
-REAR_OVERHANG_M: Final = 0.75
-"""From the rear axle to the rear end of the body; usual for the class [m]."""
-CONE_RADIUS_M: Final = 0.145
-"""Half of the square base of a 0.5 m traffic cone [m]."""
 
-
-def lane_overstep(recording: RecordingLike, course: Course, car: Car) -> float:
+def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> float:
     """How far a wheel gets beyond the side of a lane at most.
 
     A wheel counts while its contact point is between the two ends of a lane. Its outer side is half the tyre's width
@@ -49,7 +42,7 @@ def lane_overstep(recording: RecordingLike, course: Course, car: Car) -> float:
     return float(np.nanmax(oversteps)) if len(oversteps) > 1 else math.nan
 
 
-def all_wheels_in_lanes(recording: RecordingLike, course: Course, car: Car) -> bool:
+def all_wheels_in_lanes(recording: RecordingLike, course: Course, car: Footprint) -> bool:
     """Whether all four wheels go through every lane to its end and none gets beyond a side.
 
     A car that turns round before the last lane oversteps nothing there, but it has not kept to the lanes.
@@ -62,12 +55,12 @@ def all_wheels_in_lanes(recording: RecordingLike, course: Course, car: Car) -> b
     return lane_overstep(recording, course, car) <= 0.0
 
 
-def cone_distances(recording: RecordingLike, course: Course, car: Car) -> Array:
+def cone_distances(recording: RecordingLike, course: Course, car: Footprint) -> Array:
     """Smallest distance between the side of each cone and the body of the car.
 
-    The body is a rectangle of the car's width, reaching `FRONT_OVERHANG_M` and `REAR_OVERHANG_M` beyond the axles. A
-    cone is a disc of `CONE_RADIUS_M` around its point; one on the side of a lane is the point itself, since a lane's
-    width is measured between the sides of its cones.
+    The body is a rectangle of the car's width with a usual overhang beyond the axles (`Footprint`). A cone is a disc of
+    `CONE_RADIUS_M` around its point; one on the side of a lane is the point itself, since a lane's width is measured
+    between the sides of its cones.
 
     Returns:
         Distance [m], shape (number of cones,); 0 or less where the cone is hit, by how far the body covers it.
@@ -76,8 +69,8 @@ def cone_distances(recording: RecordingLike, course: Course, car: Car) -> Array:
         np.asarray(recording[name], dtype=np.float64) for name in ("front_axle_x_m", "front_axle_y_m", "yaw_rad")
     )
     cos, sin = np.cos(yaw), np.sin(yaw)
-    middle_m = 0.5 * (FRONT_OVERHANG_M - car.wheelbase_m - REAR_OVERHANG_M)
-    half_length_m = FRONT_OVERHANG_M - middle_m
+    middle_m = 0.5 * (car.front_m + car.rear_m)
+    half_length_m = car.front_m - middle_m
     distances = np.empty(len(course.cones_m))
     for index, (x, y) in enumerate(course.cones_m):
         ahead = (x - front_x) * cos + (y - front_y) * sin

@@ -8,15 +8,16 @@ gate, or a recording that ends within the 3 s, has no values for it.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from activesteer.analysis import lanes, track
-from activesteer.analysis.course import Course, read_car, read_course
 from activesteer.analysis.series import Array, lag, largest_rate, rate_rms, rms, timestep
-from activesteer.analysis.source import RecordingLike, maneuver_kind
+from activesteer.analysis.source import RecordingLike, maneuver_kind, read_course, read_footprint
 from activesteer.conventions import CORNERS
+from activesteer.road.course import Course
 
 AFTER_S: Final = 3.0
 """Time after the last gate in which the car should come to rest [s]."""
@@ -151,11 +152,11 @@ def _steering_effort(wheel: Array, step_s: float) -> dict[str, float]:
 
 def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
     """Where the car is, against path, lanes and cones."""
-    deviation = track.path_distance(*track.front_axle(recording), course.path_x_m, course.path_y_m)
+    deviation = track.path_distance(*track.front_axle(recording), course.path.x_m, course.path.y_m)
     values = {"track_deviation_max_m": float(np.abs(deviation).max()), "track_deviation_rms_m": rms(deviation)}
     if not course.lanes and not len(course.cones_m):
         return values
-    car = read_car(recording)
+    car = read_footprint(recording)
     if course.lanes:
         values["lane_overstep_m"] = lanes.lane_overstep(recording, course, car)
         values["all_wheels_in_lanes"] = float(lanes.all_wheels_in_lanes(recording, course, car))
@@ -173,8 +174,8 @@ def _slalom(recording: RecordingLike, course: Course) -> dict[str, float]:
     x = np.linspace(row[:, 0].min(), row[:, 0].max(), 1000)
     y = track.track_over_x(recording, x)
     sides = np.sign(track.track_over_x(recording, row[:, 0]) - row[:, 1])
-    asked = np.sign(np.interp(row[:, 0], course.path_x_m, course.path_y_m) - row[:, 1])
-    distances = lanes.cone_distances(recording, course._replace(cones_m=row), read_car(recording))
+    asked = np.sign(np.interp(row[:, 0], course.path.x_m, course.path.y_m) - row[:, 1])
+    distances = lanes.cone_distances(recording, replace(course, cones_m=row), read_footprint(recording))
     return {
         "track_amplitude_m": 0.5 * float(y.max() - y.min()),
         "cone_distance_mean_m": float(distances.mean()),

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.errors import RecordingError
+from activesteer.road.course import Course, course_of
+from activesteer.road.footprint import Footprint, footprint_of
 
 
 class RecordingLike(Protocol):
@@ -43,3 +45,27 @@ def maneuver_kind(recording: RecordingLike) -> str:
             "expected a table with the key 'kind'"
         )
     return kind
+
+
+def read_course(recording: RecordingLike) -> Course:
+    """The course of a run.
+
+    Raises:
+        RecordingError: the metadata hold none, or a wrong one.
+    """
+    course = course_of(recording.metadata)
+    if course is None:
+        raise RecordingError("the metadata of the recording have no table 'course': the manoeuvre has no path")
+    return course
+
+
+def read_footprint(recording: RecordingLike) -> Footprint:
+    """Sizes of the car of a run.
+
+    Raises:
+        RecordingError: the metadata do not give them, or wrong ones.
+    """
+    footprint = footprint_of(recording.metadata)
+    if footprint is None:
+        raise RecordingError("the metadata of the recording have no table 'car': its sizes are needed")
+    return footprint

@@ -60,15 +60,11 @@ def _watch(options: argparse.Namespace) -> int:
 def _show(scenario: Any, controller: str, speed: float) -> None:
     import mujoco.viewer
 
-    from activesteer.scenario import describe
     from activesteer.simulation.live_view import Pacer, drive, stage_for
     from activesteer.simulation.simulation import Simulation
 
     simulation = Simulation(scenario, controller)
-    course = scenario.maneuver.course
-    stage = stage_for(
-        simulation, course.describe() if course is not None else None, describe(scenario)["maneuver"]["road"]
-    )
+    stage = stage_for(simulation, scenario.maneuver)
     with (
         _threads_joined(),
         mujoco.viewer.launch_passive(stage.model, stage.data, show_left_ui=False, show_right_ui=False) as viewer,

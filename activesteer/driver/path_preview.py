@@ -24,6 +24,7 @@ from activesteer.compilation import compiled
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
 from activesteer.road.path import Path
+from activesteer.road.path_search import PathSearch
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 
 Array = NDArray[np.float64]
@@ -92,13 +93,13 @@ class PathPreviewDriver:
 
     def _update_preview(self, path: Path, motion: Motion) -> None:
         """Looks at the road ahead and decides on a steering wheel angle."""
-        speed = motion.speed_mps
-        along = self._along_m = path.nearest(motion.x_m, motion.y_m, self._along_m, _WINDOW_M)
+        speed, search = motion.speed_mps, PathSearch(path)
+        along = self._along_m = search.nearest(motion.x_m, motion.y_m, self._along_m, _WINDOW_M)
         if speed < _LEAST_SPEED_MPS:
             self._decide(self._decided_rad[-1])
             return
         preview = self._preview(speed)
-        ahead = path.at(along + speed * preview.times_s)
+        ahead = search.at(along + speed * preview.times_s)
         self._decide(self.robot.steering_ratio * _best_steering(*motion, *ahead, *preview[1:]))
 
     def _decide(self, steering_wheel_rad: float) -> None:

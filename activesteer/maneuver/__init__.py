@@ -3,7 +3,6 @@
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.constant_radius import ConstantRadius
-from activesteer.maneuver.course import Course
 from activesteer.maneuver.follow_path import FollowPath
 from activesteer.maneuver.kinds import KINDS, build_maneuver, filled_from_csv, maneuver_class
 from activesteer.maneuver.lane_change import LaneChange
@@ -19,7 +18,6 @@ __all__ = [
     "KINDS",
     "BrakeInTurn",
     "ConstantRadius",
-    "Course",
     "FollowPath",
     "Lane",
     "LaneChange",

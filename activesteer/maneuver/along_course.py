@@ -10,7 +10,7 @@ from typing import Annotated, Final
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver
-from activesteer.maneuver.course import Course
+from activesteer.road.course import Course
 from activesteer.signals import Reference
 
 Width = Annotated[float, Range(0.5, 4.0)]

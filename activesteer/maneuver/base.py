@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from activesteer.config import Range
-from activesteer.maneuver.course import Course
 from activesteer.maneuver.search import Search
+from activesteer.road.course import Course
 from activesteer.road.road import Road
 from activesteer.signals import Reference
 

@@ -10,9 +10,9 @@ from typing import Any
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.along_course import AlongCourse
-from activesteer.maneuver.course import Course
 from activesteer.maneuver.csv_table import find_csv
 from activesteer.maneuver.path_points import check_points, read_csv
+from activesteer.road.course import Course
 from activesteer.road.path import Path
 
 

@@ -22,6 +22,9 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from activesteer.road.lane import Lane
 
 STANDARDS: Final = ("iso_3888_1", "iso_3888_2")
@@ -74,10 +77,13 @@ def _lane(section: _Section, start_x_m: float, side: float) -> Lane:
     return Lane(section.name, start, start + section.length_m, centre - half, centre + half)
 
 
-def cones(course: Sequence[Lane]) -> tuple[tuple[float, float], ...]:
+def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
     """Where cones touch the edges of lanes: at both ends, and at equal distances of at most 5 m between.
 
     The standards lay the edges of a lane tangentially to the feet of its cones.
+
+    Returns:
+        World x and y of the cones [m], shape (number of cones, 2).
     """
     points: list[tuple[float, float]] = []
     for lane in course:
@@ -85,4 +91,4 @@ def cones(course: Sequence[Lane]) -> tuple[tuple[float, float], ...]:
         for number in range(gaps + 1):
             x = lane.start_x_m + (lane.end_x_m - lane.start_x_m) * number / gaps
             points += [(x, lane.right_y_m), (x, lane.left_y_m)]
-    return tuple(points)
+    return np.array(points)

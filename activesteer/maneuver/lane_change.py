@@ -14,9 +14,9 @@ from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.along_course import AlongCourse, Width, known_width
 from activesteer.maneuver.choices import SIDES, check_choice
-from activesteer.maneuver.course import Course
 from activesteer.maneuver.iso_3888 import STANDARDS, cones, lanes
 from activesteer.maneuver.least_jerk import Bound, least_jerk
+from activesteer.road.course import Course
 from activesteer.road.lane import Lane
 from activesteer.road.path import Path
 

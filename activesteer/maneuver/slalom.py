@@ -13,7 +13,7 @@ from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.along_course import AlongCourse, Width, known_width
 from activesteer.maneuver.choices import SIDES, check_choice
-from activesteer.maneuver.course import Course
+from activesteer.road.course import Course
 from activesteer.road.path import Path
 
 _SAMPLE_M: Final = 0.5
@@ -72,13 +72,13 @@ class Slalom(AlongCourse):
                 f"above {0.5 * width:g} m"
             )
             raise ManeuverError(msg)
-        places = row.entry_m + row.spacing_m * np.arange(row.count)
-        path_x, path_y = _way_round(places, row.spacing_m, row.offset_m)
-        cones = tuple((x, 0.0) for x in places.tolist())
-        return Course(Path.through(path_x, SIDES[row.side] * path_y), (), cones, cones[-1][0])
+        places = row.entry_m + row.spacing_m * np.arange(row.count, dtype=np.float64)
+        path_x, path_y = _slalom_path(places, row.spacing_m, row.offset_m)
+        cones = np.column_stack([places, np.zeros_like(places)])
+        return Course(Path.through(path_x, SIDES[row.side] * path_y), (), cones, float(places[-1]))
 
 
-def _way_round(places: np.ndarray, spacing: float, offset: float) -> tuple[np.ndarray, np.ndarray]:
+def _slalom_path(places: np.ndarray, spacing: float, offset: float) -> tuple[np.ndarray, np.ndarray]:
     """Path that passes the first cone on the left."""
     first, last = float(places[0]), float(places[-1])
     wave_number = math.pi / spacing

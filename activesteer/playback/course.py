@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -13,6 +13,9 @@ from activesteer.playback.car import rgb
 from activesteer.playback.geometry import heading, rotated
 from activesteer.playback.runs import CHASSIS, Run
 from activesteer.playback.timeline import times
+from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, course_of
+from activesteer.road.footprint import Footprint, footprint_of
+from activesteer.road.road import road_of
 
 Array = NDArray[np.float64]
 
@@ -35,8 +38,6 @@ _PATH: Final = (240, 228, 66)
 _MAP_PATH: Final = (140, 132, 40)
 _SLIPPERY: Final = (110, 150, 190)
 _GRIPPY: Final = (44, 44, 46)
-_CONE_HEIGHT_M: Final = 0.5
-_CONE_RADIUS_M: Final = 0.14
 _CONE_SIDES: Final = 12
 
 
@@ -53,11 +54,8 @@ def extent(runs: Sequence[Run]) -> Extent:
     """What cars and course take up together."""
     points = [_track(run) for run in runs]
     course = _course(runs)
-    if course:
-        points.append(_path(course))
-        points += [np.array([[lane["start_x_m"], lane["right_y_m"]]]) for lane in course["lanes"]]
-        points += [np.array([[lane["end_x_m"], lane["left_y_m"]]]) for lane in course["lanes"]]
-        points += [np.reshape(course["cones"], (-1, 2))]
+    if course is not None:
+        points += [_path(course), course.cones_m, *(lane.outline_m() for lane in course.lanes)]
     # The path goes on for a while where the car has long stopped; what is of interest is where the cars are.
     reach = np.concatenate([_track(run) for run in runs])
     every = np.concatenate(points)
@@ -79,30 +77,24 @@ def send_road(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
     across = [[(x, low_y, 0.005), (x, high_y, 0.005)] for x in np.arange(low_x, high_x + 1.0, _TILE_M)]
     along = [[(low_x, y, 0.005), (high_x, y, 0.005)] for y in np.arange(low_y, high_y + 1.0, _TILE_M)]
     stream.log(f"{ROAD}/grid", rr.LineStrips3D(across + along, colors=[_MARKING], radii=[0.03]), static=True)
-    road = runs[0].recording.metadata.get("maneuver", {}).get("road", {})
-    usual = float(road.get("mu", 1.0))
-    sides = [("left", road.get("mu_left"), 0.0, high_y), ("right", road.get("mu_right"), low_y, 0.0)]
-    areas = [(side, mu, low_x, high_x, low, high) for side, mu, low, high in sides if mu is not None]
-    for patch in road.get("patches", ()):
-        low, high = {"left": (0.0, high_y), "right": (low_y, 0.0)}.get(patch["side"], (low_y, high_y))
-        start, end = max(low_x, patch["start_m"]), min(high_x, patch["end_m"])
-        areas.append(("patch", patch["mu"], start, end, low, high))
-    for number, (name, mu, start, end, low, high) in enumerate(areas):
-        if start < end and mu != usual:
-            colour = _SLIPPERY if mu < usual else _GRIPPY
-            surface = _plane(start, end, low, high, 0.002 + 0.0005 * number, colour)
-            stream.log(f"{ROAD}/{name}_{number}_mu_{round(100 * mu)}_percent", surface, static=True)
+    road = road_of(runs[0].recording.metadata)
+    for index, area in enumerate(road.areas()):
+        shown = area.clipped(low_x, high_x, low_y, high_y)
+        if shown is not None:
+            colour = _SLIPPERY if area.mu < road.mu else _GRIPPY if area.mu > road.mu else _ASPHALT
+            surface = _plane(*shown[:4], 0.002 + 0.0005 * index, colour)
+            stream.log(f"{ROAD}/patch_{index}_mu_{round(100 * area.mu)}_percent", surface, static=True)
 
 
 def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
     """Sends lanes, cones and path, where the manoeuvre has them."""
     course = _course(runs)
-    if not course:
+    if course is None:
         return
     path = _path(course)
     line = np.column_stack([path, np.full(len(path), 0.02)])
     stream.log(f"{COURSE}/path", rr.LineStrips3D([line], colors=[_PATH], radii=[0.03]), static=True)
-    edges = _lane_outlines(course)
+    edges = [lane.outline_m() for lane in course.lanes]
     stream.log(
         f"{MAP}/path",
         rr.LineStrips2D([_flat(path)], colors=[_MAP_PATH], radii=_points(1.0), draw_order=1.0),
@@ -115,7 +107,7 @@ def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
         stream.log(
             f"{MAP}/lanes", rr.LineStrips2D(flat, colors=[_LANE], radii=_points(1.0), draw_order=2.0), static=True
         )
-    cones = np.reshape(course["cones"], (-1, 2))
+    cones = course.cones_m
     if len(cones):
         stream.log(f"{COURSE}/cones", _cones(cones), static=True)
         stream.log(
@@ -148,9 +140,8 @@ def send_track(stream: rr.RecordingStream, run: Run) -> None:
 
 def _outline(run: Run) -> Array:
     """Sides of the car and a stroke for each wheel, on the map, shape (poses, strokes, 2 points, 2)."""
-    poses, car = run.recording.poses, run.recording.metadata.get("car", {})
-    half, wheelbase = 0.5 * float(car.get("width_m", 1.8)), float(car.get("wheelbase_m", 2.7))
-    nose, tail = 0.85, -wheelbase - 0.75  # typical overhangs; nothing but this drawing depends on them
+    poses, car = run.recording.poses, footprint_of(run.recording.metadata) or Footprint()
+    half, front, rear = 0.5 * car.width_m, car.front_m, car.rear_m
     chassis = poses.names.index(CHASSIS)
 
     def placed(body: int, points: Sequence[tuple[float, float]], *, level: bool) -> Array:
@@ -164,7 +155,7 @@ def _outline(run: Run) -> Array:
         x, y = np.array(points).T
         return _flat(np.stack([at[:, :1] + cos * x - sin * y, at[:, 1:2] + sin * x + cos * y], axis=-1))
 
-    corners = [(nose, half), (nose, -half), (tail, -half), (tail, half), (nose, half)]
+    corners = [(front, half), (front, -half), (rear, -half), (rear, half), (front, half)]
     strips = [placed(chassis, corners[side : side + 2], level=False) for side in range(4)]
     wheels = [index for index, name in enumerate(poses.names) if name.endswith("_wheel")]
     strips += [placed(wheel, [(-0.32, 0.0), (0.32, 0.0)], level=True) for wheel in wheels]
@@ -181,21 +172,12 @@ def _track(run: Run) -> Array:
     return track[np.isfinite(track).all(axis=1)]
 
 
-def _course(runs: Sequence[Run]) -> Mapping[str, Any] | None:
-    courses = [run.recording.metadata.get("course") for run in runs]
-    return next((course for course in courses if course), None)
+def _course(runs: Sequence[Run]) -> Course | None:
+    return next((course for run in runs if (course := course_of(run.recording.metadata)) is not None), None)
 
 
-def _path(course: Mapping[str, Any]) -> Array:
-    return np.column_stack([course["path"]["x_m"], course["path"]["y_m"]])
-
-
-def _lane_outlines(course: Mapping[str, Any]) -> list[Array]:
-    outlines = []
-    for lane in course["lanes"]:
-        x, y = (lane["start_x_m"], lane["end_x_m"]), (lane["right_y_m"], lane["left_y_m"])
-        outlines.append(np.array([(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]), (x[0], y[0])]))
-    return outlines
+def _path(course: Course) -> Array:
+    return np.column_stack([course.path.x_m, course.path.y_m])
 
 
 def _flat(points: Array) -> Array:
@@ -224,7 +206,7 @@ def _cones(places: Array) -> Any:
     """All cones as one mesh."""
     angle = np.linspace(0.0, 2.0 * np.pi, _CONE_SIDES, endpoint=False)
     ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_CONE_SIDES)])
-    corners = np.vstack([ring * _CONE_RADIUS_M, [[0.0, 0.0, _CONE_HEIGHT_M]]])
+    corners = np.vstack([ring * CONE_RADIUS_M, [[0.0, 0.0, CONE_HEIGHT_M]]])
     outward = np.vstack([ring + np.array((0.0, 0.0, 0.3)), [[0.0, 0.0, 1.0]]])
     sides = np.arange(_CONE_SIDES)
     faces = np.column_stack([sides, (sides + 1) % _CONE_SIDES, np.full(_CONE_SIDES, _CONE_SIDES)])

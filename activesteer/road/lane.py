@@ -1,8 +1,11 @@
-"""A lane on the road: laid out by the manoeuvre, looked at by the analysis."""
+"""A lane on the road: laid out by the manoeuvre, evaluated by the analysis."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 class Lane(NamedTuple):
@@ -21,3 +24,8 @@ class Lane(NamedTuple):
     end_x_m: float
     right_y_m: float
     left_y_m: float
+
+    def outline_m(self) -> NDArray[np.float64]:
+        """Its corners, once round: world x and y [m], shape (5, 2)."""
+        (start, end), (right, left) = self[1:3], self[3:]
+        return np.array([(start, right), (end, right), (end, left), (start, left), (start, right)])

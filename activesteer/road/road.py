@@ -8,11 +8,13 @@ contact point. While the car settles before the recording, it rolls on `mu` alon
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
-from activesteer.config import Range
-from activesteer.errors import ManeuverError, nearest_names
+from activesteer.config import Range, Source, build
+from activesteer.errors import ManeuverError, RecordingError, nearest_names
+from activesteer.road.recorded import table_of
 
 Friction = Annotated[float, Range(0.01, 2.0)]
 
@@ -48,13 +50,19 @@ class RoadPatch:
 
 
 class Area(NamedTuple):
-    """A rectangle of the road, x from start to before the end, y from beyond the right border to the left one."""
+    """A rectangle of the road, x from start to before the end, y from beyond the right border to the left one [m]."""
 
     start_m: float
     end_m: float
     right_m: float
     left_m: float
     mu: float
+
+    def clipped(self, start_m: float, end_m: float, right_m: float, left_m: float) -> Area | None:
+        """What of it lies within a rectangle [m]; None where nothing does."""
+        start, end = max(self.start_m, start_m), min(self.end_m, end_m)
+        right, left = max(self.right_m, right_m), min(self.left_m, left_m)
+        return Area(start, end, right, left, self.mu) if start < end and right < left else None
 
 
 @dataclass(frozen=True)
@@ -77,3 +85,14 @@ class Road:
         sides = (("left", self.mu_left), ("right", self.mu_right))
         split = [Area(-math.inf, math.inf, *_SIDES[side], mu) for side, mu in sides if mu is not None]
         return (*split, *(Area(it.start_m, it.end_m, *_SIDES[it.side], it.mu) for it in self.patches))
+
+
+def road_of(metadata: Mapping[str, Any]) -> Road:
+    """The road of a recorded run; a plain one where it was not recorded.
+
+    Raises:
+        RecordingError: it was, and a key of it is unknown, missing, of the wrong type or out of range.
+    """
+    maneuver = table_of(metadata.get("maneuver", {}), "maneuver")
+    table = table_of(maneuver.get("road", {}), "maneuver.road")
+    return build(Road, table, Source("the metadata of the recording", error=RecordingError), ("maneuver", "road"))

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, Final, NamedTuple, Protocol
 
+from activesteer.maneuver import Maneuver
 from activesteer.simulation.appearance import scene_of
 from activesteer.simulation.simulation import Simulation
 from activesteer.video import Car, Stage
@@ -105,19 +106,18 @@ class Driven(NamedTuple):
     finished: bool
 
 
-def stage_for(simulation: Simulation, course: Any = None, road: Any = None) -> Stage:
+def stage_for(simulation: Simulation, maneuver: Maneuver) -> Stage:
     """The stage for a simulation's car.
 
     Args:
         simulation: The simulation.
-        course: Lanes, cones and path, as in the metadata of a recording.
-        road: The road, likewise.
+        maneuver: The manoeuvre, whose road and course are shown.
 
     Raises:
         PlaybackError: the car cannot be drawn.
     """
     vehicle = simulation.vehicle
-    return Stage([Car(scene_of(vehicle.model), vehicle.body_names)], course, road)
+    return Stage([Car(scene_of(vehicle.model), vehicle.body_names)], maneuver.course, maneuver.road)
 
 
 def drive(simulation: Simulation, stage: Stage, viewer: Viewer, pacer: Pacer) -> Driven:

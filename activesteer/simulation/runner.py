@@ -171,7 +171,7 @@ class RunContext(NamedTuple):
             "versions": _versions(),
         }
         if (course := scenario.maneuver.course) is not None:
-            metadata["course"] = course.describe()
+            metadata["course"] = course.to_table()
         files = scenario.files | user_file(controller)
         return cls(channels_of(vehicle), vehicle.body_names, metadata, files, scene_of(vehicle.model))
 

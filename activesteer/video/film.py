@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from activesteer.conventions import CORNERS, RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
+from activesteer.road.course import course_of
+from activesteer.road.road import road_of
 from activesteer.video.cameras import view
 from activesteer.video.encoder import check, encoder, frame_rate
 from activesteer.video.gauges import Dials, Gauges
@@ -87,7 +89,7 @@ class Film:
         ]
         first = next(iter(recordings.values()))
         maneuver = first.metadata.get("maneuver", {})
-        self._stage = Stage(cars, first.metadata.get("course"), maneuver.get("road"), settings.size)
+        self._stage = Stage(cars, course_of(first.metadata), road_of(first.metadata), settings.size)
         dials = [
             Dials(recording, SYSTEM_LABELS.get(name, name), colour)
             for (name, recording), colour in zip(recordings.items(), colours, strict=True)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import mujoco
 import numpy as np
+
+from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course
+from activesteer.road.path import Path
+from activesteer.road.road import Road
 
 _TEXTURE: Final = "road"
 _DRY: Final = (0.37, 0.375, 0.385)
@@ -21,26 +24,24 @@ _PATH: Final = (0.98, 0.8, 0.15, 0.9)
 _CONE: Final = (1.0, 0.4, 0.05, 1.0)
 _STRIPE: Final = (0.97, 0.97, 0.97, 1.0)
 _BASE: Final = (0.12, 0.12, 0.13, 1.0)
-_CONE_HEIGHT_M: Final = 0.5
-_CONE_RADIUS_M: Final = 0.14
 _LINE_M: Final = 0.12
 """Width of lines on the road [m]."""
 _DASH_M: Final = 1.5
 _GAP_M: Final = 2.5
 _FAR_M: Final = 2000.0
-"""How far a side of the road with its own friction goes [m]."""
-_MOST_PATCHES: Final = 1000
-"""Most patches that are drawn: beyond it a road is rather a table than a picture."""
+"""How far an area with its own friction is drawn [m]."""
+_MAX_AREAS, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
+"""Most of each that are drawn: a renderer's scene holds a limited number of solids."""
 
 
-def add_road(spec: mujoco.MjSpec, road: Mapping[str, Any]) -> None:
-    """Adds the surface, the bluer the less grip there is.
+def add_road(spec: mujoco.MjSpec, road: Road) -> None:
+    """Adds the surface, the bluer the less friction there is.
 
     Args:
         spec: The model.
-        road: The road, as in the metadata of a recording; only its friction `mu` counts here.
+        road: The road; only its friction `mu` counts here.
     """
-    colour = np.array(_colour(float(road.get("mu", 1.0))))
+    colour = np.array(_colour(road.mu))
     spec.add_texture(
         name=_TEXTURE,
         type=mujoco.mjtTexture.mjTEXTURE_2D,
@@ -65,57 +66,41 @@ def add_road(spec: mujoco.MjSpec, road: Mapping[str, Any]) -> None:
     )
 
 
-def add_patches(spec: mujoco.MjSpec, road: Mapping[str, Any]) -> None:
-    """Adds what of the road has a friction of its own.
+def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
+    """Adds the areas with a friction of their own; in their order the later ones hide the earlier ones.
 
     Args:
         spec: The model.
-        road: `mu`, `mu_left`, `mu_right` and `patches`, as in the metadata of a recording; in the same order they
-            hide each other.
+        road: The road.
     """
-    sides = {"left": (0.0, _FAR_M), "right": (-_FAR_M, 0.0), "both": (-_FAR_M, _FAR_M)}
-    areas = [(side, road.get(f"mu_{side}"), -_FAR_M, _FAR_M) for side in ("left", "right")]
-    areas += [
-        (patch["side"], patch["mu"], patch["start_m"], patch["end_m"])
-        for patch in list(road.get("patches", ()))[:_MOST_PATCHES]
-    ]
-    height = 0.004
-    for side, mu, begin, finish in areas:
-        if mu is None:
-            continue
-        start, end = max(float(begin), -_FAR_M), min(float(finish), _FAR_M)
-        if start >= end:
-            continue
-        right, left = sides[side]
-        _box(spec, (start, end), (right, left), height, (*_colour(float(mu)), 1.0))
-        height += 0.0005
+    for index, area in enumerate(road.areas()[:_MAX_AREAS]):
+        shown = area.clipped(-_FAR_M, _FAR_M, -_FAR_M, _FAR_M)
+        if shown is not None:
+            start, end, right, left, mu = shown
+            _box(spec, (start, end), (right, left), 0.004 + 0.0005 * index, (*_colour(mu), 1.0))
 
 
-def add_course(spec: mujoco.MjSpec, course: Mapping[str, Any]) -> None:
+def add_course(spec: mujoco.MjSpec, course: Course) -> None:
     """Adds lanes, cones and the path in dashes.
 
     Args:
         spec: The model.
-        course: As in the metadata of a recording.
+        course: The course.
     """
     half = 0.5 * _LINE_M
-    for lane in course["lanes"]:
-        x = (lane["start_x_m"], lane["end_x_m"])
-        y = (lane["right_y_m"], lane["left_y_m"])
-        for side in y:
-            _box(spec, x, (side - half, side + half), 0.012, _LANE)
-        for end in x:
-            _box(spec, (end - half, end + half), y, 0.012, _LANE)
-    _add_path(spec, course["path"])
-    cones = np.reshape(np.asarray(course["cones"], np.float64), (-1, 2))
-    if len(cones):
-        _add_cones(spec, cones)
+    for _, start, end, right, left in course.lanes[:_MAX_LANES]:
+        for side in (right, left):
+            _box(spec, (start, end), (side - half, side + half), 0.012, _LANE)
+        for across in (start, end):
+            _box(spec, (across - half, across + half), (right, left), 0.012, _LANE)
+    _add_path(spec, course.path)
+    if len(course.cones_m):
+        _add_cones(spec, course.cones_m[:_MAX_CONES])
 
 
-def _add_path(spec: mujoco.MjSpec, path: Mapping[str, Any]) -> None:
-    x, y = np.asarray(path["x_m"], np.float64), np.asarray(path["y_m"], np.float64)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-    starts = np.arange(0.0, along[-1] - _DASH_M, _DASH_M + _GAP_M)
+def _add_path(spec: mujoco.MjSpec, path: Path) -> None:
+    x, y, along = path.x_m, path.y_m, path.s_m
+    starts = np.arange(0.0, min(along[-1] - _DASH_M, _MAX_DASHES * (_DASH_M + _GAP_M)), _DASH_M + _GAP_M)
     for start in starts:
         ends = start, start + _DASH_M
         (x0, x1), (y0, y1) = np.interp(ends, along, x), np.interp(ends, along, y)
@@ -133,10 +118,10 @@ def _add_path(spec: mujoco.MjSpec, path: Mapping[str, Any]) -> None:
 
 def _add_cones(spec: mujoco.MjSpec, cones: np.ndarray) -> None:
     """A cone of three rings, the middle one white, on a foot."""
-    third = _CONE_HEIGHT_M / 3.0
+    third = CONE_HEIGHT_M / 3.0
     rings = []
     for number, colour in enumerate((_CONE, _STRIPE, _CONE)):
-        below, above = (_CONE_RADIUS_M * (1.0 - 0.85 * (number + step) / 3.0) for step in (0, 1))
+        below, above = (CONE_RADIUS_M * (1.0 - 0.85 * (number + step) / 3.0) for step in (0, 1))
         mesh = spec.add_mesh(name=f"cone_{number}")
         mesh.make_cone(12, above / below)
         mesh.scale = (below, below, 0.5 * third)
@@ -144,7 +129,7 @@ def _add_cones(spec: mujoco.MjSpec, cones: np.ndarray) -> None:
     for x, y in cones:
         spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=(1.25 * _CONE_RADIUS_M, 1.25 * _CONE_RADIUS_M, 0.015),
+            size=(1.25 * CONE_RADIUS_M, 1.25 * CONE_RADIUS_M, 0.015),
             pos=(x, y, 0.015),
             rgba=_BASE,
             contype=0,

@@ -6,8 +6,8 @@ nothing of a file is compiled, and a car drawn over another is no more than the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
-from activesteer.video.road import add_course, add_patches, add_road
+from activesteer.road.course import Course
+from activesteer.road.road import Road
+from activesteer.video.road import add_areas, add_course, add_road
 
 Array = NDArray[np.float64]
 
@@ -85,16 +87,16 @@ class Stage:
     def __init__(
         self,
         cars: Sequence[Car],
-        course: Mapping[str, Any] | None = None,
-        road: Mapping[str, Any] | None = None,
+        course: Course | None = None,
+        road: Road | None = None,
         size: tuple[int, int] = (640, 480),
     ) -> None:
         """Builds it.
 
         Args:
             cars: The cars.
-            course: Lanes, cones and path, as in the metadata of a recording.
-            road: The road, as in the metadata of a recording.
+            course: Lanes, cones and path.
+            road: The road; a plain one where not given.
             size: Largest width and height of a picture [pixels].
 
         Raises:
@@ -102,9 +104,9 @@ class Stage:
         """
         try:
             spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
-            add_road(spec, road or {})
-            add_patches(spec, road or {})
-            if course:
+            add_road(spec, road or Road())
+            add_areas(spec, road or Road())
+            if course is not None:
                 add_course(spec, course)
             for number, car in enumerate(cars):
                 _add_car(spec, car, f"{number}/")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from activesteer.errors import PlaybackError
 from activesteer.recording import Recording
+from activesteer.road.footprint import Footprint, footprint_of
 from activesteer.video.stage import CHASSIS
 
 Array = NDArray[np.float64]
@@ -16,8 +17,6 @@ Array = NDArray[np.float64]
 _STEADY_S: Final = 0.35
 """Standard deviation of the window over which the direction of the camera is averaged [s]: it follows the car through
 a bend, but not its every twitch, which is then seen."""
-_WHEELBASE_M: Final = 2.7
-"""Of a car whose recording does not tell its own [m]."""
 
 
 class Track:
@@ -52,8 +51,7 @@ class Track:
         w, x, y, z = self._quaternions[:, poses.names.index(CHASSIS)].T
         self._heading_rad = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
         self._steady_rad = _smooth(self._time_s, self._heading_rad)
-        car = recording.metadata.get("car")
-        self._middle_m = -0.5 * float(car.get("wheelbase_m", _WHEELBASE_M) if isinstance(car, dict) else _WHEELBASE_M)
+        self._middle_m = -0.5 * (footprint_of(recording.metadata) or Footprint()).wheelbase_m
 
     def poses(self, time_s: float) -> tuple[Array, Array]:
         """Poses at an instant; before the first it is the first, after the last the last.

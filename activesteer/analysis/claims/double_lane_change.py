@@ -15,8 +15,7 @@ from typing import Final
 from activesteer.analysis import path_following, track
 from activesteer.analysis.claims.claim import SYSTEMS, Claim, Runs, all_metrics, lowered, pick
 from activesteer.analysis.claims.path_following import SYSTEMS_WITH_CONTROL, calmed
-from activesteer.analysis.course import read_course
-from activesteer.analysis.source import RecordingLike
+from activesteer.analysis.source import RecordingLike, read_course
 
 ALIKE_M: Final = 0.5
 """Tracks look alike when they are nowhere further apart than this [m]."""

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from activesteer.analysis import track
-from activesteer.analysis.course import Course, read_course
+from activesteer.analysis.course_view import CourseView, view_of
 from activesteer.analysis.figures import style
-from activesteer.analysis.source import RecordingLike
+from activesteer.analysis.source import RecordingLike, read_course
 from activesteer.plotting import new_figure
+from activesteer.road.course import Course
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -22,17 +20,17 @@ if TYPE_CHECKING:
 LANE_COLOUR: Final = "#f0e6c8"
 CONE_COLOUR: Final = "#e69f00"
 WIDTH_IN: Final = 8.5
-COURSE_SHARE: Final = 0.2
-TRACK_SHARE: Final = 0.35
+COURSE_ASPECT: Final = 0.2
+TRACK_ASPECT: Final = 0.35
 """Height over width of the axes of courses and of tracks, about."""
 
 
 def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
     """The course: path, lanes with their sizes, cones. It says by how much lateral positions are stretched."""
     course = read_course(style.curves(recordings)[0].recording)
-    figure = new_figure(width_in=WIDTH_IN, height_in=0.65 + (WIDTH_IN - 0.9) * _height_share(course, COURSE_SHARE))
+    figure = new_figure(width_in=WIDTH_IN, height_in=0.65 + _axis_height_in(course, COURSE_ASPECT))
     axis: Axes = figure.subplots()
-    _draw_course(axis, course, COURSE_SHARE)
+    _draw_course(axis, course, COURSE_ASPECT)
     for lane in course.lanes:
         text = f"{lane.name}\n" if lane.name else ""
         axis.annotate(
@@ -46,7 +44,7 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
 def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
     """Tracks of the front axle centre along the course. It says by how much lateral positions are stretched."""
     course = read_course(style.curves(recordings)[0].recording)
-    figure = new_figure(width_in=WIDTH_IN, height_in=1.05 + (WIDTH_IN - 0.9) * _height_share(course, TRACK_SHARE))
+    figure = new_figure(width_in=WIDTH_IN, height_in=1.05 + _axis_height_in(course, TRACK_ASPECT))
     axis: Axes = figure.subplots()
     _draw_tracks(axis, recordings)
     style.name_curves(figure, axis)
@@ -78,10 +76,10 @@ def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
     for curve in drawn:
         x, y = (style.thinned(values) for values in track.front_axle(curve.recording))
         axis.plot(x, y, color=curve.colour, linewidth=1.4, label=curve.label)
-    _draw_course(axis, read_course(drawn[0].recording), TRACK_SHARE)
+    _draw_course(axis, read_course(drawn[0].recording), TRACK_ASPECT)
 
 
-def _draw_course(axis: Axes, course: Course, share: float) -> None:
+def _draw_course(axis: Axes, course: Course, aspect: float) -> None:
     """Lanes, path and cones, with a legend of their own, and the limits of the axis."""
     from matplotlib.patches import Rectangle  # noqa: PLC0415 - an extra, and slow to import
 
@@ -91,33 +89,29 @@ def _draw_course(axis: Axes, course: Course, share: float) -> None:
         length_m, width_m = lane.end_x_m - lane.start_x_m, lane.left_y_m - lane.right_y_m
         patch = axis.add_patch(Rectangle(corner, length_m, width_m, color=LANE_COLOUR, linewidth=0.0, zorder=0))
         shown = [patch]
-    (left, right), (low, high) = course.shown()
-    # Beyond its last point the path goes on straight.
-    dx, dy = (float(values[-1] - values[-2]) for values in (course.path_x_m, course.path_y_m))
-    far = (right - left) / math.hypot(dx, dy)
-    path_x = np.append(course.path_x_m, course.path_x_m[-1] + far * dx)
-    path_y = np.append(course.path_y_m, course.path_y_m[-1] + far * dy)
-    shown += axis.plot(path_x, path_y, ":", color="#888888", linewidth=1.2, zorder=1)
+    view = view_of(course)
+    shown += axis.plot(view.path_x_m, view.path_y_m, ":", color="#888888", linewidth=1.2, zorder=1)
     if len(course.cones_m):
         x, y = course.cones_m.T
         shown += axis.plot(x, y, "^", color=CONE_COLOUR, markersize=4.5, markeredgewidth=0.0, zorder=3)
     names = [*(["lane"] if course.lanes else []), "path asked for", "cone"]
     axis.legend(shown, names[: len(shown)], loc="upper right", fontsize="small", frameon=False)
     style.plain(axis)
-    axis.set_xlim(left, right)
-    axis.set_ylim(low, high)
+    axis.set_xlim(view.x_m)
+    axis.set_ylim(view.y_m)
     axis.set_xlabel("x [m]")
-    stretch = _stretch(course, share)
+    stretch = _stretch(view, aspect)
     axis.set_aspect(stretch)
     axis.set_ylabel("y [m]" + (f"\n(stretched {stretch} times)" if stretch > 1 else ""))
 
 
-def _stretch(course: Course, share: float) -> int:
-    """By how much lateral positions are stretched for an axis about `share` as high as it is wide."""
-    (left, right), (low, high) = course.shown()
-    return max(1, round(share * (right - left) / (high - low)))
+def _stretch(view: CourseView, aspect: float) -> int:
+    """By how much lateral positions are stretched for an axis about `aspect` times as high as it is wide."""
+    (left, right), (low, high) = view.x_m, view.y_m
+    return max(1, round(aspect * (right - left) / (high - low)))
 
 
-def _height_share(course: Course, share: float) -> float:
-    (left, right), (low, high) = course.shown()
-    return _stretch(course, share) * (high - low) / (right - left)
+def _axis_height_in(course: Course, aspect: float) -> float:
+    view = view_of(course)
+    (left, right), (low, high) = view.x_m, view.y_m
+    return (WIDTH_IN - 0.9) * _stretch(view, aspect) * (high - low) / (right - left)

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis import sine_with_dwell
-from activesteer.analysis.course import Course, read_course
+from activesteer.analysis.course_view import view_of
 from activesteer.analysis.report.runs import Group, Run
+from activesteer.analysis.source import read_course
 from activesteer.analysis.track import front_axle, path_distance
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
+from activesteer.road.course import Course
 
 Array = NDArray[np.float64]
 
@@ -71,7 +73,7 @@ def _over_corners(channel: str, choose: np.ufunc, factor: float = 1.0) -> Callab
 
 def _from_path(recording: Recording) -> Array:
     course = read_course(recording)
-    return path_distance(*front_axle(recording), course.path_x_m, course.path_y_m)
+    return path_distance(*front_axle(recording), course.path.x_m, course.path.y_m)
 
 
 PANELS: Final = (
@@ -203,17 +205,12 @@ def _courses(group: Group) -> Iterator[Course]:
 
 
 def _course(course: Course) -> dict[str, Any]:
-    (left, right), (low, high) = course.shown()
-    # Beyond its last point the path goes on straight.
-    dx, dy = (float(values[-1] - values[-2]) for values in (course.path_x_m, course.path_y_m))
-    far = (right - left) / math.hypot(dx, dy)
-    path_x = np.append(course.path_x_m, course.path_x_m[-1] + far * dx)
-    path_y = np.append(course.path_y_m, course.path_y_m[-1] + far * dy)
+    view = view_of(course)
     return {
         "lanes": [
             {"name": name, "x": [start, end], "y": [below, above]} for name, start, end, below, above in course.lanes
         ],
         "cones": [[round(x, 3), round(y, 3)] for x, y in course.cones_m.tolist()],
-        "path": {"x": _rounded(path_x, 2), "y": _rounded(path_y, 3)},
-        "view": {"x": [left, right], "y": [low, high]},
+        "path": {"x": _rounded(view.path_x_m, 2), "y": _rounded(view.path_y_m, 3)},
+        "view": {"x": list(view.x_m), "y": list(view.y_m)},
     }

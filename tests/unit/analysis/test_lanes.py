@@ -7,15 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.course import read_car, read_course
-from activesteer.analysis.lanes import (
-    CONE_RADIUS_M,
-    FRONT_OVERHANG_M,
-    REAR_OVERHANG_M,
-    all_wheels_in_lanes,
-    cone_distances,
-    lane_overstep,
-)
+from activesteer.analysis.lanes import all_wheels_in_lanes, cone_distances, lane_overstep
+from activesteer.analysis.source import read_course, read_footprint
+from activesteer.road.course import CONE_RADIUS_M
+from activesteer.road.footprint import FRONT_OVERHANG_M, REAR_OVERHANG_M
 from tests.unit.analysis.made_up import LANES, WHEELBASE_M, WIDTH_M, MadeUp, along_path, offset_track
 
 HALF_M = 0.75 + 0.1
@@ -27,15 +22,15 @@ def straight(y_m: float, **words) -> MadeUp:
 
 
 def overstep(run: MadeUp) -> float:
-    return lane_overstep(run, read_course(run), read_car(run))
+    return lane_overstep(run, read_course(run), read_footprint(run))
 
 
 def kept(run: MadeUp) -> bool:
-    return all_wheels_in_lanes(run, read_course(run), read_car(run))
+    return all_wheels_in_lanes(run, read_course(run), read_footprint(run))
 
 
 def distances(run: MadeUp) -> np.ndarray:
-    return cone_distances(run, read_course(run), read_car(run))
+    return cone_distances(run, read_course(run), read_footprint(run))
 
 
 @pytest.mark.parametrize("y_m", [-0.5, 0.0, 0.3])

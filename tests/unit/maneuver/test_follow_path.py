@@ -46,7 +46,7 @@ def test_course_goes_through_the_points():
     course = follow(X, Y).course
     assert np.interp(X, course.path.x_m, course.path.y_m) == pytest.approx(Y, abs=0.01)
     assert course.lanes == ()
-    assert course.cones == ()
+    assert len(course.cones_m) == 0
     assert course.last_gate_x_m is None
 
 

@@ -41,7 +41,7 @@ def test_lanes_to_the_right_are_mirrored(standard):
 @pytest.mark.parametrize("standard", ["iso_3888_1", "iso_3888_2"])
 def test_cones_stand_in_pairs_on_the_edges_from_end_to_end(standard):
     course = lanes(standard, 1.8, 30.0, 1.0)
-    points = cones(course)
+    points = [tuple(point) for point in cones(course).tolist()]
     assert len(points) == len(set(points))
     for lane in course:
         for edge in (lane.right_y_m, lane.left_y_m):

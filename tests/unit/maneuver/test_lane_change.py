@@ -9,7 +9,9 @@ import pytest
 
 from activesteer.config import Source
 from activesteer.errors import ManeuverError, ParameterError
-from activesteer.maneuver import Course, LaneChange, build_maneuver
+from activesteer.maneuver import LaneChange, build_maneuver
+from activesteer.road.course import Course
+from activesteer.road.path_search import PathSearch
 from activesteer.scenario import resolve
 
 SOURCE = Source("my_lanes.toml", error=ManeuverError)
@@ -31,7 +33,7 @@ def least_distance_m(course: Course, width_m: float) -> float:
     """Least distance between the car's sides, at axles 1.3 m from its centre, and the edges of the lanes."""
     path = course.path
     s = np.arange(0.0, path.length_m, 0.02)
-    x, y = path.at(s)
+    x, y = PathSearch(path).at(s)
     heading = np.interp(s, path.s_m, path.heading_rad)
     distances = []
     for ahead in (1.3, -1.3):
@@ -91,7 +93,7 @@ def test_change_to_the_right_is_the_mirror_image(standard, path):
     left, right = (course({"standard": standard, "path": path, "side": side}) for side in ("left", "right"))
     assert np.array_equal(right.path.y_m, -left.path.y_m)
     assert np.array_equal(right.path.x_m, left.path.x_m)
-    assert {(x, -y) for x, y in right.cones} == set(left.cones)
+    assert {(x, -y) for x, y in right.cones_m.tolist()} == set(map(tuple, left.cones_m.tolist()))
 
 
 def test_course_is_the_same_every_time():

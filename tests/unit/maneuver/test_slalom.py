@@ -26,10 +26,10 @@ def slalom(cones: dict[str, Any] | None = None, **keys: Any) -> Slalom:
 @pytest.mark.parametrize("count", [2, 5, 6])
 def test_every_cone_is_passed_on_the_other_side_by_the_offset(side, count):
     course = slalom({"side": side, "count": count, "offset_m": 1.2, "spacing_m": 30.0, "entry_m": 40.0}).course
-    assert course.cones == tuple((40.0 + 30.0 * number, 0.0) for number in range(count))
+    assert course.cones_m.tolist() == [[40.0 + 30.0 * number, 0.0] for number in range(count)]
     assert course.last_gate_x_m == 40.0 + 30.0 * (count - 1)
     assert course.lanes == ()
-    y = np.interp([x for x, _ in course.cones], course.path.x_m, course.path.y_m)
+    y = np.interp(course.cones_m[:, 0], course.path.x_m, course.path.y_m)
     first = 1.0 if side == "left" else -1.0
     assert y == pytest.approx([first * 1.2 * (-1.0) ** number for number in range(count)], abs=2e-3)
 

@@ -9,6 +9,7 @@ import pytest
 
 from activesteer.errors import ManeuverError
 from activesteer.road.path import SPACING_M, Path
+from activesteer.road.path_search import PathSearch
 
 
 def arc(radius_m: float, degrees: float, points: int = 60) -> Path:
@@ -39,7 +40,7 @@ def test_heading_counts_on_beyond_half_a_turn() -> None:
 
 def test_it_goes_on_straight_at_both_ends() -> None:
     path = Path.through([0.0, 10.0, 20.0], [0.0, 10.0, 20.0])
-    x, y = path.at(np.array([-math.sqrt(2.0), path.length_m + math.sqrt(2.0)]))
+    x, y = PathSearch(path).at(np.array([-math.sqrt(2.0), path.length_m + math.sqrt(2.0)]))
     assert x == pytest.approx([-1.0, 21.0])
     assert y == pytest.approx([-1.0, 21.0])
 
@@ -47,7 +48,7 @@ def test_it_goes_on_straight_at_both_ends() -> None:
 def test_the_nearest_point_is_found_between_the_samples() -> None:
     path = Path.through([0.0, 100.0], [0.0, 0.0])
     for x in (17.13, -3.2, 104.4):
-        assert path.nearest(x, 2.0, x + 3.0, 5.0) == pytest.approx(x, abs=1e-9)
+        assert PathSearch(path).nearest(x, 2.0, x + 3.0, 5.0) == pytest.approx(x, abs=1e-9)
 
 
 def test_the_nearest_point_stays_on_its_own_branch() -> None:
@@ -55,7 +56,7 @@ def test_the_nearest_point_stays_on_its_own_branch() -> None:
     angle = np.linspace(0.0, 2.0 * math.pi, 200)
     path = Path.through(50.0 * np.sin(2.0 * angle), 50.0 * np.sin(angle))
     middle = path.length_m / 2
-    assert path.nearest(0.0, 0.0, middle - 3.0, 6.0) == pytest.approx(middle, abs=0.05)
+    assert PathSearch(path).nearest(0.0, 0.0, middle - 3.0, 6.0) == pytest.approx(middle, abs=0.05)
 
 
 @pytest.mark.parametrize(

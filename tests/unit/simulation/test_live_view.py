@@ -66,7 +66,7 @@ def watched(duration_s: float = 0.5, speed: float = 1.0, **look: Any):
         scenario, maneuver=scenario.maneuver.search.accept(0.8)
     )  # instead of searching for it
     simulation, clock = Simulation(scenario), Clock()
-    stage = stage_for(simulation)
+    stage = stage_for(simulation, scenario.maneuver)
     viewer, pacer = Viewer(stage, clock, **look), Pacer(speed, clock, clock.sleep)
     return drive(simulation, stage, viewer, pacer), viewer, clock, pacer, simulation
 

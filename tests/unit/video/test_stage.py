@@ -6,9 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.errors import PlaybackError
+from activesteer.errors import PlaybackError, RecordingError
 from activesteer.recording import Primitive
-from activesteer.video import Car, Stage
+from activesteer.road.course import Course
+from activesteer.road.road import Road, RoadPatch
+from activesteer.video import Car, Film, Settings, Stage
 from activesteer.video.track import Track
 from tests.unit.playback.made_up import circle
 
@@ -89,7 +91,7 @@ def test_solids_have_the_size_of_the_recording():
 
 
 def test_course_has_its_cones_and_lanes():
-    bare, built = stage().model, stage(course=COURSE).model
+    bare, built = stage().model, stage(course=Course.from_table(COURSE)).model
     meshes = built.geom_type == mujoco.mjtGeom.mjGEOM_MESH
     assert meshes.sum() == 3 * 2  # three rings a cone
     places = {tuple(np.round(place[:2], 6)) for place in built.geom_pos[meshes]}
@@ -100,14 +102,13 @@ def test_course_has_its_cones_and_lanes():
 
 def test_slippery_ground_looks_different():
     def colour(**road) -> np.ndarray:
-        model = stage(road=road).model
+        model = stage(road=Road(**road)).model
         texture = model.texture("road").id
         start = model.tex_adr[texture]
         return model.tex_data[start : start + 3 * 512 * 512].reshape(-1, 3).mean(axis=0)
 
     assert colour(mu=0.1)[2] > colour(mu=0.9)[2] + 50
-    patch = {"start_m": 20.0, "end_m": 40.0, "mu": 0.2, "side": "left"}
-    split = stage(road={"mu": 0.9, "mu_right": 0.3, "patches": [patch]}).model
+    split = stage(road=Road(0.9, mu_right=0.3, patches=(RoadPatch(20.0, 40.0, 0.2, "left"),))).model
     added = [split.geom_size[index] for index in range(split.ngeom) if split.geom_bodyid[index] == 0][1:]
     assert len(added) == 2
     assert added[1][0] == 10.0
@@ -118,9 +119,19 @@ def test_slippery_ground_looks_different():
     [
         {"course": {"lanes": [], "cones": []}},
         {"course": {**COURSE, "lanes": [{"name": "a"}]}},
-        {"road": {"patches": [{"mu": 0.3}]}},
+        {"maneuver": {"road": {"patches": [{"mu": 0.3}]}}},
     ],
 )
-def test_recording_that_cannot_be_drawn_says_so(more):
+def test_a_recording_with_a_damaged_course_or_road_says_so(more):
+    with pytest.raises(RecordingError, match=r"course|road\.patches"):
+        Film({"circle": circle(metadata=more)}, Settings())
+
+
+def test_a_car_that_cannot_be_drawn_says_so():
     with pytest.raises(PlaybackError, match="cannot be drawn"):
-        stage(**more)
+        stage(Car((Primitive("chassis", "cone", (1.0, 1.0, 1.0)),), ("chassis",)))
+
+
+def test_a_course_without_end_is_drawn_as_far_as_a_picture_can_hold():
+    far = {"path": {"x_m": [0.0, 1e6], "y_m": [0.0, 0.0]}, "cones": [[float(x), 0.0] for x in range(5000)]}
+    assert stage(course=Course.from_table(far)).model.ngeom < 20000

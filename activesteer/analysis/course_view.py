@@ -1,0 +1,47 @@
+"""What of a course a picture shows."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.road.course import Course
+
+Array = NDArray[np.float64]
+
+BEFORE_M: Final = 20.0
+AFTER_M: Final = 50.0
+"""How much of the road is shown before the first gate and after the last [m]."""
+BESIDE_M: Final = 2.0
+"""How much of it beside the course [m]; a car that goes further off is out of the picture."""
+
+
+class CourseView(NamedTuple):
+    """A course as it is drawn.
+
+    Attributes:
+        x_m: Limits of x [m].
+        y_m: Limits of y [m].
+        path_x_m: World x of the path, straight on beyond its end as far as the picture goes [m], shape (n,).
+        path_y_m: World y of it [m], shape (n,).
+    """
+
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+    path_x_m: Array
+    path_y_m: Array
+
+
+def view_of(course: Course) -> CourseView:
+    """From before the first gate to behind the last; all of the path where there are no gates."""
+    path = course.path
+    sides = [y for lane in course.lanes for y in (lane.right_y_m, lane.left_y_m)]
+    every_y = np.concatenate([path.y_m, course.cones_m[:, 1], sides])
+    low, high = float(every_y.min()) - BESIDE_M, float(every_y.max()) + BESIDE_M
+    if course.last_gate_x_m is None:
+        left, right = float(path.x_m.min()) - BESIDE_M, float(path.x_m.max()) + BESIDE_M
+    else:
+        left, right = course.first_gate_x_m - BEFORE_M, course.last_gate_x_m + AFTER_M
+    return CourseView((left, right), (low, high), *path.extended(right - left))

@@ -1,0 +1,111 @@
+"""What a driver follows: a path, and the lanes and cones beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.road.lane import Lane
+from activesteer.road.path import MIN_CHORD_M, Path
+from activesteer.road.recorded import fail, number, numbers, sequence, table_of, text
+
+Array = NDArray[np.float64]
+
+CONE_RADIUS_M: Final = 0.145
+"""Half of the square base of a traffic cone of `CONE_HEIGHT_M` [m]."""
+CONE_HEIGHT_M: Final = 0.5
+_ON_SIDE_M: Final = 1e-3
+"""How near to the side of a lane a cone marks it [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Path, lanes and cones in the world frame: the car starts at the origin, heading along x.
+
+    Attributes:
+        path: Path of the centre of gravity.
+        lanes: Lanes that the car has to stay in, in the order of travel.
+        cones_m: World x and y of the cones [m], shape (number of cones, 2).
+        last_gate_x_m: Where the last gate ends [m]; None for a path without gates.
+    """
+
+    path: Path
+    lanes: tuple[Lane, ...] = ()
+    cones_m: Array = field(default_factory=lambda: np.empty((0, 2)))
+    last_gate_x_m: float | None = None
+
+    @property
+    def first_gate_x_m(self) -> float:
+        """Where the first lane begins, or the first cone stands where there are no lanes [m]; 0 without both."""
+        if self.lanes:
+            return min(lane.start_x_m for lane in self.lanes)
+        return float(self.cones_m[:, 0].min()) if len(self.cones_m) else 0.0
+
+    def on_lane_side(self) -> NDArray[np.bool_]:
+        """Which cones stand on the side of a lane, so that they mark its width; shape (number of cones,)."""
+        x, y = self.cones_m.T
+        marks = np.zeros(len(x), dtype=bool)
+        for lane in self.lanes:
+            along = (x >= lane.start_x_m - _ON_SIDE_M) & (x <= lane.end_x_m + _ON_SIDE_M)
+            marks |= along & (np.minimum(np.abs(y - lane.right_y_m), np.abs(y - lane.left_y_m)) < _ON_SIDE_M)
+        return marks
+
+    def to_table(self) -> dict[str, Any]:
+        """The same as plain tables, ready for JSON; kept with a recording as `course`."""
+        return {
+            "path": {"x_m": self.path.x_m.tolist(), "y_m": self.path.y_m.tolist()},
+            "lanes": [lane._asdict() for lane in self.lanes],
+            "cones": self.cones_m.tolist(),
+            "last_gate_x_m": self.last_gate_x_m,
+        }
+
+    @classmethod
+    def from_table(cls, table: object) -> Course:
+        """The course that `to_table` describes; heading and curvature of its path are those between its points.
+
+        Args:
+            table: What a recording holds.
+
+        Raises:
+            RecordingError: a key of it is missing, of the wrong type or out of range.
+        """
+        course = table_of(table, "course")
+        path = table_of(course.get("path"), "course.path")
+        x_m, y_m = (numbers(path.get(key), f"course.path.{key}") for key in ("x_m", "y_m"))
+        if len(x_m) != len(y_m) or len(x_m) < 2:
+            raise fail("course.path", f"has {len(x_m)} x_m and {len(y_m)} y_m; as many of each are needed, at least 2")
+        if (np.hypot(np.diff(x_m), np.diff(y_m)) < MIN_CHORD_M).any():
+            raise fail("course.path", "has two points in a row that are the same")
+        lanes = sequence(course.get("lanes", ()), "course.lanes")
+        cones = sequence(course.get("cones", ()), "course.cones")
+        places = [numbers(cone, f"course.cones.{index}", count=2) for index, cone in enumerate(cones)]
+        last = course.get("last_gate_x_m")
+        return cls(
+            Path.between(x_m, y_m),
+            tuple(_lane(lane, f"course.lanes.{index}") for index, lane in enumerate(lanes)),
+            np.reshape(places, (-1, 2)),
+            None if last is None else number(last, "course.last_gate_x_m"),
+        )
+
+
+def course_of(metadata: Mapping[str, Any]) -> Course | None:
+    """The course of a recorded run; None where its manoeuvre has none.
+
+    Raises:
+        RecordingError: there is one that is wrong.
+    """
+    table = metadata.get("course")
+    return None if table is None else Course.from_table(table)
+
+
+def _lane(table: object, key: str) -> Lane:
+    lane = table_of(table, key)
+    sides = [number(lane.get(field), f"{key}.{field}") for field in Lane._fields[1:]]
+    found = Lane(text(lane.get("name", ""), f"{key}.name"), *sides)
+    if not (found.start_x_m <= found.end_x_m and found.right_y_m <= found.left_y_m):
+        raise fail(key, f"is {tuple(sides)}: it must end behind its start, and its left edge lie left of its right one")
+    return found

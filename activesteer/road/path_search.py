@@ -1,0 +1,95 @@
+"""Where a car is along a path, and where the path is ahead of it: native, since a driver asks with every look."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.compilation import compiled
+from activesteer.road.path import SPACING_M, Path
+
+Array = NDArray[np.float64]
+
+
+class PathSearch:
+    """Places along a path, also before its beginning and beyond its end."""
+
+    def __init__(self, path: Path) -> None:
+        """Prepares what the kernels take.
+
+        Args:
+            path: The path; its points have equal distances.
+        """
+        spacing = path.length_m / (len(path.s_m) - 1)
+        self._line = spacing, path.x_m, path.y_m, float(path.heading_rad[0]), float(path.heading_rad[-1])
+
+    def at(self, s_m: Array) -> tuple[Array, Array]:
+        """Points at arc lengths, also before the beginning and beyond the end.
+
+        Args:
+            s_m: Arc lengths [m], shape (k,).
+
+        Returns:
+            World x and y [m], shape (k,) each.
+        """
+        return _points_at(s_m, *self._line)
+
+    def nearest(self, x_m: float, y_m: float, around_m: float, window_m: float) -> float:
+        """Arc length of the point of the path nearest to a point, looked for around a place where it was before.
+
+        Args:
+            x_m: World x of the point [m].
+            y_m: World y of the point [m].
+            around_m: Arc length to look around [m].
+            window_m: How far to look to either side [m].
+
+        Returns:
+            Arc length [m]; below 0 or above the length where the path goes on straight.
+        """
+        return _nearest(x_m, y_m, around_m, window_m, *self._line)
+
+
+@compiled
+def _point_at(s, spacing, xs, ys, heading_first, heading_last):
+    """One point: linear between points, straight beyond the ends."""
+    last = len(xs) - 1
+    place = s / spacing
+    if place <= 0.0:
+        return xs[0] + s * math.cos(heading_first), ys[0] + s * math.sin(heading_first)
+    if place >= last:
+        beyond = s - last * spacing
+        return xs[last] + beyond * math.cos(heading_last), ys[last] + beyond * math.sin(heading_last)
+    index = min(int(place), last - 1)
+    fraction = place - index
+    return xs[index] + fraction * (xs[index + 1] - xs[index]), ys[index] + fraction * (ys[index + 1] - ys[index])
+
+
+@compiled
+def _points_at(s, spacing, xs, ys, heading_first, heading_last):
+    """`PathSearch.at` as native code."""
+    x, y = np.empty(len(s)), np.empty(len(s))
+    for index in range(len(s)):
+        x[index], y[index] = _point_at(s[index], spacing, xs, ys, heading_first, heading_last)
+    return x, y
+
+
+@compiled
+def _nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
+    """`PathSearch.nearest` as native code."""
+    count = math.ceil(2.0 * window / SPACING_M) + 1
+    best, least, before, after = 0, math.inf, math.inf, math.inf
+    previous = math.inf
+    for index in range(count):
+        px, py = _point_at(around - window + index * SPACING_M, spacing, xs, ys, heading_first, heading_last)
+        distance = (px - x) ** 2 + (py - y) ** 2
+        if index == best + 1:
+            after = distance
+        if distance < least:
+            best, least, before, after = index, distance, previous, math.inf
+        previous = distance
+    # The parabola through the three nearest points: the result moves on smoothly between them.
+    bend = before - 2.0 * least + after
+    shift = 0.5 * (before - after) / bend if 0.0 < bend < math.inf else 0.0
+    return around - window + (best + min(max(shift, -1.0), 1.0)) * SPACING_M
