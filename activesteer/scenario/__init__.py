@@ -1,5 +1,6 @@
 """What is driven, by which car."""
 
-from activesteer.scenario.scenario import CarFile, FileOrTable, Scenario, describe, resolve
+from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, load_car
+from activesteer.scenario.scenario import Scenario, describe, resolve
 
-__all__ = ["CarFile", "FileOrTable", "Scenario", "describe", "resolve"]
+__all__ = ["Car", "FileOrTable", "Scenario", "VehicleConfig", "describe", "load_car", "resolve"]

@@ -51,9 +51,9 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
         ManeuverError: no angle gives what is asked for.
     """
     probed = replace(scenario, maneuver=search.probe)
-    tables = [to_table(probed.maneuver), search.lateral_acceleration_mps2, to_table(probed.car), timestep_s]
-    models = sorted(item for item in scenario.files.items() if item[0].startswith(("mjcf/", "tyres/")))
-    key = (json.dumps(tables, sort_keys=True), scenario.mjcf, *models)
+    tables = [to_table(probed.maneuver), search.lateral_acceleration_mps2, to_table(probed.car.config), timestep_s]
+    models = sorted(item for item in scenario.car.files.items() if item[0].startswith(("mjcf/", "tyres/")))
+    key = (json.dumps(tables, sort_keys=True), scenario.car.mjcf, *models)
     if key not in _found:
         if isinstance(search, RampAngle):
             _found[key] = _ramp_angle(probed, search, timestep_s)
@@ -70,10 +70,10 @@ def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> f
     probe = search.probe
     simulation = Simulation(scenario, "none", timestep_s)
     start = simulation.save_state()
-    car, speed = scenario.car.single_track, max(probe.speed_mps, 1.0)
+    car, speed = scenario.car.config.single_track, max(probe.speed_mps, 1.0)
     wheelbase = car.cg_to_front_m + car.cg_to_rear_m
     # First guess: Ackermann angle with the understeer of a usual car, some 2.5 deg per g.
-    angle = scenario.car.steering.ratio * wanted * (wheelbase / speed**2 + 0.0044)
+    angle = scenario.car.config.steering.ratio * wanted * (wheelbase / speed**2 + 0.0044)
     tried: list[tuple[float, float]] = []
     for _ in range(_RUNS):
         reached = _steady_acceleration(simulation, probe.with_amplitude(angle), start)

@@ -16,7 +16,7 @@ from activesteer.driver import Driver, StandardDriver
 from activesteer.scenario import Scenario
 from activesteer.signals import Measurement, Motion, Reference, SteerCommand
 from activesteer.simulation.recorder import Recorder
-from activesteer.vehicle import Vehicle, engine_warnings_held
+from activesteer.vehicle import engine_warnings_held
 
 _CHECK_EVERY_STEPS = 100
 """How often the engine is asked for warnings; the speed is looked at in every step."""
@@ -57,7 +57,7 @@ class Simulation:
             SimulationDiverged: the car does not settle.
         """
         self.maneuver = maneuver = scenario.maneuver
-        self.vehicle = vehicle = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, maneuver.road, timestep_s)
+        self.vehicle = vehicle = scenario.car.on(maneuver.road, timestep_s)
         setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m)
         self.driver: Driver = StandardDriver.from_vehicle(setup)
         self.controller: Controller = load_controller(controller, scenario.controller_setup(timestep_s))

@@ -175,7 +175,7 @@ def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
         for measured, present in ((with_tyres, wheels), (without, 0.0)):
             numbers[count] = present
             measured.append(_per_step_us(lambda: _repeat(mujoco.mj_passive, model, data, _CALLS), _CALLS))
-    return tyre_bench(scenario.tyres[0], rounds) | {"four_tyres_us": min(with_tyres) - min(without)}
+    return tyre_bench(scenario.car.tyres[0], rounds) | {"four_tyres_us": min(with_tyres) - min(without)}
 
 
 def _blocks(scenario: Scenario) -> dict[str, float]:

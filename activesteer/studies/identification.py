@@ -23,11 +23,12 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.tables import comparison, label_and_unit
 from activesteer.controllers import SingleTrackParameters
 from activesteer.errors import ModelError, RecordingError
+from activesteer.scenario import Car as CarFiles
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.scenario.vehicle_file import write_values
 from activesteer.simulation.runner import run_scenario
 from activesteer.theory.single_track import SingleTrack
-from activesteer.vehicle import Vehicle
+from activesteer.vehicle.mass_properties import mass_properties
 
 CONSTANT_SPEED_TESTS: Final = {"80 km/h": 80.0, "100 km/h": 100.0}
 """Tests at constant speed: name and speed [km/h]; the single-track model comes from these."""
@@ -127,7 +128,7 @@ def identify(
         for name, speed in CONSTANT_SPEED_TESTS.items()
     }
     scenarios[RADIUS_TEST] = resolve("constant_radius", vehicle, overrides)
-    body = mass_properties(scenarios[RADIUS_TEST])
+    body = _body(scenarios[RADIUS_TEST].car)
     tests = {}
     for name, scenario in scenarios.items():
         if progress is not None:
@@ -153,32 +154,22 @@ def identify_single_track(
         resolve("slowly_increasing_steer", vehicle, {**(overrides or {}), **_LINEAR, "speed_kmh": speed})
         for speed in CONSTANT_SPEED_TESTS.values()
     ]
-    body = mass_properties(scenarios[0])
+    body = _body(scenarios[0].car)
     return _single_track(body, [_drive(scenario, body) for scenario in scenarios])
 
 
-def mass_properties(scenario: Scenario) -> Body:
-    """Mass properties of the whole car, from the model at static ride.
-
-    Args:
-        scenario: The car; what it drives does not matter.
-    """
-    vehicle = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.maneuver.road)
-    model, data = vehicle.model, vehicle.data
-    centre = data.subtree_com[model.body("chassis").id]
-    inertia = 0.0
-    for body in range(1, model.nbody):
-        axes = data.ximat[body].reshape(3, 3)
-        offset = data.xipos[body] - centre
-        about_own = (axes @ np.diag(model.body_inertia[body]) @ axes.T)[2, 2]
-        inertia += about_own + model.body_mass[body] * (offset[0] ** 2 + offset[1] ** 2)
-    front, rear = (data.xpos[model.body(f"{axle}l_wheel").id, 0] for axle in "fr")
-    return Body(float(model.body_mass.sum()), float(inertia), float(front - centre[0]), float(centre[0] - rear))
+def _body(car: CarFiles) -> Body:
+    """Mass properties of the whole car, from the model at static ride."""
+    vehicle = car.on()
+    body = mass_properties(vehicle.model, vehicle.data)
+    front, rear = (vehicle.data.xpos[vehicle.model.body(f"{axle}l_wheel").id, 0] for axle in "fr")
+    x_m = body.cg_m[0]
+    return Body(body.mass_kg, float(body.inertia_kgm2[2, 2]), float(front - x_m), float(x_m - rear))
 
 
 def _drive(scenario: Scenario, body: Body) -> Handling:
     recording = run_scenario(scenario)
-    return evaluate(recording, Car(body.cg_to_front_m, body.cg_to_rear_m, scenario.car.steering.ratio))
+    return evaluate(recording, Car(body.cg_to_front_m, body.cg_to_rear_m, scenario.car.config.steering.ratio))
 
 
 def _single_track(body: Body, tests: list[Handling]) -> SingleTrackParameters:

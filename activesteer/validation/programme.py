@@ -14,7 +14,7 @@ from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder, replacing, write_text
 from activesteer.road.road import Road
-from activesteer.scenario import resolve
+from activesteer.scenario import load_car, resolve
 from activesteer.simulation.runner import prepared, run_scenario
 from activesteer.validation.comparison import Comparison, to_json
 from activesteer.validation.kinematics import Curves, compare_kinematics
@@ -23,7 +23,6 @@ from activesteer.validation.reference import ReferenceData, Table
 from activesteer.validation.runs import compare_run
 from activesteer.validation.static import compare_static
 from activesteer.validation.tyre_grid import compare_tyre
-from activesteer.vehicle import Vehicle
 
 _FRICTION: Final = 0.9
 """Friction of the road in all reference runs."""
@@ -96,11 +95,11 @@ def validate(
             progress(done / (len(driven) + 2), what)
 
     tell(0, "rig")
-    scenario = resolve(data.maneuver(data.runs[0]), data.vehicle)
-    vehicle = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, Road(mu=_FRICTION), timestep_s)
+    car = load_car(data.vehicle)
+    vehicle = car.on(Road(mu=_FRICTION), timestep_s)
     rows, curves = compare_kinematics(vehicle, data)
     tell(1, "static")
-    comparisons = [*compare_static(vehicle, data), *rows, *compare_tyre(scenario.tyres[0], data)]
+    comparisons = [*compare_static(vehicle, data), *rows, *compare_tyre(car.tyres[0], data)]
     runs = {}
     for number, run in enumerate(driven):
         tell(number + 2, run)

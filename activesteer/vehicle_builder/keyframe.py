@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from activesteer.scenario import FileOrTable, resolve
-from activesteer.vehicle import Vehicle
+from activesteer.scenario import FileOrTable, load_car
 
 
 def keyframe_xml(vehicle: FileOrTable) -> tuple[str, Path]:
@@ -17,9 +16,8 @@ def keyframe_xml(vehicle: FileOrTable) -> tuple[str, Path]:
     Raises:
         ActiveSteerError: the car cannot be built, or has no static equilibrium.
     """
-    scenario = resolve("standstill", vehicle)
-    car = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.maneuver.road)
-    qpos = " ".join(f"{value:.15g}" for value in car.data.qpos)
+    car = load_car(vehicle)
+    qpos = " ".join(f"{value:.15g}" for value in car.on().data.qpos)
     text = f"""<mujocoinclude>
   <!-- Written by tools/make_keyframe.py: static equilibrium on the tyres. -->
   <keyframe>
@@ -28,4 +26,4 @@ def keyframe_xml(vehicle: FileOrTable) -> tuple[str, Path]:
   </keyframe>
 </mujocoinclude>
 """
-    return text, scenario.mjcf.parent / "keyframes.xml"
+    return text, car.mjcf.parent / "keyframes.xml"

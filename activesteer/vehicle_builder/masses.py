@@ -1,51 +1,16 @@
-"""The chassis as what is left of the whole car, and the whole car as the sum of its bodies."""
+"""The chassis as what is left of the whole car."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.errors import ParameterError
+from activesteer.vehicle.mass_properties import mass_properties, point_mass_inertia
 from activesteer.vehicle_builder.design import Car, Log, Solid
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Whole:
-    """Mass, centre of gravity and inertia tensor about it [kg, m, kg m2]."""
-
-    mass_kg: float
-    cg_m: Array
-    inertia_kgm2: Array
-
-
-def whole(model: mujoco.MjModel, *, without_chassis: bool = False) -> Whole:
-    """Mass properties of a car in its design position.
-
-    Args:
-        model: The car.
-        without_chassis: Leave its body out.
-    """
-    data = mujoco.MjData(model)
-    mujoco.mj_fwdPosition(model, data)
-    left_out = {0, model.body("chassis").id} if without_chassis else {0}
-    bodies = [body for body in range(model.nbody) if body not in left_out]
-    mass = float(sum(model.body_mass[body] for body in bodies))
-    cg = np.sum([model.body_mass[body] * data.xipos[body] for body in bodies], axis=0) / mass
-    inertia = np.zeros((3, 3))
-    for body in bodies:
-        axes = data.ximat[body].reshape(3, 3)
-        inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
-        inertia += float(model.body_mass[body]) * _steiner(data.xipos[body] - cg)
-    return Whole(mass, cg, inertia)
-
-
-def _steiner(offset: Array) -> Array:
-    return np.asarray(offset @ offset * np.eye(3) - np.outer(offset, offset))
 
 
 def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
@@ -59,7 +24,7 @@ def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
     Raises:
         ParameterError: nothing possible is left.
     """
-    table, others = car.table.mass, whole(model, without_chassis=True)
+    table, others = car.table.mass, mass_properties(model, without=["chassis"])
     base = car.wheelbase_m
     if table.chassis_kg is not None and table.chassis_cg is not None:
         inertia = table.chassis_inertia_kgm2
@@ -82,7 +47,7 @@ def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
         inertia = _usual_inertia(table.total_kg, base, car, table.front_share)
         log.note("mass.inertia_kgm2", _words(inertia), _INERTIA_RULE)
     left = np.diag(np.array(inertia)).astype(float) - others.inertia_kgm2
-    left -= others.mass_kg * _steiner(others.cg_m - cg) + mass * _steiner(chassis_cg - cg)
+    left -= others.mass_kg * point_mass_inertia(others.cg_m - cg) + mass * point_mass_inertia(chassis_cg - cg)
     own = np.diag(left)
     if own.min() <= 0.0 or 2.0 * own.max() > own.sum():
         msg = (

@@ -20,14 +20,15 @@ from numpy.typing import NDArray
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar
-from activesteer.scenario import resolve
+from activesteer.scenario import load_car
 from activesteer.tyre.kernels.vertical import deflection_under_load, vertical_force
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle
+from activesteer.vehicle.mass_properties import mass_properties
 from activesteer.vehicle.parameters import Friction
 from activesteer.vehicle_builder.completion import rack_per_steer_m
 from activesteer.vehicle_builder.design import Axle, Car, Log
-from activesteer.vehicle_builder.masses import chassis_of, whole
+from activesteer.vehicle_builder.masses import chassis_of
 from activesteer.vehicle_builder.motion import corner_motion
 from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
 
@@ -84,7 +85,7 @@ def trim(car: Car, write: Write, log: Log) -> Trimmed:
     trimmed.chassis = chassis_of(car, model, log)
     write(trimmed)
     model = _compiled(mjcf)
-    body = whole(model)
+    body = mass_properties(model)
     trimmed.cg_m = float(body.cg_m[0]), float(body.cg_m[2])
     share = float(body.cg_m[0] - car.rear.wheel_centre_m[0]) / car.wheelbase_m
     loads = {
@@ -184,9 +185,8 @@ def _first_guess(
 
 
 def _stand(vehicle_file: Path) -> _Stand:
-    scenario = resolve("standstill", vehicle_file)
-    smooth = dataclasses.replace(scenario.car, friction=Friction())
-    vehicle = Vehicle(scenario.mjcf, smooth, scenario.tyres, scenario.maneuver.road)
+    car = load_car(vehicle_file)
+    vehicle = dataclasses.replace(car, config=dataclasses.replace(car.config, friction=Friction())).on()
     design = mujoco.MjData(vehicle.model)
     mujoco.mj_kinematics(vehicle.model, design)
     chassis = vehicle.model.body("chassis").id

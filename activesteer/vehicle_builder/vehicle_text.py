@@ -12,8 +12,8 @@ import mujoco
 from activesteer.controllers import SingleTrackParameters
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.tyre.evaluation import MagicFormula
+from activesteer.vehicle.mass_properties import mass_properties
 from activesteer.vehicle_builder.design import Axle, Car
-from activesteer.vehicle_builder.masses import whole
 from activesteer.vehicle_builder.numbers import num, sig
 from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
 
@@ -83,7 +83,7 @@ def _single_track(car: Car, model: mujoco.MjModel | None) -> SingleTrackParamete
     base = car.wheelbase_m
     mass, inertia, to_front, stiffness = 1500.0, 2300.0, 0.45 * base, {"front": 1e5, "rear": 1.5e5}
     if model is not None:
-        body = whole(model)
+        body = mass_properties(model)
         mass, inertia = body.mass_kg, float(body.inertia_kgm2[2, 2])
         to_front = float(car.front.wheel_centre_m[0] - body.cg_m[0])
         for axle in car.axles:

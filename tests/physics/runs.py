@@ -63,7 +63,7 @@ def go_on(simulation: Simulation, steps: int) -> NDArray[np.float64]:
 def car(maneuver: str = "standstill") -> Vehicle:
     """The car in static ride."""
     scenario = resolve(maneuver)
-    return Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.maneuver.road)
+    return scenario.car.on(scenario.maneuver.road)
 
 
 def mass_kg(vehicle: Vehicle) -> float:

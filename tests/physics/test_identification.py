@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from activesteer.controllers import SingleTrackParameters
-from activesteer.scenario import resolve
+from activesteer.scenario import load_car
 from activesteer.studies.identification import (
     CONSTANT_SPEED_TESTS,
     RADIUS_TEST,
@@ -36,7 +36,7 @@ def full() -> Identification:
 @pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(SingleTrackParameters)])
 def test_stored_single_track_parameter_matches_the_car(name):
     """Where this fails the car has changed: run `activesteer identify`."""
-    stored = resolve("standstill", "compact").car.single_track
+    stored = load_car("compact").config.single_track
     assert getattr(stored, name) == pytest.approx(getattr(single_track(), name), rel=0.01)
 
 

@@ -19,8 +19,7 @@ from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.rigs.kc.held_car import Case, HeldCar
-from activesteer.road.road import Road
-from activesteer.scenario import resolve
+from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from tests.physics.rigid_links import FRONT_LINKS, REAR_LINKS, Pose, RigidCorner
 from tests.physics.static_corner import PINION_M, StaticCorner
@@ -37,8 +36,7 @@ def compact() -> KcResult:
 
 
 def vehicle() -> Vehicle:
-    scenario = resolve("step_steer", "compact")
-    return Vehicle(scenario.mjcf, scenario.car, scenario.tyres, Road())
+    return load_car("compact").on()
 
 
 def is_link(name: str) -> bool:
@@ -212,8 +210,7 @@ def moved_hardpoint(folder: Path, file: str, site: str, axis: int, by_m: float) 
 
 def bump_slopes(changed: dict) -> tuple[Array, Array]:
     """Toe and camber of the left wheels [deg/m], front and rear, over +-15 mm of a changed car."""
-    scenario = resolve("step_steer", changed)
-    held = HeldCar(Vehicle(scenario.mjcf, scenario.car, scenario.tyres, Road()))
+    held = HeldCar(load_car(changed).on())
     axles = []
     for height in (-0.015, 0.015):
         held.equilibrium(Case(height_m=np.full(4, height)))

@@ -12,7 +12,7 @@ import pytest
 import activesteer.analysis
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.errors import ParameterError
-from activesteer.scenario import resolve
+from activesteer.scenario import load_car, resolve
 from activesteer.signals import SteerCommand
 from activesteer.simulation.simulation import Simulation
 from activesteer.studies.linearisation import (
@@ -143,7 +143,7 @@ def test_yaw_gain_is_largest_at_the_characteristic_speed():
     speeds = np.arange(60.0, 116.0, 5.0) / 3.6
     gains = [np.asarray(one.state_space().dcgain())[0, 0] for one in linear_cars("compact", list(speeds))]
     a, b, _ = np.polyfit(speeds, gains, 2)
-    stored = resolve("standstill").car.single_track.characteristic_speed_mps
+    stored = load_car().config.single_track.characteristic_speed_mps
     assert -b / (2 * a) == pytest.approx(stored, rel=0.05)
 
 

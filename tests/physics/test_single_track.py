@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from activesteer.scenario import resolve
+from activesteer.scenario import load_car
 from activesteer.theory.single_track import SingleTrack
 from tests.physics.runs import last, run
 
@@ -14,7 +14,7 @@ TENTH_G_MPS2 = 0.981
 @pytest.mark.parametrize("speed_kmh", [50.0, 80.0, 120.0])
 def test_steady_state_yaw_rate_agrees_at_a_tenth_of_g(speed_kmh: float) -> None:
     recording = run("step_steer", steer__lateral_acceleration_g=0.1, speed_kmh=speed_kmh)
-    car = resolve("step_steer").car
+    car = load_car().config
     end = last(recording, 0.5)
     assert recording["ay_mps2"][end].mean() == pytest.approx(TENTH_G_MPS2, rel=2e-3)
     demand_rad = recording["steering_wheel_demand_rad"][end].mean() / car.steering.ratio

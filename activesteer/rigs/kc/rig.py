@@ -14,9 +14,7 @@ from activesteer.rigs.kc import metrics_kinematics, metrics_compliance, metrics_
 from activesteer.rigs.kc.programme import measure
 from activesteer.rigs.kc.result import KcResult, evaluated
 from activesteer.rigs.kc.targets import load_targets
-from activesteer.road.road import Road
-from activesteer.scenario import FileOrTable, resolve
-from activesteer.vehicle import Vehicle
+from activesteer.scenario import FileOrTable, load_car
 from activesteer.vehicle.parameters import Friction
 
 
@@ -40,19 +38,14 @@ def kinematics_compliance(
         ModelError: the model is not found, lacks a part, or has no equilibrium.
         TyreFileError: a tyre file is not found or wrong.
     """
-    changes = {
-        key if key.startswith("vehicle.") else f"vehicle.{key}": value for key, value in (overrides or {}).items()
-    }
-    # A scenario needs a manoeuvre; the rig uses the car alone.
-    scenario = resolve("step_steer", vehicle, changes)
-    bands = load_targets(scenario.car.name, targets)
+    car = load_car(vehicle, overrides)
+    bands = load_targets(car.name, targets)
     # Dry friction pushes as far one way as the other: without it the rig finds the mean of both directions of a sweep.
-    smooth = dataclasses.replace(scenario.car, friction=Friction())
-    car = Vehicle(scenario.mjcf, smooth, scenario.tyres, Road())
+    smooth = dataclasses.replace(car, config=dataclasses.replace(car.config, friction=Friction()))
     try:
-        measured = measure(car, scenario.tyres)
+        measured = measure(smooth.on(), car.tyres)
     except KeyError as reason:
         # The engine's look-up by name: its message says which there are.
-        msg = f"{scenario.mjcf}: the kinematics and compliance rig needs a part that the model lacks: {reason}"
+        msg = f"{car.mjcf}: the kinematics and compliance rig needs a part that the model lacks: {reason}"
         raise ModelError(msg) from reason
-    return evaluated(scenario.car.name, measured, bands)
+    return evaluated(car.name, measured, bands)

@@ -10,8 +10,7 @@ import mujoco
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.resources import find_vehicle
 from activesteer.rigs.kc import kinematics_compliance
-from activesteer.scenario import resolve
-from activesteer.vehicle import Vehicle
+from activesteer.scenario import load_car
 from activesteer.vehicle_builder.check.findings import CheckReport, Finding
 from activesteer.vehicle_builder.check.geometry import geometry
 from activesteer.vehicle_builder.check.moving import moving
@@ -34,13 +33,13 @@ def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
     file = _file(vehicle)
     findings: list[Finding] = []
     try:
-        scenario = resolve("standstill", file)
+        car = load_car(file)
     except ActiveSteerError as reason:
         return CheckReport(file.stem, (Finding("parts", "vehicle file", "error", "wrong", "", str(reason)),))
     findings.append(Finding("parts", "vehicle file, MJCF and tyre files", "ok", "read"))
-    name = scenario.car.name
+    name = car.name
     try:
-        model = mujoco.MjModel.from_xml_path(str(scenario.mjcf))
+        model = mujoco.MjModel.from_xml_path(str(car.mjcf))
     except ValueError as reason:
         findings.append(Finding("parts", "MJCF compiles", "error", "no", "", str(reason)))
         return CheckReport(name, tuple(findings))
@@ -49,11 +48,11 @@ def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
         return CheckReport(name, tuple(findings))
     findings += geometry(model)
     try:
-        car = Vehicle(scenario.mjcf, scenario.car, scenario.tyres, scenario.maneuver.road)
+        standing_car = car.on()
     except ActiveSteerError as reason:
         findings.append(Finding("standing", "static equilibrium", "error", "none", "", str(reason)))
         return CheckReport(name, tuple(findings))
-    findings += standing(car, scenario)
+    findings += standing(standing_car, car)
     try:
         findings += moving(kinematics_compliance(file))
     except ActiveSteerError as reason:

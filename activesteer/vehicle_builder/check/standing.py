@@ -11,37 +11,37 @@ import numpy as np
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import SimulationDiverged
-from activesteer.scenario import Scenario
+from activesteer.scenario import Car
 from activesteer.signals import DriverCommand, SteerCommand
 from activesteer.vehicle import Vehicle, engine_warnings_held
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.mass_properties import mass_properties
 from activesteer.vehicle_builder.check.findings import Finding, Usual, judged
-from activesteer.vehicle_builder.masses import whole
 
 _STEPS: Final = 500
 _STILL_MPS: Final = 0.01
 
 
-def standing(vehicle: Vehicle, scenario: Scenario) -> Iterator[Finding]:
+def standing(vehicle: Vehicle, car: Car) -> Iterator[Finding]:
     """All findings about the car at rest.
 
     Args:
         vehicle: The car in static ride; it is stepped.
-        scenario: What it was made from.
+        car: What it was made from.
     """
     model, data = vehicle.model, vehicle.data
     load = data.userdata[: 4 * fb.USERDATA_PER_WHEEL].reshape(4, fb.USERDATA_PER_WHEEL)[:, fb.U_FZ].copy()
-    body = whole(model)
+    body = mass_properties(model)
     yield Finding("standing", "static equilibrium", "ok", "found")
     yield from _loads(load, body.mass_kg)
     yield from _height(vehicle)
     yield from _stability(vehicle, float(data.subtree_com[0, 2]))
     yield from _inertia(model)
-    yield from _dampers(scenario)
-    yield from _brakes(vehicle, scenario, body.mass_kg)
-    yield from _controllers_view(scenario, body.mass_kg, float(body.inertia_kgm2[2, 2]))
+    yield from _dampers(car)
+    yield from _brakes(vehicle, car, body.mass_kg)
+    yield from _controllers_view(car, body.mass_kg, float(body.inertia_kgm2[2, 2]))
     yield from _stays(vehicle)
-    yield from _tyres(scenario, load)
+    yield from _tyres(car, load)
 
 
 def _loads(load_N: np.ndarray, mass_kg: float) -> Iterator[Finding]:
@@ -112,7 +112,7 @@ def _stability(vehicle: Vehicle, height_m: float) -> Iterator[Finding]:
 
 
 def _inertia(model: mujoco.MjModel) -> Iterator[Finding]:
-    body = whole(model)
+    body = mass_properties(model)
     front, rear = (model.body(f"{corner}_wheel").id for corner in ("fl", "rl"))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -124,8 +124,8 @@ def _inertia(model: mujoco.MjModel) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def _tyres(scenario: Scenario, load_N: np.ndarray) -> Iterator[Finding]:
-    for axle, tyre, load in zip(("front", "rear"), scenario.tyres, (load_N[:2].mean(), load_N[2:].mean()), strict=True):
+def _tyres(car: Car, load_N: np.ndarray) -> Iterator[Finding]:
+    for axle, tyre, load in zip(("front", "rear"), car.tyres, (load_N[:2].mean(), load_N[2:].mean()), strict=True):
         nominal, most = float(tyre["FNOMIN"]), float(tyre["FZMAX"])
         yield judged(
             "tyres", f"{axle} static load over the tyre's nominal load", float(load) / nominal, "",
@@ -138,8 +138,8 @@ def _tyres(scenario: Scenario, load_N: np.ndarray) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _dampers(scenario: Scenario) -> Iterator[Finding]:
-    for axle, curve in (("front", scenario.car.dampers.front), ("rear", scenario.car.dampers.rear)):
+def _dampers(car: Car) -> Iterator[Finding]:
+    for axle, curve in (("front", car.config.dampers.front), ("rear", car.config.dampers.rear)):
         pushes = [force * speed < 0.0 for speed, force in zip(curve.velocity_mps, curve.force_N, strict=True)]
         bad = any(pushes) or float(np.interp(0.0, curve.velocity_mps, curve.force_N)) != 0.0
         yield Finding(
@@ -148,8 +148,8 @@ def _dampers(scenario: Scenario) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _brakes(vehicle: Vehicle, scenario: Scenario, mass_kg: float) -> Iterator[Finding]:
-    brakes = scenario.car.brakes
+def _brakes(vehicle: Vehicle, car: Car, mass_kg: float) -> Iterator[Finding]:
+    brakes = car.config.brakes
     radius = vehicle.data.xpos[vehicle.model.body("fl_wheel").id, 2]
     most = 2.0 * (brakes.front_torque_Nm + brakes.rear_torque_Nm) / radius / (mass_kg * GRAVITY_MPS2)
     yield judged(
@@ -158,8 +158,8 @@ def _brakes(vehicle: Vehicle, scenario: Scenario, mass_kg: float) -> Iterator[Fi
     )  # fmt: skip
 
 
-def _controllers_view(scenario: Scenario, mass_kg: float, yaw_inertia: float) -> Iterator[Finding]:
-    track = scenario.car.single_track
+def _controllers_view(car: Car, mass_kg: float, yaw_inertia: float) -> Iterator[Finding]:
+    track = car.config.single_track
     for what, known, real in (("mass", track.mass_kg, mass_kg), ("yaw inertia", track.yaw_inertia_kgm2, yaw_inertia)):
         off = 100.0 * (known / real - 1.0)
         yield judged(

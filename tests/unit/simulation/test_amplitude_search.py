@@ -33,7 +33,7 @@ def expected_deg() -> float:
     assert car.characteristic_speed_mps is not None
     ackermann = (car.cg_to_front_m + car.cg_to_rear_m) * 0.3 * 9.81 / speed**2
     understeer = 1.0 + (speed / car.characteristic_speed_mps) ** 2
-    return math.degrees(scenario.car.steering.ratio * ackermann * understeer)
+    return math.degrees(scenario.car.config.steering.ratio * ackermann * understeer)
 
 
 def test_angle_at_03_g_is_that_of_the_understeer_gradient():

@@ -13,7 +13,7 @@ from activesteer.analysis.handling import Handling
 from activesteer.config import read_toml
 from activesteer.controllers import SingleTrackParameters
 from activesteer.resources import find_vehicle
-from activesteer.scenario import resolve
+from activesteer.scenario import load_car
 from activesteer.studies.identification import Identification, single_track_response, write_single_track
 from activesteer.theory.single_track import SingleTrack
 from tests.unit.analysis.made_up import step_steer
@@ -60,7 +60,7 @@ def test_vehicle_file_takes_the_parameters(tmp_path):
     path = tmp_path / "mine.toml"
     shutil.copy(find_vehicle("compact"), path)
     write_single_track(path, RESULT, "activesteer identify --vehicle mine.toml", "2026-11-21")
-    found = resolve("standstill", path).car
+    found = load_car(path).config
     assert found.single_track.front_stiffness_Nprad == 90e3
     assert found.single_track.characteristic_speed_mps == pytest.approx(23.0)
     other, _ = read_toml(find_vehicle("compact"))

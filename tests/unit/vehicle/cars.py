@@ -11,22 +11,14 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import CORNERS
-from activesteer.scenario import Scenario, resolve
+from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb
 
 
-def scenario(overrides: Mapping[str, Any] | None = None) -> Scenario:
-    return resolve("standstill", overrides=overrides)
-
-
-def vehicle_of(given: Scenario) -> Vehicle:
-    return Vehicle(given.mjcf, given.car, given.tyres, given.maneuver.road)
-
-
 def standing(overrides: Mapping[str, Any] | None = None) -> Vehicle:
     """The car in static ride."""
-    return vehicle_of(scenario(overrides))
+    return load_car(overrides=overrides).on()
 
 
 def floating(overrides: Mapping[str, Any] | None = None) -> Vehicle:
@@ -46,7 +38,7 @@ def floating(overrides: Mapping[str, Any] | None = None) -> Vehicle:
 
 def changed_model(folder: Path, file: str, old: str, new: str) -> Path:
     """A copy of the car's model in which one text is replaced; its main file."""
-    source = scenario().mjcf
+    source = load_car().mjcf
     target = folder / "model"
     shutil.copytree(source.parent, target)
     text = (target / file).read_text(encoding="utf-8")

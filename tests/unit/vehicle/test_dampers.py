@@ -8,9 +8,10 @@ import pytest
 
 from activesteer.conventions import CORNERS
 from activesteer.errors import ParameterError
+from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb
-from tests.unit.vehicle.cars import scenario, standing
+from tests.unit.vehicle.cars import standing
 
 CURVE_MPS = [-0.8, -0.2, 0.0, 0.1, 0.5]
 CURVE_N = [-2000.0, -900.0, 0.0, 250.0, 700.0]
@@ -88,4 +89,4 @@ def test_a_wrong_curve_is_an_error_that_names_file_and_axle(
     velocity_mps: list[float], force_N: list[float], words: str
 ) -> None:
     with pytest.raises(ParameterError, match=rf"compact\.toml.*dampers\.rear.*{words}"):
-        scenario({"dampers.rear.velocity_mps": velocity_mps, "dampers.rear.force_N": force_N})
+        load_car(overrides={"dampers.rear.velocity_mps": velocity_mps, "dampers.rear.force_N": force_N})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -11,9 +12,10 @@ import pytest
 
 from activesteer.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError
+from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.dry_friction import friction_rate
-from tests.unit.vehicle.cars import activation, actuator, changed_model, dof, floating, scenario, standing, step
+from tests.unit.vehicle.cars import activation, actuator, changed_model, dof, floating, standing, step
 
 SLIP_M = 4e-4
 NO_FRICTION = {"friction.front_damper_N": 0.0, "friction.rear_damper_N": 0.0, "friction.rack_N": 0.0}
@@ -164,13 +166,12 @@ def test_static_ride_leaves_friction_relaxed() -> None:
 def test_friction_without_a_place_in_the_model_is_answered(tmp_path: Path) -> None:
     rack = '    <general name="rack_friction" class="friction_state" joint="rack"/>\n'
     mjcf = changed_model(tmp_path, "compact.xml", rack, "")
-    given = scenario()
+    given = load_car()
     with pytest.raises(ModelError, match="no actuator 'rack_friction'"):
-        Vehicle(mjcf, given.car, given.tyres, given.maneuver.road)
-    without = scenario({"friction.rack_N": 0.0})
-    Vehicle(mjcf, without.car, without.tyres, without.maneuver.road)
+        dataclasses.replace(given, mjcf=mjcf).on()
+    dataclasses.replace(load_car(overrides={"friction.rack_N": 0.0}), mjcf=mjcf).on()
 
 
 def test_negative_friction_is_answered() -> None:
     with pytest.raises(ParameterError, match=r"rack_N: -1\.0 is out of range"):
-        scenario({"friction.rack_N": -1.0})
+        load_car(overrides={"friction.rack_N": -1.0})

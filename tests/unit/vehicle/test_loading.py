@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from activesteer.errors import ModelError
-from tests.unit.vehicle.cars import changed_model, scenario, vehicle_of
+from activesteer.scenario import load_car
+from tests.unit.vehicle.cars import changed_model
 
 
 @pytest.mark.parametrize(
@@ -35,10 +36,10 @@ from tests.unit.vehicle.cars import changed_model, scenario, vehicle_of
 def test_a_wrong_model_is_an_error_with_file_and_name(
     tmp_path: Path, file: str, old: str, new: str, words: str
 ) -> None:
-    given = scenario()
+    given = load_car()
     broken = dataclasses.replace(given, mjcf=changed_model(tmp_path, file, old, new))
     with pytest.raises(ModelError, match=rf"(?s)compact\.xml.*{words}"):
-        vehicle_of(broken)
+        broken.on()
 
 
 def test_a_renamed_wheel_body_is_named(tmp_path: Path) -> None:
@@ -46,25 +47,25 @@ def test_a_renamed_wheel_body_is_named(tmp_path: Path) -> None:
     main = path.read_text(encoding="utf-8").replace('objname="rl_wheel"', 'objname="rl_tire"')
     path.write_text(main.replace('site="rl_wheel_centre"', 'site="rl_tire_centre"'), encoding="utf-8")
     with pytest.raises(ModelError, match=r"(?s)compact\.xml.*no body 'rl_wheel'; did you mean"):
-        vehicle_of(dataclasses.replace(scenario(), mjcf=path))
+        dataclasses.replace(load_car(), mjcf=path).on()
 
 
 def test_a_missing_file_is_an_error_that_names_it(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"absent\.xml"):
-        vehicle_of(dataclasses.replace(scenario(), mjcf=tmp_path / "absent.xml"))
+        dataclasses.replace(load_car(), mjcf=tmp_path / "absent.xml").on()
 
 
 def test_an_unchanged_copy_loads(tmp_path: Path) -> None:
     """The counterpart: it is the change that fails above."""
     path = changed_model(tmp_path, "compact.xml", 'model="compact"', 'model="copy"')
-    vehicle = vehicle_of(dataclasses.replace(scenario(), mjcf=path))
+    vehicle = dataclasses.replace(load_car(), mjcf=path).on()
     assert vehicle.model.nv > 30
 
 
 def test_the_load_changes_mass_and_centre_of_gravity() -> None:
     plain, loaded = (
-        vehicle_of(scenario()),
-        vehicle_of(scenario({"load.mass_factor": 1.2, "load.cg_height_change_m": 0.1})),
+        load_car().on(),
+        load_car(overrides={"load.mass_factor": 1.2, "load.cg_height_change_m": 0.1}).on(),
     )
     chassis = plain.model.body("chassis").id
     assert loaded.model.body_mass[chassis] == pytest.approx(1.2 * plain.model.body_mass[chassis])

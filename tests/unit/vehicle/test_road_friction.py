@@ -8,19 +8,19 @@ import pytest
 
 from activesteer.conventions import CORNERS
 from activesteer.road.road import Road, RoadPatch
+from activesteer.scenario import load_car
 from activesteer.tyre.kernels.magic_formula import steady_state
 from activesteer.tyre.kernels.parameter_index import FZMAX
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb
-from tests.unit.vehicle.cars import record, scenario, tilted_and_moving
+from tests.unit.vehicle.cars import record, tilted_and_moving
 
 LEFT, RIGHT = (0, 2), (1, 3)
 
 
 def rolling(road: Road) -> Vehicle:
     """The car at 20 m/s where a recording starts: its centre of gravity at the origin."""
-    given = scenario()
-    vehicle = Vehicle(given.mjcf, given.car, given.tyres, road)
+    vehicle = load_car().on(road)
     vehicle.start(20.0)
     return vehicle
 
@@ -107,7 +107,7 @@ def test_the_contact_point_lies_in_the_wheel_plane_below_the_centre(rng: np.rand
 
 @pytest.mark.parametrize("mu", [1.0, 0.4])
 def test_friction_use_is_that_of_the_formula_s_own_peaks(mu: float, rng: np.random.Generator) -> None:
-    given = scenario()
+    given = load_car()
     vehicle = rolling(Road(mu))
     tilted_and_moving(vehicle, rng)
     mujoco.mj_forward(vehicle.model, vehicle.data)

@@ -14,8 +14,8 @@ from activesteer.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError, TyreFileError
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance
+from activesteer.vehicle.mass_properties import mass_properties
 from activesteer.vehicle_builder import new_vehicle
-from activesteer.vehicle_builder.masses import whole
 from tests.unit.vehicle_builder.tables import COMPACT, WISHBONE, changed
 
 
@@ -63,7 +63,7 @@ def test_what_is_left_of_the_whole_car_is_the_compacts_chassis(tmp_path: Path) -
 
 def test_the_whole_car_weighs_what_was_asked_for(tmp_path: Path) -> None:
     made = new_vehicle("again", COMPACT, tmp_path / "again")
-    body = whole(mujoco.MjModel.from_xml_path(str(made.folder / "again.xml")))
+    body = mass_properties(mujoco.MjModel.from_xml_path(str(made.folder / "again.xml")))
     assert body.mass_kg == pytest.approx(1430.0, abs=0.01)
     np.testing.assert_allclose(np.diag(body.inertia_kgm2), [530.0, 2100.0, 2200.0], atol=0.05)
 

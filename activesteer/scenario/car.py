@@ -1,0 +1,157 @@
+"""A car as its files describe it: vehicle file, MJCF, tyres and overrides, checked before anything is built."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from activesteer.config import Source, build, read_toml
+from activesteer.controllers import ControllerParameters, SingleTrackParameters
+from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.driver import DriverParameters
+from activesteer.errors import ActiveSteerError, ModelError, ParameterError, TyreFileError, nearest_names, shown
+from activesteer.resources import find_vehicle, models_dir
+from activesteer.road.road import Road
+from activesteer.scenario.overrides import Override, applied, plain
+from activesteer.tyre.file.tir import load_tir
+from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle import Vehicle, VehicleParameters
+
+FileOrTable = str | os.PathLike[str] | Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleConfig(VehicleParameters):
+    """A whole vehicle file: the car, what the controllers know of it, and who drives it."""
+
+    single_track: SingleTrackParameters
+    """The car as the controllers see it."""
+    controllers: ControllerParameters = ControllerParameters()
+    """Gains and limits."""
+    driver: DriverParameters = DriverParameters()
+    """Gains and limits."""
+
+
+@dataclass(frozen=True)
+class Car:
+    """A car, ready to be put on a road.
+
+    Attributes:
+        config: The vehicle file.
+        mjcf: The model file.
+        tyres: Tyres of the front and of the rear axle.
+        overrides: What was changed against the vehicle file.
+        files: What it was made from, by name, to be kept with a recording.
+    """
+
+    config: VehicleConfig
+    mjcf: Path
+    tyres: tuple[TyreParameters, TyreParameters]
+    overrides: dict[str, Any] = field(default_factory=dict)
+    files: dict[str, bytes] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name of the vehicle."""
+        return self.config.name
+
+    def on(self, road: Road | None = None, timestep_s: float = DEFAULT_TIMESTEP_S) -> Vehicle:
+        """The car in the engine, at rest in static equilibrium.
+
+        Args:
+            road: Friction and grade; level and dry where not given.
+            timestep_s: Step of the engine [s].
+
+        Returns:
+            A new vehicle.
+
+        Raises:
+            ModelError: the MJCF does not compile, lacks a part, or has no static equilibrium.
+        """
+        return Vehicle(self.mjcf, self.config, self.tyres, Road() if road is None else road, timestep_s)
+
+
+def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | None = None) -> Car:
+    """Reads and checks a car.
+
+    Args:
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key -> value: `load.mass_factor`, `vehicle.tyres.rear`.
+
+    Returns:
+        The car.
+
+    Raises:
+        ParameterError: the vehicle is not found or wrong, or an override names a key that does not exist.
+        ModelError: the model file is not found.
+        TyreFileError: a tyre file is not found or wrong.
+    """
+    changes = plain(overrides)
+    listed = [Override(key, tuple(key.removeprefix("vehicle.").split(".")), value) for key, value in changes.items()]
+    return replace(car_with(vehicle, listed), overrides=changes)
+
+
+def car_with(vehicle: FileOrTable, overrides: list[Override]) -> Car:
+    """The car with overrides that are known to be meant for it; see `load_car`."""
+    table, source, folder, files = read_table(vehicle, "vehicle", find_vehicle, ParameterError)
+    table, source = applied(VehicleConfig, table, source, overrides)
+    config = build(VehicleConfig, table, source)
+    mjcf = _find_file(config.mjcf, folder, models_dir() / "mjcf", source, ("mjcf",), ModelError)
+    front, rear = (
+        _find_file(name, folder, models_dir() / "tyres", source, ("tyres", axle), TyreFileError)
+        for axle, name in (("front", config.tyres.front), ("rear", config.tyres.rear))
+    )
+    files |= {f"tyres/{path.name}": path.read_bytes() for path in (front, rear)}
+    files |= {f"mjcf/{mjcf.parent.name}/{path.name}": path.read_bytes() for path in sorted(mjcf.parent.glob("*.xml"))}
+    front_tyre = replace(load_tir(front), conventions=config.tyres.conventions)
+    rear_tyre = front_tyre if rear == front else replace(load_tir(rear), conventions=config.tyres.conventions)
+    return Car(config, mjcf, (front_tyre, rear_tyre), files=files)
+
+
+def read_table(
+    given: FileOrTable, part: str, find: Any, error: type[ActiveSteerError]
+) -> tuple[dict[str, Any], Source, Path | None, dict[str, bytes]]:
+    """The table of a manoeuvre or vehicle, with its name.
+
+    Args:
+        given: Name, path, or the table itself.
+        part: `maneuver` or `vehicle`.
+        find: Name or path -> file.
+        error: Class of the errors to raise.
+
+    Returns:
+        The table, its source, the folder of its file and the file by its name; a table has no folder and no file.
+
+    Raises:
+        ActiveSteerError: the file is not found or cannot be read; of class `error`.
+    """
+    if isinstance(given, Mapping):
+        name = str(given.get("name") or part)
+        return {"name": name, **given}, Source(f"{part} given as a table", error=error), None, {}
+    if not isinstance(given, (str, os.PathLike)):
+        raise error(f"a {part} is a name, a path or a table, not {shown(given)}", value=given)
+    path = find(given)
+    table, source = read_toml(path, error)
+    table.setdefault("name", path.stem)
+    return table, source, path.parent, {f"{part}.toml": source.text.encode()}
+
+
+def _find_file(
+    name: str,
+    own: Path | None,
+    folder: Path,
+    source: Source,
+    key: tuple[str, ...],
+    error: type[ModelError] | type[TyreFileError],
+) -> Path:
+    """A file that a vehicle file names: beside the vehicle file, among the package's models, or a path of its own."""
+    beside = () if own is None else (own / name,)
+    for candidate in (*beside, folder / name, Path(name).expanduser()):
+        if candidate.is_file():
+            return candidate
+    present = [str(path.relative_to(folder)) for path in folder.rglob(f"*{Path(name).suffix or '.*'}")]
+    problem = f"there is no file {shown(name)} in {folder.parent.name}/{folder.name}; {nearest_names(name, present)}"
+    raise replace(source, error=error).fail(key, problem, name, present)
