@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from activesteer.analysis.series import timestep
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
+from activesteer.theory.single_track import characteristic_speed
 
 Array = NDArray[np.float64]
 
@@ -162,7 +163,7 @@ def evaluate(recording: RecordingLike, car: Car | None = None) -> Handling:
         steer_gradient_radpmps2=gradient(steer),
         ackermann_gradient_radpmps2=gradient(car.wheelbase_m * curvature),
         linear_range_mps2=float(smoothed[int(departed.argmax())]) if departed.any() else math.nan,
-        characteristic_speed_mps=math.sqrt(car.wheelbase_m / understeer) if understeer > 0.0 else math.nan,
+        characteristic_speed_mps=characteristic_speed(car.wheelbase_m, understeer),
         roll_gradient_radpmps2=gradient(side * channel("roll_rad")),
         sideslip_gradient_radpmps2=gradient(sideslip),
         front_slip_gradient_radpmps2=gradient(steer - sideslip - car.cg_to_front_m * curvature),

@@ -7,28 +7,7 @@ from enum import Enum
 from typing import Final, NamedTuple
 
 from activesteer.controllers.parameters import CorrectorParameters
-
-
-def tolerance(error_radps: float, off_radps: float, full_radps: float) -> float:
-    """How much of the corrector is active: 0 up to c_off, 1 from c_in, a smooth cubic between (Fig. 9).
-
-    Args:
-        error_radps: Yaw rate error, either sign [rad/s].
-        off_radps: c_off [rad/s].
-        full_radps: c_in [rad/s].
-
-    Returns:
-        Activity, 0 to 1.
-
-    Source: Dorsch 2012, Fig. 9; the cubic is ours, the figure shows no formula.
-    """
-    size = error_radps if error_radps >= 0.0 else -error_radps
-    if size <= off_radps:
-        return 0.0
-    if size >= full_radps:
-        return 1.0
-    x = (size - off_radps) / (full_radps - off_radps)
-    return x * x * (3.0 - 2.0 * x)
+from activesteer.theory.tolerance import tolerance
 
 
 class Situation(Enum):
@@ -92,11 +71,11 @@ class Corrector:
             timestep_s: Time between two steps [s].
         """
         p = parameters
-        self._off_radps, self._full_radps = p.off_radps, p.full_radps
+        self._deadband_radps = p.off_radps, p.full_radps
         self._proportional_gain_s = p.proportional_gain_s
-        self._integral_share = p.integral_gain * timestep_s
-        self._derivative_share_s = p.derivative_gain_s2 / timestep_s
-        self._filter_share = 1.0 - math.exp(-timestep_s / p.derivative_filter_s)
+        self._integral_fraction = p.integral_gain * timestep_s
+        self._derivative_fraction_s = p.derivative_gain_s2 / timestep_s
+        self._filter_fraction = 1.0 - math.exp(-timestep_s / p.derivative_filter_s)
         self._integral_rad = 0.0
         self._filtered_radps: float | None = None
 
@@ -111,16 +90,16 @@ class Corrector:
         Returns:
             Angle [rad].
         """
-        activity = tolerance(error_radps, self._off_radps, self._full_radps)
+        activity = tolerance(error_radps, *self._deadband_radps)
         angle = self._proportional_gain_s * error_radps
-        if self._integral_share:
+        if self._integral_fraction:
             if saturated * error_radps <= 0.0:
-                self._integral_rad += self._integral_share * error_radps * activity
+                self._integral_rad += self._integral_fraction * error_radps * activity
             angle += self._integral_rad
-        if self._derivative_share_s:
+        if self._derivative_fraction_s:
             before = error_radps if self._filtered_radps is None else self._filtered_radps
-            self._filtered_radps = before + self._filter_share * (error_radps - before)
-            angle += self._derivative_share_s * (self._filtered_radps - before)
+            self._filtered_radps = before + self._filter_fraction * (error_radps - before)
+            angle += self._derivative_fraction_s * (self._filtered_radps - before)
         return activity * angle
 
     def reset(self) -> None:

@@ -27,7 +27,7 @@ from activesteer.scenario import Car as CarFiles
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.scenario.vehicle_file import write_values
 from activesteer.simulation.runner import run_scenario
-from activesteer.theory.single_track import SingleTrack
+from activesteer.theory.single_track import SingleTrack, characteristic_speed
 from activesteer.vehicle.mass_properties import mass_properties
 
 CONSTANT_SPEED_TESTS: Final = {"80 km/h": 80.0, "100 km/h": 100.0}
@@ -193,7 +193,7 @@ def _single_track(body: Body, tests: list[Handling]) -> SingleTrackParameters:
         cg_to_rear_m=body.cg_to_rear_m,
         front_stiffness_Nprad=body.mass_kg * body.cg_to_rear_m / wheelbase / front,
         rear_stiffness_Nprad=body.mass_kg * body.cg_to_front_m / wheelbase / rear,
-        characteristic_speed_mps=math.sqrt(wheelbase / understeer),
+        characteristic_speed_mps=characteristic_speed(wheelbase, understeer),
     )
 
 

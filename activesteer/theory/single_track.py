@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
@@ -20,6 +21,7 @@ from activesteer.errors import ParameterError
 if TYPE_CHECKING:
     import control
 
+_Speed = TypeVar("_Speed", float, NDArray[np.float64])
 _Positive = Annotated[float, Range(1e-9)]
 
 
@@ -41,6 +43,19 @@ class SingleTrackParameters:
     """Cornering stiffness of the rear axle with its suspension, C_H [N/rad]."""
     characteristic_speed_mps: _Positive | None = None
     """Characteristic speed v_ch from a test of the car [m/s]; eq. 4 where not given."""
+
+
+def characteristic_speed(wheelbase_m: float, understeer_gradient_radpmps2: float) -> float:
+    """Speed at which an understeering car answers with half the yaw rate of a neutral one, sqrt(l/EG).
+
+    Args:
+        wheelbase_m: l [m].
+        understeer_gradient_radpmps2: EG, at the road wheel [rad/(m/s2)].
+
+    Returns:
+        v_ch [m/s]; nan for a car that does not understeer.
+    """
+    return math.sqrt(wheelbase_m / understeer_gradient_radpmps2) if understeer_gradient_radpmps2 > 0.0 else math.nan
 
 
 class SingleTrack:
@@ -90,7 +105,7 @@ class SingleTrack:
         ratio = speed_mps / self.characteristic_speed_mps
         return speed_mps / self.wheelbase_m / (1.0 + ratio * ratio)
 
-    def rear_prediction(self, speed_mps: float) -> tuple[float, float, float]:
+    def rear_prediction(self, speed_mps: _Speed) -> tuple[_Speed, _Speed, _Speed]:
         """Coefficients of the rear angle that keeps the sideslip angle at zero, eq. 5.
 
             G(s) = delta_H(s)/delta_V(s) = (K_H + K_H T_z s) / (1 + T_1 s)
@@ -99,7 +114,7 @@ class SingleTrack:
         and positive at high speed. K_H T_z is returned in place of T_z, which is infinite where K_H is zero.
 
         Args:
-            speed_mps: Speed v > 0 [m/s].
+            speed_mps: Speed v > 0 [m/s]; one, or an array.
 
         Returns:
             K_H [-], K_H T_z [s], T_1 [s].

@@ -7,9 +7,9 @@ import math
 import pytest
 
 from activesteer.controllers import ControllerParameters, FrontSuperposition, NoControl, RearSteer, SingleTrack
-from activesteer.controllers.corrector import tolerance
 from activesteer.controllers.parameters import CorrectorParameters, FrontSuperpositionParameters, RearSteerParameters
 from activesteer.signals import SteerCommand
+from activesteer.theory.tolerance import tolerance
 from tests.unit.controllers.cars import CAR, held, measured, setup, steering
 
 LIMIT_RAD = math.radians(3.0)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from activesteer.controllers import ControllerParameters, RearSteer, SingleTrack
-from activesteer.controllers.corrector import tolerance
 from activesteer.controllers.parameters import CorrectorParameters, RearSteerParameters
 from activesteer.controllers.rear_steer import RearPrediction
+from activesteer.theory.tolerance import tolerance
 from tests.unit.controllers.cars import CAR, NO_PREDICTION_MPS, held, measured, setup, steering
 
 MODEL = SingleTrack(CAR)

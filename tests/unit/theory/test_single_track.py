@@ -160,6 +160,11 @@ def test_predicted_angle_is_first_against_the_front_one_at_every_speed(car):
         assert lead_s / lag_s == pytest.approx(-0.75, rel=1e-14)
 
 
+def test_prediction_of_many_speeds_is_that_of_each(car):
+    one_by_one = np.array([car.rear_prediction(speed_mps) for speed_mps in SPEEDS_MPS])
+    assert pytest.approx(one_by_one, rel=1e-15) == np.array(car.rear_prediction(np.array(SPEEDS_MPS))).T
+
+
 def test_car_is_stable_at_all_speeds(car):
     for speed_mps in SPEEDS_MPS:
         assert car.state_space(speed_mps).poles().real.max() < 0.0
