@@ -264,10 +264,10 @@ class TyreRig:
 
     def _spin(self, load_N: float, slip_ratio: float, speed_mps: float) -> float:
         """Spin [rad/s] at a slip ratio; the rolling radius grows with it."""
-        array = self.formula.parameters.array
+        tyre = self.formula.parameters.record
         spin = 0.0
         for _ in range(_MOST_STEPS):
-            radius = effective_rolling_radius(array, load_N, spin, self.pressure_Pa)
+            radius = effective_rolling_radius(tyre, load_N, spin, self.pressure_Pa)
             spin = (speed_mps + slip_ratio * abs(speed_mps)) / radius
         return spin
 

@@ -73,7 +73,7 @@ def compile_rig(
             low_speed_mps=low_speed_mps,
             low_speed_damping_Nspm=low_speed_damping_Nspm,
             chain=chain,
-            tyre=tyre.array,
+            tyre=tyre.record,
         )
     )
     for address, slot in zip(states, (fb.U_RATE_X, fb.U_RATE_Y, fb.U_RATE_Z), strict=True):

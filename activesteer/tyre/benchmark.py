@@ -19,9 +19,9 @@ _ROUNDS: Final = 5
 
 
 @compiled
-def _scalar_calls(p, count, pressure_Pa):
+def _scalar_calls(tyre, count, pressure_Pa):
     """The sum of all five outputs of `count` scalar calls, each with inputs of its own."""
-    total = 0.0
+    p, total = tyre[0], 0.0
     for index in range(count):
         # Small changes, so that no call can be left out or moved out of the loop.
         share = (index % 1000) * 0.001
@@ -44,7 +44,7 @@ def bench(params: TyreParameters, rounds: int = _ROUNDS) -> dict[str, float]:
         `vectorised_us_per_row`: microseconds per row of `MagicFormula.evaluate` over 100 000 rows;
         `python_call_us`: microseconds for one `MagicFormula.evaluate` of a single point from Python.
     """
-    array, pressure = params.array, params["INFLPRES"]
+    record, pressure = np.atleast_1d(params.record), params["INFLPRES"]
     rng = np.random.default_rng(0)
     rows = [rng.uniform(low, high, _CALLS) for low, high in ((500, 8000), (-0.2, 0.2), (-0.2, 0.2), (-0.05, 0.05))]
     formula = MagicFormula(params)
@@ -55,7 +55,7 @@ def bench(params: TyreParameters, rounds: int = _ROUNDS) -> dict[str, float]:
             formula.evaluate(4000.0, 0.05, 0.04, 0.02)
 
     return {
-        "scalar_us": _best_us(lambda: _scalar_calls(array, _CALLS, pressure), _CALLS, rounds),
+        "scalar_us": _best_us(lambda: _scalar_calls(record, _CALLS, pressure), _CALLS, rounds),
         "vectorised_us_per_row": _best_us(lambda: formula.evaluate(*rows), _CALLS, rounds),
         "python_call_us": _best_us(single, single_calls, rounds),
     }

@@ -19,7 +19,7 @@ _CHOICES: Final = {
     "rolling_radius": ("file", "third_of_deflection"),
     "trail_load": ("nominal", "scaled"),
 }
-"""Words that a key takes; the first is the default, the second stands as 1 in the parameter array."""
+"""Words that a key takes; the first is the default, the second stands as 1 in the tyre's record."""
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,17 @@ class TyreConventions:
             msg = f"reference_friction: {self.reference_friction:g} is outside 0.1 to 2"
             raise ParameterError(msg)
 
-    def numbers(self) -> tuple[float, ...]:
-        """The conventions as they stand at the end of a parameter array, in the order of `parameters`."""
-        chosen = (float(getattr(self, key) == words[1]) for key, words in _CHOICES.items())
-        return (
-            float(not self.camber), float(not self.relaxation), *chosen, self.speed_offset_mps, self.reference_friction,
-        )  # fmt: skip
+    def numbers(self) -> dict[str, float]:
+        """What the kernels read of the conventions, by the field of the tyre's record."""
+        second = {key: float(getattr(self, key) == words[1]) for key, words in _CHOICES.items()}
+        return {
+            "CAMBER_OFF": float(not self.camber),
+            "RELAXATION_OFF": float(not self.relaxation),
+            "FRICTION_ELLIPSE": second["combined_slip"],
+            "SCALE_PEAKS_ONLY": second["friction_scales"],
+            "SLIP_AT_CENTRE": second["slip_velocity"],
+            "RADIUS_BY_DEFLECTION": second["rolling_radius"],
+            "TRAIL_BY_SCALED_LOAD": second["trail_load"],
+            "SPEED_OFFSET": self.speed_offset_mps,
+            "REFERENCE_FRICTION": self.reference_friction,
+        }

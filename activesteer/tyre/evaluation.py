@@ -25,7 +25,7 @@ class TyreForces:
     worked out when they are first asked for.
     """
 
-    _array: Values = field(repr=False)
+    _tyre: NDArray[np.record] = field(repr=False)
     _inputs: Values = field(repr=False)
     _forces: Values = field(repr=False)
     _flags: NDArray[np.int64] = field(repr=False)
@@ -43,7 +43,7 @@ class TyreForces:
     def _rolling(self) -> Values:
         """Columns of ROLLING_COLUMNS."""
         rolling = np.empty((len(self._inputs), len(ROLLING_COLUMNS)))
-        rolling_rows(self._array, self._inputs, self._forces, rolling)
+        rolling_rows(self._tyre, self._inputs, self._forces, rolling)
         return rolling
 
     @property
@@ -160,7 +160,7 @@ class MagicFormula:
 
     def __init__(self, parameters: TyreParameters) -> None:
         self.parameters = parameters
-        self._array = parameters.array
+        self._tyre = np.atleast_1d(parameters.record)
 
     def evaluate(
         self,
@@ -213,5 +213,5 @@ class MagicFormula:
             raise ParameterError("turn_slip_1pm is not zero, but MF 5.2 knows no turn slip; use a 6.x tyre")
         forces = np.empty((len(inputs), len(FORCE_COLUMNS)))
         flags = np.empty(len(inputs), dtype=np.int64)
-        evaluate_rows(self._array, inputs, forces, flags)
-        return TyreForces(self._array, inputs, forces, flags, shape)
+        evaluate_rows(self._tyre, inputs, forces, flags)
+        return TyreForces(self._tyre, inputs, forces, flags, shape)

@@ -14,7 +14,7 @@ import numpy as np
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.file.coefficients import BY_NAME, COEFFICIENTS
-from activesteer.tyre.kernels import parameter_index as index
+from activesteer.tyre.kernels.record import TYRE_RECORD
 
 DEFAULT_PRESSURE_PA = 220_000.0
 DEFAULT_LONGITUDINAL_STIFFNESS_NPM = 300_000.0
@@ -77,21 +77,23 @@ class TyreParameters(Mapping[str, float]):
         return _MF_VERSIONS[int(self["FITTYP"])]
 
     @property
-    def array(self) -> np.ndarray:
-        """The parameter array of the kernels, float64, shape (PARAMETER_COUNT,); a new one at every call."""
-        array = np.empty(index.PARAMETER_COUNT)
-        array[: len(COEFFICIENTS)] = [self[coefficient.name] for coefficient in COEFFICIENTS]
-        array[index.MF_VERSION] = self.version
-        array[index.SLIP_TANGENT] = self.slip_tangent
-        array[index.SIDE] = 1.0 if self.mounted == self.side else -1.0
-        array[index.PTX_GIVEN] = self.version == 52 and "PTX1" in self.given
-        array[index.PTY_GIVEN] = self.version == 52 and "PTY1" in self.given
-        array[index.Q_RA_GIVEN] = "Q_RA1" in self.given or "Q_RA2" in self.given
-        array[index.Q_RB_GIVEN] = "Q_RB1" in self.given or "Q_RB2" in self.given
-        array[index.CAMBER_OFF :] = self.conventions.numbers()
+    def record(self) -> np.record:
+        """What the kernels take, a new `TYRE_RECORD` at every call."""
+        record = np.zeros(1, TYRE_RECORD)[0]
+        for coefficient in COEFFICIENTS:
+            record[coefficient.name] = self[coefficient.name]
+        record["MF_VERSION"] = self.version
+        record["SLIP_TANGENT"] = self.slip_tangent
+        record["SIDE"] = 1.0 if self.mounted == self.side else -1.0
+        record["PTX_GIVEN"] = self.version == 52 and "PTX1" in self.given
+        record["PTY_GIVEN"] = self.version == 52 and "PTY1" in self.given
+        record["Q_RA_GIVEN"] = "Q_RA1" in self.given or "Q_RA2" in self.given
+        record["Q_RB_GIVEN"] = "Q_RB1" in self.given or "Q_RB2" in self.given
+        for name, number in self.conventions.numbers().items():
+            record[name] = number
         for name in ("VERTICAL_STIFFNESS", "Q_FZ1", "Q_FZ2", "Q_FZ3"):
-            array[getattr(index, name)] *= self["LCZ"]
-        return array
+            record[name] *= self["LCZ"]
+        return record
 
     def mounted_on(self, side: Side) -> TyreParameters:
         """The same tyre on a side of the vehicle: mirrored where its coefficients belong to the other one."""
@@ -116,7 +118,7 @@ class TyreParameters(Mapping[str, float]):
             raise ParameterError(f"there is no tyre coefficient {key!r}: {nearest_names(key, values)}") from None
 
     def __iter__(self) -> Iterator[str]:
-        """Every key, in the order of the parameter array."""
+        """Every key, in the order of the table."""
         return iter(BY_NAME)
 
     def __len__(self) -> int:

@@ -78,7 +78,7 @@ class WheelEntry:
     low_speed_mps: float
     low_speed_damping_Nspm: float
     chain: list[int]
-    tyre: NDArray[np.float64]
+    tyre: np.record
 
 
 @dataclass
@@ -129,7 +129,7 @@ class ForceBlock:
         actuators_start = dampers_start + len(self.dampers) * DAMPER_SIZE
         areas_start = actuators_start + len(self.actuators) * ACTUATOR_SIZE
         tyres_start = areas_start + len(self.areas) * AREA_SIZE
-        tyres = [wheel.tyre for wheel in self.wheels]
+        tyres = [np.atleast_1d(wheel.tyre).view(np.float64) for wheel in self.wheels]
         block = np.zeros(tyres_start + sum(tyre.size for tyre in tyres))
         model = self.model
         block[:CHASSIS_DOFS] = (
@@ -148,8 +148,8 @@ class ForceBlock:
                 wheel.low_speed_mps, wheel.low_speed_damping_Nspm, tyre_start, len(wheel.chain),
             )  # fmt: skip
             record[W_CHAIN : W_CHAIN + len(wheel.chain)] = wheel.chain
-            block[tyre_start : tyre_start + wheel.tyre.size] = wheel.tyre
-            tyre_start += wheel.tyre.size
+            block[tyre_start : tyre_start + tyres[index].size] = tyres[index]
+            tyre_start += tyres[index].size
         for index, damper in enumerate(self.dampers):
             start = dampers_start + index * DAMPER_SIZE
             record = block[start : start + DAMPER_SIZE]

@@ -12,7 +12,6 @@ import numpy as np
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError, nearest_names
 from activesteer.road.road import Road
-from activesteer.tyre.kernels import parameter_index as tyre_index
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, DamperCurve, VehicleParameters
@@ -185,11 +184,11 @@ def _wheel(
         act_y=_activation(model, f"{corner}_slip_y"),
         act_z=_activation(model, f"{corner}_slip_z"),
         mu=road.mu,
-        pressure_Pa=pressure if pressure is not None else float(tyre.array[tyre_index.INFLPRES]),
+        pressure_Pa=pressure if pressure is not None else tyre["INFLPRES"],
         low_speed_mps=fitment.low_speed_mps,
         low_speed_damping_Nspm=fitment.low_speed_damping_Nspm,
         chain=chain,
-        tyre=tyre.mounted_on("LEFT" if corner.endswith("l") else "RIGHT").array,
+        tyre=tyre.mounted_on("LEFT" if corner.endswith("l") else "RIGHT").record,
     )
 
 

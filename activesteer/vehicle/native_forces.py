@@ -13,18 +13,19 @@ from __future__ import annotations
 from typing import Any, Final
 
 import mujoco
-from numba import carray, types
+from numba import carray, from_dtype, types
 
 from activesteer.compilation import compiled_callback, inlined
 from activesteer.errors import ModelError
 from activesteer.tyre.kernels.contact import tyre_on_road
-from activesteer.tyre.kernels.parameter_index import PARAMETER_COUNT as TYRE_PARAMETERS
+from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.dry_friction import friction_rate
 from activesteer.vehicle.engine_layout import EngineLayout, measure_engine_layout
-from activesteer.vehicle.native_memory import array_at, f64_pointer, word
+from activesteer.vehicle.native_memory import array_at, f64_pointer, pointer_to, word
 
 _MARKER: Final = fb.MARKER
+_tyre_pointer: Final = pointer_to(from_dtype(TYRE_RECORD))
 
 
 @inlined
@@ -88,11 +89,8 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
         contact_x = xpos[3 * body] + reach * ax
         contact_y = xpos[3 * body + 1] + reach * ay
         mu = _road_mu(block, wheel[fb.W_MU], contact_x, contact_y)
-        (
-            fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, rate_z, radius, hx, hy, arm_x, arm_y, arm_z,
-            limited, use,
-        ) = tyre_on_road(
-            block[tyre_start : tyre_start + TYRE_PARAMETERS],
+        tyre = tyre_on_road(
+            carray(_tyre_pointer(block.ctypes.data + 8 * tyre_start), (1,))[0],
             mu,
             wheel[fb.W_PRESSURE_Pa],
             wheel[fb.W_LOW_SPEED_mps],
@@ -111,29 +109,31 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
             act[int(wheel[fb.W_ACT_X])],
             act[int(wheel[fb.W_ACT_Y])],
             act[int(wheel[fb.W_ACT_Z])],
-        )  # fmt: skip
+        )
         out = userdata[index * fb.USERDATA_PER_WHEEL :]
-        out[fb.U_FX] = fx
-        out[fb.U_FY] = fy
-        out[fb.U_FZ] = fz
-        out[fb.U_MX] = mx
-        out[fb.U_MY] = my
-        out[fb.U_MZ] = mz
-        out[fb.U_SLIP_RATIO] = kappa
-        out[fb.U_SLIP_ANGLE] = alpha
-        out[fb.U_INCLINATION] = gamma
-        out[fb.U_RATE_X] = rate_x
-        out[fb.U_RATE_Y] = rate_y
-        out[fb.U_RATE_Z] = rate_z
-        out[fb.U_LOADED_RADIUS] = radius
-        out[fb.U_LIMITED] = limited
-        out[fb.U_FRICTION_USE] = use
+        out[fb.U_FX] = tyre.fx_N
+        out[fb.U_FY] = tyre.fy_N
+        out[fb.U_FZ] = tyre.fz_N
+        out[fb.U_MX] = tyre.mx_Nm
+        out[fb.U_MY] = tyre.my_Nm
+        out[fb.U_MZ] = tyre.mz_Nm
+        out[fb.U_SLIP_RATIO] = tyre.slip_ratio
+        out[fb.U_SLIP_ANGLE] = tyre.slip_angle_rad
+        out[fb.U_INCLINATION] = tyre.inclination_rad
+        out[fb.U_RATE_X] = tyre.deflection_x_rate_mps
+        out[fb.U_RATE_Y] = tyre.deflection_y_rate_mps
+        out[fb.U_RATE_Z] = tyre.deflection_z_rate_radps
+        out[fb.U_LOADED_RADIUS] = tyre.loaded_radius_m
+        out[fb.U_LIMITED] = tyre.limited
+        out[fb.U_FRICTION_USE] = tyre.friction_use
         out[fb.U_MU] = mu
         out[fb.U_CONTACT_X] = contact_x
         out[fb.U_CONTACT_Y] = contact_y
-        gx = fx * hx - fy * hy
-        gy = fx * hy + fy * hx
-        px, py, pz = to_x + arm_x, to_y + arm_y, to_z + arm_z
+        hx, hy = tyre.heading_x, tyre.heading_y
+        fz = tyre.fz_N
+        gx = tyre.fx_N * hx - tyre.fy_N * hy
+        gy = tyre.fx_N * hy + tyre.fy_N * hx
+        px, py, pz = to_x + tyre.arm_x_m, to_y + tyre.arm_y_m, to_z + tyre.arm_z_m
         chain = wheel[fb.W_CHAIN : fb.W_CHAIN + int(wheel[fb.W_CHAIN_LENGTH])]
         _apply(
             qfrc,
@@ -142,9 +142,9 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
             gx,
             gy,
             fz,
-            py * fz - pz * gy + mx * hx - my * hy,
-            pz * gx - px * fz + mx * hy + my * hx,
-            px * gy - py * gx + mz,
+            py * fz - pz * gy + tyre.mx_Nm * hx - tyre.my_Nm * hy,
+            pz * gx - px * fz + tyre.mx_Nm * hy + tyre.my_Nm * hx,
+            px * gy - py * gx + tyre.mz_Nm,
         )
 
 

@@ -11,7 +11,9 @@ from numba.extending import intrinsic
 from activesteer.compilation import inlined
 
 
-def _pointer_to(numba_type: types.Type) -> Any:
+def pointer_to(numba_type: types.Type) -> Any:
+    """An intrinsic: address (intp) -> pointer to a type."""
+
     @intrinsic
     def cast(_typing_context, _address):
         signature = types.CPointer(numba_type)(types.intp)
@@ -24,9 +26,9 @@ def _pointer_to(numba_type: types.Type) -> Any:
     return cast
 
 
-f64_pointer = _pointer_to(types.float64)
+f64_pointer = pointer_to(types.float64)
 """Address (intp) -> pointer to float64."""
-word_pointer = _pointer_to(types.intp)
+word_pointer = pointer_to(types.intp)
 """Address (intp) -> pointer to a machine word."""
 
 

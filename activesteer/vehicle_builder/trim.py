@@ -134,8 +134,8 @@ def _compiled(mjcf: Path) -> mujoco.MjModel:
 def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
     """Vertical stiffness of a tyre under a load [N/m]."""
     pressure = float(tyre["INFLPRES"])
-    deflection = deflection_under_load(tyre.array, load_N, 0.0, pressure, 0.0, 0.0, 0.0)
-    more, less = (vertical_force(tyre.array, deflection + step, 0.0, pressure) for step in (1e-4, -1e-4))
+    deflection = deflection_under_load(tyre.record, load_N, 0.0, pressure, 0.0, 0.0, 0.0)
+    more, less = (vertical_force(tyre.record, deflection + step, 0.0, pressure) for step in (1e-4, -1e-4))
     return float((more - less) / 2e-4)
 
 

@@ -13,7 +13,6 @@ from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.recording import Recording
 from activesteer.scenario import load_car
 from activesteer.tyre.kernels.magic_formula import magic_formula
-from activesteer.tyre.kernels.parameter_index import INFLPRES
 from activesteer.vehicle.force_block import USERDATA_PER_WHEEL
 from tests.physics.runs import COAST_OR_BRAKE, car, corners, in_the_corner, last, mass_kg, run, step_steer
 
@@ -159,8 +158,8 @@ def locked(mu: float) -> tuple[float, float]:
 @pytest.mark.parametrize("mu", [0.4, 1.0])
 def test_full_braking_locks_the_wheels_and_they_slide_at_the_friction_of_the_road(mu: float) -> None:
     deceleration, share = locked(mu)
-    tyre = load_car().tyres[0].array
-    sliding = -magic_formula(tyre, 3500.0, -1.0, 0.0, 0.0, float(tyre[INFLPRES]), 10.0, mu)[0] / 3500.0
+    tyre = load_car().tyres[0].record
+    sliding = -magic_formula(tyre, 3500.0, -1.0, 0.0, 0.0, tyre["INFLPRES"], 10.0, mu)[0] / 3500.0
     assert share == pytest.approx(sliding, rel=0.05)
     assert 0.6 * mu < sliding < 1.1 * mu
     # Drag helps, most at the speed at which it began.
@@ -176,8 +175,8 @@ def test_no_tyre_uses_more_than_the_road_gives() -> None:
     recording = rolling(mu=0.4, pedal=1.0)
     loads = corners(recording, "tyre_fz_N")
     used = np.hypot(corners(recording, "tyre_fx_N"), corners(recording, "tyre_fy_N")) / loads
-    tyre = load_car().tyres[0].array
+    tyre = load_car().tyres[0].record
     slips = np.linspace(-1.0, 0.0, 400)
-    pressure = float(tyre[INFLPRES])
+    pressure = tyre["INFLPRES"]
     peak = max(abs(magic_formula(tyre, loads.min(), slip, 0.0, 0.0, pressure, 10.0, 0.4)[0]) for slip in slips)
     assert 0.4 * 0.9 < used.max() < 1.02 * peak / loads.min()

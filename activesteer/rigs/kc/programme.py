@@ -15,7 +15,6 @@ from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
 from activesteer.rigs.kc.modes import Modes, modes
 from activesteer.rigs.kc.steering_axis import SteeringAxis, steering_axis
 from activesteer.rigs.kc.sweep import INWARDS, Sweep, run
-from activesteer.tyre.kernels import parameter_index as tyre_index
 from activesteer.tyre.kernels.relaxation import carcass_stiffnesses
 from activesteer.tyre.kernels.vertical import deflection_under_load, vertical_force
 from activesteer.tyre.tyre_parameters import TyreParameters
@@ -99,13 +98,13 @@ def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> M
 
 
 def _stiffness(tyre: TyreParameters, pressure_Pa: float | None, load_N: float) -> TyreStiffness:
-    array = tyre.array
-    pressure = float(array[tyre_index.INFLPRES]) if pressure_Pa is None else pressure_Pa
-    deflection = deflection_under_load(array, load_N, 0.0, pressure, 0.0, 0.0, 0.0)
+    record = tyre.record
+    pressure = tyre["INFLPRES"] if pressure_Pa is None else pressure_Pa
+    deflection = deflection_under_load(record, load_N, 0.0, pressure, 0.0, 0.0, 0.0)
     step = 1e-4
-    more, less = (vertical_force(array, deflection + sign * step, 0.0, pressure) for sign in (1.0, -1.0))
-    lateral = carcass_stiffnesses(array, load_N, pressure)[1]
-    return TyreStiffness((more - less) / (2.0 * step), float(lateral), float(array[tyre_index.WIDTH]), pressure)
+    more, less = (vertical_force(record, deflection + sign * step, 0.0, pressure) for sign in (1.0, -1.0))
+    lateral = carcass_stiffnesses(record, load_N, pressure)[1]
+    return TyreStiffness((more - less) / (2.0 * step), float(lateral), tyre["WIDTH"], pressure)
 
 
 def _sweeps(

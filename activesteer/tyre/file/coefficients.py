@@ -49,7 +49,7 @@ def _parse(table: str) -> tuple[Coefficient, ...]:
 
 
 COEFFICIENTS: tuple[Coefficient, ...] = _parse(TABLE)
-"""Every numeric key that the package knows, in the order of the parameter array."""
+"""Every numeric key that the package knows, in the order of the table."""
 
 BY_NAME: dict[str, Coefficient] = {coefficient.name: coefficient for coefficient in COEFFICIENTS}
 """The same, by key."""

@@ -8,34 +8,33 @@ from __future__ import annotations
 import math
 
 from activesteer.compilation import compiled
-from activesteer.tyre.kernels import parameter_index as c
 
 
 @compiled
-def _cosine_formula(b: float, c_: float, e: float, x: float) -> float:
+def _cosine_formula(b: float, c: float, e: float, x: float) -> float:
     """cos(C atan(Bx - E(Bx - atan Bx))) with E not above 1."""
     e = min(e, 1.0)
     bx = b * x
-    return math.cos(c_ * math.atan(bx - e * (bx - math.atan(bx))))
+    return math.cos(c * math.atan(bx - e * (bx - math.atan(bx))))
 
 
 @compiled
 def longitudinal_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) -> float:
     """G_xalpha: what the slip angle leaves of the longitudinal force (4.E50 to 4.E57)."""
-    b = (p[c.RBX1] + p[c.RBX3] * gamma_s * gamma_s) * math.cos(math.atan(p[c.RBX2] * kappa)) * p[c.LXAL]
-    e = p[c.REX1] + p[c.REX2] * dfz
-    s_h = p[c.RHX1]
-    return _cosine_formula(b, p[c.RCX1], e, alpha_s + s_h) / _cosine_formula(b, p[c.RCX1], e, s_h)
+    b = (p.RBX1 + p.RBX3 * gamma_s * gamma_s) * math.cos(math.atan(p.RBX2 * kappa)) * p.LXAL
+    e = p.REX1 + p.REX2 * dfz
+    s_h = p.RHX1
+    return _cosine_formula(b, p.RCX1, e, alpha_s + s_h) / _cosine_formula(b, p.RCX1, e, s_h)
 
 
 @compiled
 def lateral_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) -> float:
     """G_ykappa: what the longitudinal slip leaves of the lateral force (4.E58 to 4.E65)."""
-    slope = p[c.RBY1] + p[c.RBY4] * gamma_s * gamma_s
-    b = slope * math.cos(math.atan(p[c.RBY2] * (alpha_s - p[c.RBY3]))) * p[c.LYKA]
-    e = p[c.REY1] + p[c.REY2] * dfz
-    s_h = p[c.RHY1] + p[c.RHY2] * dfz
-    return _cosine_formula(b, p[c.RCY1], e, kappa + s_h) / _cosine_formula(b, p[c.RCY1], e, s_h)
+    slope = p.RBY1 + p.RBY4 * gamma_s * gamma_s
+    b = slope * math.cos(math.atan(p.RBY2 * (alpha_s - p.RBY3))) * p.LYKA
+    e = p.REY1 + p.REY2 * dfz
+    s_h = p.RHY1 + p.RHY2 * dfz
+    return _cosine_formula(b, p.RCY1, e, kappa + s_h) / _cosine_formula(b, p.RCY1, e, s_h)
 
 
 @compiled
@@ -43,8 +42,8 @@ def slip_induced_side_force(
     p, dfz: float, kappa: float, alpha_s: float, gamma_s: float, mu_fz: float, z2: float
 ) -> float:
     """S_Vykappa: the lateral force [N] that longitudinal slip induces (4.E66, 4.E67); mu_fz is mu_y F_z [N]."""
-    d = mu_fz * (p[c.RVY1] + p[c.RVY2] * dfz + p[c.RVY3] * gamma_s) * math.cos(math.atan(p[c.RVY4] * alpha_s)) * z2
-    return d * math.sin(p[c.RVY5] * math.atan(p[c.RVY6] * kappa)) * p[c.LVYKA]
+    d = mu_fz * (p.RVY1 + p.RVY2 * dfz + p.RVY3 * gamma_s) * math.cos(math.atan(p.RVY4 * alpha_s)) * z2
+    return d * math.sin(p.RVY5 * math.atan(p.RVY6 * kappa)) * p.LVYKA
 
 
 @compiled
@@ -55,7 +54,7 @@ def friction_ellipse(
     """What combined slip leaves of both pure forces: an ellipse, divided by the ratio of the shifted slips.
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         fz: Load [N].
         dfz: Load relative to the nominal one, less 1.
         d: Rolling direction.
@@ -78,9 +77,9 @@ def friction_ellipse(
     F_x = F_x0 / sqrt(1 + (mu_x t / mu_ymax)^2), F_y = F_y0 / sqrt(1 + (mu_y / (t mu_xmax))^2) with the ratio of the
     shifted slips t = |alpha_c| / |kappa_c|.
     """
-    s_hx = (p[c.PHX1] + p[c.PHX2] * dfz) * p[c.LHX] * d
-    shifted = p[c.LMUX] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmux
-    s_vx = fz * (p[c.PVX1] + p[c.PVX2] * dfz) * p[c.LVX] * shifted * d
+    s_hx = (p.PHX1 + p.PHX2 * dfz) * p.LHX * d
+    shifted = p.LMUX if p.SCALE_PEAKS_ONLY != 0.0 else lmux
+    s_vx = fz * (p.PVX1 + p.PVX2 * dfz) * p.LVX * shifted * d
     along = abs(kappa + s_hx + s_vx / k_x)
     across = abs(math.sin(alpha_s + s_hy + s_vy / k_y))
     # Multiplied out: either slip may vanish.

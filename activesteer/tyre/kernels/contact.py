@@ -30,7 +30,6 @@ import math
 from typing import Final, NamedTuple
 
 from activesteer.compilation import compiled
-from activesteer.tyre.kernels import parameter_index as prm
 from activesteer.tyre.kernels.limits import limit_flags
 from activesteer.tyre.kernels.magic_formula import slip_stiffnesses, steady_state
 from activesteer.tyre.kernels.relaxation import relaxation_lengths
@@ -86,6 +85,23 @@ class WheelForces(NamedTuple):
     friction_use: float
 
 
+class _Rolling(NamedTuple):
+    """What a tyre does at a given load above zero."""
+
+    fx_N: float
+    fy_N: float
+    mx_Nm: float
+    my_Nm: float
+    mz_Nm: float
+    slip_ratio: float
+    slip_angle_rad: float
+    deflection_x_rate_mps: float
+    deflection_y_rate_mps: float
+    deflection_z_rate_radps: float
+    limited: float
+    friction_use: float
+
+
 @compiled
 def _mean_decay(x):
     """Mean of exp(-t) over t from 0 to x: what is left, over a step, of the rate at its beginning."""
@@ -102,14 +118,14 @@ def _low_speed_slip_limit(file_limit, sliding_slip, share):
 def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn, gamma, u, v, w
 ):
-    """Forces, slips, rates of the relaxation states, whether a limit is exceeded, friction used, at a load above zero.
+    """A tyre at a load above zero.
 
     The arguments are those of `tyre_on_road`, with the load [N], the velocities of the contact point along and across
     the heading [m/s], the spin and the yaw rate of the wheel plane [rad/s], the camber [rad] and the relaxation states.
     """
     vsx = vx - spin * effective_rolling_radius(p, fz, spin, pressure_Pa)
-    limit_x = max(p[prm.KPUMAX] if vsx < 0.0 else -p[prm.KPUMIN], _SMALLEST_SLIP_LIMIT)
-    limit_y = max(math.tan(min(p[prm.ALPMAX] if vsy > 0.0 else -p[prm.ALPMIN], 1.5)), _SMALLEST_SLIP_LIMIT)
+    limit_x = max(p.KPUMAX if vsx < 0.0 else -p.KPUMIN, _SMALLEST_SLIP_LIMIT)
+    limit_y = max(math.tan(min(p.ALPMAX if vsy > 0.0 else -p.ALPMIN, 1.5)), _SMALLEST_SLIP_LIMIT)
     speed = abs(vx)
     share = 0.0
     damping_slip_x = 0.0
@@ -119,14 +135,14 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
         stiffness_x, stiffness_y = slip_stiffnesses(p, fz, gamma, pressure_Pa, mu)
         stiffness_x = abs(stiffness_x)
         stiffness_y = abs(stiffness_y)
-        sliding = _SLIDING_TO_LINEAR * mu / p[prm.REFERENCE_FRICTION] * fz
+        sliding = _SLIDING_TO_LINEAR * mu / p.REFERENCE_FRICTION * fz
         limit_x = _low_speed_slip_limit(limit_x, sliding / stiffness_x, share)
         limit_y = _low_speed_slip_limit(limit_y, sliding / stiffness_y, share)
         damping_slip_x = -low_speed_damping_Nspm * share * vsx / stiffness_x
         damping_slip_y = low_speed_damping_Nspm * share * vsy / stiffness_y
 
     sigma_x, sigma_y = relaxation_lengths(p, fz, gamma, pressure_Pa)
-    if p[prm.RELAXATION_OFF] != 0.0:
+    if p.RELAXATION_OFF != 0.0:
         sigma_x *= share
         sigma_y *= share
     sigma_x = max(sigma_x, _MIN_RELAXATION_LENGTH_M)
@@ -138,7 +154,7 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
         together = share * math.sqrt(sliding_x * sliding_x + sliding_y * sliding_y)
         sliding_x = (1.0 - share) * sliding_x + together
         sliding_y = (1.0 - share) * sliding_y + together
-    rolling = speed + p[prm.SPEED_OFFSET]
+    rolling = speed + p.SPEED_OFFSET
     carry_x = max(rolling, sliding_x)
     carry_y = max(rolling, sliding_y)
     rate_x = (-vsx - carry_x * u / sigma_x) * _mean_decay(timestep_s * carry_x / sigma_x)
@@ -156,22 +172,23 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
         limited = 1.0
     # Camber works by the path that the tread takes through the patch of a rolling tyre: at rest there is none.
     gamma *= 1.0 - share
-    fx, fy, mx, my, mz, mu_x, mu_y = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, 0.0)[:7]
+    straight = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, 0.0)
+    fx, fy, mx, my, mz = straight.fx_N, straight.fy_N, straight.mx_Nm, straight.my_Nm, straight.mz_Nm
     if share > 0.0:
         # The formula with turn slip treats camber differently, even without any: the two are blended, never switched.
         turn_slip = (w + timestep_s * rate_z) / half_length
         if turn_slip == 0.0:
             turn_slip = _NO_TURN_SLIP_1PM
         twisted = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, turn_slip)
-        fx += share * (twisted[0] - fx)
-        fy += share * (twisted[1] - fy)
-        mx += share * (twisted[2] - mx)
-        my += share * (twisted[3] - my)
-        mz += share * (twisted[4] - mz)
+        fx += share * (twisted.fx_N - fx)
+        fy += share * (twisted.fy_N - fy)
+        mx += share * (twisted.mx_Nm - mx)
+        my += share * (twisted.my_Nm - my)
+        mz += share * (twisted.mz_Nm - mz)
     # Beyond the range of the file the formula gives the forces of its greatest load.
-    load = min(fz, p[prm.FZMAX])
-    use = math.hypot(fx / (mu_x * load), fy / (mu_y * load))
-    return fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use
+    load = min(fz, p.FZMAX)
+    use = math.hypot(fx / (straight.friction_x * load), fy / (straight.friction_y * load))
+    return _Rolling(fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use)
 
 
 @compiled
@@ -208,7 +225,7 @@ def tyre_on_road(
     """Forces of a tyre on the plane road z = 0 and the rates of its relaxation states.
 
     Args:
-        p: Tyre parameters, shape (PARAMETER_COUNT,); it knows the side that the tyre is mounted on.
+        p: Record of the tyre; it knows the side that the tyre is mounted on.
         mu: Friction of the road relative to the one of the tyre file [-].
         pressure_Pa: Inflation pressure [Pa].
         low_speed_mps: Speed below which the standstill terms fade in [m/s].
@@ -229,7 +246,7 @@ def tyre_on_road(
         deflection_z_rad: Relaxation state about the normal of the road [rad].
 
     Returns:
-        The members of `WheelForces` in their order. `heading_x`, `heading_y` is the unit vector of the wheel's heading
+        A `WheelForces`. `heading_x`, `heading_y` is the unit vector of the wheel's heading
         in the road plane; `arm_..._m` leads from the wheel centre to the contact point, world frame;
         `limited` is 1.0 where a limit of validity of the tyre file is exceeded; `friction_use` is the share of the
         available friction that the forces take, sqrt((F_x / mu_x F_z)^2 + (F_y / mu_y F_z)^2) with the peak
@@ -255,43 +272,45 @@ def tyre_on_road(
     contact_y = velocity_y_mps + turn_z * arm_x - turn_x * arm_z
     vx = velocity_x_mps * heading_x + velocity_y_mps * heading_y
     vsy = contact_y * heading_x - contact_x * heading_y
-    if p[prm.SLIP_AT_CENTRE] != 0.0:
+    if p.SLIP_AT_CENTRE != 0.0:
         vsy = velocity_y_mps * heading_x - velocity_x_mps * heading_y
 
     deflection = free_radius(p, spin) - loaded_radius
     axis_z_rate = turn_x * axis_y - turn_y * axis_x
     closing = -(velocity_z_mps / horizontal + centre_height_m * axis_z * axis_z_rate / horizontal**3)
-    damping = p[prm.VERTICAL_DAMPING] * closing
+    damping = p.VERTICAL_DAMPING * closing
     fz = _load(p, deflection, spin, pressure_Pa, damping, 0.0, 0.0, gamma)
     if fz <= 0.0:
         decay = -_LIFTED_DECAY_PER_S
-        return (
+        return WheelForces(
             0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gamma, decay * deflection_x_m, decay * deflection_y_m,
             decay * deflection_z_rad, loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, 0.0, 0.0,
         )  # fmt: skip
 
-    fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use = _rolling_tyre(
+    rolling = _rolling_tyre(
         p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn_z, gamma,
         deflection_x_m, deflection_y_m, deflection_z_rad,
     )  # fmt: skip
-    if p[prm.Q_FCX] != 0.0 or p[prm.Q_FCY] != 0.0:
+    if p.Q_FCX != 0.0 or p.Q_FCY != 0.0:
         # Horizontal forces soften the tyre, and the load makes the horizontal forces: a secant search for both.
         fz_before = fz
-        step = _load(p, deflection, spin, pressure_Pa, damping, fx, fy, gamma) - fz
+        step = _load(p, deflection, spin, pressure_Pa, damping, rolling.fx_N, rolling.fy_N, gamma) - fz
         fz = fz + step if fz + step > 0.0 else _CAUTIOUS * fz
         for _ in range(_MOST_LOAD_STEPS):
-            fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use = _rolling_tyre(
+            rolling = _rolling_tyre(
                 p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn_z, gamma,
                 deflection_x_m, deflection_y_m, deflection_z_rad,
             )  # fmt: skip
-            missing = _load(p, deflection, spin, pressure_Pa, damping, fx, fy, gamma) - fz
+            missing = _load(p, deflection, spin, pressure_Pa, damping, rolling.fx_N, rolling.fy_N, gamma) - fz
             if abs(missing) <= _LOAD_TOLERANCE * fz or missing == step:
                 break
             fz_next = fz + missing * (fz - fz_before) / (step - missing)
             fz_before = fz
             step = missing
             fz = fz_next if fz_next > 0.0 else _CAUTIOUS * fz
-    return (
-        fx, fy, fz, mx, my, mz, kappa, alpha, gamma, rate_x, rate_y, rate_z,
-        loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, limited, use,
+    return WheelForces(
+        rolling.fx_N, rolling.fy_N, fz, rolling.mx_Nm, rolling.my_Nm, rolling.mz_Nm,
+        rolling.slip_ratio, rolling.slip_angle_rad, gamma,
+        rolling.deflection_x_rate_mps, rolling.deflection_y_rate_mps, rolling.deflection_z_rate_radps,
+        loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, rolling.limited, rolling.friction_use,
     )  # fmt: skip

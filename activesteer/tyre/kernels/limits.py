@@ -5,7 +5,6 @@ from __future__ import annotations
 from enum import IntFlag
 
 from activesteer.compilation import compiled
-from activesteer.tyre.kernels import parameter_index as c
 
 
 class Limit(IntFlag):
@@ -25,7 +24,7 @@ def limit_flags(p, fz_N: float, kappa: float, alpha_rad: float, gamma_rad: float
     """Sum of the `Limit` values that apply; a load of zero is a lifted wheel and no violation.
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         fz_N: Load [N].
         kappa: Longitudinal slip.
         alpha_rad: Slip angle [rad].
@@ -33,16 +32,16 @@ def limit_flags(p, fz_N: float, kappa: float, alpha_rad: float, gamma_rad: float
         pressure_Pa: Inflation pressure [Pa].
     """
     flags = 0
-    if 0.0 < fz_N < p[c.FZMIN]:
+    if 0.0 < fz_N < p.FZMIN:
         flags += 1
-    if fz_N > p[c.FZMAX]:
+    if fz_N > p.FZMAX:
         flags += 2
-    if kappa < p[c.KPUMIN] or kappa > p[c.KPUMAX]:
+    if kappa < p.KPUMIN or kappa > p.KPUMAX:
         flags += 4
-    if alpha_rad < p[c.ALPMIN] or alpha_rad > p[c.ALPMAX]:
+    if alpha_rad < p.ALPMIN or alpha_rad > p.ALPMAX:
         flags += 8
-    if gamma_rad < p[c.CAMMIN] or gamma_rad > p[c.CAMMAX]:
+    if gamma_rad < p.CAMMIN or gamma_rad > p.CAMMAX:
         flags += 16
-    if pressure_Pa < p[c.PRESMIN] or pressure_Pa > p[c.PRESMAX]:
+    if pressure_Pa < p.PRESMIN or pressure_Pa > p.PRESMAX:
         flags += 32
     return flags

@@ -3,7 +3,7 @@
 Inputs and outputs are in ISO-W axes at the contact point, SI and radians: alpha > 0 gives F_y < 0, kappa > 0 drives,
 gamma > 0 inclines the wheel about +x, M_y < 0 rolls forward. Slip is taken against the speed's absolute value.
 
-`p` is the parameter array of `parameters`. Inputs outside the ranges of the file are evaluated at the limit
+`p` is the record of the tyre (`record.TYRE_RECORD`). Inputs outside the ranges of the file are evaluated at the limit
 (`limits.limit_flags` says which); a load below the smallest valid one scales the forces of that load down to zero.
 
 Below the speed VXLOW everything that depends on the rolling direction (shifts, trail, rolling resistance) fades with
@@ -17,9 +17,9 @@ nothing could catch one, and the state's guard there finds what is not finite.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from activesteer.compilation import compiled
-from activesteer.tyre.kernels import parameter_index as c
 from activesteer.tyre.kernels.combined_slip import (
     friction_ellipse,
     lateral_weight,
@@ -56,10 +56,40 @@ __all__ = [
 ]
 
 
+class SteadyState(NamedTuple):
+    """Everything that one evaluation knows, ISO-W axes at the contact point.
+
+    Attributes:
+        fx_N: Longitudinal force [N].
+        fy_N: Lateral force [N].
+        mx_Nm: Overturning moment [Nm].
+        my_Nm: Rolling resistance moment [Nm].
+        mz_Nm: Aligning moment [Nm].
+        friction_x: Peak longitudinal friction mu_x.
+        friction_y: Peak lateral friction mu_y.
+        trail_m: Pneumatic trail [m].
+        residual_moment_Nm: Residual part of the aligning moment [Nm].
+        slip_stiffness_N: K_xkappa [N].
+        cornering_stiffness_Nprad: K_yalpha [N/rad].
+    """
+
+    fx_N: float
+    fy_N: float
+    mx_Nm: float
+    my_Nm: float
+    mz_Nm: float
+    friction_x: float
+    friction_y: float
+    trail_m: float
+    residual_moment_Nm: float
+    slip_stiffness_N: float
+    cornering_stiffness_Nprad: float
+
+
 @compiled
 def rolling_direction(p, vx_mps: float) -> float:
     """1 rolling forward, -1 backward, a sine between them below VXLOW."""
-    low = p[c.VXLOW]
+    low = p.VXLOW
     if vx_mps >= low:
         return 1.0
     if vx_mps <= -low:
@@ -76,17 +106,17 @@ def clamp(x: float, low: float, high: float) -> float:
 @compiled
 def relative_pressure(p, pressure_Pa: float) -> float:
     """Pressure over the nominal one, less 1."""
-    return clamp(pressure_Pa, p[c.PRESMIN], p[c.PRESMAX]) / p[c.NOMPRES] - 1.0
+    return clamp(pressure_Pa, p.PRESMIN, p.PRESMAX) / p.NOMPRES - 1.0
 
 
 @compiled
 def steady_state(
     p, fz: float, kappa: float, alpha: float, gamma: float, pressure: float, vx: float, mu: float, turn_slip: float
 ):
-    """Everything that one evaluation knows.
+    """One evaluation.
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         fz: Load [N].
         kappa: Longitudinal slip.
         alpha: Slip angle [rad].
@@ -97,35 +127,34 @@ def steady_state(
         turn_slip: Yaw rate over speed [1/m], positive to the left; MF 6.x only.
 
     Returns:
-        F_x, F_y, M_x, M_y, M_z, then peak friction mu_x and mu_y, trail [m], residual moment [Nm],
-        slip stiffness K_xkappa [N] and cornering stiffness K_yalpha [N/rad].
+        A `SteadyState`.
     """
     if not fz > 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    load = clamp(fz, p[c.FZMIN], p[c.FZMAX])
+        return SteadyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    load = clamp(fz, p.FZMIN, p.FZMAX)
     scale = min(fz / load, 1.0)
     fz = load
-    side = p[c.SIDE]
-    kappa = clamp(kappa, p[c.KPUMIN], p[c.KPUMAX])
-    alpha = side * clamp(alpha, p[c.ALPMIN], p[c.ALPMAX])
-    gamma = side * clamp(gamma, p[c.CAMMIN], p[c.CAMMAX])
-    if p[c.CAMBER_OFF] != 0.0:
+    side = p.SIDE
+    kappa = clamp(kappa, p.KPUMIN, p.KPUMAX)
+    alpha = side * clamp(alpha, p.ALPMIN, p.ALPMAX)
+    gamma = side * clamp(gamma, p.CAMMIN, p.CAMMAX)
+    if p.CAMBER_OFF != 0.0:
         gamma = 0.0
-    mu = mu / p[c.REFERENCE_FRICTION]
-    pressure = clamp(pressure, p[c.PRESMIN], p[c.PRESMAX])
-    fz0 = p[c.LFZO] * p[c.FNOMIN]
+    mu = mu / p.REFERENCE_FRICTION
+    pressure = clamp(pressure, p.PRESMIN, p.PRESMAX)
+    fz0 = p.LFZO * p.FNOMIN
     dfz = (fz - fz0) / fz0
     dpi = relative_pressure(p, pressure)
     d = rolling_direction(p, vx)
     tan_alpha = math.tan(alpha)
     alpha_s, gamma_s = alpha, gamma
-    if p[c.SLIP_TANGENT] != 0.0:
+    if p.SLIP_TANGENT != 0.0:
         alpha_s, gamma_s = tan_alpha, math.sin(gamma)
-    lmux, lmuy = p[c.LMUX] * mu, p[c.LMUY] * mu
-    mf52 = p[c.MF_VERSION] == MF52
+    lmux, lmuy = p.LMUX * mu, p.LMUY * mu
+    mf52 = p.MF_VERSION == MF52
     gamma_x, gamma_y, gamma_z = gamma, gamma_s, gamma_s
     if mf52:
-        gamma_x, gamma_y, gamma_z = gamma * p[c.LGAX], gamma_s * p[c.LGAY], gamma_s * p[c.LGAZ]
+        gamma_x, gamma_y, gamma_z = gamma * p.LGAX, gamma_s * p.LGAY, gamma_s * p.LGAZ
 
     # On a slippery road the pure forces reach their peaks at smaller slips; the weights have to follow, else both peaks
     # are there at once and the resultant exceeds the friction (similarity method, Pacejka 2012, section 4.2).
@@ -139,8 +168,8 @@ def steady_state(
         )
     fx0, mu_x, k_x = longitudinal_force(p, fz, dfz, dpi, kappa, gamma_x, lmux, d, z1)
     fy0, mu_y, k_y, b_y, c_y, s_hy, s_vy = lateral_force(p, fz, dfz, dpi, alpha_s, gamma_y, lmuy, d, z0, z2, z3, z4)
-    kappa_z, lmu_z = kappa, p[c.LMUY] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmuy
-    if p[c.FRICTION_ELLIPSE] != 0.0:
+    kappa_z, lmu_z = kappa, p.LMUY if p.SCALE_PEAKS_ONLY != 0.0 else lmuy
+    if p.FRICTION_ELLIPSE != 0.0:
         g_x, g_y = friction_ellipse(
             p, fz, dfz, d, kappa, alpha_s, fx0, fy0, mu_x * fz, mu_y * fz, k_x, k_y, s_hy, s_vy, lmux
         )
@@ -163,7 +192,7 @@ def steady_state(
         fx, fy, fy_trail, z0, z2, z5, z6, z7, z8,
     )  # fmt: skip
     mirrored = side * scale
-    return (
+    return SteadyState(
         scale * fx, mirrored * fy, mirrored * mx, scale * my, mirrored * mz,
         mu_x, mu_y, trail, mirrored * residual, scale * k_x, scale * k_y,
     )  # fmt: skip
@@ -176,7 +205,7 @@ def magic_formula(
     """Forces and moments of the tyre at the contact point in steady state.
 
     Args:
-        p: Parameter array, float64, shape (PARAMETER_COUNT,).
+        p: Record of the tyre, a `TYRE_RECORD`.
         fz_N: Load [N]; zero or less gives no forces.
         kappa: Longitudinal slip -V_sx/|V_x|, positive drives; -1 is a locked wheel.
         alpha_rad: Slip angle atan(V_sy/|V_x|) [rad].
@@ -193,7 +222,7 @@ def magic_formula(
     Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 4.3.2.
     """
     r = steady_state(p, fz_N, kappa, alpha_rad, gamma_rad, pressure_Pa, vx_mps, mu, 0.0)
-    return r[0], r[1], r[2], r[3], r[4]
+    return r.fx_N, r.fy_N, r.mx_Nm, r.my_Nm, r.mz_Nm
 
 
 @compiled
@@ -201,7 +230,7 @@ def slip_stiffnesses(p, fz_N: float, gamma_rad: float, pressure_Pa: float, mu: f
     """Slopes of the forces at zero slip.
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         fz_N: Load [N].
         gamma_rad: Camber [rad].
         pressure_Pa: Inflation pressure [Pa].
@@ -214,14 +243,14 @@ def slip_stiffnesses(p, fz_N: float, gamma_rad: float, pressure_Pa: float, mu: f
     """
     if not fz_N > 0.0:
         return 0.0, 0.0
-    load = clamp(fz_N, p[c.FZMIN], p[c.FZMAX])
+    load = clamp(fz_N, p.FZMIN, p.FZMAX)
     scale = min(fz_N / load, 1.0)
-    dfz = load / (p[c.LFZO] * p[c.FNOMIN]) - 1.0
+    dfz = load / (p.LFZO * p.FNOMIN) - 1.0
     dpi = relative_pressure(p, pressure_Pa)
-    gamma = clamp(gamma_rad, p[c.CAMMIN], p[c.CAMMAX])
-    if p[c.MF_VERSION] == MF52:
-        gamma *= p[c.LGAY]
-    if p[c.SLIP_TANGENT] != 0.0:
+    gamma = clamp(gamma_rad, p.CAMMIN, p.CAMMAX)
+    if p.MF_VERSION == MF52:
+        gamma *= p.LGAY
+    if p.SLIP_TANGENT != 0.0:
         gamma = math.sin(gamma)
     k_x = longitudinal_stiffness(p, load, dfz, dpi)
     return scale * k_x, scale * cornering_stiffness(p, load, gamma, dpi)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 from activesteer.compilation import compiled
-from activesteer.tyre.kernels import parameter_index as c
 from activesteer.tyre.kernels.pure_slip import EPSILON, MF52
 
 SMALLEST_FRICTION = 1e-6
@@ -20,28 +19,28 @@ SMALLEST_FRICTION = 1e-6
 @compiled
 def overturning_moment(p, fz: float, fy: float, gamma: float, dpi: float) -> float:
     """Overturning moment M_x [Nm] (4.E69, corrected)."""
-    r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
-    if p[c.MF_VERSION] == MF52:
-        return r0 * fz * (p[c.QSX1] * p[c.LVMX] - p[c.QSX2] * gamma + p[c.QSX3] * fy / fz0) * p[c.LMX]
-    mixed = p[c.QSX4] * math.cos(p[c.QSX5] * math.atan((p[c.QSX6] * fz / fz0) ** 2))
-    mixed *= math.sin(p[c.QSX7] * gamma + p[c.QSX8] * math.atan(p[c.QSX9] * fy / fz0))
-    sum_ = p[c.QSX1] * p[c.LVMX] - p[c.QSX2] * gamma * (1.0 + p[c.PPMX1] * dpi) + p[c.QSX3] * fy / fz0
-    sum_ += mixed + p[c.QSX10] * math.atan(p[c.QSX11] * fz / fz0) * gamma
-    added = fy * (p[c.QSX13] + p[c.QSX14] * abs(gamma)) - fz * p[c.QSX12] * gamma * abs(gamma)
-    return r0 * p[c.LMX] * (fz * sum_ + added)
+    r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
+    if p.MF_VERSION == MF52:
+        return r0 * fz * (p.QSX1 * p.LVMX - p.QSX2 * gamma + p.QSX3 * fy / fz0) * p.LMX
+    mixed = p.QSX4 * math.cos(p.QSX5 * math.atan((p.QSX6 * fz / fz0) ** 2))
+    mixed *= math.sin(p.QSX7 * gamma + p.QSX8 * math.atan(p.QSX9 * fy / fz0))
+    sum_ = p.QSX1 * p.LVMX - p.QSX2 * gamma * (1.0 + p.PPMX1 * dpi) + p.QSX3 * fy / fz0
+    sum_ += mixed + p.QSX10 * math.atan(p.QSX11 * fz / fz0) * gamma
+    added = fy * (p.QSX13 + p.QSX14 * abs(gamma)) - fz * p.QSX12 * gamma * abs(gamma)
+    return r0 * p.LMX * (fz * sum_ + added)
 
 
 @compiled
 def rolling_resistance_moment(p, fz: float, fx: float, gamma: float, pressure: float, vx: float, d: float) -> float:
     """Rolling resistance moment M_y [Nm], negative when rolling forward (4.E70)."""
-    r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
-    speed = abs(vx) / p[c.LONGVL]
-    sum_ = p[c.QSY1] + p[c.QSY2] * d * fx / fz0 + p[c.QSY3] * speed + p[c.QSY4] * speed**4
-    if p[c.MF_VERSION] == MF52:
-        return -r0 * fz * sum_ * p[c.LMY] * d
-    sum_ += (p[c.QSY5] + p[c.QSY6] * fz / fz0) * gamma * gamma
-    load = (fz / fz0) ** p[c.QSY7] * (pressure / p[c.NOMPRES]) ** p[c.QSY8]
-    return -r0 * fz0 * sum_ * load * p[c.LMY] * d
+    r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
+    speed = abs(vx) / p.LONGVL
+    sum_ = p.QSY1 + p.QSY2 * d * fx / fz0 + p.QSY3 * speed + p.QSY4 * speed**4
+    if p.MF_VERSION == MF52:
+        return -r0 * fz * sum_ * p.LMY * d
+    sum_ += (p.QSY5 + p.QSY6 * fz / fz0) * gamma * gamma
+    load = (fz / fz0) ** p.QSY7 * (pressure / p.NOMPRES) ** p.QSY8
+    return -r0 * fz0 * sum_ * load * p.LMY * d
 
 
 @compiled
@@ -61,7 +60,7 @@ def aligning_moment(
     """Aligning moment at combined slip (4.E31 to 4.E49, 4.E71 to 4.E78).
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         fz: Load [N], > 0.
         dfz: Load relative to the nominal one, less 1.
         dpi: Pressure relative to the nominal one, less 1.
@@ -92,38 +91,38 @@ def aligning_moment(
     Returns:
         Aligning moment [Nm], pneumatic trail [m], residual moment [Nm].
     """
-    r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
+    r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
     k_ya = k_y + math.copysign(EPSILON, k_y)
     speed = abs(vx)
     cos_alpha = speed / (speed * math.sqrt(1.0 + tan_alpha * tan_alpha) + EPSILON)
-    stiffness = p[c.LKY] / max(lmu, SMALLEST_FRICTION)
+    stiffness = p.LKY / max(lmu, SMALLEST_FRICTION)
     size = abs(gamma_s)
-    gamma_z = gamma * p[c.LGAZ] if p[c.MF_VERSION] == MF52 else gamma
+    gamma_z = gamma * p.LGAZ if p.MF_VERSION == MF52 else gamma
 
-    alpha_t = alpha_s + (p[c.QHZ1] + p[c.QHZ2] * dfz) * d + (p[c.QHZ3] + p[c.QHZ4] * dfz) * gamma_s
+    alpha_t = alpha_s + (p.QHZ1 + p.QHZ2 * dfz) * d + (p.QHZ3 + p.QHZ4 * dfz) * gamma_s
     alpha_r = alpha_s + s_hy + s_vy / k_ya
     slip = k_x / k_ya * kappa
     alpha_t_eq = _equivalent_slip(alpha_t, slip)
     alpha_r_eq = _equivalent_slip(alpha_r, slip)
 
-    b_t = (p[c.QBZ1] + p[c.QBZ2] * dfz + p[c.QBZ3] * dfz * dfz) * stiffness
-    b_t *= 1.0 + p[c.QBZ4] * gamma_z + p[c.QBZ5] * abs(gamma_z)
-    c_t = p[c.QCZ1]
-    d_t = fz * r0 / (p[c.LFZO] * fz0) * (p[c.QDZ1] + p[c.QDZ2] * dfz) * (1.0 - p[c.PPZ1] * dpi) * p[c.LTR] * d
-    d_t *= (1.0 + p[c.QDZ3] * gamma_z + p[c.QDZ4] * gamma_z * gamma_z) * z5
-    curve = (p[c.QEZ4] + p[c.QEZ5] * gamma_s) * 2.0 / math.pi * math.atan(b_t * c_t * alpha_t)
-    e_t = min((p[c.QEZ1] + p[c.QEZ2] * dfz + p[c.QEZ3] * dfz * dfz) * (1.0 + curve), 1.0)
+    b_t = (p.QBZ1 + p.QBZ2 * dfz + p.QBZ3 * dfz * dfz) * stiffness
+    b_t *= 1.0 + p.QBZ4 * gamma_z + p.QBZ5 * abs(gamma_z)
+    c_t = p.QCZ1
+    d_t = fz * r0 / (p.LFZO * fz0) * (p.QDZ1 + p.QDZ2 * dfz) * (1.0 - p.PPZ1 * dpi) * p.LTR * d
+    d_t *= (1.0 + p.QDZ3 * gamma_z + p.QDZ4 * gamma_z * gamma_z) * z5
+    curve = (p.QEZ4 + p.QEZ5 * gamma_s) * 2.0 / math.pi * math.atan(b_t * c_t * alpha_t)
+    e_t = min((p.QEZ1 + p.QEZ2 * dfz + p.QEZ3 * dfz * dfz) * (1.0 + curve), 1.0)
     bt = b_t * alpha_t_eq
     trail = d_t * math.cos(c_t * math.atan(bt - e_t * (bt - math.atan(bt)))) * cos_alpha
-    if p[c.TRAIL_BY_SCALED_LOAD] == 0.0:
-        trail *= p[c.LFZO]
+    if p.TRAIL_BY_SCALED_LOAD == 0.0:
+        trail *= p.LFZO
 
-    b_r = (p[c.QBZ9] * stiffness + p[c.QBZ10] * b_y * c_y) * z6
-    d_r = (p[c.QDZ6] + p[c.QDZ7] * dfz) * p[c.LRES] * z2
-    camber = (p[c.QDZ8] + p[c.QDZ9] * dfz) * (1.0 + p[c.PPZ2] * dpi) + (p[c.QDZ10] + p[c.QDZ11] * dfz) * size
-    d_r += camber * gamma_s * p[c.LKZC] * z0
+    b_r = (p.QBZ9 * stiffness + p.QBZ10 * b_y * c_y) * z6
+    d_r = (p.QDZ6 + p.QDZ7 * dfz) * p.LRES * z2
+    camber = (p.QDZ8 + p.QDZ9 * dfz) * (1.0 + p.PPZ2 * dpi) + (p.QDZ10 + p.QDZ11 * dfz) * size
+    d_r += camber * gamma_s * p.LKZC * z0
     d_r = fz * r0 * d_r * lmu * d * math.cos(alpha_s) + z8 - 1.0
     residual = d_r * math.cos(z7 * math.atan(b_r * alpha_r_eq))
 
-    arm = r0 * (p[c.SSZ1] + p[c.SSZ2] * fy / fz0 + (p[c.SSZ3] + p[c.SSZ4] * dfz) * gamma) * p[c.LS]
+    arm = r0 * (p.SSZ1 + p.SSZ2 * fy / fz0 + (p.SSZ3 + p.SSZ4 * dfz) * gamma) * p.LS
     return -trail * fy_trail + residual + arm * fx, trail, residual

@@ -1,7 +1,7 @@
 """Longitudinal and lateral force at pure slip, compiled, on plain floats.
 
-Symbols are those of the source: p (parameter array), z0 ... z4 (turn slip factors zeta), lmu (friction scale with the
-road's), `_s` for the starred angles, K stiffness, S_H and S_V shifts.
+Symbols are those of the source: p (record of the tyre), z0 ... z4 (turn slip factors zeta), lmu (friction scale with
+the road's), `_s` for the starred angles, K stiffness, S_H and S_V shifts.
 
 Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, equations 4.E9 to 4.E30;
 for MF 5.2: 2nd ed. 2006, section 4.3.2.
@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 
 from activesteer.compilation import compiled
-from activesteer.tyre.kernels import parameter_index as c
 
 EPSILON = 1e-6
 """Guard of the denominators; it carries the sign of its neighbour, so that it never cancels it."""
@@ -27,11 +26,11 @@ def guarded(x: float) -> float:
 
 
 @compiled
-def sine_formula(b: float, c_: float, d: float, e: float, x: float) -> float:
+def sine_formula(b: float, c: float, d: float, e: float, x: float) -> float:
     """D sin(C atan(Bx - E(Bx - atan Bx))) with E not above 1 (equation 4.E9)."""
     e = min(e, 1.0)
     bx = b * x
-    return d * math.sin(c_ * math.atan(bx - e * (bx - math.atan(bx))))
+    return d * math.sin(c * math.atan(bx - e * (bx - math.atan(bx))))
 
 
 @compiled
@@ -43,17 +42,17 @@ def sign(x: float) -> float:
 @compiled
 def longitudinal_stiffness(p, fz: float, dfz: float, dpi: float) -> float:
     """Slip stiffness K_xkappa [N] (4.E15)."""
-    pressure = 1.0 + p[c.PPX1] * dpi + p[c.PPX2] * dpi * dpi
-    return fz * (p[c.PKX1] + p[c.PKX2] * dfz) * math.exp(p[c.PKX3] * dfz) * pressure * p[c.LKX]
+    pressure = 1.0 + p.PPX1 * dpi + p.PPX2 * dpi * dpi
+    return fz * (p.PKX1 + p.PKX2 * dfz) * math.exp(p.PKX3 * dfz) * pressure * p.LKX
 
 
 @compiled
 def cornering_stiffness(p, fz: float, gamma_s: float, dpi: float) -> float:
     """Cornering stiffness K_yalpha [N/rad] without turn slip, negative for a tyre in ISO-W axes (4.E25)."""
-    fz0 = p[c.LFZO] * p[c.FNOMIN]
-    load = (p[c.PKY2] + p[c.PKY5] * gamma_s * gamma_s) * (1.0 + p[c.PPY2] * dpi) * fz0
-    peak = p[c.PKY1] * fz0 * (1.0 + p[c.PPY1] * dpi) * (1.0 - p[c.PKY3] * abs(gamma_s)) * p[c.LKY]
-    return peak * math.sin(p[c.PKY4] * math.atan(fz / load))
+    fz0 = p.LFZO * p.FNOMIN
+    load = (p.PKY2 + p.PKY5 * gamma_s * gamma_s) * (1.0 + p.PPY2 * dpi) * fz0
+    peak = p.PKY1 * fz0 * (1.0 + p.PPY1 * dpi) * (1.0 - p.PKY3 * abs(gamma_s)) * p.LKY
+    return peak * math.sin(p.PKY4 * math.atan(fz / load))
 
 
 @compiled
@@ -63,7 +62,7 @@ def longitudinal_force(
     """Longitudinal force at pure slip (4.E9 to 4.E18).
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         fz: Load [N], > 0.
         dfz: Load relative to the nominal one, less 1.
         dpi: Pressure relative to the nominal one, less 1.
@@ -76,15 +75,15 @@ def longitudinal_force(
     Returns:
         Force [N], peak friction, slip stiffness [N].
     """
-    mu = (p[c.PDX1] + p[c.PDX2] * dfz) * (1.0 + p[c.PPX3] * dpi + p[c.PPX4] * dpi * dpi)
-    mu *= (1.0 - p[c.PDX3] * gamma * gamma) * lmu
-    c_x = p[c.PCX1] * p[c.LCX]
+    mu = (p.PDX1 + p.PDX2 * dfz) * (1.0 + p.PPX3 * dpi + p.PPX4 * dpi * dpi)
+    mu *= (1.0 - p.PDX3 * gamma * gamma) * lmu
+    c_x = p.PCX1 * p.LCX
     d_x = mu * fz * z1
     k_x = longitudinal_stiffness(p, fz, dfz, dpi)
-    kappa_x = kappa + (p[c.PHX1] + p[c.PHX2] * dfz) * p[c.LHX] * d
-    shifted = p[c.LMUX] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmu
-    s_v = fz * (p[c.PVX1] + p[c.PVX2] * dfz) * p[c.LVX] * shifted * z1 * d
-    e_x = (p[c.PEX1] + p[c.PEX2] * dfz + p[c.PEX3] * dfz * dfz) * (1.0 - p[c.PEX4] * d * sign(kappa_x)) * p[c.LEX]
+    kappa_x = kappa + (p.PHX1 + p.PHX2 * dfz) * p.LHX * d
+    shifted = p.LMUX if p.SCALE_PEAKS_ONLY != 0.0 else lmu
+    s_v = fz * (p.PVX1 + p.PVX2 * dfz) * p.LVX * shifted * z1 * d
+    e_x = (p.PEX1 + p.PEX2 * dfz + p.PEX3 * dfz * dfz) * (1.0 - p.PEX4 * d * sign(kappa_x)) * p.LEX
     b_x = k_x / guarded(c_x * d_x)
     return sine_formula(b_x, c_x, d_x, e_x, kappa_x) + s_v, mu, k_x
 
@@ -97,7 +96,7 @@ def lateral_force(
     """Lateral force at pure side slip (4.E19 to 4.E30).
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         fz: Load [N], > 0.
         dfz: Load relative to the nominal one, less 1.
         dpi: Pressure relative to the nominal one, less 1.
@@ -114,21 +113,21 @@ def lateral_force(
         Force [N], peak friction, cornering stiffness K_yalpha [N/rad], B_y, C_y, S_Hy, S_Vy [N].
     """
     k_y = cornering_stiffness(p, fz, gamma_s, dpi) * z3
-    shift = (p[c.PHY1] + p[c.PHY2] * dfz) * p[c.LHY] * d
-    shifted = p[c.LMUY] if p[c.SCALE_PEAKS_ONLY] != 0.0 else lmu
-    s_vg = fz * (p[c.PVY3] + p[c.PVY4] * dfz) * gamma_s * p[c.LKYC] * shifted * z2
-    if p[c.MF_VERSION] == MF52:
-        s_h = shift + p[c.PHY3] * gamma_s * p[c.LKYC]
+    shift = (p.PHY1 + p.PHY2 * dfz) * p.LHY * d
+    shifted = p.LMUY if p.SCALE_PEAKS_ONLY != 0.0 else lmu
+    s_vg = fz * (p.PVY3 + p.PVY4 * dfz) * gamma_s * p.LKYC * shifted * z2
+    if p.MF_VERSION == MF52:
+        s_h = shift + p.PHY3 * gamma_s * p.LKYC
     else:
-        k_yg = fz * (p[c.PKY6] + p[c.PKY7] * dfz) * (1.0 + p[c.PPY5] * dpi) * p[c.LKYC]
+        k_yg = fz * (p.PKY6 + p.PKY7 * dfz) * (1.0 + p.PPY5 * dpi) * p.LKYC
         s_h = shift + (k_yg * gamma_s - s_vg) * z0 / guarded(k_y) + z4 - 1.0
-    s_v = fz * (p[c.PVY1] + p[c.PVY2] * dfz) * p[c.LVY] * shifted * z2 * d + s_vg
-    mu = (p[c.PDY1] + p[c.PDY2] * dfz) * (1.0 + p[c.PPY3] * dpi + p[c.PPY4] * dpi * dpi)
-    mu *= (1.0 - p[c.PDY3] * gamma_s * gamma_s) * lmu
-    c_y = p[c.PCY1] * p[c.LCY]
+    s_v = fz * (p.PVY1 + p.PVY2 * dfz) * p.LVY * shifted * z2 * d + s_vg
+    mu = (p.PDY1 + p.PDY2 * dfz) * (1.0 + p.PPY3 * dpi + p.PPY4 * dpi * dpi)
+    mu *= (1.0 - p.PDY3 * gamma_s * gamma_s) * lmu
+    c_y = p.PCY1 * p.LCY
     d_y = mu * fz * z2
     b_y = k_y / guarded(c_y * d_y)
     alpha_y = alpha_s + s_h
-    side = (p[c.PEY3] + p[c.PEY4] * gamma_s) * sign(alpha_y)
-    e_y = (p[c.PEY1] + p[c.PEY2] * dfz) * (1.0 + p[c.PEY5] * gamma_s * gamma_s - side) * p[c.LEY]
+    side = (p.PEY3 + p.PEY4 * gamma_s) * sign(alpha_y)
+    e_y = (p.PEY1 + p.PEY2 * dfz) * (1.0 + p.PEY5 * gamma_s * gamma_s - side) * p.LEY
     return sine_formula(b_y, c_y, d_y, e_y, alpha_y) + s_v, mu, k_y, b_y, c_y, s_h, s_v

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 from activesteer.compilation import compiled
-from activesteer.tyre.kernels import parameter_index as c
 
 MF62 = 62.0
 _SOFTEST = 0.1
@@ -20,15 +19,15 @@ _SOFTEST = 0.1
 @compiled
 def stiffness_pressure_factor(p, pressure_Pa: float) -> float:
     """What the inflation pressure makes of the vertical stiffness (equation 5)."""
-    pressure = min(max(pressure_Pa, p[c.PRESMIN]), p[c.PRESMAX])
-    return 1.0 + p[c.PFZ1] * (pressure / p[c.NOMPRES] - 1.0)
+    pressure = min(max(pressure_Pa, p.PRESMIN), p.PRESMAX)
+    return 1.0 + p.PFZ1 * (pressure / p.NOMPRES - 1.0)
 
 
 @compiled
 def free_radius(p, omega_radps: float) -> float:
     """Radius of the rotating, unloaded tyre [m] at a rotational speed [rad/s] (equation 1)."""
-    speed = omega_radps * p[c.UNLOADED_RADIUS] / p[c.LONGVL]
-    return p[c.UNLOADED_RADIUS] * (p[c.Q_RE0] + p[c.Q_V1] * speed * speed)
+    speed = omega_radps * p.UNLOADED_RADIUS / p.LONGVL
+    return p.UNLOADED_RADIUS * (p.Q_RE0 + p.Q_V1 * speed * speed)
 
 
 @compiled
@@ -36,26 +35,26 @@ def effective_rolling_radius(p, fz_N: float, omega_radps: float, pressure_Pa: fl
     """Effective rolling radius [m], forward speed over rotational speed of a wheel that rolls freely (equation 7).
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         fz_N: Load [N]; a negative one counts as zero.
         omega_radps: Rotational speed [rad/s].
         pressure_Pa: Inflation pressure [Pa].
     """
-    fz0 = p[c.FNOMIN]
+    fz0 = p.FNOMIN
     ratio = max(fz_N, 0.0) / fz0
-    stiffness = p[c.VERTICAL_STIFFNESS] * stiffness_pressure_factor(p, pressure_Pa)
-    if p[c.RADIUS_BY_DEFLECTION] != 0.0:
+    stiffness = p.VERTICAL_STIFFNESS * stiffness_pressure_factor(p, pressure_Pa)
+    if p.RADIUS_BY_DEFLECTION != 0.0:
         return free_radius(p, omega_radps) - max(fz_N, 0.0) / (3.0 * stiffness)
-    curve = p[c.DREFF] * math.atan(p[c.BREFF] * ratio) + p[c.FREFF] * ratio
+    curve = p.DREFF * math.atan(p.BREFF * ratio) + p.FREFF * ratio
     return free_radius(p, omega_radps) - fz0 / stiffness * curve
 
 
 @compiled
 def _softening(p, omega: float, fx: float, fy: float) -> float:
     """What speed and horizontal forces make of the vertical stiffness (equation 2)."""
-    r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
-    x, y = p[c.Q_FCX] * fx / fz0, p[c.Q_FCY] * fy / fz0
-    return max(1.0 + p[c.Q_V2] * abs(omega) * r0 / p[c.LONGVL] - x * x - y * y, _SOFTEST)
+    r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
+    x, y = p.Q_FCX * fx / fz0, p.Q_FCY * fy / fz0
+    return max(1.0 + p.Q_V2 * abs(omega) * r0 / p.LONGVL - x * x - y * y, _SOFTEST)
 
 
 @compiled
@@ -65,7 +64,7 @@ def vertical_force_loaded(
     """Elastic vertical force [N], with the softening by horizontal forces and by camber.
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         deflection_m: Free radius of the rotating tyre less the loaded one [m]; zero or less gives no force.
         omega_radps: Rotational speed [rad/s].
         pressure_Pa: Inflation pressure [Pa].
@@ -75,34 +74,34 @@ def vertical_force_loaded(
 
     Source: Besselink 2010, equations 2 to 5; MF 6.2 manual for FITTYP 62.
     """
-    r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
-    gamma, fy = p[c.SIDE] * gamma_rad, p[c.SIDE] * fy_N
-    q1 = p[c.Q_FZ1] + p[c.Q_FZ3] * gamma * gamma
-    if p[c.MF_VERSION] == MF62:
+    r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
+    gamma, fy = p.SIDE * gamma_rad, p.SIDE * fy_N
+    q1 = p.Q_FZ1 + p.Q_FZ3 * gamma * gamma
+    if p.MF_VERSION == MF62:
         free = free_radius(p, omega_radps)
         loaded = free - deflection_m
         ratio = loaded / free
-        offset = (p[c.Q_FYS1] + p[c.Q_FYS2] * ratio + p[c.Q_FYS3] * ratio * ratio) * gamma
+        offset = (p.Q_FYS1 + p.Q_FYS2 * ratio + p.Q_FYS3 * ratio * ratio) * gamma
         rho_free = max(deflection_m, 0.0)
         rho_camber = 0.0
-        denominator = p[c.Q_CAM1] * free + p[c.Q_CAM2] * free * free
+        denominator = p.Q_CAM1 * free + p.Q_CAM2 * free * free
         if denominator != 0.0 and gamma != 0.0:
-            tread = (1.075 - 0.5 * p[c.ASPECT_RATIO]) * p[c.WIDTH]
-            shape = (p[c.Q_CAM1] * loaded + p[c.Q_CAM2] * loaded * loaded) / denominator
-            rho_camber = shape * shape * tread / 8.0 * abs(math.tan(gamma)) - p[c.Q_CAM3] * rho_free * abs(gamma)
+            tread = (1.075 - 0.5 * p.ASPECT_RATIO) * p.WIDTH
+            shape = (p.Q_CAM1 * loaded + p.Q_CAM2 * loaded * loaded) / denominator
+            rho_camber = shape * shape * tread / 8.0 * abs(math.tan(gamma)) - p.Q_CAM3 * rho_free * abs(gamma)
         # A cambered tyre touches with its shoulder before its middle does.
         rho = (deflection_m + rho_camber) / r0
         if rho <= 0.0:
             return 0.0
-        x = p[c.Q_FCX] * fx_N / fz0
-        y = rho ** p[c.Q_FCY2] * p[c.Q_FCY] * (fy - offset) / fz0
-        soft = 1.0 + p[c.Q_V2] * abs(omega_radps) * r0 / p[c.LONGVL] - x * x - y * y
+        x = p.Q_FCX * fx_N / fz0
+        y = rho**p.Q_FCY2 * p.Q_FCY * (fy - offset) / fz0
+        soft = 1.0 + p.Q_V2 * abs(omega_radps) * r0 / p.LONGVL - x * x - y * y
     else:
         if deflection_m <= 0.0:
             return 0.0
         rho = deflection_m / r0
         soft = _softening(p, omega_radps, fx_N, fy)
-    return max(soft * stiffness_pressure_factor(p, pressure_Pa) * (q1 * rho + p[c.Q_FZ2] * rho * rho) * fz0, 0.0)
+    return max(soft * stiffness_pressure_factor(p, pressure_Pa) * (q1 * rho + p.Q_FZ2 * rho * rho) * fz0, 0.0)
 
 
 @compiled
@@ -110,12 +109,12 @@ def bottoming_force(p, deflection_m: float, omega_radps: float) -> float:
     """Additional vertical force [N] once the tyre is pressed onto the rim.
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         deflection_m: Free radius of the rotating tyre less the loaded one [m].
         omega_radps: Rotational speed [rad/s].
     """
-    room = free_radius(p, omega_radps) - p[c.RIM_RADIUS] - p[c.BOTTOM_OFFST]
-    return p[c.BOTTOM_STIFF] * max(deflection_m - room, 0.0)
+    room = free_radius(p, omega_radps) - p.RIM_RADIUS - p.BOTTOM_OFFST
+    return p.BOTTOM_STIFF * max(deflection_m - room, 0.0)
 
 
 @compiled
@@ -123,7 +122,7 @@ def vertical_force(p, deflection_m: float, omega_radps: float, pressure_Pa: floa
     """Elastic vertical force [N] of a tyre without horizontal forces and camber, with bottoming on the rim.
 
     Args:
-        p: Parameter array.
+        p: Record of the tyre.
         deflection_m: Free radius of the rotating tyre less the loaded one [m]; zero or less gives no force.
         omega_radps: Rotational speed [rad/s].
         pressure_Pa: Inflation pressure [Pa].
@@ -142,13 +141,13 @@ def deflection_under_load(
     """
     if fz_N <= 0.0:
         return 0.0
-    r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
-    if p[c.MF_VERSION] != MF62:
+    r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
+    if p.MF_VERSION != MF62:
         soft = _softening(p, omega_radps, fx_N, fy_N) * stiffness_pressure_factor(p, pressure_Pa)
         load = fz_N / (fz0 * soft)
-        q1 = p[c.Q_FZ1] + p[c.Q_FZ3] * gamma_rad * gamma_rad
+        q1 = p.Q_FZ1 + p.Q_FZ3 * gamma_rad * gamma_rad
         # The root that stays finite where the quadratic term vanishes.
-        return r0 * 2.0 * load / (q1 + math.sqrt(q1 * q1 + 4.0 * p[c.Q_FZ2] * load))
+        return r0 * 2.0 * load / (q1 + math.sqrt(q1 * q1 + 4.0 * p.Q_FZ2 * load))
     low, high = -0.5 * r0, r0
     for _ in range(100):
         middle = 0.5 * (low + high)
@@ -169,17 +168,17 @@ def contact_patch(p, fz_N: float, pressure_Pa: float):
     MF-Tyre 5.2 manual, and the width is that of the tyre.
     """
     fz = max(fz_N, 0.0)
-    r0, fz0 = p[c.UNLOADED_RADIUS], p[c.FNOMIN]
-    stiffness = p[c.VERTICAL_STIFFNESS] * stiffness_pressure_factor(p, pressure_Pa)
-    fz = min(fz, max(r0 - p[c.RIM_RADIUS] - p[c.BOTTOM_OFFST], 0.0) * stiffness)
+    r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
+    stiffness = p.VERTICAL_STIFFNESS * stiffness_pressure_factor(p, pressure_Pa)
+    fz = min(fz, max(r0 - p.RIM_RADIUS - p.BOTTOM_OFFST, 0.0) * stiffness)
     ratio = fz / (stiffness * r0)
-    if p[c.Q_RA_GIVEN] != 0.0:
-        half_length = r0 * (p[c.Q_RA2] * ratio + p[c.Q_RA1] * math.sqrt(ratio))
+    if p.Q_RA_GIVEN != 0.0:
+        half_length = r0 * (p.Q_RA2 * ratio + p.Q_RA1 * math.sqrt(ratio))
     else:
-        y = math.log10(r0 * p[c.VERTICAL_STIFFNESS] / fz0)
+        y = math.log10(r0 * p.VERTICAL_STIFFNESS / fz0)
         q_a1 = ((-0.0388 * y + 0.2509) * y - 0.6283) * y + 0.6279
         half_length = r0 * (1.693 * q_a1 * q_a1 * fz / fz0 + q_a1 * math.sqrt(fz / fz0))
-    half_width = 0.5 * p[c.WIDTH]
-    if p[c.Q_RB_GIVEN] != 0.0:
-        half_width = p[c.WIDTH] * (p[c.Q_RB2] * ratio + p[c.Q_RB1] * ratio ** (1.0 / 3.0))
+    half_width = 0.5 * p.WIDTH
+    if p.Q_RB_GIVEN != 0.0:
+        half_width = p.WIDTH * (p.Q_RB2 * ratio + p.Q_RB1 * ratio ** (1.0 / 3.0))
     return 2.0 * half_length, 2.0 * half_width

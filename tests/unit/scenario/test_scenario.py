@@ -231,7 +231,7 @@ def test_described_scenario_resolves_to_itself(maneuver):
         scenario.car.config,
         scenario.car.mjcf,
     )
-    assert [tyre.array.tolist() for tyre in again.car.tyres] == [tyre.array.tolist() for tyre in scenario.car.tyres]
+    assert [tyre.record.tolist() for tyre in again.car.tyres] == [tyre.record.tolist() for tyre in scenario.car.tyres]
 
 
 @pytest.mark.parametrize("controller", ["none", "ars", "afs"])

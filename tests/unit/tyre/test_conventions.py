@@ -11,7 +11,6 @@ import pytest
 from activesteer.errors import ParameterError
 from activesteer.tyre import MagicFormula, load_tir
 from activesteer.tyre.conventions import TyreConventions
-from activesteer.tyre.kernels import parameter_index as parameters
 from activesteer.tyre.tyre_parameters import TyreParameters
 from tests.unit.tyre.tyres import TYRES
 
@@ -30,9 +29,9 @@ def forces(tyre: TyreParameters, kappa: float = 0.0, alpha: float = ALPHA_RAD, g
 
 
 def test_the_defaults_stand_as_zero_and_one(tyre: TyreParameters) -> None:
-    numbers = tyre.array[parameters.CAMBER_OFF :]
-    np.testing.assert_array_equal(numbers, [0.0] * 8 + [1.0])
-    assert len(TyreConventions().numbers()) == len(numbers)
+    numbers = TyreConventions().numbers()
+    assert list(numbers.values()) == [0.0] * 8 + [1.0]
+    assert {name: tyre.record[name] for name in numbers} == numbers
 
 
 def test_each_convention_has_its_own_place(tyre: TyreParameters) -> None:
@@ -41,10 +40,10 @@ def test_each_convention_has_its_own_place(tyre: TyreParameters) -> None:
         "slip_velocity": "wheel_centre", "rolling_radius": "third_of_deflection", "trail_load": "scaled",
         "speed_offset_mps": 0.1, "reference_friction": 0.8,
     }  # fmt: skip
-    default = tyre.array
-    for place, (key, value) in enumerate(changes.items(), parameters.CAMBER_OFF):
-        changed = replace(tyre, conventions=TyreConventions(**{key: value})).array  # type: ignore[arg-type]
-        assert np.flatnonzero(changed != default).tolist() == [place], key
+    default = tyre.record
+    for place, (key, value) in zip(default.dtype.names[-len(changes) :], changes.items(), strict=True):
+        changed = replace(tyre, conventions=TyreConventions(**{key: value})).record  # type: ignore[arg-type]
+        assert [name for name in default.dtype.names if changed[name] != default[name]] == [place], key
 
 
 def test_they_travel_between_processes_and_to_the_other_side(tyre: TyreParameters) -> None:

@@ -10,7 +10,6 @@ from activesteer.conventions import CORNERS
 from activesteer.road.road import Road, RoadPatch
 from activesteer.scenario import load_car
 from activesteer.tyre.kernels.magic_formula import steady_state
-from activesteer.tyre.kernels.parameter_index import FZMAX
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb
 from tests.unit.vehicle.cars import record, tilted_and_moving
@@ -114,9 +113,9 @@ def test_friction_use_is_that_of_the_formula_s_own_peaks(mu: float, rng: np.rand
     for corner in CORNERS:
         fx, fy, fz = (record(vehicle, corner, slot) for slot in (fb.U_FX, fb.U_FY, fb.U_FZ))
         gamma = record(vehicle, corner, fb.U_INCLINATION)
-        tyre = given.tyres[0].mounted_on("LEFT" if corner.endswith("l") else "RIGHT").array
+        tyre = given.tyres[0].mounted_on("LEFT" if corner.endswith("l") else "RIGHT").record
         # The formula ends at the greatest load of the file.
-        load = min(fz, tyre[FZMAX])
+        load = min(fz, tyre["FZMAX"])
         assert load > 100.0
         # Friction does not depend on the slips; the formula wants some all the same.
         mu_x, mu_y = steady_state(tyre, load, 0.01, 0.02, gamma, 250e3, 15.0, mu, 0.0)[5:7]

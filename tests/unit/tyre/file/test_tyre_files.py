@@ -10,18 +10,17 @@ from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.file.coefficients import COEFFICIENTS
 from activesteer.tyre.file.tir import tir_from_text
 from activesteer.tyre.file.writer import tir_text
-from activesteer.tyre.kernels import parameter_index as parameters
+from activesteer.tyre.kernels.record import TYRE_RECORD
 from tests.unit.tyre.tyres import TYRES, tyre
 
 FILES = sorted(TYRES.glob("*.tir"))
 
 
-def test_every_coefficient_has_its_index() -> None:
-    for place, coefficient in enumerate(COEFFICIENTS):
-        assert getattr(parameters, coefficient.name) == place
-    assert len({coefficient.name for coefficient in COEFFICIENTS}) == len(COEFFICIENTS)
-    assert len(COEFFICIENTS) == parameters.MF_VERSION
-    assert parameters.REFERENCE_FRICTION + 1 == parameters.PARAMETER_COUNT
+def test_every_coefficient_reaches_the_kernels_under_its_name() -> None:
+    given = tyre()
+    assert TYRE_RECORD.itemsize == 8 * len(TYRE_RECORD)
+    for coefficient in COEFFICIENTS:
+        assert given.record[coefficient.name] == given[coefficient.name]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -30,7 +29,7 @@ def test_written_and_read_again_it_is_the_same_tyre(path) -> None:
     again = tir_from_text(tir_text(first, "a comment"), path)
     assert again.given == first.given
     assert again.side == first.side
-    np.testing.assert_array_equal(again.array, first.array)
+    assert again.record == first.record
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

@@ -21,7 +21,7 @@ LOAD_N = 4000.0
 def _contact(**changes: Any) -> WheelForces:
     """An upright wheel of the compact, rolling along x."""
     inputs: dict[str, Any] = {
-        "p": tyre().array, "mu": 1.0, "pressure_Pa": 230e3, "low_speed_mps": LOW_SPEED_MPS,
+        "p": tyre().record, "mu": 1.0, "pressure_Pa": 230e3, "low_speed_mps": LOW_SPEED_MPS,
         "low_speed_damping_Nspm": DAMPING_NSPM, "timestep_s": STEP_S, "centre_height_m": 0.295,
         "axis_x": 0.0, "axis_y": 1.0, "axis_z": 0.0, "velocity_x_mps": 0.0, "velocity_y_mps": 0.0,
         "velocity_z_mps": 0.0, "spin_x_radps": 0.0, "spin_y_radps": 0.0, "spin_z_radps": 0.0,
@@ -96,7 +96,7 @@ def test_a_tyre_at_rest_is_the_spring_of_its_carcass(load_N: float, direction: i
     velocity[:200, direction] = 0.005
     forces = _moved(rig, velocity, height_m=_standing_height_m(rig, load_N))
     pushed_m = 0.005 * 200 * STEP_S
-    stiffness = carcass_stiffnesses(tyre().array, load_N, rig.pressure_Pa)[direction]
+    stiffness = carcass_stiffnesses(tyre().record, load_N, rig.pressure_Pa)[direction]
     assert -forces.force_N[-1, direction] / pushed_m == pytest.approx(stiffness, rel=0.05)
     # It stays wound up, and the viscous force acts while it moves.
     assert forces.force_N[-1] == pytest.approx(forces.force_N[300], rel=1e-12)
@@ -224,7 +224,7 @@ def test_a_lifted_tyre_has_no_forces_and_forgets_its_deflection() -> None:
 
 @pytest.mark.parametrize("vertical_mps", [-2.0, -0.3, 0.0, 0.3])
 def test_touching_down_and_lifting_off_is_continuous_at_any_vertical_speed(vertical_mps: float) -> None:
-    free_m = free_radius(tyre().array, 0.0)
+    free_m = free_radius(tyre().record, 0.0)
     above, below = (
         _contact(centre_height_m=free_m + d, velocity_z_mps=vertical_mps, velocity_y_mps=0.5, deflection_y_m=0.01)
         for d in (1e-7, -1e-7)
@@ -290,7 +290,7 @@ def test_pressure_outside_its_range_is_flagged() -> None:
 @pytest.mark.parametrize("softening", [{}, {"Q_FCX": 0.15, "Q_FCY": 0.4, "VERTICAL_DAMPING": 5000.0}])
 @pytest.mark.parametrize("name", ["compact_205_55R16", "synthetic_all_terms"])
 def test_nothing_a_wheel_can_do_gives_a_force_that_is_not_finite(name: str, softening: dict, rng) -> None:
-    p = tyre(name).with_values(**softening).array
+    p = tyre(name).with_values(**softening).record
     for _ in range(2000):
         tilt, heading = rng.uniform(-0.5, 0.5), rng.uniform(-3.0, 3.0)
         axis = (-math.sin(heading) * math.cos(tilt), math.cos(heading) * math.cos(tilt), math.sin(tilt))

@@ -91,7 +91,7 @@ def test_slip_stiffness_is_the_slope_at_the_origin_of_the_curve() -> None:
     symmetric = tyre().with_values(
         **dict.fromkeys(["PHX1", "PHX2", "PVX1", "PVX2", "PHY1", "PHY2", "PVY1", "PVY2"], 0.0)
     )
-    p, step = symmetric.array, 1e-5
+    p, step = symmetric.record, 1e-5
     k_x, k_y = slip_stiffnesses(p, 4000.0, 0.0, 230e3, 1.0)
 
     def slope(kappa: float, alpha: float, place: int) -> float:
@@ -162,7 +162,7 @@ def test_arrays_broadcast_and_agree_with_the_scalar_kernel(compact: MagicFormula
     assert forces.mz_Nm.shape == (2, 7)
     parameters = compact.parameters
     scalar = magic_formula(
-        parameters.array, 5000.0, 0.03, float(angles[2]), 0.0, parameters["INFLPRES"], parameters["LONGVL"], 1.0
+        parameters.record, 5000.0, 0.03, float(angles[2]), 0.0, parameters["INFLPRES"], parameters["LONGVL"], 1.0
     )
     assert tuple(float(getattr(forces, name)[1, 2]) for name in ALL) == scalar
 

@@ -32,7 +32,7 @@ def _mf62():
 
 def test_the_stiffness_at_the_nominal_load_is_that_of_the_file() -> None:
     parameters = tyre()
-    p, load = parameters.array, parameters["FNOMIN"]
+    p, load = parameters.record, parameters["FNOMIN"]
     deflection = deflection_under_load(p, load, 0.0, 230e3, 0.0, 0.0, 0.0)
     step = 1e-6
     slope = vertical_force(p, deflection + step, 0.0, 230e3) - vertical_force(p, deflection - step, 0.0, 230e3)
@@ -41,33 +41,33 @@ def test_the_stiffness_at_the_nominal_load_is_that_of_the_file() -> None:
 
 @pytest.mark.parametrize("parameters", [tyre(), tyre("synthetic_all_terms"), _mf62()], ids=["61", "synthetic", "62"])
 def test_deflection_and_force_are_inverse(parameters, rng: np.random.Generator) -> None:
-    p = parameters.array
+    p = parameters.record
     for load, fx, fy, gamma in rng.uniform([200, -3000, -3000, -0.08], [9000, 3000, 3000, 0.08], (50, 4)):
         deflection = deflection_under_load(p, load, 40.0, 220e3, fx, fy, gamma)
         assert vertical_force_loaded(p, deflection, 40.0, 220e3, fx, fy, gamma) == pytest.approx(load, rel=1e-9)
 
 
 def test_no_deflection_gives_no_force() -> None:
-    assert vertical_force(tyre().array, 0.0, 50.0, 230e3) == 0.0
-    assert vertical_force(tyre().array, -0.01, 50.0, 230e3) == 0.0
+    assert vertical_force(tyre().record, 0.0, 50.0, 230e3) == 0.0
+    assert vertical_force(tyre().record, -0.01, 50.0, 230e3) == 0.0
 
 
 def test_a_cambered_mf62_tyre_touches_with_its_shoulder_and_lifts_off() -> None:
-    p = _mf62().array
+    p = _mf62().record
     first = vertical_force_loaded(p, 0.0, 0.0, 230e3, 0.0, 0.0, 0.05)
     assert 0.0 < first < 1000.0
     assert vertical_force_loaded(p, -0.05, 0.0, 230e3, 0.0, 0.0, 0.05) == 0.0
 
 
 def test_pressure_and_speed_stiffen_the_tyre() -> None:
-    p = tyre().array
+    p = tyre().record
     assert vertical_force(p, 0.02, 0.0, 280e3) > vertical_force(p, 0.02, 0.0, 230e3)
     assert vertical_force(p, 0.02, 100.0, 230e3) > vertical_force(p, 0.02, 0.0, 230e3)
 
 
 def test_the_rim_stops_a_tyre_that_bottoms() -> None:
     parameters = tyre()
-    p = parameters.array
+    p = parameters.record
     room = free_radius(p, 0.0) - parameters["RIM_RADIUS"] - parameters["BOTTOM_OFFST"]
     before = vertical_force(p, room, 0.0, 230e3)
     elastic = vertical_force_loaded(p, room + 0.005, 0.0, 230e3, 0.0, 0.0, 0.0)
@@ -80,7 +80,7 @@ def test_the_rolling_radius_lies_between_the_loaded_and_the_free_one() -> None:
     assert (forces.effective_radius_m > forces.loaded_radius_m).all()
     assert (forces.effective_radius_m < tyre()["UNLOADED_RADIUS"]).all()
     assert (np.diff(forces.effective_radius_m) < 0).all()
-    assert effective_rolling_radius(tyre().array, 0.0, 0.0, 230e3) == free_radius(tyre().array, 0.0)
+    assert effective_rolling_radius(tyre().record, 0.0, 0.0, 230e3) == free_radius(tyre().record, 0.0)
 
 
 def test_the_spin_of_a_rolling_wheel_gives_its_slip_back() -> None:
@@ -89,7 +89,7 @@ def test_the_spin_of_a_rolling_wheel_gives_its_slip_back() -> None:
 
 
 def test_relaxation_lengths_vanish_with_the_load() -> None:
-    p = tyre().array
+    p = tyre().record
     assert relaxation_lengths(p, 0.0, 0.0, 230e3) == (0.0, 0.0)
     short, long = relaxation_lengths(p, 10.0, 0.0, 230e3), relaxation_lengths(p, 1000.0, 0.0, 230e3)
     assert all(0.0 < a < b for a, b in zip(short, long, strict=True))
