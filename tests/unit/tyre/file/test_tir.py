@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from activesteer.errors import ParameterError, TyreFileError
 from activesteer.tyre import TyreParameters, load_tir
 from activesteer.tyre.file.tir import tir_from_text
-from tests.unit.tyre.tyres import TYRES, tyre
+from tests.unit.tyre.tyres import TYRES, differing, tyre
 
 MINIMAL = """
 [MODEL]
@@ -149,7 +149,7 @@ def test_a_right_hand_file_mounted_left_is_mirrored() -> None:
     assert _read(text).record.tolist() == _read(MINIMAL).record.tolist()
     mirrored = _read(text, mounted="LEFT").record
     given = _read(MINIMAL).record
-    assert [name for name in given.dtype.names if mirrored[name] != given[name]] == ["SIDE"]
+    assert differing(mirrored, given) == ["SIDE"]
 
 
 def _mutated(data: bytes, chance: random.Random) -> bytes:
