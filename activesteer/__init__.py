@@ -1,8 +1,37 @@
 """activesteer: a multibody car in MuJoCo with active rear steering and active front steering superposition."""
 
-from activesteer.recording import Recording
-from activesteer.signals import DriverCommand, Measurement, SteerCommand
-from activesteer.simulation.runner import simulate
+from __future__ import annotations
+
 from activesteer.version import __version__
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+    from activesteer.recording import Recording
+    from activesteer.signals import DriverCommand, Measurement, SteerCommand
+    from activesteer.simulation.runner import simulate
+
 __all__ = ["DriverCommand", "Measurement", "Recording", "SteerCommand", "__version__", "simulate"]
+
+# Imported at first use: engine and compiler take a second, which help and lists of names need not wait for.
+_HOMES = {
+    "Recording": "activesteer.recording",
+    "DriverCommand": "activesteer.signals",
+    "Measurement": "activesteer.signals",
+    "SteerCommand": "activesteer.signals",
+    "simulate": "activesteer.simulation.runner",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    value = globals()[name] = getattr(import_module(_HOMES[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

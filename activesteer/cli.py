@@ -2,79 +2,102 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
-from collections.abc import Sequence
 
-from activesteer.commands import (
-    bench,
-    figures,
-    identify,
-    info,
-    kc,
-    linearise,
-    listing,
-    replay,
-    report,
-    reproduce,
-    run,
-    tyre,
-    validate,
-    vehicle,
-    video,
-    watch,
-)
-from activesteer.errors import ActiveSteerError
-from activesteer.version import __version__
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from activesteer.commands.arguments import Commands
+    from activesteer.commands.stopping import StopSignals
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of the console script.
 
     Args:
-        arguments: Words after the program's name; those of the process where not given.
+        arguments: Words after the program's name. Where not given, those of the process, which then is the program's
+            own: Ctrl-C and SIGTERM end it as `commands.stopping` says.
 
     Returns:
-        Exit status: 0, 1 for an error that was explained, 130 after Ctrl-C.
+        Exit status: 0, 1 for an error that was explained, 130 after Ctrl-C, 143 after SIGTERM.
     """
-    parser = _parser()
-    options = parser.parse_args(arguments)
+    # Before anything else is imported: a signal may come at any moment.
+    from activesteer.commands.stopping import StopSignals
+
+    stop = StopSignals()
     try:
-        return options.action(options)
-    except ActiveSteerError as error:
+        if arguments is None:
+            stop.watch()
+        status = _called(arguments, stop)
+        if arguments is None:
+            sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads the output, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 1
+    except BaseException as error:
+        # Whatever an interrupted import or an ended worker made of the signal, the signal is the reason.
+        if stop.number is None and not isinstance(error, KeyboardInterrupt):
+            raise
+        return stop.end()
+    if stop.number is not None:
+        return stop.end()
+    stop.finished = True
+    return status
+
+
+def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
+    from activesteer.commands.output import log_to_terminal
+    from activesteer.errors import ActiveSteerError
+
+    stop.options = options = all_commands().parser().parse_args(arguments)
+    try:
+        with log_to_terminal():
+            return options.action(options)
+    except BrokenPipeError:
+        raise
+    except (ActiveSteerError, OSError) as error:
+        if stop.number is not None:
+            raise
+        # An OSError that gets here is of the output, or of a folder for what is temporary.
         lines = [f"activesteer: {error}", *getattr(error, "__notes__", [])]
         print("\n".join(lines), file=sys.stderr)
         return 1
-    except BrokenPipeError:  # whoever reads the output, such as `head`, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    except KeyboardInterrupt:
-        print("activesteer: stopped; what was recorded until then is saved", file=sys.stderr)
-        return 130
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="activesteer", description="A multibody car with active steering, in MuJoCo.")
-    parser.add_argument("--version", action="version", version=f"activesteer {__version__}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for command in (
-        run,
-        reproduce,
+def all_commands() -> Commands:
+    """The commands of the program, in the groups under which `--help` lists them."""
+    from activesteer.commands import (
+        bench,
         figures,
-        replay,
-        watch,
-        video,
-        report,
-        listing,
+        identify,
         info,
-        tyre,
         kc,
+        linearise,
+        listing,
+        replay,
+        report,
+        reproduce,
+        run,
+        tyre,
         validate,
         vehicle,
-        identify,
-        linearise,
-        bench,
-    ):
-        command.add_to(commands)
-    return parser
+        video,
+        watch,
+    )
+    from activesteer.commands.arguments import Commands
+    from activesteer.version import __version__
+
+    commands = Commands(f"activesteer {__version__}")
+    for title, modules in {
+        "drive": (listing, run, watch),
+        "look": (info, report, replay, video),
+        "car": (vehicle, tyre, kc),
+        "study": (identify, linearise),
+        "prove": (reproduce, figures, validate, bench),
+    }.items():
+        commands.begin_group(title)
+        for module in modules:
+            module.add_to(commands)
+    return commands

@@ -12,15 +12,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from activesteer.errors import ActiveSteerError
-
-_SHOWN_CHARACTERS = 200
+from activesteer.errors import MAX_SHOWN, ActiveSteerError
 
 
-def shown(path: str | os.PathLike[str]) -> str:
+def shown_path(path: str | os.PathLike[str]) -> str:
     """A path as a message shows it: cut to 200 characters, and none of them moves a cursor or cannot be printed."""
     text = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in os.fspath(path))
-    return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 3] + "..."
+    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."
 
 
 @contextmanager
@@ -128,8 +126,8 @@ def make_folder(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> 
 @contextmanager
 def _refused(doing: str, path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[None]:
     if "\0" in os.fspath(path):
-        raise error(f"cannot {doing} {shown(path)}: a path has no zero byte")
+        raise error(f"cannot {doing} {shown_path(path)}: a path has no zero byte")
     try:
         yield
     except OSError as reason:
-        raise error(f"cannot {doing} {shown(path)}: {reason.strerror or reason}") from reason
+        raise error(f"cannot {doing} {shown_path(path)}: {reason.strerror or reason}") from reason

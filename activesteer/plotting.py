@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from activesteer.errors import ActiveSteerError, ParameterError
-from activesteer.files import make_folder, replacing, shown
+from activesteer.files import make_folder, replacing, shown_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +45,7 @@ def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterEr
         try:
             figure.savefig(part, dpi=150)
         except ValueError as reason:  # an ending that is no format of matplotlib's
-            raise error(f"cannot write {shown(path)}: {reason}") from reason
+            raise error(f"cannot write {shown_path(path)}: {reason}") from reason
     return path
 
 

@@ -75,8 +75,8 @@ def find_vehicle(name_or_path: str | os.PathLike[str]) -> Path:
     """The parameter file of a vehicle.
 
     Args:
-        name_or_path: A name from `list_vehicles`, or the path of a .toml file. A string is a path if it contains a
-            separator or ends in `.toml`.
+        name_or_path: A name from `list_vehicles`, or the path of a .toml file or of the folder that it is in. A string
+            is a path if it contains a separator or ends in `.toml`, or is no vehicle's name and a folder has it.
 
     Returns:
         Path of an existing file.
@@ -84,7 +84,33 @@ def find_vehicle(name_or_path: str | os.PathLike[str]) -> Path:
     Raises:
         ParameterError: there is no such vehicle or file; the message names the nearest ones.
     """
+    if name_or_path not in list_vehicles() and (folder := Path(name_or_path).expanduser()).is_dir():
+        name_or_path = _vehicle_in(folder)
     return _find(name_or_path, models_dir() / "vehicles", "vehicle", ParameterError)
+
+
+def _vehicle_in(folder: Path) -> Path:
+    """The vehicle file of a folder: that of the folder's name, or the only one there is."""
+    names = [name for name in _names(folder) if name != "table"]  # what `vehicle new` keeps of its input
+    name = folder.resolve().name
+    if name in names:
+        return folder / f"{name}.toml"
+    if len(names) == 1:
+        return folder / f"{names[0]}.toml"
+    raise ParameterError(f"which vehicle file of {folder} is meant? There are: {', '.join(names) or 'none'}")
+
+
+def check_own(file: Path) -> None:
+    """Refuses to change a file that belongs to an installed package.
+
+    Args:
+        file: The file.
+
+    Raises:
+        ParameterError: it does.
+    """
+    if file.resolve().is_relative_to(_PACKAGE) or {"site-packages", "dist-packages"} & set(file.resolve().parts):
+        raise ParameterError(f"{file} belongs to an installed package; copy it to a place of your own")
 
 
 def _names(directory: Path) -> list[str]:

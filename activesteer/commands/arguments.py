@@ -1,20 +1,76 @@
-"""Arguments that several commands share: which vehicle, which manoeuvre, which parameters are replaced."""
+"""Options that several commands share, each declared once: the same name, meaning and help everywhere."""
 
 from __future__ import annotations
 
 import argparse
 import tomllib
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.errors import ParameterError
 
 if TYPE_CHECKING:
     from activesteer.scenario import Scenario
 
+_NAME_WIDTH: Final = 12
+
+
+class Commands:
+    """The commands of the program as they are added, and the list of them that `--help` shows, in groups."""
+
+    def __init__(self, version: str) -> None:
+        """Begins with no command.
+
+        Args:
+            version: What `--version` prints.
+        """
+        self._parser = argparse.ArgumentParser(
+            prog="activesteer",
+            usage="activesteer [-h] [--version] COMMAND ...",
+            description="A multibody car with active steering, in MuJoCo.",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        self._parser.add_argument("--version", action="version", version=version)
+        self._added = self._parser.add_subparsers(
+            required=True, metavar="COMMAND", help=argparse.SUPPRESS, prog="activesteer"
+        )
+        self._groups: dict[str, dict[str, str]] = {}
+
+    def begin_group(self, title: str) -> None:
+        """Commands that are added from now on stand under this title."""
+        self._groups[title] = {}
+
+    def add_parser(self, name: str, help: str, description: str = "") -> argparse.ArgumentParser:
+        """Adds a command, as argparse does it.
+
+        Args:
+            name: Its name.
+            help: What it does, in some words.
+            description: What its own help begins with; the words of `help` where not given.
+        """
+        group = self._groups[next(reversed(self._groups))]
+        group[name] = help
+        return self._added.add_parser(name, description=description or f"{help[0].upper()}{help[1:]}.")
+
+    def names(self) -> list[str]:
+        """The commands."""
+        return [name for group in self._groups.values() for name in group]
+
+    def parser(self) -> argparse.ArgumentParser:
+        """The whole command line."""
+        lines = []
+        for title, group in self._groups.items():
+            lines += [f"{title}:", *(f"  {name:{_NAME_WIDTH}}{words}" for name, words in group.items()), ""]
+        self._parser.epilog = "\n".join([*lines, "`activesteer COMMAND --help` tells more of a command."])
+        return self._parser
+
 
 def add_vehicle(parser: argparse.ArgumentParser) -> None:
     """Adds `--vehicle`."""
-    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
+    parser.add_argument(
+        "--vehicle", default="compact", metavar="NAME_OR_PATH",
+        help="a name from `activesteer list`, a vehicle file or its folder (default: compact)",
+    )  # fmt: skip
 
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
@@ -25,6 +81,62 @@ def add_scenario(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
         help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
     )  # fmt: skip
+
+
+def add_controller(parser: argparse.ArgumentParser, *, several: bool) -> None:
+    """Adds `-c`; where there may be several, `options.controller` is a list, or None."""
+    words = "none, ars, afs, or my_file.py:MyController"
+    parser.add_argument(
+        "-c", "--controller", metavar="CONTROLLER",
+        action="append" if several else "store", default=None if several else "none",
+        help=f"{words}{'; one run for each' if several else ''} (default: none)",
+    )  # fmt: skip
+
+
+def add_recording(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+    """Adds the recordings to look at: `options.file`, or `options.files` where there may be several."""
+    words = "a recording that `activesteer run` or `reproduce` made"
+    if several:
+        parser.add_argument("files", nargs="+", type=Path, metavar="FILE.mcap", help=f"{words}; several are compared")
+    else:
+        parser.add_argument("file", type=Path, metavar="FILE.mcap", help=words)
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Adds `--json`."""
+    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
+
+
+def add_output(parser: argparse.ArgumentParser, metavar: str, words: str, default: str | None = None) -> None:
+    """Adds `-o`.
+
+    Args:
+        parser: Of the command.
+        metavar: What is to be given: DIR, FILE.html.
+        words: What goes there, and what is done without the option where it has no default.
+        default: Where it goes if nothing is given.
+    """
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar=metavar, default=None if default is None else Path(default),
+        help=words if default is None else f"{words} (default: {default})",
+    )  # fmt: skip
+
+
+def add_figures_folder(parser: argparse.ArgumentParser) -> None:
+    """Adds `-o` of a command that draws only where it is told to."""
+    add_output(parser, "DIR", "folder for the figures; none are drawn without it")
+
+
+def add_jobs(parser: argparse.ArgumentParser) -> None:
+    """Adds `--jobs`."""
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one per processor)")
+
+
+def add_pace(parser: argparse.ArgumentParser) -> None:
+    """Adds `--speed`, the pace of what is shown."""
+    parser.add_argument(
+        "--speed", type=float, default=1.0, metavar="FACTOR", help="0.25 is slow motion, 4 is fast (default: 1)"
+    )
 
 
 def scenario_of(options: argparse.Namespace) -> Scenario:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any, Final
 
+from activesteer.commands.arguments import add_json
 from activesteer.commands.output import print_json
 from activesteer.errors import ParameterError
 
@@ -15,7 +16,7 @@ def add_to(commands: Any) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--tyre", action="store_true", help="what a tyre's evaluation costs instead")
     what.add_argument("--maneuvers", action="store_true", help="the paper's scenarios instead, and their key metrics")
-    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    add_json(parser)
     parser.add_argument("--rounds", type=int, default=5, metavar="N", help="the best of N counts (default: 5)")
     parser.set_defaults(action=_bench)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from activesteer.commands.arguments import add_vehicle
+from activesteer.commands.arguments import add_jobs, add_vehicle
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("figures", help="the paper's figures from our own runs, as PNG and SVG")
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder for the figures")
+    parser.add_argument("output", type=Path, metavar="DIR", help="folder for the figures")
     parser.add_argument(
         "--recordings", type=Path, metavar="DIR",
         help="recordings that `activesteer reproduce -o DIR` has made; where not given they are made now, in DIR/runs",
     )  # fmt: skip
     add_vehicle(parser)
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one per processor)")
+    add_jobs(parser)
     parser.set_defaults(action=_figures)
 
 
@@ -39,7 +39,7 @@ def _figures(options: argparse.Namespace) -> int:
     else:
         with ProgressBar("runs", quiet=False) as bar:
             result = reproduce(
-                options.folder / "runs",
+                options.output / "runs",
                 options.vehicle,
                 jobs=options.jobs,
                 progress=lambda what, done, total: bar(done / total, what),
@@ -49,7 +49,7 @@ def _figures(options: argparse.Namespace) -> int:
             msg = f"{' '.join(first)} failed: {result.failures[first]}"
             raise ParameterError(msg)
         recordings = result.recordings()
-    for path in draw_all(recordings, options.folder, options.vehicle):
+    for path in draw_all(recordings, options.output, options.vehicle):
         print(path)
     return 0
 

@@ -7,20 +7,22 @@ import datetime
 import sys
 from typing import Any
 
+from activesteer.commands.arguments import add_json, add_vehicle
+
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("identify", help="understeer, limits and single-track model of a vehicle (ISO 4138)")
-    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
+    add_vehicle(parser)
     parser.add_argument(
-        "--dry-run", action="store_true", help="leave the table [single_track] of the vehicle file as it is"
+        "--write", action="store_true", help="also write the result to the table [single_track] of the vehicle file"
     )
-    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    add_json(parser)
     parser.set_defaults(action=_identify)
 
 
 def _identify(options: argparse.Namespace) -> int:
-    from activesteer.resources import find_vehicle
+    from activesteer.resources import check_own, find_vehicle
     from activesteer.studies.identification import identify, write_single_track
 
     def progress(test: str) -> None:
@@ -28,13 +30,17 @@ def _identify(options: argparse.Namespace) -> int:
             print(f"{test} ...", file=sys.stderr)
 
     file = find_vehicle(options.vehicle)
+    if options.write:
+        check_own(file)
+        options.output = file
     result = identify(options.vehicle, progress=progress)
     if options.json:
         print(result.to_json())
     else:
         print(result.table())
-    if not options.dry_run:
-        command = "activesteer identify" + (f" --vehicle {options.vehicle}" if options.vehicle != "compact" else "")
+    if options.write:
+        vehicle = f" --vehicle {options.vehicle}" if options.vehicle != "compact" else ""
+        command = f"activesteer identify{vehicle} --write"
         write_single_track(file, result, command, datetime.date.today().isoformat())
         if not options.json:
             print(f"written to {file}")

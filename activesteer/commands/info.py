@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
+
+from activesteer.commands.arguments import add_recording
 
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("info", help="what a recording holds")
-    parser.add_argument("file", type=Path, metavar="FILE.mcap")
+    add_recording(parser)
     parser.set_defaults(action=_info)
 
 

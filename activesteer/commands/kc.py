@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
+
+from activesteer.commands.arguments import add_figures_folder, add_json, add_vehicle
 
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("kc", help="kinematics and compliance of the suspensions, as on a rig")
-    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for the pictures; none without it")
-    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    add_vehicle(parser)
+    add_figures_folder(parser)
+    add_json(parser)
     parser.set_defaults(action=_kc)
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any, Final
 
+from activesteer.commands.arguments import add_figures_folder, add_vehicle
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder
 
@@ -16,9 +16,9 @@ _LOCUS_KMH: Final = (40.0, 60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("linearise", help="modes of the full car at a speed, Bode plots and root locus")
-    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
+    add_vehicle(parser)
     parser.add_argument("--speed-kmh", type=float, default=80.0, metavar="V", help="default: 80")
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for the pictures; none without it")
+    add_figures_folder(parser)
     parser.set_defaults(action=_linearise)
 
 

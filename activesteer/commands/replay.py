@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from activesteer.commands.arguments import add_recording
 from activesteer.errors import ParameterError
 
 
@@ -19,8 +19,10 @@ def add_to(commands: Any) -> None:
         help="look at recordings: the car in 3D, its signals, its metrics",
         description="Opens recordings in the rerun viewer; several are shown together.",
     )
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE.mcap")
-    parser.add_argument("--save", type=Path, metavar="OUT.rrd", help="write a file for the viewer, open no window")
+    add_recording(parser, several=True)
+    parser.add_argument(
+        "--save", type=Path, dest="output", metavar="OUT.rrd", help="write a file for the viewer, open no window"
+    )
     parser.add_argument("--web", action="store_true", help="serve it to a browser, until Ctrl-C")
     parser.add_argument(
         "--compare", action="store_true", help="of several files, only the page that shows them side by side"
@@ -42,14 +44,13 @@ def _replay(options: argparse.Namespace) -> int:
     recordings = [Recording.open(file, recover=True) for file in options.files]
     names = _names(options.files, recordings)
     runs = runs_of(dict(zip(names, recordings, strict=True)))
-    if options.save is not None:
-        save(runs, options.save, compare=options.compare, label=label_and_unit)
-        print(f"{options.save}: open it with `rerun {options.save}`", file=sys.stderr)
-    with suppress(KeyboardInterrupt):  # the way to end it
-        if options.web:
-            serve(runs, _announce, compare=options.compare, label=label_and_unit)
-        elif options.save is None:
-            show(runs, compare=options.compare, label=label_and_unit)
+    if options.output is not None:
+        save(runs, options.output, compare=options.compare, label=label_and_unit)
+        print(f"{options.output}: open it with `rerun {options.output}`", file=sys.stderr)
+    if options.web:
+        serve(runs, _announce, compare=options.compare, label=label_and_unit)
+    elif options.output is None:
+        show(runs, compare=options.compare, label=label_and_unit)
     return 0
 
 

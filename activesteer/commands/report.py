@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-_DEFAULT_FILE: Final = Path("report.html")
+from activesteer.commands.arguments import add_output, add_recording
 
 
 def add_to(commands: Any) -> None:
@@ -16,10 +15,8 @@ def add_to(commands: Any) -> None:
         help="compare recordings on one HTML page",
         description="One page that needs no network: scorecard, plots, track, metrics, parameters, versions.",
     )
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE.mcap")
-    parser.add_argument(
-        "-o", "--output", type=Path, default=_DEFAULT_FILE, metavar="FILE.html", help="default: report.html"
-    )
+    add_recording(parser, several=True)
+    add_output(parser, "FILE.html", "the page; one that exists is replaced", "report.html")
     parser.set_defaults(action=_report)
 
 

@@ -6,31 +6,28 @@ import argparse
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
+from activesteer.commands.arguments import add_jobs, add_json, add_output, add_vehicle
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 
 if TYPE_CHECKING:
     from activesteer.studies.reproduction import Reproduction
 
-_DEFAULT_FOLDER: Final = Path("runs")
-
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("reproduce", help="drive the paper's scenarios and check what it claims")
-    parser.add_argument(
-        "-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="DIR", help="folder (default: runs)"
-    )
-    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one per processor)")
+    add_output(parser, "DIR", "folder for recordings, report and figures", "runs")
+    add_vehicle(parser)
+    add_jobs(parser)
     parser.add_argument("--figures", action="store_true", help="also draw the paper's figures")
     parser.add_argument(
         "--robustness", action="store_true",
         help="instead: check the claims with another mass, centre of gravity, friction and speed; no files",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    add_json(parser)
     parser.set_defaults(action=_reproduce)
 
 

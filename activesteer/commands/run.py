@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
+from activesteer.commands.arguments import add_controller, add_json, add_output, add_scenario, scenario_of
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError
@@ -17,28 +17,15 @@ from activesteer.files import make_folder
 if TYPE_CHECKING:
     from activesteer.analysis.claims import Scorecard
 
-_DEFAULT_FOLDER: Final = Path("runs")
-
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     run = commands.add_parser("run", help="drive a manoeuvre and record it")
-    run.add_argument("maneuver", metavar="MANEUVER", help="a name from `activesteer list`, or a TOML file")
-    run.add_argument(
-        "-c", "--controller", action="append", metavar="CONTROLLER",
-        help="none, ars, afs, or my_file.py:MyController; one run for each (default: none)",
-    )  # fmt: skip
-    run.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
-    run.add_argument(
-        "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
-        help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
-    )  # fmt: skip
-    run.add_argument(
-        "-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="FILE_OR_DIR",
-        help="a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap (default: runs)",
-    )  # fmt: skip
+    add_scenario(run)
+    add_controller(run, several=True)
+    add_output(run, "FILE_OR_DIR", "a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap", "runs")
     run.add_argument("--plot", action="store_true", help="also draw the runs")
-    run.add_argument("--json", action="store_true", help="print metrics as JSON and nothing else")
+    add_json(run)
     run.set_defaults(action=_run)
 
 
@@ -46,11 +33,10 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.analysis.tables import comparison
     from activesteer.controllers import load_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
-    from activesteer.scenario import resolve
     from activesteer.simulation.runner import prepared, run_scenario
 
     controllers = options.controller or ["none"]
-    scenario = resolve(options.maneuver, options.vehicle, dict(parse_override(text) for text in options.overrides))
+    scenario = scenario_of(options)
     # What is wrong with the last controller or the plot is said before the first run, not after it.
     for controller in controllers:
         load_controller(controller, scenario.controller_setup(DEFAULT_TIMESTEP_S))
@@ -109,18 +95,6 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[str]) -> li
     for path in paths:
         check_target(path)
     return paths
-
-
-def parse_override(text: str) -> tuple[str, Any]:
-    """`key=value`, the value as in TOML; what is no TOML value is a text."""
-    key, sign, value = text.partition("=")
-    if not sign or not key:
-        msg = f"--set {text}: KEY=VALUE is needed, as in --set road.mu=0.4"
-        raise ParameterError(msg)
-    try:
-        return key.strip(), tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return key.strip(), value
 
 
 def _claims(recordings: Mapping[str, Any], vehicle: str) -> Scorecard | None:

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from activesteer.commands.arguments import add_figures_folder, add_json
 from activesteer.commands.output import print_json
 from activesteer.errors import TyreFileError, nearest_names
 
@@ -14,8 +15,8 @@ def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("tyre", help="what a .tir file holds, what is unusual in it, and its pictures")
     parser.add_argument("file", metavar="FILE.tir", help="a path, or a name in models/tyres")
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for the pictures; none without it")
-    parser.add_argument("--json", action="store_true", help="print key figures as JSON and nothing else")
+    add_figures_folder(parser)
+    add_json(parser)
     parser.set_defaults(action=_tyre)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from activesteer.commands.arguments import add_json, add_output
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 
@@ -19,9 +20,7 @@ def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("validate", help="compare a car with the same car in another multibody code")
     parser.add_argument("name", nargs="?", default="sedan", help="folder in models/reference (default: sedan)")
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="folder for page, JSON and runs; none without it"
-    )
+    add_output(parser, "DIR", "folder for page, JSON and runs; none are written without it")
     parser.add_argument(
         "--reference", type=Path, metavar="DIR", help="folder with further reference runs, NAME.csv in the same columns"
     )
@@ -30,7 +29,7 @@ def add_to(commands: Any) -> None:
         help="also: what the other code's simplifications of the tyre cost, and what the step size costs",
     )  # fmt: skip
     parser.add_argument("--timestep", type=float, default=0.001, metavar="S", help="our step [s] (default: 0.001)")
-    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    add_json(parser)
     parser.set_defaults(action=_validate)
 
 

@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from activesteer.commands.arguments import add_json, add_output
+
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
@@ -15,11 +17,11 @@ def add_to(commands: Any) -> None:
     new = actions.add_parser("new", help="make a car from a table of hardpoints, masses, springs and bushings")
     new.add_argument("name", metavar="NAME", help="name of the car")
     new.add_argument("--table", required=True, type=Path, metavar="FILE", help=".toml or .csv; see docs/own_car.md")
-    new.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder for its files; default: vehicles/NAME")
+    add_output(new, "DIR", "folder for its files (default: vehicles/NAME)")
     new.add_argument("--front", metavar="KIND", help="mcpherson, double_wishbone; default: what the table says")
     new.add_argument("--rear", metavar="KIND", help="five_link, multilink, double_wishbone; default: the table's")
     new.add_argument("--overwrite", action="store_true", help="replace the files of an earlier car in that folder")
-    new.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    add_json(new)
     new.set_defaults(action=_new)
 
     table = actions.add_parser("table", help="print a table that comes with the package, to start from")
@@ -28,11 +30,11 @@ def add_to(commands: Any) -> None:
 
     check = actions.add_parser("check", help="what is missing or implausible in a car; exit status 1 on errors")
     check.add_argument("vehicle", metavar="NAME_OR_PATH", help="name, vehicle file, or its folder")
-    check.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    add_json(check)
     check.set_defaults(action=_check)
 
     keyframe = actions.add_parser("keyframe", help="write the position in which a car stands, after it was edited")
-    keyframe.add_argument("vehicle", metavar="PATH", help="vehicle file")
+    keyframe.add_argument("vehicle", metavar="PATH", help="vehicle file or its folder")
     keyframe.set_defaults(action=_keyframe)
 
 

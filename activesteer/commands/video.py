@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from activesteer.commands.arguments import add_output, add_pace, add_recording
 from activesteer.commands.progress import ProgressBar
 from activesteer.conventions import CORNERS
 from activesteer.errors import ParameterError
@@ -21,10 +22,8 @@ def add_to(commands: Any) -> None:
         help="make a film of a recording",
         description="Draws a recording picture by picture, without a window, and writes an MP4 or a GIF.",
     )
-    parser.add_argument("file", type=Path, metavar="FILE.mcap")
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="OUT.mp4|gif", help="default: FILE.mp4 beside the recording"
-    )
+    add_recording(parser)
+    add_output(parser, "OUT.mp4|gif", "the film (default: FILE.mp4 beside the recording)")
     parser.add_argument(
         "--camera", default="chase", choices=("chase", "top", "wheel"), help="where it is taken from (default: chase)"
     )
@@ -36,9 +35,7 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument("--size", type=_size, default=(640, 480), metavar="WxH", help="pixels (default: 640x480)")
     parser.add_argument("--fps", type=float, help="pictures a second (default: 30, of a GIF 20)")
-    parser.add_argument(
-        "--speed", type=float, default=1.0, metavar="FACTOR", help="0.25 is slow motion, 4 is fast (default: 1)"
-    )
+    add_pace(parser)
     parser.set_defaults(action=_video)
 
 

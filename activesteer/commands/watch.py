@@ -9,9 +9,10 @@ import threading
 import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any, Final
 
+from activesteer.commands.arguments import add_controller, add_pace, add_scenario, scenario_of
 from activesteer.errors import ParameterError, PlaybackError
 
 _ELSEWHERE: Final = "`activesteer video` makes a film of a recording without a window"
@@ -25,35 +26,22 @@ def add_to(commands: Any) -> None:
         help="see a manoeuvre while it is driven",
         description="Opens MuJoCo's viewer and drives the manoeuvre at the pace of a clock; nothing is recorded.",
     )
-    parser.add_argument("maneuver", metavar="MANEUVER", help="a name from `activesteer list`, or a TOML file")
-    parser.add_argument(
-        "-c", "--controller", default="none", metavar="CONTROLLER",
-        help="none, ars, afs, or my_file.py:MyController (default: none)",
-    )  # fmt: skip
-    parser.add_argument("--vehicle", default="compact", metavar="NAME_OR_PATH", help="default: compact")
-    parser.add_argument(
-        "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
-        help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
-    )  # fmt: skip
-    parser.add_argument(
-        "--speed", type=float, default=1.0, metavar="FACTOR", help="0.25 is slow motion, 4 is fast (default: 1)"
-    )
+    add_scenario(parser)
+    add_controller(parser, several=False)
+    add_pace(parser)
     parser.set_defaults(action=_watch)
 
 
 def _watch(options: argparse.Namespace) -> int:
-    from activesteer.commands.run import parse_override
-    from activesteer.scenario import resolve
     from activesteer.simulation.runner import prepared
 
     if not 0.01 <= options.speed <= 100.0:
         msg = f"--speed: is {options.speed:g}, must be 0.01 to 100"
         raise ParameterError(msg)
     # What is wrong with the manoeuvre is said wherever one is; only then is a window needed.
-    scenario = resolve(options.maneuver, options.vehicle, dict(parse_override(text) for text in options.overrides))
+    scenario = scenario_of(options)
     check_display()
-    with suppress(KeyboardInterrupt):  # a way to end it
-        _show(prepared(scenario), options.controller, options.speed)
+    _show(prepared(scenario), options.controller, options.speed)
     return 0
 
 

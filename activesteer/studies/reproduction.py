@@ -168,7 +168,8 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
 def worker_pool(jobs: int | None = None) -> Iterator[ProcessPoolExecutor]:
     """Processes that share nothing with this one, started afresh: the engine's callbacks belong to a process.
 
-    Where the work ends early, by an error or Ctrl-C, what has not begun is not begun; what runs is ended properly.
+    Where the work ends early, by an error, what has not begun is not begun, and what runs is waited for. Ctrl-C, which
+    a terminal sends to every process, reaches this one alone: it decides. Then the others are ended at once.
 
     Args:
         jobs: How many; as many as there are processors where not given.
@@ -179,14 +180,27 @@ def worker_pool(jobs: int | None = None) -> Iterator[ProcessPoolExecutor]:
     if jobs is not None and jobs < 1:
         msg = f"--jobs {jobs}: at least 1 is needed"
         raise ParameterError(msg)
-    # Ctrl-C reaches every process of a terminal; this one decides.
-    ignore = (signal.SIGINT, signal.SIG_IGN)
-    spawn = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs or os.cpu_count() or 1, spawn, initializer=signal.signal, initargs=ignore)
+    pool = _DeafPool(jobs or os.cpu_count() or 1, multiprocessing.get_context("spawn"))
     try:
         yield pool
+    except KeyboardInterrupt:
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+class _DeafPool(ProcessPoolExecutor):
+    """Processes that never see a Ctrl-C, not even while they start: what is blocked here stays blocked there."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """As that of the base, which starts processes here as they are needed."""
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _Car(NamedTuple):

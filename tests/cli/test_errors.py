@@ -133,7 +133,7 @@ def test_car_that_diverges_keeps_what_was_recorded(call):
 def test_output_that_cannot_be_written_is_answered(call, tmp_path, output):
     (tmp_path / "file").write_text("in the way")
     (tmp_path / "folder.mcap").mkdir()
-    refused(call("run", "straight_line", *SHORT, "-o", output), output)
+    refused(call("run", "straight_line", *SHORT, "-o", output), output.partition("/")[0])
     assert (tmp_path / "file").read_text() == "in the way"
 
 

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 from pathlib import Path
 
 import pytest
 
-from activesteer.cli import _parser
+from activesteer.cli import all_commands
 from activesteer.maneuver import KINDS
 from activesteer.resources import list_maneuvers
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 MOST_BYTES = 1_500_000
-
-
-def commands() -> list[str]:
-    (actions,) = (it for it in _parser()._actions if isinstance(it, argparse._SubParsersAction))
-    return list(actions.choices)
 
 
 @pytest.mark.parametrize("name", list_maneuvers())
@@ -35,7 +29,7 @@ def test_every_kind_of_manoeuvre_is_in_the_reference() -> None:
     assert not [kind for kind in KINDS if f"## {kind}\n" not in page]
 
 
-@pytest.mark.parametrize("command", commands())
+@pytest.mark.parametrize("command", all_commands().names())
 def test_every_command_is_in_the_list(command: str) -> None:
     page = (DOCS / "commands.md").read_text(encoding="utf-8")
     assert re.search(rf"^\| `{command}\b", page, re.MULTILINE), f"docs/commands.md does not list {command}"

@@ -14,7 +14,7 @@ from activesteer.simulation.runner import run_scenario
 from tests.render.headless import Headless, ViewerDied
 
 _NOTHING_DRAWS: Final = ("No graphics adapter was found", "Failed to get render context")
-"""What the viewer ends with where there is no Vulkan driver: without OpenGL, and with an OpenGL that does not suffice."""
+"""What the viewer ends with where there is no Vulkan driver: without OpenGL, and with one that does not suffice."""
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from activesteer.errors import ParameterError, PlaybackError
-from activesteer.files import make_folder, reading, replacing, shown, write_text, writing
+from activesteer.files import make_folder, reading, replacing, shown_path, write_text, writing
 
 
 @pytest.mark.parametrize("there", [None, "before"])
@@ -83,6 +83,6 @@ def test_only_what_the_system_refuses_becomes_an_error_of_ours(tmp_path: Path) -
 
 
 def test_path_is_shown_without_what_a_terminal_would_obey() -> None:
-    assert shown("a\x1b[2Jb\nc") == "a\\x1b[2Jb\\nc"
-    assert shown(os.fsdecode(b"a\xffb")) == "a\\udcffb"
-    assert len(shown("x" * 5000)) == 200
+    assert shown_path("a\x1b[2Jb\nc") == "a\\x1b[2Jb\\nc"
+    assert shown_path(os.fsdecode(b"a\xffb")) == "a\\udcffb"
+    assert len(shown_path("x" * 5000)) == 200

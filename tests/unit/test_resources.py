@@ -77,3 +77,24 @@ def test_an_incomplete_installation_says_where_it_looked(tmp_path, monkeypatch):
         resources.models_dir()
     with pytest.raises(ManeuverError, match="maneuvers"):
         resources.maneuvers_dir()
+
+
+def test_a_vehicle_may_be_named_by_its_folder(checkout, tmp_path, monkeypatch):
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    with pytest.raises(ParameterError, match=r"which vehicle file of .*mine is meant"):
+        resources.find_vehicle(str(folder))
+    for name in ("table", "other"):
+        (folder / f"{name}.toml").touch()
+    monkeypatch.chdir(tmp_path)
+    assert resources.find_vehicle("mine") == Path("mine/other.toml")
+    (folder / "mine.toml").touch()
+    assert resources.find_vehicle(folder) == folder / "mine.toml"
+    (tmp_path / "compact").mkdir()  # a name is a name, whatever lies about
+    assert resources.find_vehicle("compact") == checkout / "models" / "vehicles" / "compact.toml"
+
+
+def test_a_file_of_an_installed_package_is_not_changed(tmp_path):
+    resources.check_own(tmp_path / "mine.toml")
+    with pytest.raises(ParameterError, match="belongs to an installed package; copy it"):
+        resources.check_own(tmp_path / "lib" / "site-packages" / "activesteer" / "_data" / "compact.toml")

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import mujoco
 
-from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.errors import ActiveSteerError
 from activesteer.resources import find_vehicle
 from activesteer.rigs.kc import kinematics_compliance
 from activesteer.scenario import load_car
@@ -30,7 +29,7 @@ def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
     Raises:
         ParameterError: there is no such vehicle.
     """
-    file = _file(vehicle)
+    file = find_vehicle(vehicle)
     findings: list[Finding] = []
     try:
         car = load_car(file)
@@ -58,17 +57,3 @@ def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
     except ActiveSteerError as reason:
         findings.append(Finding("riding", "kinematics and compliance", "error", "cannot be measured", "", str(reason)))
     return CheckReport(name, tuple(findings))
-
-
-def _file(vehicle: str | os.PathLike[str]) -> Path:
-    """The vehicle file, which may be named by its folder."""
-    folder = Path(vehicle)
-    if folder.is_dir():
-        files = sorted(folder.glob("*.toml"))
-        cars = [file for file in files if file.stem == folder.name] or [file for file in files if file.stem != "table"]
-        if len(cars) == 1:
-            return cars[0]
-        names = ", ".join(file.name for file in cars) or "none"
-        msg = f"{folder} has no one vehicle file: {names}; name the file itself"
-        raise ParameterError(msg)
-    return find_vehicle(vehicle)

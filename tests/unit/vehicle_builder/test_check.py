@@ -172,5 +172,5 @@ def test_a_tyre_that_is_too_small(damaged: Damage, tmp_path: Path) -> None:
 def test_a_car_that_does_not_exist(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="did you mean 'compact'"):
         check_vehicle("compakt")
-    with pytest.raises(ParameterError, match="no one vehicle file"):
+    with pytest.raises(ParameterError, match="which vehicle file"):
         check_vehicle(tmp_path)

@@ -1,0 +1,135 @@
+"""Ctrl-C and SIGTERM at many moments of many commands: how the program ends, and what it says is saved."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from activesteer import Recording
+
+ROOT = Path(__file__).resolve().parents[2]
+MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
+END_S = 5.0
+"""What an end may take at most; on a busy machine even one second is no measure."""
+
+QUICK = [(("run", "slalom", "-c", "none", "-c", "ars"), signal.SIGINT, after_s) for after_s in (0.1, 0.5, 1.5, 3.0)] + [
+    (("run", "slalom"), signal.SIGTERM, 2.0),
+    (("reproduce", "--jobs", "2"), signal.SIGINT, 3.0),
+    (("kc",), signal.SIGTERM, 1.0),
+]
+COMMANDS = (
+    ("run", "slalom", "-c", "none", "-c", "ars"),
+    ("reproduce", "--jobs", "2"),
+    ("figures", "runs"),
+    ("validate", "-o", "runs"),
+    ("vehicle", "check", "compact"),
+    ("identify",),
+    ("linearise", "-o", "runs"),
+    ("kc", "-o", "runs"),
+    ("bench",),
+)
+MANY = [
+    (words, number, after_s)
+    for words in COMMANDS
+    for number in (signal.SIGINT, signal.SIGTERM)
+    for after_s in (0.06, 0.2, 0.4, 0.7, 1.1, 1.6, 2.3, 3.2, 4.5, 6.5)
+]
+
+
+@pytest.mark.parametrize(("words", "number", "after_s"), QUICK)
+def test_signal_ends_a_command_and_one_true_line_says_what_is_saved(tmp_path, words, number, after_s):
+    stopped(tmp_path, words, number, after_s)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("words", "number", "after_s"), MANY)
+def test_signal_ends_every_command_at_any_moment(tmp_path, words, number, after_s):
+    stopped(tmp_path, words, number, after_s)
+
+
+@pytest.mark.parametrize("swallowed", ["while True:\n    pass", "import time\ntime.sleep(60.0)"])
+def test_command_that_does_not_listen_is_ended(tmp_path, controller, swallowed):
+    """A user's own code may catch everything, or be busy elsewhere."""
+    body = f"import contextlib\nwhile True:\n    with contextlib.suppress(BaseException):\n        {swallowed}"
+    body = body.replace("\n    pass", "\n            pass").replace("\ntime.", "\n        time.")
+    stopped(tmp_path, ("run", "slalom", "-c", controller(body)), signal.SIGINT, 4.0)
+
+
+def stopped(folder: Path, words: tuple[str, ...], number: signal.Signals, after_s: float) -> None:
+    """Sends the signal as a terminal does, to all processes of the group, and looks at the end."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", MAIN, *words],
+        cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, start_new_session=True,
+    )  # fmt: skip
+    try:
+        time.sleep(after_s)
+        if process.poll() is not None:
+            assert process.returncode in {0, 1}, process.communicate()
+            return
+        os.killpg(process.pid, number)
+        _, told = process.communicate(timeout=END_S)
+    finally:
+        process.kill()
+    deadline = time.monotonic() + END_S
+    while alive(process.pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not alive(process.pid), "processes are left"
+    lines = [
+        line for line in told.splitlines() if "compiling" not in line and not re.match(r"\d+/\d+ |.* \.\.\.$", line)
+    ]
+    lines = [line for line in lines if not re.fullmatch(r"\S+ \S+: \S+\.mcap", line)]
+    assert process.returncode == 128 + number, told
+    assert len(lines) == 1, told
+    name = "Ctrl-C" if number == signal.SIGINT else number.name
+    assert lines[0].startswith(f"activesteer: stopped by {name}; "), told
+    is_true(lines[0].partition("; ")[2], folder)
+
+
+def alive(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def is_true(saved: str, folder: Path) -> None:
+    """Compares what is said to be saved with what is there."""
+    there = {
+        str(path.relative_to(folder)): path
+        for path in folder.rglob("*")
+        if path.is_file() and path.parts[-1] != "mine.py"
+    }
+    there = {name: path for name, path in there.items() if "__pycache__" not in name}
+    if saved == "nothing was saved":
+        assert not there
+        return
+    named = saved.removeprefix("saved: ").split(", ")
+    counted = 0
+    for item in named:
+        if files := re.fullmatch(r"(\d+) files in runs", item):
+            counted += int(files[1])
+            continue
+        found = re.fullmatch(r"(\S+)(?: \((.*)\))?", item)
+        assert found, saved
+        path, part = there[found[1]], found[2]
+        counted += 1
+        if path.suffix != ".mcap":
+            continue
+        if part == "cut off":
+            continue
+        recording = Recording.open(path)
+        assert recording.metadata["complete"] is (part is None)
+        if part == "without a step":
+            assert len(recording) == 0
+        elif part is not None:
+            assert part == f"up to {recording.time_s[-1]:.3f} s"
+    assert counted == len(there)
