@@ -24,10 +24,10 @@ def own_vehicle(tmp_path):
 @pytest.mark.slow
 def test_identify_writes_the_single_track_model_into_the_vehicle_file(own_vehicle, capsys):
     kept = shutil.copy(own_vehicle, own_vehicle.with_name("kept.toml"))
-    assert main(["identify", "--vehicle", str(kept), "--dry-run", "--json"]) == 0
+    assert main(["identify", "--vehicle", str(kept), "--json"]) == 0
     assert kept.read_text(encoding="utf-8") == own_vehicle.read_text(encoding="utf-8")
     found = json.loads(capsys.readouterr().out)["single_track"]
-    assert main(["identify", "--vehicle", str(own_vehicle)]) == 0
+    assert main(["identify", "--vehicle", str(own_vehicle), "--write"]) == 0
     assert "understeer gradient" in capsys.readouterr().out
     written = own_vehicle.read_text(encoding="utf-8")
     assert "120.0" not in written
