@@ -14,6 +14,7 @@ import numpy as np
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.file.coefficients import BY_NAME, COEFFICIENTS
+from activesteer.tyre.finiteness import culprit, is_finite
 from activesteer.tyre.kernels.record import TYRE_RECORD
 
 DEFAULT_PRESSURE_PA = 220_000.0
@@ -60,10 +61,16 @@ class TyreParameters(Mapping[str, float]):
         """Check the values and work out what the file leaves open.
 
         Raises:
-            ParameterError: a key is missing, unknown, or outside its range.
+            ParameterError: a key is missing, unknown, or outside its range, or the tyre is not finite inside its own.
         """
-        values = _resolve(self.given, str(self.source or "tyre"))
+        source = str(self.source or "tyre")
+        values = _resolve(self.given, source)
         object.__setattr__(self, "_values", MappingProxyType(values))
+        record = self.record
+        if not is_finite(record):
+            name = culprit(record, self.given)
+            blamed = "the tyre is" if name is None else f"{name} = {values[name]:g} makes forces that are"
+            raise ParameterError(f"{source}: {blamed} not finite inside the file's own ranges of load and slip")
 
     def __reduce__(self) -> tuple[type[TyreParameters], tuple[object, ...]]:
         """Travels between processes by what it was made from: read-only views cannot be copied."""
@@ -92,7 +99,7 @@ class TyreParameters(Mapping[str, float]):
         for name, number in self.conventions.numbers().items():
             record[name] = number
         for name in ("VERTICAL_STIFFNESS", "Q_FZ1", "Q_FZ2", "Q_FZ3"):
-            record[name] *= self["LCZ"]
+            record[name] = self[name] * self["LCZ"]
         return record
 
     def mounted_on(self, side: Side) -> TyreParameters:
