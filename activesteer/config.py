@@ -17,12 +17,13 @@ import re
 import tomllib
 import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
+from activesteer.files import read_text
 
 T = TypeVar("T")
 
@@ -37,6 +38,9 @@ _EDGE_UNITS: Final = {
 
 _MAX_NUMBER: Final = 1e12
 """Beyond this no number of a file has a meaning, in whatever unit."""
+_MAX_DEPTH: Final = 32
+_DEEP_KEY: Final = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){{{_MAX_DEPTH}}}""")
+"""A dotted key of more than so many parts; the time that tomllib takes grows with the square of their number."""
 _MAX_TEXT: Final = 1000
 """Longest text [characters]."""
 
@@ -140,16 +144,25 @@ def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tup
     Raises:
         ActiveSteerError: the file cannot be read or is no TOML; of class `error`.
     """
+    text = read_text(path, error)
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as reason:
-        msg = f"cannot read {path}: {reason}"
-        raise error(msg) from reason
+        return _parsed(text), Source(path.name, text, error)
+    except ValueError as reason:
+        raise error(f"no valid TOML: {reason}", file=path.name) from reason
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    """A TOML text's table.
+
+    Raises:
+        ValueError: it is no TOML, has a number of too many digits, or is nested too deeply.
+    """
+    if _DEEP_KEY.search(text):
+        raise ValueError(f"a key is nested more than {_MAX_DEPTH} deep")
     try:
-        return tomllib.loads(text), Source(path.name, text, error)
-    except tomllib.TOMLDecodeError as reason:
-        msg = f"{path}: no valid TOML: {reason}"
-        raise error(msg) from reason
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("lists or tables are nested too deeply") from None
 
 
 def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence[str] = ()) -> T:
@@ -172,11 +185,11 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
     values: dict[str, Any] = {}
     for key, raw in table.items():
         where = (*path, str(key))
-        name, factor = _field_of(key, fields)
+        name, factor = field_in_unit(key, fields)
         if name is None:
             raise _no_such_key(cls, source, where)
         if name in values:
-            first = next(other for other in table if _field_of(other, fields)[0] == name)
+            first = next(other for other in table if field_in_unit(other, fields)[0] == name)
             raise source.fail(where, f"{first} and {key} are the same in two units; give one of them")
         values[name] = _convert(hints[name], raw, factor, source, where)
     for name, field in fields.items():
@@ -215,13 +228,13 @@ def merged(
         raise source.fail(above, f"is {shown(table)}, which is no table and has no {path[0]}", table)
     hints, fields = typing.get_type_hints(cls), _fields(cls)
     key, rest = path[0], path[1:]
-    name, _ = _field_of(key, fields)
+    name, _ = field_in_unit(key, fields)
     if name is None:
         raise _no_such_key(cls, source, where)
     result = dict(table)
     if not rest:
         for present in table:
-            if _field_of(present, fields)[0] == name:
+            if field_in_unit(present, fields)[0] == name:
                 del result[present]
         result[key] = value
         return result
@@ -279,7 +292,7 @@ def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:
     """Keys with the names of the fields in place of other units: `speed_kmh` becomes `speed_mps`."""
     if not path:
         return ()
-    name, _ = _field_of(path[0], _fields(cls))
+    name, _ = field_in_unit(path[0], _fields(cls))
     if name is None:
         return tuple(path)
     hint, rest = typing.get_type_hints(cls)[name], path[1:]
@@ -310,6 +323,23 @@ def to_table(value: Any) -> Any:
     return value
 
 
+def checked_number(key: str, value: object, limits: Range) -> float:
+    """An argument of a Python function, checked as a number of a file is.
+
+    Args:
+        key: Name of the argument.
+        value: What was given.
+        limits: Allowed range.
+
+    Returns:
+        The number.
+
+    Raises:
+        ParameterError: it is no number, or out of range.
+    """
+    return _scalar(float, value, 1.0, limits, Source(""), (key,))
+
+
 def parse_value(text: str) -> Any:
     """A value as TOML writes it; what is no TOML value is a text.
 
@@ -317,11 +347,11 @@ def parse_value(text: str) -> Any:
         ParameterError: it is nested too deeply, or has a number of too many digits.
     """
     try:
-        table = tomllib.loads(f"value = {text}")
+        table = _parsed(f"value = {text}")
     except tomllib.TOMLDecodeError:
         return text
-    except (RecursionError, ValueError) as reason:
-        raise ParameterError(f"{shown(text)} is nested too deeply, or a number with too many digits") from reason
+    except ValueError as reason:
+        raise ParameterError(f"{shown(text)}: {reason}", value=text) from reason
     return table["value"] if len(table) == 1 else text
 
 
@@ -344,7 +374,16 @@ def _names_in_file(fields: Mapping[str, Any]) -> list[str]:
     return [spelling for name in fields for spelling in _spellings(name)]
 
 
-def _field_of(key: object, fields: Mapping[str, Any]) -> tuple[str | None, float]:
+def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, float]:
+    """The field that a key of a file fills.
+
+    Args:
+        key: The key, perhaps in a unit of the edge.
+        fields: Names of the fields, in SI.
+
+    Returns:
+        Name of the field, None where there is none, and the factor from the key's unit to SI.
+    """
     if not isinstance(key, str):
         return None, 1.0
     if key in fields:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import reprlib
 from collections.abc import Iterable
@@ -84,7 +85,9 @@ class PlaybackError(ActiveSteerError):
 
 
 def shown(value: object) -> str:
-    """A value as an error message repeats it: as Python writes it, of a long one beginning and end."""
+    """A value as an error message repeats it: as Python writes it, a path as it is; of a long one beginning and end."""
+    if isinstance(value, os.PathLike):
+        return _shortened(_printable(os.fsdecode(value)), MAX_SHOWN)
     try:
         text = _REPR.repr(value)
     except ValueError:  # Python refuses to write out whole numbers of more than 4300 digits
@@ -121,9 +124,13 @@ _REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = 20
 def _one_line(text: str) -> str:
     """Line breaks become blanks, and what cannot be printed becomes its escape sequence."""
     line = re.sub(r"[ \t]*[\r\n]\s*", " ", _shortened(text.strip(), 4 * _MAX_MESSAGE))
-    if not line.isprintable():
-        line = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in line)
-    return _shortened(line, _MAX_MESSAGE)
+    return _shortened(_printable(line), _MAX_MESSAGE)
+
+
+def _printable(text: str) -> str:
+    if text.isprintable():
+        return text
+    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
 
 
 def _shortened(text: str, most: int) -> str:

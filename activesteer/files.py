@@ -6,19 +6,28 @@ and why.
 
 from __future__ import annotations
 
+import csv
 import os
+import re
 import secrets
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Final, NamedTuple
 
-from activesteer.errors import MAX_SHOWN, ActiveSteerError
+from activesteer.errors import ActiveSteerError, shown
+
+MAX_TEXT_BYTES: Final = 2_000_000
+"""Longest text file that is read as an input, unless said otherwise; those of the package have some 20 kB."""
+MAX_CSV_BYTES: Final = 10_000_000
+"""Longest CSV; an hour of samples every 10 ms has 8 MB."""
+_DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def shown_path(path: str | os.PathLike[str]) -> str:
     """A path as a message shows it: cut to 200 characters, and none of them moves a cursor or cannot be printed."""
-    text = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in os.fspath(path))
-    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."
+    return shown(Path(os.fsdecode(path)))
 
 
 @contextmanager
@@ -102,6 +111,125 @@ def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerE
     with replacing(path, error) as part:
         part.write_text(text, encoding="utf-8")
     return Path(path)
+
+
+def user_path(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:
+    """A path as a user writes it, `~` replaced by the home folder.
+
+    Args:
+        path: The path.
+        error: Class of the error where there is no such home folder.
+
+    Returns:
+        The path.
+
+    Raises:
+        ActiveSteerError: there is no such home folder; of class `error`.
+    """
+    try:
+        return Path(os.fsdecode(path)).expanduser()
+    except RuntimeError as reason:
+        raise error(f"{shown_path(path)}: there is no such home folder") from reason
+
+
+def is_file(path: str | os.PathLike[str]) -> bool:
+    """Whether there is a regular file; a name that no file can have is none."""
+    try:
+        return stat.S_ISREG(os.stat(path).st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+def why_no_file(path: str | os.PathLike[str]) -> str:
+    """What is at a path where a file was expected, for an error message."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return "is a link to nothing" if os.path.islink(path) else "does not exist"
+    return "is a folder" if stat.S_ISDIR(mode) else "is no regular file"
+
+
+def read_bytes(path: str | os.PathLike[str], error: type[ActiveSteerError], max_bytes: int = MAX_TEXT_BYTES) -> bytes:
+    """Reads a regular file of limited size.
+
+    Args:
+        path: The file.
+        error: Class of the error where it cannot be read.
+        max_bytes: Longest file that is read [bytes].
+
+    Returns:
+        What it holds.
+
+    Raises:
+        ActiveSteerError: it cannot be read, is a folder, pipe or device, or is too long; of class `error`.
+    """
+    with reading(path, error):
+        # Without O_NONBLOCK, opening a pipe would wait for someone who writes to it.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            os.close(descriptor)
+            raise error(f"cannot read {shown_path(path)}: it {why_no_file(path)}")
+        with open(descriptor, "rb") as file:
+            data = file.read(max_bytes + 1)
+    if len(data) > max_bytes:
+        raise error(f"cannot read {shown_path(path)}: it is longer than {max_bytes} bytes")
+    return data
+
+
+def read_text(
+    path: str | os.PathLike[str],
+    error: type[ActiveSteerError],
+    max_bytes: int = MAX_TEXT_BYTES,
+) -> str:
+    """Reads a text file in UTF-8; see `read_bytes`. Line ends become those of Python, a byte order mark is left out."""
+    try:
+        text = read_bytes(path, error, max_bytes).decode("utf-8-sig")
+    except UnicodeDecodeError as reason:
+        raise error(f"cannot read {shown_path(path)}: it is no text in UTF-8 (byte {reason.start})") from reason
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+class CsvRow(NamedTuple):
+    """A row of a CSV.
+
+    Attributes:
+        line: Line in the file, from 1.
+        cells: Its cells without blanks around them.
+    """
+
+    line: int
+    cells: list[str]
+
+
+def read_csv(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> list[CsvRow]:
+    """Reads the rows of a CSV, whose cells are apart by commas, semicolons or tabs; the first line with any decides.
+
+    What is behind a `#` is a comment. Where cells are apart by semicolons or tabs, 1,5 is the number 1.5.
+
+    Args:
+        path: The file.
+        error: Class of the error where it cannot be read.
+
+    Returns:
+        Rows that are not empty.
+
+    Raises:
+        ActiveSteerError: it cannot be read, or is no CSV; of class `error`.
+    """
+    lines = [line.partition("#")[0] for line in read_text(path, error, MAX_CSV_BYTES).split("\n")]
+    separator = next((sign for line in lines for sign in ";\t," if sign in line), ",")
+    reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    rows = []
+    try:
+        for given in reader:
+            cells = [cell.strip() for cell in given]
+            if separator != ",":
+                cells = [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in cells]
+            if any(cells):
+                rows.append(CsvRow(reader.line_num, cells))
+    except csv.Error as reason:
+        raise error(f"no valid CSV: {reason}", file=Path(path).name, line=reader.line_num) from reason
+    return rows
 
 
 def make_folder(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:

@@ -8,7 +8,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError, nearest_names
+from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError, nearest_names, shown
+from activesteer.files import is_file, user_path, why_no_file
 
 _PACKAGE = Path(__file__).resolve().parent
 
@@ -114,20 +115,24 @@ def check_own(file: Path) -> None:
 
 
 def _names(directory: Path) -> list[str]:
-    return sorted(file.stem for file in directory.glob("*.toml"))
+    try:
+        return sorted(file.stem for file in directory.iterdir() if file.suffix == ".toml")
+    except (OSError, ValueError):  # no folder, or none that may be looked into
+        return []
 
 
 def _find(name_or_path: str | os.PathLike[str], directory: Path, kind: str, error: type[ActiveSteerError]) -> Path:
-    text = os.fspath(name_or_path)
+    text = os.fsdecode(name_or_path)
     separators = [separator for separator in (os.sep, os.altsep) if separator]
     is_path = not isinstance(name_or_path, str) or text.endswith(".toml") or any(s in text for s in separators)
     if is_path:
-        path = Path(text).expanduser()
-        if path.is_file():
+        path = user_path(text, error)
+        if is_file(path):
             return path
-        siblings = _names(path.parent) if path.parent.is_dir() else []
-        raise error(f"{kind} file {path} does not exist; in {path.parent}: {nearest_names(path.stem, siblings)}")
+        help_ = f"in {shown_path(path.parent)}: {nearest_names(path.stem, _names(path.parent))}"
+        raise error(f"{kind} file {shown_path(path)} {why_no_file(path)}; {help_}", value=text)
     file = directory / f"{text}.toml"
-    if file.is_file():
+    if is_file(file):
         return file
-    raise error(f"no {kind} is named {text!r}; {nearest_names(text, _names(directory))}")
+    known = _names(directory)
+    raise error(f"no {kind} is named {shown(text)}; {nearest_names(text, known)}", value=text, allowed=known)

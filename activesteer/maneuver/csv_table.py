@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from activesteer.config import Source
-from activesteer.errors import ManeuverError, nearest_names
+from activesteer.config import Source, field_in_unit
+from activesteer.errors import ManeuverError, nearest_names, shown
+from activesteer.files import is_file, read_csv, user_path
 
 
 def find_csv(name: str, own: Path | None, source: Source, key: Sequence[str]) -> Path:
@@ -27,18 +27,21 @@ def find_csv(name: str, own: Path | None, source: Source, key: Sequence[str]) ->
         ManeuverError: there is no such file; the message names the nearest ones.
     """
     beside = () if own is None else (own / name,)
-    for candidate in (*beside, Path(name).expanduser()):
-        if candidate.is_file():
+    for candidate in (*beside, user_path(name, source.error)):
+        if name.isprintable() and is_file(candidate):
             return candidate
     folder = own or Path.cwd()
-    present = [path.name for path in folder.glob("*.csv")]
-    raise source.fail(key, f"there is no file {name!r} in {folder}; {nearest_names(name, present)}")
+    present = [path.name for path in folder.iterdir() if path.suffix == ".csv"]
+    problem = f"there is no file {shown(name)} in {shown(folder)}; {nearest_names(name, present)}"
+    raise source.fail(key, problem, name, present)
 
 
 def read_columns(
     path: Path, required: Sequence[str], optional: Sequence[str] = ()
-) -> tuple[dict[str, list[float]], list[str]]:
+) -> tuple[dict[str, list[float]], list[int]]:
     """Columns of a CSV whose first line names them; others may stand beside them.
+
+    A column may be in a unit of the edge, as in a TOML file: `steering_wheel_deg` fills `steering_wheel_rad`.
 
     Args:
         path: The file.
@@ -46,41 +49,41 @@ def read_columns(
         optional: Names of columns that it may have.
 
     Returns:
-        Column name -> values, and where each row stands, as `track.csv, line 7`.
+        Column name -> values in SI, and the line in which each row stands.
 
     Raises:
-        ManeuverError: the file cannot be read, a column is missing, or a value is no number.
+        ManeuverError: the file cannot be read, a column is missing or given twice, or a value is no number.
     """
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as reason:
-        msg = f"cannot read {path}: {reason}"
-        raise ManeuverError(msg) from reason
-    reader = csv.DictReader(lines, skipinitialspace=True)
-    header = [name.strip() for name in reader.fieldnames or []]
-    for column in required:
-        if column not in header:
-            known = nearest_names(column, header)
-            wanted = " and ".join(required)
-            msg = f"{path.name}, line 1: must name the columns {wanted}; {column} is missing: {known}"
-            raise ManeuverError(msg)
-    reader.fieldnames = header
-    columns: dict[str, list[float]] = {name: [] for name in (*required, *optional) if name in header}
-    places = []
-    for row in reader:
-        place = f"{path.name}, line {reader.line_num}"
-        for name, values in columns.items():
-            values.append(_number(row[name], f"{place}: {name}"))
-        places.append(place)
-    return columns, places
+    rows = read_csv(path, ManeuverError)
+    if not rows:
+        raise ManeuverError("is empty; its first line must name the columns", file=path.name, line=1)
+    header, rows = rows[0], rows[1:]
+    places: dict[str, tuple[int, str, float]] = {}
+    for place, given in enumerate(header.cells):
+        name, factor = field_in_unit(given, (*required, *optional))
+        if name is None:
+            continue
+        if name in places:
+            problem = f"{places[name][1]} and {given} are the same column; leave one out"
+            raise ManeuverError(problem, file=path.name, line=header.line, key=given)
+        places[name] = place, given, factor
+    for name in required:
+        if name not in places:
+            problem = f"must name the columns {' and '.join(required)}; {name} is missing"
+            raise ManeuverError(problem, file=path.name, line=header.line, key=name, allowed=(*required, *optional))
+    columns: dict[str, list[float]] = {
+        name: [_number(row.cells, place, path.name, row.line, given) * factor for row in rows]
+        for name, (place, given, factor) in places.items()
+    }
+    return columns, [row.line for row in rows]
 
 
-def _number(text: str | None, where: str) -> float:
+def _number(cells: Sequence[str], place: int, file: str, line: int, column: str) -> float:
+    text = cells[place] if place < len(cells) else ""
     try:
-        value = float(text or "")
+        value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        msg = f"{where}: {text!r} is not a number"
-        raise ManeuverError(msg)
+        raise ManeuverError(f"{shown(text)} is not a number", file=file, line=line, key=column, value=text)
     return value

@@ -9,6 +9,7 @@ from typing import Any
 
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
+from activesteer.files import MAX_CSV_BYTES, read_bytes
 from activesteer.maneuver.along_course import AlongCourse
 from activesteer.maneuver.csv_table import find_csv
 from activesteer.maneuver.path_points import check_points, read_csv
@@ -75,8 +76,9 @@ def with_csv(table: Mapping[str, Any], own: FilePath | None, source: Source) -> 
         raise source.fail(("path", "csv"), "csv and the lists x_m, y_m are two ways to give the points; leave one out")
     file = find_csv(points["csv"], own, source, ("path", "csv"))
     try:
-        x_m, y_m, places = read_csv(file)
-        check_points(x_m, y_m, places.__getitem__)
+        x_m, y_m, lines = read_csv(file)
+        check_points(x_m, y_m, lambda index: f"{file.name}, line {lines[index]}")
     except ManeuverError as reason:
         raise source.fail(("path", "csv"), str(reason)) from reason
-    return {**table, "path": {**points, "x_m": x_m, "y_m": y_m}}, {f"path/{file.name}": file.read_bytes()}
+    filled = {**table, "path": {**points, "x_m": x_m, "y_m": y_m}}
+    return filled, {f"path/{file.name}": read_bytes(file, ManeuverError, MAX_CSV_BYTES)}

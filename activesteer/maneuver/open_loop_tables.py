@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final
 from activesteer.config import Range, Source
 from activesteer.conventions import CORNERS
 from activesteer.errors import ManeuverError
+from activesteer.files import MAX_CSV_BYTES, read_bytes
 from activesteer.maneuver.csv_table import find_csv, read_columns
 
 
@@ -146,17 +147,17 @@ def with_tables(table: Mapping[str, Any], own: Path | None, source: Source) -> t
             filled[name] = _read(file, columns)
         except ManeuverError as reason:
             raise source.fail((key,), str(reason)) from reason
-        files[f"tables/{file.name}"] = file.read_bytes()
+        files[f"tables/{file.name}"] = read_bytes(file, ManeuverError, MAX_CSV_BYTES)
     return filled, files
 
 
 def _read(file: Path, columns: Sequence[str]) -> dict[str, list[float]]:
-    values, places = read_columns(file, ("time_s",), columns)
+    values, lines = read_columns(file, ("time_s",), columns)
     if len(values) == 1:
-        msg = f"{file.name}, line 1: must name at least one of the columns {', '.join(columns)}"
-        raise ManeuverError(msg)
+        problem = f"must name at least one of the columns {', '.join(columns)}"
+        raise ManeuverError(problem, file=file.name, line=1, allowed=columns)
     for number, (earlier, later) in enumerate(pairwise(values["time_s"]), 1):
         if later <= earlier:
-            msg = f"{places[number]}: time_s does not increase from {earlier:g} to {later:g} s"
-            raise ManeuverError(msg)
+            problem = f"does not increase from {earlier:g} to {later:g} s"
+            raise ManeuverError(problem, file=file.name, line=lines[number], key="time_s", value=later)
     return values

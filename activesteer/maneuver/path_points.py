@@ -27,20 +27,20 @@ _MOST_START_RAD: Final = math.radians(15.0)
 """By how much the first stretch may point off the car's heading [rad]."""
 
 
-def read_csv(path: Path) -> tuple[list[float], list[float], list[str]]:
+def read_csv(path: Path) -> tuple[list[float], list[float], list[int]]:
     """The points in a CSV with the header x_m,y_m.
 
     Args:
         path: The file.
 
     Returns:
-        x, y [m], and where each point stands, as `track.csv, line 7`.
+        x, y [m], and the line in which each point stands.
 
     Raises:
         ManeuverError: the file cannot be read, a column is missing, or a value is no number.
     """
-    columns, places = read_columns(path, COLUMNS)
-    return columns["x_m"], columns["y_m"], places
+    columns, lines = read_columns(path, COLUMNS)
+    return columns["x_m"], columns["y_m"], lines
 
 
 def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[int], str]) -> None:

@@ -6,20 +6,24 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from activesteer.config import Source, build, read_toml
+from activesteer.config import Range, Source, build, checked_number, read_toml
 from activesteer.controllers import ControllerParameters, SingleTrackParameters
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import DriverParameters
 from activesteer.errors import ActiveSteerError, ModelError, ParameterError, TyreFileError, nearest_names, shown
+from activesteer.files import is_file, read_bytes, user_path
 from activesteer.resources import find_vehicle, models_dir
 from activesteer.road.road import Road
+from activesteer.scenario.model_files import model_files
 from activesteer.scenario.overrides import Override, applied, plain
 from activesteer.tyre.file.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle, VehicleParameters
 
+TIMESTEP_RANGE_S: Final = Range(1e-4, 5e-3)
+"""Steps of the engine that a car of stiff links is stable and accurate at [s]."""
 FileOrTable = str | os.PathLike[str] | Mapping[str, Any]
 
 
@@ -63,14 +67,16 @@ class Car:
 
         Args:
             road: Friction and grade; level and dry where not given.
-            timestep_s: Step of the engine [s].
+            timestep_s: Step of the engine, 0.1 to 5 ms [s].
 
         Returns:
             A new vehicle.
 
         Raises:
+            ParameterError: the step is out of range.
             ModelError: the MJCF does not compile, lacks a part, or has no static equilibrium.
         """
+        checked_number("timestep_s", timestep_s, TIMESTEP_RANGE_S)
         return Vehicle(self.mjcf, self.config, self.tyres, Road() if road is None else road, timestep_s)
 
 
@@ -104,8 +110,9 @@ def car_with(vehicle: FileOrTable, overrides: list[Override]) -> Car:
         _find_file(name, folder, models_dir() / "tyres", source, ("tyres", axle), TyreFileError)
         for axle, name in (("front", config.tyres.front), ("rear", config.tyres.rear))
     )
-    files |= {f"tyres/{path.name}": path.read_bytes() for path in (front, rear)}
-    files |= {f"mjcf/{mjcf.parent.name}/{path.name}": path.read_bytes() for path in sorted(mjcf.parent.glob("*.xml"))}
+    files |= {f"tyres/{path.name}": read_bytes(path, TyreFileError) for path in (front, rear)}
+    model = mjcf.parent.name.encode("utf-8", "backslashreplace").decode()
+    files |= {f"mjcf/{model}/{name}": text for name, text in model_files(mjcf).items()}
     front_tyre = replace(load_tir(front), conventions=config.tyres.conventions)
     rear_tyre = front_tyre if rear == front else replace(load_tir(rear), conventions=config.tyres.conventions)
     return Car(config, mjcf, (front_tyre, rear_tyre), files=files)
@@ -149,9 +156,10 @@ def _find_file(
 ) -> Path:
     """A file that a vehicle file names: beside the vehicle file, among the package's models, or a path of its own."""
     beside = () if own is None else (own / name,)
-    for candidate in (*beside, folder / name, Path(name).expanduser()):
-        if candidate.is_file():
+    for candidate in (*beside, folder / name, user_path(name, error)):
+        if is_file(candidate):
             return candidate
-    present = [str(path.relative_to(folder)) for path in folder.rglob(f"*{Path(name).suffix or '.*'}")]
+    suffix = Path(name).suffix
+    present = [str(path.relative_to(folder)) for path in folder.rglob("*") if not suffix or path.suffix == suffix]
     problem = f"there is no file {shown(name)} in {folder.parent.name}/{folder.name}; {nearest_names(name, present)}"
     raise replace(source, error=error).fail(key, problem, name, present)

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+from activesteer.config import read_toml
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
 
@@ -36,13 +37,8 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
     Raises:
         ParameterError: the file cannot be read or written, is no TOML, or has no such table.
     """
-    try:
-        text = vehicle_file.read_text(encoding="utf-8")
-        before = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as reason:
-        msg = f"cannot read {vehicle_file}: {reason}"
-        raise ParameterError(msg) from reason
-    lines = text.splitlines()
+    before, source = read_toml(vehicle_file)
+    lines = source.text.splitlines()
     header = next((number for number, line in enumerate(lines) if _is_header(line, table)), None)
     if header is None:
         msg = f"{vehicle_file}: there is no table [{table}] to write to; add such a line where it shall stand"

@@ -27,7 +27,6 @@ from activesteer.validation.tyre_grid import compare_tyre
 _FRICTION: Final = 0.9
 """Friction of the road in all reference runs."""
 _WRITTEN_EVERY_S: Final = 0.005
-_STEPS_S: Final = (1e-5, 0.005)
 
 
 @dataclass(frozen=True)
@@ -82,10 +81,6 @@ def validate(
     Raises:
         ActiveSteerError: reference or car are not found or wrong, or a run failed.
     """
-    low, high = _STEPS_S
-    if not low <= timestep_s <= high:
-        msg = f"timestep: {timestep_s:g} s is outside {low:g} to {high:g} s"
-        raise ParameterError(msg)
     data = ReferenceData.load(reference, more)
     references = {run: table for run in data.runs if (table := data.run(run)) is not None}
     driven = data.runs if unknown_runs else list(references)

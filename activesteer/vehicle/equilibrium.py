@@ -52,7 +52,12 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
             mujoco.mj_integratePos(model, data.qpos, move, 1.0)
             stiffness[:, column] = (_residual(model, data, free) - residual) / _DIFFERENCE
             data.qpos[:] = start
-        step = np.linalg.lstsq(stiffness, -residual, rcond=None)[0]
+        try:
+            step = np.linalg.lstsq(stiffness, -residual, rcond=None)[0]
+        except np.linalg.LinAlgError as reason:
+            bad = free[~np.isfinite(residual + stiffness.sum(axis=1))]
+            joint = model.joint(int(model.dof_jntid[bad[0]])).name if bad.size else "unknown"
+            raise ModelError(f"no static equilibrium: the force at joint {joint!r} is not finite") from reason
         largest = np.abs(step).max()
         step *= min(1.0, _LARGEST_STEP / largest) if largest > 0.0 else 0.0
         move[:] = 0.0

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import mujoco
 
-from activesteer.errors import ParameterError, TyreFileError, nearest_names
-from activesteer.files import writing
+from activesteer.errors import ParameterError, TyreFileError, nearest_names, shown
+from activesteer.files import is_file, user_path, writing
 from activesteer.resources import models_dir
 from activesteer.tyre.file.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
@@ -121,11 +121,11 @@ def _tyre(axle: str, table: CarTable, beside: Path, log: Log) -> tuple[str, Tyre
     if name is None:
         log.note(f"{axle}.tyre", DEFAULT_TYRE, "the compact's")
         name = DEFAULT_TYRE
-    own, shipped = beside / Path(name).expanduser(), models_dir() / "tyres" / name
-    if own.is_file():
+    own, shipped = beside / user_path(name, TyreFileError), models_dir() / "tyres" / name
+    if is_file(own):
         return own.name, load_tir(own), own
-    if shipped.is_file():
+    if is_file(shipped):
         return name, load_tir(shipped), None
-    present = [path.name for path in shipped.parent.glob("*.tir")]
-    msg = f"{axle}.tyre: there is no file {name!r} beside the table or in models/tyres; {nearest_names(name, present)}"
-    raise TyreFileError(msg)
+    present = [path.name for path in (models_dir() / "tyres").glob("*.tir")]
+    problem = f"there is no file {shown(name)} beside the table or in models/tyres; {nearest_names(name, present)}"
+    raise TyreFileError(problem, key=f"{axle}.tyre", value=name, allowed=present)

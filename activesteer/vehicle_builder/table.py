@@ -6,7 +6,6 @@ In a CSV file a row is a dotted key and its values: `front.wheel_centre, 0, 762.
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Annotated, Any, Final
 
 from activesteer.config import Range, Source, build, read_toml
 from activesteer.errors import ParameterError, nearest_names
+from activesteer.files import read_csv
 from activesteer.vehicle.parameters import Aerodynamics, Brakes, Powertrain
 from activesteer.vehicle_builder.axle_kinds import DEFAULTS, AxleKind, kind_of
 
@@ -220,25 +220,17 @@ def read_table(path: Path) -> tuple[CarTable, Source]:
 
 
 def _read_csv(path: Path) -> tuple[dict[str, Any], Source]:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as reason:
-        msg = f"cannot read {path}: {reason}"
-        raise ParameterError(msg) from reason
     axle_keys = {item.name for item in dataclasses.fields(AxleTable)} | {"toe_deg", "camber_deg"}
     raw: dict[str, Any] = {}
-    lines = []
-    rows = list(csv.reader((line.partition("#")[0] for line in text.splitlines()), skipinitialspace=True))
-    for number, row in enumerate(rows, 1):
-        cells = [cell.strip() for cell in row]
-        while cells and not cells[-1]:
+    lines: list[str] = []
+    for number, cells in read_csv(path, ParameterError):
+        while not cells[-1]:
             cells.pop()
-        lines.append("")
-        if not cells or (cells[0].lower() in ("name", "key") and not raw):
+        lines += [""] * (number - len(lines))
+        if cells[0].lower() in ("name", "key") and not raw:
             continue
         if len(cells) < 2:
-            msg = f"{path.name}, line {number}: {cells[0]!r} has no value"
-            raise ParameterError(msg)
+            raise ParameterError("has no value", file=path.name, line=number, key=cells[0])
         keys = cells[0].split(".")
         if len(keys) == 2 and keys[0] in ("front", "rear") and keys[1] not in axle_keys:
             keys = [keys[0], "points", keys[1]]
@@ -246,10 +238,9 @@ def _read_csv(path: Path) -> tuple[dict[str, Any], Source]:
         values = [_value(cell) for cell in cells[1:]]
         within = raw
         for key in keys[:-1]:
-            within = within.setdefault(key, {})
+            within = within.setdefault(key, {}) if isinstance(within, dict) else within
         if not isinstance(within, dict) or keys[-1] in within:
-            msg = f"{path.name}, line {number}: {cells[0]} is given twice"
-            raise ParameterError(msg)
+            raise ParameterError("is given twice", file=path.name, line=number, key=cells[0])
         within[keys[-1]] = values[0] if len(values) == 1 else values
     return raw, Source(path.name, "\n".join(lines))
 

@@ -7,6 +7,8 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from activesteer.errors import ModelError
 
 # The metrics enter themselves into the table of definitions, in this order.
@@ -44,6 +46,8 @@ def kinematics_compliance(
     smooth = dataclasses.replace(car, config=dataclasses.replace(car.config, friction=Friction()))
     try:
         measured = measure(smooth.on(), car.tyres)
+    except np.linalg.LinAlgError as reason:
+        raise ModelError(f"{car.mjcf}: the car has no equilibrium on the rig: {reason}") from reason
     except KeyError as reason:
         # The engine's look-up by name: its message says which there are.
         msg = f"{car.mjcf}: the kinematics and compliance rig needs a part that the model lacks: {reason}"

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from activesteer.errors import TyreFileError
+from activesteer.files import read_bytes
 
-MOST_BYTES = 4_000_000
+MAX_BYTES = 4_000_000
 """Longest file that is read; real ones have some tens of kilobytes."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d{1,4})?\Z")
@@ -53,15 +54,7 @@ def read_text(path: Path) -> str:
     Raises:
         TyreFileError: the file cannot be read, or is no text of the size of a tyre file.
     """
-    try:
-        with path.open("rb") as file:
-            raw = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise TyreFileError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except ValueError as error:
-        raise TyreFileError(f"{path!s}: cannot be read: {error}") from error
-    if len(raw) > MOST_BYTES:
-        raise TyreFileError(f"{path}: is longer than {MOST_BYTES} bytes, no tyre file is")
+    raw = read_bytes(path, TyreFileError, MAX_BYTES)
     return raw.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
 
 

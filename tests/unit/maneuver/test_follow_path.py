@@ -104,8 +104,8 @@ def test_other_columns_and_spaces_in_a_csv_do_not_matter(track):
         ),
         ("x_m,y_m\n0,0\n5,0\n5,0\n8,0", r"track\.csv, line 4: the point \(5, 0\) m is the same as the one before"),
         ("x_m,y_m\n0,0\n5,0\nten,0\n8,0", r"track\.csv, line 4: x_m: 'ten' is not a number"),
-        ("x_m,y_m\n0,0\n5\n10,0\n15,0", r"track\.csv, line 3: y_m: None is not a number"),
-        ("x,y\n0,0\n5,0", r"track\.csv, line 1: must name the columns x_m and y_m; x_m is missing: "),
+        ("x_m,y_m\n0,0\n5\n10,0\n15,0", r"track\.csv, line 3: y_m: '' is not a number"),
+        ("x,y\n0,0\n5,0", r"track\.csv, line 1: x_m: must name the columns x_m and y_m; x_m is missing"),
         ("x_m,y_m\n0,0\n5,0", r"the path has 2 x_m and 2 y_m; as many of each are needed, at least 4"),
         (
             "x_m,y_m\n100,20\n105,20\n110,20\n115,20",

@@ -61,7 +61,7 @@ def test_table_at_the_end_of_the_file_is_found(tmp_path):
     ("text", "words"),
     [
         ("a = 1\n", r"no table \[single_track\]"),
-        ("[single_track\n", "cannot read"),
+        ("[single_track\n", "no valid TOML"),
         ('[single_track]\nnote = """\nmass_kg = 1\n"""\n', "one key a line"),
     ],
 )
