@@ -129,8 +129,8 @@ def _find(name_or_path: str | os.PathLike[str], directory: Path, kind: str, erro
         path = user_path(text, error)
         if is_file(path):
             return path
-        help_ = f"in {shown_path(path.parent)}: {nearest_names(path.stem, _names(path.parent))}"
-        raise error(f"{kind} file {shown_path(path)} {why_no_file(path)}; {help_}", value=text)
+        help_ = f"in {shown(path.parent)}: {nearest_names(path.stem, _names(path.parent))}"
+        raise error(f"{kind} file {shown(path)} {why_no_file(path)}; {help_}", value=text)
     file = directory / f"{text}.toml"
     if is_file(file):
         return file
