@@ -9,7 +9,6 @@ response that it is driven for.
 from __future__ import annotations
 
 import io
-import math
 import re
 import sys
 import tempfile
@@ -21,9 +20,10 @@ import numpy as np
 from PIL import Image
 
 from activesteer.analysis.figures import BY_KIND, style, time_histories
-from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL, Panel
+from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.plotting import new_figure
+from activesteer.quantities import DisplayUnit, Quantity, quantity_of
 from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
 from activesteer.simulation.runner import prepared, run_scenario
@@ -40,25 +40,26 @@ SYSTEMS: Final = ("none", "ars", "afs")
 CONTROL_FREE: Final = frozenset({"slowly_increasing_steer", "constant_radius", "open_loop"})
 """Kinds that are there to look at the car itself, or in which no system has anything to do."""
 
-LOADS: Final = (
-    Panel("front left\nload [kN]", "fl_tyre_fz_N", 1e-3),
-    Panel("rear left\nload [kN]", "rl_tyre_fz_N", 1e-3),
-)
-PITCH: Final = Panel("pitch angle\n[deg]", "pitch_rad", math.degrees(1.0))
-WAY: Final = Panel("way\n[mm]", "x_m", 1e3)
-BRAKE: Final = Panel("brake torque\nfront left [Nm]", "fl_brake_torque_Nm", 1.0)
-PANELS: Final[Mapping[str, Sequence[Panel]]] = {
-    "straight_line": (SPEED, Panel("drive torque\nfront left [Nm]", "fl_drive_torque_Nm", 1.0), *LOADS),
-    "standstill": (WAY, *LOADS),
-    "hill_hold": (WAY, BRAKE, *LOADS),
-    "drive_off_and_stop": (SPEED, Panel("longitudinal\nacc. [m/s²]", "ax_mps2", 1.0), PITCH, *LOADS),
+CORNER_WORDS: Final = {"fl": "front left", "rl": "rear left"}
+
+
+def at_wheel(channel: str) -> Quantity:
+    """A corner's quantity with the corner in its name."""
+    found = quantity_of(channel)
+    return found._replace(short=f"{found.short}\n{CORNER_WORDS[channel[:2]]}")
+
+
+LOADS: Final = (at_wheel("fl_tyre_fz_N"), at_wheel("rl_tyre_fz_N"))
+DISTANCE: Final = quantity_of("path_distance_m")._replace(channel="x_m", short="distance", unit=DisplayUnit("mm", 1e3))
+PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
+    "straight_line": (SPEED, at_wheel("fl_drive_torque_Nm"), *LOADS),
+    "standstill": (DISTANCE, *LOADS),
+    "hill_hold": (DISTANCE, at_wheel("fl_brake_torque_Nm"), *LOADS),
+    "drive_off_and_stop": (SPEED, quantity_of("ax_mps2"), quantity_of("pitch_rad"), *LOADS),
     "parking": (
-        STEERING_WHEEL,
-        Panel("front left\nsteer [deg]", "fl_steer_rad", math.degrees(1.0)),
-        Panel("aligning moment\nfront left [Nm]", "fl_tyre_mz_Nm", 1.0),
-        Panel("tie rod force\nfront left [kN]", "fl_tie_rod_force_N", 1e-3),
+        STEERING_WHEEL, at_wheel("fl_steer_rad"), at_wheel("fl_tyre_mz_Nm"), at_wheel("fl_tie_rod_force_N"),
     ),
-}
+}  # fmt: skip
 """What shows a manoeuvre better than the general picture: where the car goes straight or stands, that is rounding."""
 LEAST_SPAN: Final = 0.1
 """No axis of these is enlarged further than this, in its unit, so that what stays as it is looks so."""

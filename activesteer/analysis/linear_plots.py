@@ -16,6 +16,7 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS
 from activesteer.errors import ParameterError
 from activesteer.plotting import new_figure, save
+from activesteer.quantities import quantity_of
 
 if TYPE_CHECKING:
     import control
@@ -28,12 +29,9 @@ LOCUS_LIMIT_Hz: Final = 4.5
 DAMPING_RAYS: Final = (0.2, 0.4, 0.6, 0.8)
 """Damping ratios drawn as rays into a root locus."""
 
-_TITLES: Final = {
-    "yaw_rate_radps": "yaw rate\n[1/s]",
-    "ay_mps2": "lateral acc.\n[m/s² per rad]",
-    "roll_rad": "roll angle\n[rad/rad]",
-    "sideslip_rad": "sideslip angle\n[rad/rad]",
-}
+_GAIN_UNITS: Final = {
+    "yaw_rate_radps": "1/s", "ay_mps2": "m/s² per rad", "roll_rad": "rad/rad", "sideslip_rad": "rad/rad",
+}  # fmt: skip
 
 
 def draw_bode(
@@ -82,7 +80,7 @@ def draw_bode(
             phase = np.degrees(np.unwrap(np.angle(found.response)))
             axes[row, 1].semilogx(found.frequency_Hz, phase, "o", ms=3.5, c=RUN_COLOURS[0])
     for row, output in enumerate(OUTPUTS):
-        axes[row, 0].set_ylabel(_TITLES[output])
+        axes[row, 0].set_ylabel(f"{quantity_of(output).short}\n[{_GAIN_UNITS[output]}]")
         axes[row, 1].set_ylabel("phase [deg]")
     for axis in axes.flat:
         _grid(axis)

@@ -31,7 +31,6 @@ def add_to(commands: Any) -> None:
 
 
 def _replay(options: argparse.Namespace) -> int:
-    from activesteer.analysis.tables import label_and_unit
     from activesteer.playback import runs_of, save, serve, show
     from activesteer.recording import Recording
 
@@ -45,12 +44,12 @@ def _replay(options: argparse.Namespace) -> int:
     names = _names(options.files, recordings)
     runs = runs_of(dict(zip(names, recordings, strict=True)))
     if options.output is not None:
-        save(runs, options.output, compare=options.compare, label=label_and_unit)
+        save(runs, options.output, compare=options.compare)
         print(f"{options.output}: open it with `rerun {options.output}`", file=sys.stderr)
     if options.web:
-        serve(runs, _announce, compare=options.compare, label=label_and_unit)
+        serve(runs, _announce, compare=options.compare)
     elif options.output is None:
-        show(runs, compare=options.compare, label=label_and_unit)
+        show(runs, compare=options.compare)
     return 0
 
 

@@ -80,7 +80,7 @@ def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
         rrb.Tabs(
             rrb.Vertical(*plots.views(plots.MOTION, runs), name="Motion"),
             rrb.Vertical(*plots.views_by_corner(loads, runs), name="Wheel loads"),
-            rrb.Vertical(*plots.views_by_corner(use, runs), name="Friction use"),
+            rrb.Vertical(*plots.views_by_corner(use, runs), name="Friction utilisation"),
             active_tab=page,
         ),
         column_shares=[3, 2],

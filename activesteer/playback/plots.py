@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
@@ -14,8 +13,8 @@ from activesteer.conventions import CORNERS
 from activesteer.playback.car import rgb
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
+from activesteer.quantities import quantity_of
 
-_DEGREES: Final = math.degrees(1.0)
 _CORNER_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7")
 _LINK_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00", "#a6a6a6")
 _WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
@@ -43,38 +42,38 @@ class Plot(NamedTuple):
     Attributes:
         title: What is plotted, and its unit in brackets.
         series: The lines.
-        factor: From the SI value to the unit of the title.
         entity: Name of the entity that holds all lines together, which makes the file smaller; where empty, every line
             is an entity of its own, and can stand in several plots.
     """
 
     title: str
     series: tuple[Series, ...]
-    factor: float = 1.0
     entity: str = ""
 
 
+def _of_car(channel: str) -> Plot:
+    return Plot(quantity_of(channel).title, (Series(channel),))
+
+
 MOTION: Final = (
-    Plot("Steering wheel angle [deg]", (Series("steering_wheel_rad"),), _DEGREES),
+    _of_car("steering_wheel_rad"),
     Plot(
-        "Yaw rate, desired one thin [deg/s]",
+        quantity_of("yaw_rate_radps")._replace(label="yaw rate, desired one thin").title,
         (Series("yaw_rate_radps"), Series("yaw_rate_desired_radps", "desired", "#f0e442", 0.8)),
-        _DEGREES,
     ),
-    Plot("Sideslip angle [deg]", (Series("sideslip_rad"),), _DEGREES),
-    Plot("Lateral acceleration [m/s²]", (Series("ay_mps2"),)),
+    _of_car("sideslip_rad"),
+    _of_car("ay_mps2"),
     Plot(
-        "Added steer angles, rear thick, front thin [deg]",
+        quantity_of("rear_steer_rad")._replace(label="added steer angles, rear thick, front thin").title,
         (
             Series("rear_steer_rad", "rear wheels", "#d55e00", 2.0),
             Series("superposition_rad", "front superposition", "#0072b2", 1.0),
         ),
-        _DEGREES,
     ),
 )
 """Plots of the car as a whole."""
 
-_ASKED_FOR_BY: Final = {
+_DEMAND_OF: Final = {
     "yaw_rate_desired_radps": "yaw_rate_desired_radps",
     "rear_steer_rad": "rear_steer_demand_rad",
     "superposition_rad": "superposition_demand_rad",
@@ -82,17 +81,17 @@ _ASKED_FOR_BY: Final = {
 """Channel, and the one that is not all zero where a controller asks for it: else it shows the give of a hinge."""
 
 
-def _of_wheels(title: str, channel: str, entity: str = "") -> Plot:
+def _of_wheels(channel: str, entity: str = "") -> Plot:
     lines = zip(CORNERS, _CORNER_COLOURS, strict=True)
     series = tuple(Series(f"{corner}_{channel}", _WORDS[corner], colour) for corner, colour in lines)
-    return Plot(title, series, entity=entity)
+    return Plot(quantity_of(channel).title, series, entity)
 
 
 WHEELS: Final = (
-    _of_wheels("Wheel loads [N]", "tyre_fz_N"),
-    _of_wheels("Friction use of the tyres [1]", "friction_use"),
-    _of_wheels("Lateral tyre forces [N]", "tyre_fy_N", "tyre_fy_N"),
-    _of_wheels("Longitudinal tyre forces [N]", "tyre_fx_N", "tyre_fx_N"),
+    _of_wheels("tyre_fz_N"),
+    _of_wheels("friction_use"),
+    _of_wheels("tyre_fy_N", "tyre_fy_N"),
+    _of_wheels("tyre_fx_N", "tyre_fx_N"),
 )
 """Plots of the four wheels."""
 
@@ -113,7 +112,7 @@ def links(run: Run) -> tuple[Plot, ...]:
             for index, name in enumerate(names)
         )
         title = f"Link forces {_WORDS[corner]}, tension positive [N]"
-        plots.append(Plot(title, tuple(series), entity=f"{corner}_link_forces_N"))
+        plots.append(Plot(title, tuple(series), f"{corner}_link_forces_N"))
     return tuple(plots)
 
 
@@ -135,9 +134,14 @@ def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
                 widths=[line.width for line in lines],
             )
             stream.log(path, look, static=True)
-            values = np.stack([run.channel(line.channel) * plot.factor for line in lines], axis=1)
+            values = np.stack([run.channel(line.channel) * _factor(line.channel) for line in lines], axis=1)
             columns = rr.Scalars.columns(scalars=values.reshape(-1))
             stream.send_columns(path, when, columns.partition(lengths=[len(lines)] * len(run.rows)))
+
+
+def _factor(channel: str) -> float:
+    """From the SI value to the unit that is plotted; forces of links are plotted in N."""
+    return 1.0 if channel.endswith("_force_N") else quantity_of(channel).factor
 
 
 def _legend(run: Run, line: Series, *, alone: bool) -> str:
@@ -148,14 +152,14 @@ def _legend(run: Run, line: Series, *, alone: bool) -> str:
 
 def _entities(run: Run, plot: Plot) -> list[tuple[str, list[Series]]]:
     """Paths, and the lines that each of them holds, of what a run has for a plot."""
-    lines = [line for line in plot.series if run.has(line.channel) and _asked_for(run, line.channel)]
+    lines = [line for line in plot.series if run.has(line.channel) and _is_demanded(run, line.channel)]
     if plot.entity:
         return [(f"{run.name}/plots/{plot.entity}", lines)] if lines else []
     return [(f"{run.name}/plots/{line.channel}", [line]) for line in lines]
 
 
-def _asked_for(run: Run, channel: str) -> bool:
-    demand = _ASKED_FOR_BY.get(channel)
+def _is_demanded(run: Run, channel: str) -> bool:
+    demand = _DEMAND_OF.get(channel)
     return demand is None or not run.has(demand) or bool(np.any(run.recording[demand]))
 
 

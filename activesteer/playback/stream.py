@@ -14,7 +14,7 @@ from activesteer.playback.layout import SUMMARY
 from activesteer.playback.links import send_links
 from activesteer.playback.plots import send_plots
 from activesteer.playback.runs import Run
-from activesteer.playback.summary import MetricLabel, plain_label, summary
+from activesteer.playback.summary import summary
 from activesteer.playback.tyres import send_tyre_forces
 
 
@@ -32,16 +32,13 @@ def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
     return stream
 
 
-def fill(
-    stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint, label: MetricLabel = plain_label
-) -> None:
+def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint) -> None:
     """Sends everything.
 
     Args:
         stream: Where to; its target must be chosen before.
         runs: The runs.
         layout: The layout; it takes the place of one that a viewer remembers.
-        label: How metrics are shown.
     """
     stream.send_blueprint(layout, make_active=True, make_default=True)
     several = len(runs) > 1
@@ -54,6 +51,6 @@ def fill(
         send_tyre_forces(stream, run)
         send_track(stream, run)
         send_plots(stream, run, alone=not several)
-    text = rr.TextDocument(summary(runs, label), media_type=rr.MediaType.MARKDOWN)
+    text = rr.TextDocument(summary(runs), media_type=rr.MediaType.MARKDOWN)
     stream.log(SUMMARY, text, static=True)
     stream.flush()

@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from activesteer.playback.runs import Run
-
-MetricLabel = Callable[[str], tuple[str, str, float]]
-"""From the name of a metric to words, unit, and factor from the SI value to that unit."""
+from activesteer.quantities import metric_label
 
 
-def plain_label(name: str) -> tuple[str, str, float]:
-    """The name itself, which ends in its SI unit."""
-    return name, "", 1.0
-
-
-def summary(runs: Sequence[Run], label: MetricLabel = plain_label) -> str:
+def summary(runs: Sequence[Run]) -> str:
     """A page in Markdown: scenario, systems, metrics side by side.
 
     Args:
         runs: The runs.
-        label: How metrics are shown.
     """
     lines: list[str] = []
     for text in dict.fromkeys(_scenario(run.recording.metadata) for run in runs):
@@ -41,7 +33,7 @@ def summary(runs: Sequence[Run], label: MetricLabel = plain_label) -> str:
     if names:
         lines += ["", f"| metric | unit | {' | '.join(run.short for run in runs)} |", "|---" * (2 + len(runs)) + "|"]
     for name in names:
-        words, unit, factor = label(name)
+        words, unit, factor = metric_label(name)
         values = (_number(run.recording.metrics.get(name), factor) for run in runs)
         lines.append(f"| {words} | {unit} | {' | '.join(values)} |")
     return "\n".join(lines) + "\n"

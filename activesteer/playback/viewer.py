@@ -17,21 +17,19 @@ from activesteer.errors import PlaybackError
 from activesteer.playback.layout import blueprint
 from activesteer.playback.runs import Run
 from activesteer.playback.stream import fill, new_stream
-from activesteer.playback.summary import MetricLabel, plain_label
 
 _ELSEWHERE: Final = "--web shows it in a browser, --save out.rrd writes a file for a viewer elsewhere"
 _HOST: Final = "127.0.0.1"
 """Where a browser's pages are served: to this machine alone."""
 
 
-def save(runs: Sequence[Run], path: Path, *, compare: bool = False, label: MetricLabel = plain_label) -> None:
+def save(runs: Sequence[Run], path: Path, *, compare: bool = False) -> None:
     """Writes a .rrd file with its layout.
 
     Args:
         runs: The runs.
         path: The file; one that exists is replaced.
         compare: Whether to leave out the pages of the single runs.
-        label: How metrics are shown.
 
     Raises:
         PlaybackError: the file cannot be written.
@@ -43,22 +41,21 @@ def save(runs: Sequence[Run], path: Path, *, compare: bool = False, label: Metri
         raise PlaybackError(msg) from None
     stream = new_stream(runs, compare=compare)
     stream.save(path)
-    fill(stream, runs, blueprint(runs, compare=compare), label)
+    fill(stream, runs, blueprint(runs, compare=compare))
     stream.disconnect()
 
 
-def show(runs: Sequence[Run], *, compare: bool = False, label: MetricLabel = plain_label) -> None:
+def show(runs: Sequence[Run], *, compare: bool = False) -> None:
     """Opens the viewer's window, and returns when it is closed.
 
     Args:
         runs: The runs.
         compare: Whether to leave out the pages of the single runs.
-        label: How metrics are shown.
 
     Raises:
         PlaybackError: there is no viewer, or it ended with an error, as it does without a display.
     """
-    _run_viewer(["--port", "auto"], runs, compare=compare, label=label)
+    _run_viewer(["--port", "auto"], runs, compare=compare)
 
 
 def serve(
@@ -66,7 +63,6 @@ def serve(
     announce: Callable[[str], object],
     *,
     compare: bool = False,
-    label: MetricLabel = plain_label,
 ) -> None:
     """Serves the viewer to browsers of this machine, until it is interrupted.
 
@@ -74,7 +70,6 @@ def serve(
         runs: The runs.
         announce: Called with the address to open as soon as it is served.
         compare: Whether to leave out the pages of the single runs.
-        label: How metrics are shown.
 
     Raises:
         PlaybackError: there is no viewer, or it ended with an error.
@@ -83,7 +78,7 @@ def serve(
     proxy = urllib.parse.quote(f"rerun+http://{_HOST}:{data}/proxy", safe="")
     arguments = ["--serve-web", "--bind", _HOST, "--port", str(data), "--web-viewer-port", str(page)]
     url = f"http://{_HOST}:{page}/?url={proxy}"
-    _run_viewer(arguments, runs, compare=compare, label=label, ready=lambda: announce(url), port=page)
+    _run_viewer(arguments, runs, compare=compare, ready=lambda: announce(url), port=page)
 
 
 def _run_viewer(
@@ -91,7 +86,6 @@ def _run_viewer(
     runs: Sequence[Run],
     *,
     compare: bool,
-    label: MetricLabel,
     ready: Callable[[], object] | None = None,
     port: int | None = None,
 ) -> None:
@@ -99,7 +93,7 @@ def _run_viewer(
     binary = viewer_binary()
     with tempfile.TemporaryDirectory(prefix="activesteer-") as folder:
         file, log = Path(folder) / "runs.rrd", Path(folder) / "viewer.log"
-        save(runs, file, compare=compare, label=label)
+        save(runs, file, compare=compare)
         try:
             with log.open("w") as output:
                 process = subprocess.Popen([str(binary), *arguments, str(file)], stdout=output, stderr=output)

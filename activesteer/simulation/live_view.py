@@ -9,10 +9,11 @@ from contextlib import AbstractContextManager
 from typing import Any, Final, NamedTuple, Protocol
 
 from activesteer.maneuver import Maneuver
+from activesteer.quantities import quantity_of
 from activesteer.simulation.appearance import scene_of
 from activesteer.simulation.simulation import Simulation
 from activesteer.video import Car, Stage
-from activesteer.video.gauges import in_words
+from activesteer.video.gauges import MIN_SPEED_MPS
 
 FRAME_S: Final = 0.016
 """Least time from one picture to the next [s]: a screen shows 60 a second."""
@@ -21,8 +22,6 @@ _MOST_S: Final = 0.1
 than the clock, instead of ever more jerky."""
 _TURN_S: Final = 0.4
 """Time constant with which the camera turns after the car [s]."""
-_STILL_MPS: Final = 1.0
-"""Below it the direction of motion says nothing [m/s]."""
 
 
 class Viewer(Protocol):
@@ -183,14 +182,16 @@ def _texts(simulation: Simulation, time_s: float) -> tuple[str, str]:
     """Names and values, a line for each."""
     vehicle = simulation.vehicle
     measured, motion = vehicle.measure(), vehicle.motion()
-    moving = motion.speed_mps > _STILL_MPS
+    moving = motion.speed_mps > MIN_SPEED_MPS
     sideslip = math.atan2(motion.lateral_speed_mps, motion.speed_mps) if moving else 0.0
-    lines = [
-        ("time", f"{in_words(time_s, 2)} s"),
-        ("speed", f"{in_words(3.6 * measured.speed_mps, 1)} km/h"),
-        ("steering wheel", f"{in_words(math.degrees(measured.steering_wheel_rad), 0)} deg"),
-        ("sideslip", f"{in_words(math.degrees(sideslip), 1)} deg"),
-        ("rear steer", f"{in_words(math.degrees(measured.rear_steer_rad), 2)} deg"),
-        ("added at front", f"{in_words(math.degrees(measured.superposition_rad), 2)} deg"),
-    ]
-    return "\n".join(name for name, _ in lines), "\n".join(value for _, value in lines)
+    values = {
+        "time_s": time_s,
+        "speed_mps": measured.speed_mps,
+        "steering_wheel_rad": measured.steering_wheel_rad,
+        "sideslip_rad": sideslip,
+        "rear_steer_rad": measured.rear_steer_rad,
+        "superposition_rad": measured.superposition_rad,
+    }
+    shown = {quantity_of(channel): value for channel, value in values.items()}
+    names = "\n".join(item.short for item in shown)
+    return names, "\n".join(f"{item.value_text(value)} {item.unit.name}" for item, value in shown.items())

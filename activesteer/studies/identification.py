@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.handling import Car, Handling, evaluate
 from activesteer.analysis.source import RecordingLike
-from activesteer.analysis.tables import comparison, label_and_unit
+from activesteer.analysis.tables import comparison
 from activesteer.controllers import SingleTrackParameters
 from activesteer.errors import ModelError, RecordingError
+from activesteer.quantities import metric_label
 from activesteer.scenario import Car as CarFiles
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.scenario.vehicle_file import write_values
@@ -89,7 +90,7 @@ class Identification:
             for name, value in handling._asdict().items():
                 if math.isnan(value):
                     continue
-                _, unit, factor = label_and_unit(name)
+                _, unit, factor = metric_label(name)
                 shown = value * factor
                 low, high, source = CLASS_BANDS.get(name, (None, None, None))
                 inside = None if low is None or high is None else low <= shown <= high

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from activesteer.plotting import new_figure
+from activesteer.quantities import quantity_of
 from activesteer.validation.kinematics import Curves
 from activesteer.validation.reference import Table
 from activesteer.validation.runs import QUANTITIES, RMS_TOLERANCE, traces
@@ -19,13 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _OURS, _THEIRS, _CORRIDOR = "#0072b2", "#d55e00", "#f3d9c4"
-_DEG: Final = math.degrees(1.0)
-_SHOWN: Final = {
-    "r": ("yaw rate [deg/s]", _DEG),
-    "ay": ("lateral acceleration [m/s²]", 1.0),
-    "roll": ("roll angle [deg]", _DEG),
-    "beta": ("sideslip angle [deg]", _DEG),
-}
+_CHANNELS: Final = {"r": "yaw_rate_radps", "ay": "ay_mps2", "roll": "roll_rad", "beta": "sideslip_rad"}
+"""Column of a reference -> channel."""
+_SHOWN: Final = {column: (quantity_of(name).title, quantity_of(name).factor) for column, name in _CHANNELS.items()}
 _CROSS: Final = (("rack", "ay"), ("ay", "r"), ("ay", "roll"), ("ay", "beta"))
 """Abscissa and ordinate of the cross-plots."""
 _AXIS_NAMES: Final = _SHOWN | {"rack": ("rack [mm] (- steers left)", 1e3)}

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from activesteer.quantities import quantity_of
 from activesteer.recording import Recording
 
 _HEIGHT: Final = 480.0
@@ -19,31 +20,19 @@ _WHITE: Final = (245, 246, 248, 255)
 _GREY: Final = (176, 181, 189, 255)
 _YELLOW: Final = (255, 205, 70, 255)
 _ROW: Final = 62.0
-_LEAST_ANGLE_RAD: Final = math.radians(0.005)
+_MIN_ANGLE_RAD: Final = math.radians(0.005)
 """An added angle that never reaches it is not shown: the car has no such steering [rad]."""
-_STILL_MPS: Final = 1.0
+MIN_SPEED_MPS: Final = 1.0
 """Below it the direction of motion says nothing, and so neither does the sideslip [m/s]."""
 _SIDE: Final = 3
 """Pictures in the gauges are drawn this much larger and then shrunk: Pillow's lines have hard edges."""
 
 
-class Reading(NamedTuple):
-    """A number of the gauges: its name, its value in words, and the channel that it is taken from."""
-
-    name: str
-    channel: str
-    factor: float
-    unit: str
-    digits: int
-
-
-_READINGS: Final = (
-    Reading("speed", "speed_mps", 3.6, "km/h", 1),
-    Reading("steering wheel", "steering_wheel_rad", math.degrees(1.0), "deg", 0),
-    Reading("sideslip", "sideslip_rad", math.degrees(1.0), "deg", 1),
-    Reading("rear steer", "rear_steer_rad", math.degrees(1.0), "deg", 2),
-    Reading("added at front", "superposition_rad", math.degrees(1.0), "deg", 2),
+READINGS: Final = tuple(
+    quantity_of(channel)
+    for channel in ("speed_mps", "steering_wheel_rad", "sideslip_rad", "rear_steer_rad", "superposition_rad")
 )
+"""What is written out."""
 _ADDED: Final = ("rear_steer_rad", "superposition_rad")
 
 
@@ -86,7 +75,7 @@ class Gauges:
         self._fonts = {points: _font(points * self._scale) for points in (12, 14, 24)}
         self._readings = [
             reading
-            for reading in _READINGS
+            for reading in READINGS
             if reading.channel not in _ADDED or any(_used(dial.recording, reading.channel) for dial in self._dials)
         ]
 
@@ -138,7 +127,7 @@ class Gauges:
         icon = round(44 * scale)
         steering_wheel = dial.value("steering_wheel_rad", time_s)
         sideslip = dial.value("sideslip_rad", time_s)
-        moving = dial.value("speed_mps", time_s) > _STILL_MPS
+        moving = dial.value("speed_mps", time_s) > MIN_SPEED_MPS
         wheel = _steering_wheel(steering_wheel if math.isfinite(steering_wheel) else 0.0, icon)
         car = _drifting_car(
             sideslip if math.isfinite(sideslip) and moving else None,
@@ -151,34 +140,21 @@ class Gauges:
         column = (left - margin) / len(self._readings)
         for number, reading in enumerate(self._readings):
             x = margin + number * column
-            value = dial.value(reading.channel, time_s) * reading.factor
+            value = dial.value(reading.channel, time_s)
             if reading.channel == "sideslip_rad" and not moving:
                 value = math.nan
-            text = in_words(value, reading.digits)
+            text = reading.value_text(value)
             pen.text((x, top + row - 18 * scale), text, _WHITE, self._fonts[24], anchor="ls")
             after = x + self._fonts[24].getlength(text) + 2 * scale
-            pen.text((after, top + row - 18 * scale), reading.unit, _GREY, self._fonts[14], anchor="ls")
-            pen.text((x, top + row - 4 * scale), reading.name, _GREY, self._fonts[12], anchor="ls")
-
-
-def in_words(value: float, digits: int) -> str:
-    """A number in words, without a minus sign before a zero.
-
-    Args:
-        value: The number; what is not finite is not available.
-        digits: Digits after the point.
-    """
-    if not math.isfinite(value):
-        return "n/a"
-    text = f"{value:.{digits}f}"
-    return text.lstrip("-") if float(text) == 0.0 else text
+            pen.text((after, top + row - 18 * scale), reading.unit.name, _GREY, self._fonts[14], anchor="ls")
+            pen.text((x, top + row - 4 * scale), reading.short, _GREY, self._fonts[12], anchor="ls")
 
 
 def _used(recording: Recording, channel: str) -> bool:
     if channel not in recording:
         return False
     values = np.abs(recording[channel])
-    return bool(np.max(values[np.isfinite(values)], initial=0.0) >= _LEAST_ANGLE_RAD)
+    return bool(np.max(values[np.isfinite(values)], initial=0.0) >= _MIN_ANGLE_RAD)
 
 
 def _steering_wheel(angle_rad: float, side: int) -> Image.Image:
@@ -187,9 +163,9 @@ def _steering_wheel(angle_rad: float, side: int) -> Image.Image:
     picture = Image.new("RGBA", (n, n))
     pen, centre, radius = ImageDraw.Draw(picture), n / 2, 0.45 * n
 
-    def rim(angle: float, share: float) -> tuple[float, float]:
+    def rim(angle: float, fraction: float) -> tuple[float, float]:
         """A point at an angle from the top, left positive."""
-        return centre - share * radius * math.sin(angle), centre - share * radius * math.cos(angle)
+        return centre - fraction * radius * math.sin(angle), centre - fraction * radius * math.cos(angle)
 
     for spoke in (-math.pi / 2, math.pi / 2, math.pi):
         pen.line((centre, centre, *rim(angle_rad + spoke, 0.95)), _GREY, round(0.07 * n))
@@ -208,7 +184,7 @@ def _drifting_car(sideslip_rad: float | None, steer_rad: Sequence[float], side: 
     pen, centre = ImageDraw.Draw(picture), n / 2
 
     def at(x: float, y: float) -> tuple[float, float]:
-        """Picture of a point of the car, x forward, y left, in shares of the side."""
+        """Picture of a point of the car, x forward, y left, in fractions of the side."""
         return centre - y * n, centre - x * n
 
     pen.polygon([at(0.3, 0.13), at(0.3, -0.13), at(-0.3, -0.13), at(-0.3, 0.13)], (90, 120, 160, 255))

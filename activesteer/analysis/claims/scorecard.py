@@ -11,8 +11,8 @@ from importlib.resources import files
 from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims.claim import SYSTEMS, Claim
-from activesteer.analysis.tables import label_and_unit
 from activesteer.errors import ParameterError, nearest_names
+from activesteer.quantities import metric_label
 
 CLAIM_IDS: Final = (
     "S1", "S2", "S3", "S4", "S5", "D1", "D2", "D3", "D4", "D5",
@@ -162,7 +162,7 @@ def number_lines(values: Mapping[str, float]) -> list[str]:
         by_metric.setdefault(metric if known else name, []).append((system if known else "", value))
     lines = []
     for metric, pairs in by_metric.items():
-        words, unit, factor = label_and_unit(metric)
+        words, unit, factor = metric_label(metric)
         numbers = "  ".join(f"{system} {_number(value * factor)}".strip() for system, value in pairs)
         lines.append(f"{words}: {numbers}" + ("" if unit == "-" else f" {unit}"))
     return lines

@@ -11,17 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.figures import style
-from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, Curve, Panel
+from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, Curve
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure, save
+from activesteer.quantities import quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FRONT = Panel("steering angles\n[deg]", "front_steer_rad", YAW_RATE.factor)
+FRONT = quantity_of("front_steer_rad")._replace(short="steering angles")
 
 
 def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
@@ -49,8 +50,8 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
             style.draw(axes[0], curve, DESIRED, width=1.0, style="--")
         style.draw(axes[1], curve, FRONT, width=0.8)
         style.draw_added(axes[1], curve, width=2.2)
-    style.plain(axes[0], YAW_RATE.title)
-    style.plain(axes[1], FRONT.title)
+    style.plain(axes[0], YAW_RATE.axis_title)
+    style.plain(axes[1], FRONT.axis_title)
     style.fill_panels(axes[2:], curves, (LATERAL, SIDESLIP, ROLL))
     style.explain(axes[0], [("desired", 1.0, "--")])
     style.explain(axes[1], [("front wheels", 0.8, "-"), ("added: rear wheels (2), superposition (3)", 2.2, "-")])
@@ -107,7 +108,7 @@ def figure_2(
             if panel.channel in channels:
                 values = channels[panel.channel] * panel.factor
                 axis.plot(recording.time_s, values, "--", color=colour, linewidth=1.4, label=label)
-        style.plain(axis, panel.title)
+        style.plain(axis, panel.axis_title)
         axis.legend(loc="lower right", frameon=False)
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(0.0, float(recording.time_s[-1]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -13,37 +12,24 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import ParameterError
 from activesteer.plotting import new_figure
+from activesteer.quantities import Quantity, quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_POINTS: Final = 5000
+MAX_POINTS: Final = 5000
 """A curve with more samples than this is drawn with fewer: a picture cannot show them, and its file would hold them."""
 
 
-class Panel(NamedTuple):
-    """One channel of every run over time.
-
-    Attributes:
-        title: What stands at the vertical axis, with the unit.
-        channel: Channel name.
-        factor: From the SI value to the unit of the axis.
-    """
-
-    title: str
-    channel: str
-    factor: float
-
-
-YAW_RATE: Final = Panel("yaw rate\n[deg/s]", "yaw_rate_radps", math.degrees(1.0))
-DESIRED: Final = Panel("", "yaw_rate_desired_radps", math.degrees(1.0))
-STEERING_WHEEL: Final = Panel("steering wheel\nangle [deg]", "steering_wheel_rad", math.degrees(1.0))
-LATERAL: Final = Panel("lateral acc.\n[m/s²]", "ay_mps2", 1.0)
-SIDESLIP: Final = Panel("sideslip angle\n[deg]", "sideslip_rad", math.degrees(1.0))
-ROLL: Final = Panel("roll angle\n[deg]", "roll_rad", math.degrees(1.0))
-SPEED: Final = Panel("speed\n[km/h]", "speed_mps", 3.6)
-ADDED: Final = Panel("added angle\n[deg]", "", math.degrees(1.0))
+YAW_RATE: Final = quantity_of("yaw_rate_radps")
+DESIRED: Final = quantity_of("yaw_rate_desired_radps")
+STEERING_WHEEL: Final = quantity_of("steering_wheel_rad")
+LATERAL: Final = quantity_of("ay_mps2")
+SIDESLIP: Final = quantity_of("sideslip_rad")
+ROLL: Final = quantity_of("roll_rad")
+SPEED: Final = quantity_of("speed_mps")
+ADDED: Final = quantity_of("rear_steer_rad")._replace(channel="", short="added angle")
 """The angles that the systems add: not one channel, but `ADDED_CHANNELS` of those that ask for any."""
 ADDED_CHANNELS: Final = ("rear_steer_rad", "superposition_rad")
 
@@ -78,7 +64,7 @@ def curves(recordings: Mapping[str, RecordingLike]) -> list[Curve]:
     return [Curve(recordings[label], SYSTEM_LABELS.get(label, label), colours[label]) for label in known + others]
 
 
-def draw(axis: Axes, curve: Curve, panel: Panel, label: str = "", width: float = 1.4, style: str = "-") -> None:
+def draw(axis: Axes, curve: Curve, panel: Quantity, label: str = "", width: float = 1.4, style: str = "-") -> None:
     """One channel of one run over time; without a label it stays out of the legend."""
     values = thinned(curve.recording[panel.channel]) * panel.factor
     # A leading underscore keeps a line out of the legend.
@@ -97,14 +83,14 @@ def draw_added(axis: Axes, curve: Curve, width: float = 1.4) -> None:
         draw(axis, curve, ADDED._replace(channel=channel), width=width)
 
 
-def present(panels: Sequence[Panel], drawn: Sequence[Curve]) -> list[Panel]:
+def present(panels: Sequence[Quantity], drawn: Sequence[Curve]) -> list[Quantity]:
     """The panels without that of the added angles where no run has any."""
     return [panel for panel in panels if panel is not ADDED or any(added_channels(curve) for curve in drawn)]
 
 
 def thinned(values: NDArray[np.floating]) -> NDArray[np.float64]:
     """Every n-th sample, n so that a picture has enough of them and not many more."""
-    return np.asarray(values[:: -(-len(values) // MOST_POINTS) or 1], dtype=np.float64)
+    return np.asarray(values[:: -(-len(values) // MAX_POINTS) or 1], dtype=np.float64)
 
 
 def plain(axis: Axes, title: str = "") -> None:
@@ -128,7 +114,7 @@ def name_curves(figure: Figure, axis: Axes) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 3), frameon=False)
 
 
-def fill_panels(axes: Sequence[Axes], drawn: Sequence[Curve], panels: Sequence[Panel]) -> None:
+def fill_panels(axes: Sequence[Axes], drawn: Sequence[Curve], panels: Sequence[Quantity]) -> None:
     """Draws panels over one time axis.
 
     Args:
@@ -143,14 +129,14 @@ def fill_panels(axes: Sequence[Axes], drawn: Sequence[Curve], panels: Sequence[P
                 draw_added(axis, curve)
             else:
                 draw(axis, curve, panel, label=label)
-        plain(axis, panel.title)
+        plain(axis, panel.axis_title)
         if panel is ADDED:
             explain(axis, [("rear wheels (2), superposition (3)", 1.4, "-")])
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(0.0, max(float(curve.recording.time_s[-1]) for curve in drawn))
 
 
-def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Panel]) -> Figure:
+def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Quantity]) -> Figure:
     """A figure of panels over one time axis.
 
     Raises:

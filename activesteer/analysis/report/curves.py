@@ -1,4 +1,4 @@
-"""What the plots of a report show: the signals of runs over one time axis, thinned, in degrees and km/h."""
+"""What the plots of a report show: the signals of runs over one time axis, thinned, in the units of `quantities`."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from activesteer.analysis.source import read_course
 from activesteer.analysis.track import front_axle, path_distance
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
+from activesteer.quantities import Quantity, quantity_of
 from activesteer.recording import Recording
 from activesteer.road.course import Course
 
@@ -23,11 +24,10 @@ Array = NDArray[np.float64]
 
 RATE_HZ: Final = 200.0
 """Most samples of a signal in a second; the car's own motion ends below 20 Hz."""
-MOST_SAMPLES: Final = 4000
+MAX_SAMPLES: Final = 4000
 """Most samples of a signal in all: twice what the widest screen shows, until one zooms in."""
 DIGITS: Final = 4
 """Digits after the first of a signal's range; more cannot be seen."""
-_DEG: Final = math.degrees(1.0)
 
 
 class Panel(NamedTuple):
@@ -35,59 +35,59 @@ class Panel(NamedTuple):
 
     Attributes:
         title: What it shows.
-        unit: In which unit.
-        signals: From a recording to what is drawn of it, in that unit; the first is a full line, others are dashed.
-            One that a recording does not have raises `RecordingError`, one that says nothing is None.
-        least: Smallest height of the vertical axis, in that unit: a signal that hardly moves shall look like it.
+        quantity: In which unit, and how small its axis may be.
+        signals: From a recording to what is drawn of it, SI; the first is a full line, others are dashed. One that a
+            recording does not have raises `RecordingError`, one that says nothing is None.
         note: What a dashed line is.
     """
 
     title: str
-    unit: str
+    quantity: Quantity
     signals: tuple[Callable[[Recording], Array | None], ...]
-    least: float
     note: str = ""
 
 
-def _channel(name: str, factor: float) -> Callable[[Recording], Array]:
-    return lambda recording: recording[name] * factor
+def _of(channel: str, *others: Callable[[Recording], Array | None], note: str = "") -> Panel:
+    shown = quantity_of(channel)
+    return Panel(shown.label.capitalize(), shown, (lambda recording: recording[channel], *others), note)
 
 
 def _desired(recording: Recording) -> Array | None:
-    values = recording["yaw_rate_desired_radps"] * _DEG
+    values = recording["yaw_rate_desired_radps"]
     return values if np.any(values) else None
 
 
 def _added(name: str) -> Callable[[Recording], Array | None]:
     def values(recording: Recording) -> Array | None:
         # What no controller asks for is the give of a hinge, not an added angle.
-        asked = np.any(recording[f"{name}_demand_rad"])
-        return recording[f"{name}_rad"] * _DEG if asked else None
+        return recording[f"{name}_rad"] if np.any(recording[f"{name}_demand_rad"]) else None
 
     return values
 
 
-def _over_corners(channel: str, choose: np.ufunc, factor: float = 1.0) -> Callable[[Recording], Array]:
-    return lambda run: choose.reduce([run[f"{corner}_{channel}"] for corner in CORNERS]) * factor
+def _over_corners(channel: str, choose: np.ufunc) -> Callable[[Recording], Array]:
+    return lambda run: choose.reduce([run[f"{corner}_{channel}"] for corner in CORNERS])
 
 
 def _from_path(recording: Recording) -> Array:
-    course = read_course(recording)
-    return path_distance(*front_axle(recording), course.path.x_m, course.path.y_m)
+    path = read_course(recording).path
+    return path_distance(*front_axle(recording), path.x_m, path.y_m)
 
+
+_DISTANCE, _FRICTION, _LOAD = quantity_of("path_distance_m"), quantity_of("friction_use"), quantity_of("tyre_fz_N")
 
 PANELS: Final = (
-    Panel("Steering wheel angle", "deg", (_channel("steering_wheel_rad", _DEG),), 2.0),
-    Panel("Yaw rate", "deg/s", (_channel("yaw_rate_radps", _DEG), _desired), 0.5, "dashed: desired by the controller"),
-    Panel("Sideslip angle", "deg", (_channel("sideslip_rad", _DEG),), 0.1),
-    Panel("Lateral acceleration", "m/s²", (_channel("ay_mps2", 1.0),), 0.2),
-    Panel("Added angle at the wheels", "deg", (_added("rear_steer"), _added("superposition")), 0.05,
+    _of("steering_wheel_rad"),
+    _of("yaw_rate_radps", _desired, note="dashed: desired by the controller"),
+    _of("sideslip_rad"),
+    _of("ay_mps2"),
+    Panel("Added angle at the wheels", quantity_of("rear_steer_rad"), (_added("rear_steer"), _added("superposition")),
           "full: rear wheels, dashed: front superposition"),
-    Panel("Distance from the path", "m", (_from_path,), 0.1),
-    Panel("Roll angle", "deg", (_channel("roll_rad", _DEG),), 0.1),
-    Panel("Speed", "km/h", (_channel("speed_mps", 3.6),), 4.0),
-    Panel("Use of the friction, most of four wheels", "%", (_over_corners("friction_use", np.maximum, 100.0),), 10.0),
-    Panel("Wheel load, least of four wheels", "kN", (_over_corners("tyre_fz_N", np.minimum, 1e-3),), 0.5),
+    Panel(_DISTANCE.label.capitalize(), _DISTANCE, (_from_path,)),
+    _of("roll_rad"),
+    _of("speed_mps"),
+    Panel("Friction utilisation, highest of four wheels", _FRICTION, (_over_corners("friction_use", np.maximum),)),
+    Panel("Wheel load, lowest of four wheels", _LOAD, (_over_corners("tyre_fz_N", np.minimum),)),
 )  # fmt: skip
 """In pairs, as they stand beside each other."""
 
@@ -120,7 +120,7 @@ def time_grid(times_s: Sequence[Array]) -> Array:
     step = float(np.median(np.diff(first))) if len(first) > 1 else 1.0 / RATE_HZ
     # A hair less than a whole number is rounding.
     every = max(
-        1, math.ceil(1.0 / (RATE_HZ * step) - 1e-6), math.ceil((end - start) / (step * (MOST_SAMPLES - 1)) - 1e-6)
+        1, math.ceil(1.0 / (RATE_HZ * step) - 1e-6), math.ceil((end - start) / (step * (MAX_SAMPLES - 1)) - 1e-6)
     )
     count = math.floor((end - start) / (every * step) + 1e-6) + 1
     # Times are whole nanoseconds in a recording: rounded to them, the instants are those of samples.
@@ -137,10 +137,11 @@ def _panel(panel: Panel, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
                 # A run of an older version, or of another program, may lack it; the others are shown.
                 continue
             if values is not None:
-                sampled = _sampled(run.recording.time_s, values, grid)
+                sampled = _sampled(run.recording.time_s, values * panel.quantity.factor, grid)
                 series.append({"run": number, "dashed": line > 0, "values": _rounded(sampled)})
     note = panel.note if any(item["dashed"] for item in series) else ""
-    return {"title": panel.title, "unit": panel.unit, "note": note, "least": panel.least, "series": series}
+    shown = panel.quantity
+    return {"title": panel.title, "unit": shown.unit.name, "note": note, "min_span": shown.min_span, "series": series}
 
 
 def _sampled(time_s: Array, values: Array, grid: Array) -> Array:

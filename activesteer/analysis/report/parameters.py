@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
+from activesteer.quantities import display_unit
 from activesteer.recording import Recording
-
-_SHOWN_AS: Final = (("_radps", "deg/s", math.degrees(1.0)), ("_rad", "deg", math.degrees(1.0)), ("_mps", "km/h", 3.6))
-"""Ending of a key, unit that its value is also told in, factor to it."""
 
 
 class Row(NamedTuple):
@@ -64,8 +61,6 @@ def _text(key: str, value: Any) -> str:
     if isinstance(value, bool) or value is None:
         return str(value).lower() if value is not None else "none"
     if isinstance(value, int | float):
-        for ending, unit, factor in _SHOWN_AS:
-            if key.endswith(ending):
-                return f"{value:.6g} ({value * factor:.4g} {unit})"
-        return f"{value:.6g}"
+        unit, factor = display_unit(key)
+        return f"{value:.6g}" if factor == 1.0 else f"{value:.6g} ({value * factor:.4g} {unit})"
     return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

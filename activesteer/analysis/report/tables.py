@@ -10,7 +10,7 @@ from typing import Any
 from activesteer.analysis.claims.scorecard import Judged, Scorecard, Verdict, number_lines
 from activesteer.analysis.report.parameters import Row
 from activesteer.analysis.report.runs import Group, Run, entry
-from activesteer.analysis.tables import label_and_unit
+from activesteer.quantities import metric_label
 
 _CLASS = {
     Verdict.PASSED: "passed",
@@ -96,7 +96,7 @@ def metrics(group: Group) -> str:
         titles += [run.name] if place == 0 else [run.name, f"{run.name} against {group.runs[0].name}"]
     lines = []
     for name in names:
-        words, unit, factor = label_and_unit(name)
+        words, unit, factor = metric_label(name)
         shown = [factor * metrics.get(name, math.nan) for metrics in values]
         cells = [number(shown[0])]
         for value in shown[1:]:

@@ -23,15 +23,6 @@ def system(speed_mps: float = 20.0) -> control.StateSpace:
     )  # fmt: skip
 
 
-@pytest.fixture
-def figures(monkeypatch):
-    """Every Figure that is saved, for looking at its curves."""
-    figure_module = pytest.importorskip("matplotlib.figure")
-    kept = []
-    monkeypatch.setattr(figure_module.Figure, "savefig", lambda self, *_, **__: kept.append(self))
-    return kept
-
-
 def test_bode_diagram_shows_gain_and_phase_of_every_output(figures, tmp_path):
     draw_bode({"a": system(), "b": system(40.0)}, tmp_path / "bode.png", recording=sweep())
     axes = figures[0].get_axes()

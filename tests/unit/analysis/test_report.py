@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.report import open_all, report_page, write_report
-from activesteer.analysis.report.curves import MOST_SAMPLES, plots, time_grid
+from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
 from activesteer.analysis.report.judgement import judge
 from activesteer.analysis.report.parameters import rows
 from activesteer.analysis.report.runs import groups_of
@@ -210,7 +210,7 @@ def test_runs_of_different_length_and_step_share_their_time():
 
 def test_long_runs_keep_a_bounded_number_of_samples():
     grid = time_grid([np.linspace(0.0, 599.999, 600_000)])
-    assert MOST_SAMPLES / 2 < len(grid) <= MOST_SAMPLES
+    assert MAX_SAMPLES / 2 < len(grid) <= MAX_SAMPLES
     assert grid[-1] == pytest.approx(599.999, abs=grid[1])
 
 

@@ -64,19 +64,13 @@ def test_angles_are_in_degrees_and_only_those_that_exist(saved):
     assert ends == [pytest.approx(np.degrees(-0.01), abs=1e-3), pytest.approx(np.degrees(0.01), abs=1e-3)] + [front] * 3
 
 
-def test_the_same_run_keeps_its_colour_when_others_are_left_out(tmp_path, monkeypatch):
-    figure_module = pytest.importorskip("matplotlib.figure")
-    figures = []
-    monkeypatch.setattr(figure_module.Figure, "savefig", lambda self, *_, **__: figures.append(self))
+def test_the_same_run_keeps_its_colour_when_others_are_left_out(figures, tmp_path):
     step_steer_figure(three(), tmp_path / "a.png")
     step_steer_figure({"ars": three()["ars"]}, tmp_path / "b.png")
     assert figures[0].get_axes()[2].get_lines()[1].get_color() == figures[1].get_axes()[2].get_lines()[0].get_color()
 
 
-def test_a_users_controller_is_drawn_under_its_own_name(tmp_path, monkeypatch):
-    figure_module = pytest.importorskip("matplotlib.figure")
-    figures = []
-    monkeypatch.setattr(figure_module.Figure, "savefig", lambda self, *_, **__: figures.append(self))
+def test_a_users_controller_is_drawn_under_its_own_name(figures, tmp_path):
     step_steer_figure({"my_controller.py:Mine": step_steer(rear_rad=-0.02)}, tmp_path / "a.png")
     assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["my_controller.py:Mine"]
 

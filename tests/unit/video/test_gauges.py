@@ -7,7 +7,7 @@ import pytest
 
 from activesteer.recording import Recording
 from activesteer.signals import Channel
-from activesteer.video.gauges import Dials, Gauges, in_words
+from activesteer.video.gauges import Dials, Gauges
 
 SIZE = (640, 480)
 NAMES = ("speed_mps", "steering_wheel_rad", "sideslip_rad", "rear_steer_rad", "superposition_rad", "front_steer_rad")
@@ -97,11 +97,3 @@ def test_long_title_leaves_room_for_the_time():
 @pytest.mark.parametrize("size", [(16, 16), (64, 480), (480, 64), (1920, 1080)])
 def test_any_size_can_be_drawn_on(size):
     assert drawn(recording(), title="Title", size=size, note="x 0.25").shape == (size[1], size[0], 3)
-
-
-@pytest.mark.parametrize(
-    ("value", "digits", "words"),
-    [(-0.04, 1, "0.0"), (-0.06, 1, "-0.1"), (12.345, 2, "12.35"), (math.nan, 1, "n/a"), (math.inf, 1, "n/a")],
-)
-def test_numbers_in_words(value, digits, words):
-    assert in_words(value, digits) == words

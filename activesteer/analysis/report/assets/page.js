@@ -78,7 +78,7 @@
       const plot = new uPlot({
         width: holder.clientWidth, height: PLOT_HEIGHT, padding: [6, 18, 0, 0], legend: { show: false }, pxAlign: 0,
         cursor: { y: false, sync: { key: this.data.anchor }, drag: { x: true, y: false }, points: { size: 7 } },
-        scales: { x: { time: false, range: (_, min, max) => [min, max] }, y: { range: (_, low, high) => padded(low, high, panel.least) } },
+        scales: { x: { time: false, range: (_, min, max) => [min, max] }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
         axes: [axis(26, " s"), axis(46)],
         series: [{}, ...lines],
         hooks: {

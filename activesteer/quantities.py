@@ -1,0 +1,169 @@
+"""How quantities are shown to a reader: name, unit, factor from the SI value, digits, smallest height of an axis.
+
+Everything is SI and radians inside; whatever is printed, plotted or drawn takes its unit from here.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from activesteer.conventions import CORNERS, GRAVITY_MPS2
+
+_DEG: Final = math.degrees(1.0)
+
+
+class DisplayUnit(NamedTuple):
+    """A unit as it is shown.
+
+    Attributes:
+        name: Its name; `-` for a pure number.
+        factor: From the SI value to this unit.
+    """
+
+    name: str
+    factor: float
+
+
+_BY_SUFFIX: Final = {
+    # Longest suffix first: `_srad` also ends in `rad`.
+    "_radpmps2": DisplayUnit("deg/g", _DEG * GRAVITY_MPS2),
+    "_mps2prad": DisplayUnit("g/100deg", math.radians(100.0) / GRAVITY_MPS2),
+    "_radprad": DisplayUnit("deg/deg", 1.0),
+    "_1ps": DisplayUnit("1/s", 1.0),
+    "_Hz": DisplayUnit("Hz", 1.0),
+    "_radps": DisplayUnit("deg/s", _DEG),
+    "_srad": DisplayUnit("s deg", _DEG),
+    "_rad": DisplayUnit("deg", _DEG),
+    "_mps2": DisplayUnit("m/s²", 1.0),
+    "_mps": DisplayUnit("km/h", 3.6),
+    "_Nm": DisplayUnit("Nm", 1.0),
+    "_N": DisplayUnit("N", 1.0),
+    "_m": DisplayUnit("m", 1.0),
+    "_s": DisplayUnit("s", 1.0),
+}
+_FRACTIONS: Final = ("_overshoot", "_share", "_friction_use")
+"""Endings of pure numbers that are shown in percent; they are words of the name."""
+_PERCENT: Final = DisplayUnit("%", 100.0)
+_PURE: Final = DisplayUnit("-", 1.0)
+_KILONEWTON: Final = DisplayUnit("kN", 1e-3)
+_WORDS: Final = {"ay": "lateral acceleration", "tb": "TB"}
+
+
+class Quantity(NamedTuple):
+    """A recorded signal as it is shown.
+
+    Attributes:
+        channel: Name of the channel.
+        label: Its name.
+        short: Its name where there is little room.
+        unit: Unit that it is shown in, with the factor from the SI value.
+        digits: Digits behind the point where its value is written out.
+        min_span: Smallest height of an axis, in that unit: a signal that hardly moves shall look like it.
+    """
+
+    channel: str
+    label: str
+    short: str
+    unit: DisplayUnit
+    digits: int
+    min_span: float
+
+    @property
+    def factor(self) -> float:
+        """From the SI value to the unit that is shown."""
+        return self.unit.factor
+
+    @property
+    def title(self) -> str:
+        """Label and unit, as they stand over a plot."""
+        return f"{self.label[0].upper()}{self.label[1:]} [{self.unit.name}]"
+
+    @property
+    def axis_title(self) -> str:
+        """Short name and unit in two lines, as they stand beside an axis."""
+        return f"{self.short}\n[{self.unit.name}]"
+
+    def value_text(self, value: float) -> str:
+        """A value as it is written out, without its unit and without a minus sign before a zero.
+
+        Args:
+            value: The value, SI; what is not finite is not available.
+        """
+        if not math.isfinite(value):
+            return "n/a"
+        text = f"{value * self.factor:.{self.digits}f}"
+        return text.lstrip("-") if float(text) == 0.0 else text
+
+
+def display_unit(name: str) -> DisplayUnit:
+    """The unit that a value is shown in.
+
+    Args:
+        name: Name of a channel, a metric or a parameter, ending in its SI unit.
+    """
+    if name.endswith(_FRACTIONS):
+        return _PERCENT
+    return next((unit for suffix, unit in _BY_SUFFIX.items() if name.endswith(suffix)), _PURE)
+
+
+def metric_label(name: str) -> tuple[str, str, float]:
+    """How a metric is shown.
+
+    Args:
+        name: Name with unit suffix, such as `yaw_rate_peak_radps`.
+
+    Returns:
+        Its name in words, its unit (`-` for a pure number), and the factor from the SI value to it.
+    """
+    suffix = next((suffix for suffix in _BY_SUFFIX if name.endswith(suffix)), "")
+    head, _, tail = name.removesuffix(suffix).partition("_")
+    words = " ".join(part for part in (_WORDS.get(head, head), tail.replace("_", " ")) if part)
+    unit = display_unit(name)
+    return words, unit.name, unit.factor
+
+
+def _row(
+    channel: str, label: str, digits: int, min_span: float, short: str = "", unit: DisplayUnit | None = None
+) -> Quantity:
+    return Quantity(channel, label, short or label, unit or display_unit(channel), digits, min_span)
+
+
+_QUANTITIES: Final = {
+    row.channel: row
+    for row in (
+        _row("time_s", "time", 2, 0.0),
+        _row("speed_mps", "speed", 1, 4.0),
+        _row("steering_wheel_rad", "steering wheel angle", 0, 2.0, "steering wheel"),
+        _row("yaw_rate_radps", "yaw rate", 1, 0.5),
+        _row("yaw_rate_desired_radps", "desired yaw rate", 1, 0.5),
+        _row("sideslip_rad", "sideslip angle", 1, 0.1, "sideslip"),
+        _row("ay_mps2", "lateral acceleration", 1, 0.2, "lateral acc."),
+        _row("roll_rad", "roll angle", 1, 0.1),
+        _row("ax_mps2", "longitudinal acceleration", 1, 0.2, "longitudinal acc."),
+        _row("pitch_rad", "pitch angle", 1, 0.1),
+        _row("front_steer_rad", "steer angle of the front wheels", 2, 0.1, "front wheels"),
+        _row("rear_steer_rad", "steer angle of the rear wheels", 2, 0.05, "rear steer"),
+        _row("superposition_rad", "front superposition angle", 2, 0.05, "superposition"),
+        _row("path_distance_m", "distance from the path", 2, 0.1),
+        _row("tyre_fx_N", "longitudinal tyre force", 2, 0.5, unit=_KILONEWTON),
+        _row("tyre_fy_N", "lateral tyre force", 2, 0.5, unit=_KILONEWTON),
+        _row("tyre_fz_N", "wheel load", 2, 0.5, unit=_KILONEWTON),
+        _row("tyre_mz_Nm", "aligning moment", 1, 5.0),
+        _row("drive_torque_Nm", "drive torque", 0, 5.0),
+        _row("brake_torque_Nm", "brake torque", 0, 5.0),
+        _row("steer_rad", "steer angle", 2, 0.1),
+        _row("tie_rod_force_N", "tie rod force", 2, 0.5, unit=_KILONEWTON),
+        _row("friction_use", "friction utilisation", 0, 10.0, unit=_PERCENT),
+    )
+}
+
+
+def quantity_of(channel: str) -> Quantity:
+    """How a channel is shown.
+
+    Args:
+        channel: Its name, with or without a corner before it.
+    """
+    corner, _, rest = channel.partition("_")
+    return _QUANTITIES[rest]._replace(channel=channel) if corner in CORNERS else _QUANTITIES[channel]

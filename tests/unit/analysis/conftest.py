@@ -1,0 +1,19 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """Every Figure that is saved, for looking at its curves; the file itself stays empty."""
+    figure_module = pytest.importorskip("matplotlib.figure")
+    kept = []
+
+    def keep(self, path, **_):
+        kept.append(self)
+        Path(path).touch()
+
+    monkeypatch.setattr(figure_module.Figure, "savefig", keep)
+    return kept
