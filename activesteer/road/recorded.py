@@ -8,12 +8,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.errors import RecordingError
+from activesteer.errors import RecordingError, shown
 
 LIMIT_M: Final = 1e6
 """No place or size on a road is further from 0 than this [m]."""
 _MAX_ELEMENTS: Final = 1_000_000
-_MAX_ECHO: Final = 60
 
 
 def fail(key: str, problem: str) -> RecordingError:
@@ -24,14 +23,14 @@ def fail(key: str, problem: str) -> RecordingError:
 def table_of(value: object, key: str) -> Mapping[str, Any]:
     """The value, which must be a table."""
     if not isinstance(value, Mapping):
-        raise fail(key, f"is {_shown(value)}, expected a table")
+        raise fail(key, f"is {shown(value)}, expected a table")
     return value
 
 
 def sequence(value: object, key: str) -> Sequence[Any]:
     """The value, which must be a list."""
     if not isinstance(value, list | tuple):
-        raise fail(key, f"is {_shown(value)}, expected a list")
+        raise fail(key, f"is {shown(value)}, expected a list")
     if len(value) > _MAX_ELEMENTS:
         raise fail(key, f"has {len(value)} elements, at most {_MAX_ELEMENTS} are allowed")
     return value
@@ -40,7 +39,7 @@ def sequence(value: object, key: str) -> Sequence[Any]:
 def number(value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M) -> float:
     """The value [m], which must be a number from `low` to `high`."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise fail(key, f"is {_shown(value)}, expected a number from {low:g} to {high:g} m")
+        raise fail(key, f"is {shown(value)}, expected a number from {low:g} to {high:g} m")
     return float(value)
 
 
@@ -57,11 +56,5 @@ def numbers(
 def text(value: object, key: str) -> str:
     """The value, which must be a text."""
     if not isinstance(value, str):
-        raise fail(key, f"is {_shown(value)}, expected a text")
+        raise fail(key, f"is {shown(value)}, expected a text")
     return value
-
-
-def _shown(value: object) -> str:
-    """A value as an error message echoes it."""
-    shown = "not given" if value is None else repr(value)
-    return shown if len(shown) <= _MAX_ECHO else f"{shown[:_MAX_ECHO]}..."

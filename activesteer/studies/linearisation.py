@@ -158,7 +158,7 @@ def linearise(
     *,
     cut_off_Hz: float = CUT_OFF_HZ,
 ) -> control.StateSpace:
-    """The lateral motion of a car, linearised about driving straight on; `activesteer.analysis.linearise` is the same.
+    """The lateral motion of a car, linearised about driving straight on.
 
     Args:
         vehicle: Name, path, or table of a vehicle.

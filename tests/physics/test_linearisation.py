@@ -9,7 +9,6 @@ import control
 import numpy as np
 import pytest
 
-import activesteer.analysis
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.errors import ParameterError
 from activesteer.scenario import load_car, resolve
@@ -23,7 +22,6 @@ from activesteer.studies.linearisation import (
     linear_car,
     linear_cars,
     linear_response,
-    linearise,
 )
 from tests.physics.runs import go_on, last, run
 
@@ -145,11 +143,6 @@ def test_yaw_gain_is_largest_at_the_characteristic_speed():
     a, b, _ = np.polyfit(speeds, gains, 2)
     stored = load_car().config.single_track.characteristic_speed_mps
     assert -b / (2 * a) == pytest.approx(stored, rel=0.05)
-
-
-def test_analysis_offers_the_same():
-    offered = activesteer.analysis.linearise("compact", SPEED_MPS, cut_off_Hz=10.0)
-    assert np.asarray(offered.A) == pytest.approx(np.asarray(linearise("compact", SPEED_MPS, cut_off_Hz=10.0).A))
 
 
 @pytest.mark.parametrize("speed_mps", [0.0, 2.9, -20.0, math.nan, math.inf])

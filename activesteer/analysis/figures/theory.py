@@ -7,13 +7,15 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from activesteer.analysis.figures import style
 from activesteer.analysis.source import RecordingLike
+from activesteer.config import Source, build
 from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
-from activesteer.errors import RecordingError
+from activesteer.errors import ParameterError, RecordingError, shown
 from activesteer.plotting import new_figure
+from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
+from activesteer.theory.tolerance import tolerance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,66 +25,29 @@ TOP_SPEED_MPS: Final = 200.0 / 3.6
 """Up to where the predicted angle is drawn [m/s]."""
 
 
-def predicted_rear_angle(single_track: Mapping[str, float], speed_mps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Steady rear angle over front angle that keeps the sideslip at zero, K_H.
-
-    Args:
-        single_track: Parameters of the single-track model, as in the metadata of a recording.
-        speed_mps: Speeds [m/s], shape (n,).
-
-    Returns:
-        K_H [-], shape (n,); below 0 against the front wheels.
-
-    Source: V. Dorsch, Mecatronics-REM 2012, eq. 5, re-derived from eqs. 1 and 2 with beta = beta_dot = 0.
-    """
-    p = single_track
-    m, cv, ch, lv, lh = (
-        p[key] for key in ("mass_kg", "front_stiffness_Nprad", "rear_stiffness_Nprad", "cg_to_front_m", "cg_to_rear_m")
-    )
-    v2, wheelbase = speed_mps**2, lv + lh
-    return cv / ch * (m * v2 * lv - ch * lh * wheelbase) / (m * v2 * lh + cv * lv * wheelbase)
-
-
-def tolerance(error_radps: NDArray[np.float64], off_radps: float, full_radps: float) -> NDArray[np.float64]:
-    """Activity of the corrector, 0 to 1, as the controllers have it: a cubic between c_off and c_in.
-
-    Args:
-        error_radps: Yaw rate error [rad/s], shape (n,).
-        off_radps: c_off [rad/s].
-        full_radps: c_in [rad/s].
-    """
-    width = full_radps - off_radps
-    above = np.abs(error_radps) - off_radps
-    x = np.clip(above / width, 0.0, 1.0) if width > 0.0 else (above > 0.0).astype(np.float64)
-    return x * x * (3.0 - 2.0 * x)
-
-
 def figure_7(recording: RecordingLike) -> Figure:
-    """Predicted rear angle over speed, and the share of it that the rear system uses.
+    """Predicted rear angle over speed, and the part of it that the rear system uses.
 
     Raises:
         ParameterError: matplotlib is not installed.
         RecordingError: the metadata do not hold the parameters.
     """
-    single_track = _parameters(recording, "single_track")
-    gain = float(_parameters(recording, "controllers", "ars").get("prediction_gain", 1.0))
+    single_track = _single_track(recording)
+    gain = _number(_parameters(recording, "controllers", "ars"), "prediction_gain", 1.0)
     speed_mps = np.linspace(0.0, TOP_SPEED_MPS, 400)
-    try:
-        share = predicted_rear_angle(single_track, speed_mps)
-    except KeyError as error:
-        raise RecordingError(f"the metadata's 'vehicle.single_track' has no {error}") from error
+    ratio, _, _ = single_track.rear_prediction(speed_mps)
     figure = new_figure(width_in=7.5, height_in=4.2)
     axis: Axes = figure.subplots()
     axis.axhline(0.0, color="#999999", linewidth=0.8)
     axis.plot(
-        3.6 * speed_mps, share, color=RUN_COLOURS[1], linewidth=1.6, label="keeps the sideslip angle at zero (eq. 5)"
+        3.6 * speed_mps, ratio, color=RUN_COLOURS[1], linewidth=1.6, label="keeps the sideslip angle at zero (eq. 5)"
     )
     if gain != 1.0:
         label = f"used by the rear system: {100.0 * gain:.3g} %"
-        axis.plot(3.6 * speed_mps, gain * share, "--", color=RUN_COLOURS[1], linewidth=1.4, label=label)
-    zero = np.flatnonzero((share[:-1] < 0.0) & (share[1:] >= 0.0))
+        axis.plot(3.6 * speed_mps, gain * ratio, "--", color=RUN_COLOURS[1], linewidth=1.4, label=label)
+    zero = np.flatnonzero((ratio[:-1] < 0.0) & (ratio[1:] >= 0.0))
     if zero.size:
-        at = 3.6 * float(np.interp(0.0, share[zero[0] : zero[0] + 2], speed_mps[zero[0] : zero[0] + 2]))
+        at = 3.6 * float(np.interp(0.0, ratio[zero[0] : zero[0] + 2], speed_mps[zero[0] : zero[0] + 2]))
         axis.annotate(
             f"{at:.0f} km/h", (at, 0.0), (10, -16), textcoords="offset points", color="#555555",
             arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.8},
@@ -109,12 +74,7 @@ def figure_9(recording: RecordingLike) -> Figure:
     bands: dict[tuple[float, float], list[str]] = {}
     for system in ("ars", "afs"):
         corrector = _parameters(recording, "controllers", system, "corrector")
-        try:
-            band = float(corrector["off_radps"]), float(corrector["full_radps"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise RecordingError(
-                f"the metadata's 'vehicle.controllers.{system}.corrector' gives no tolerance band: {error}"
-            ) from error
+        band = _number(corrector, "off_radps"), _number(corrector, "full_radps")
         bands.setdefault(band, []).append(system)
     end = 1.6 * max(full for _, full in bands)
     error_radps = np.linspace(-end, end, 1001)
@@ -123,7 +83,8 @@ def figure_9(recording: RecordingLike) -> Figure:
     for (off, full), systems in bands.items():
         colour = RUN_COLOURS[list(SYSTEM_LABELS).index(systems[0])] if len(systems) == 1 else RUN_COLOURS[0]
         label = " and ".join(SYSTEM_LABELS[system] for system in systems)
-        axis.plot(np.degrees(error_radps), tolerance(error_radps, off, full), color=colour, linewidth=1.6, label=label)
+        activity = [tolerance(error, off, full) for error in error_radps.tolist()]
+        axis.plot(np.degrees(error_radps), activity, color=colour, linewidth=1.6, label=label)
         for name, value in (("off", off), ("in", full)):
             axis.axvline(math.degrees(value), color=colour, linewidth=0.8, linestyle=":")
             axis.annotate(
@@ -145,3 +106,20 @@ def _parameters(recording: RecordingLike, *keys: str) -> Mapping[str, Any]:
     if not isinstance(table, Mapping):
         raise RecordingError(f"the metadata of the recording have no table 'vehicle.{'.'.join(keys)}'")
     return table
+
+
+def _single_track(recording: RecordingLike) -> SingleTrack:
+    source = Source("the metadata of the recording", error=RecordingError)
+    table = _parameters(recording, "single_track")
+    parameters = build(SingleTrackParameters, table, source, ("vehicle", "single_track"))
+    try:
+        return SingleTrack(parameters)
+    except ParameterError as error:
+        raise RecordingError(f"the metadata of the recording: {error}") from error
+
+
+def _number(table: Mapping[str, Any], key: str, default: float | None = None) -> float:
+    value = table.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise RecordingError(f"the controllers in the metadata of the recording: {key} is {shown(value)}, not a number")
+    return float(value)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+import math
+
 import numpy as np
 import pytest
 
 from activesteer.analysis.figures import BY_SCENARIO, draw_all, figure_for, theory, time_histories, tracks
-from activesteer.controllers.corrector import tolerance
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
+from activesteer.theory.tolerance import tolerance
 from tests.unit.analysis.made_up import (
     COMPLETION_S,
     LANES,
@@ -130,26 +133,42 @@ def test_a_path_without_gates_can_be_drawn(tmp_path):
     assert figure_for("follow_path")({"none": run}, tmp_path / "figure.png").exists()
 
 
-def test_predicted_angle_is_that_of_the_controllers():
-    parameters = VEHICLE["single_track"]
-    single_track = SingleTrack(SingleTrackParameters(**parameters))
-    speeds = np.array([5.0, 20.0, 40.0])
-    expected = [single_track.rear_prediction(v)[0] for v in speeds]
-    np.testing.assert_allclose(theory.predicted_rear_angle(parameters, speeds), expected)
-
-
-def test_tolerance_function_is_that_of_the_controllers():
-    errors = np.linspace(-0.01, 0.01, 41)
-    expected = [tolerance(float(error), 0.002, 0.005) for error in errors]
-    np.testing.assert_allclose(theory.tolerance(errors, 0.002, 0.005), expected, atol=1e-12)
-    np.testing.assert_allclose(theory.tolerance(np.array([-0.2, 0.1, 0.3]), 0.1, 0.1), [1.0, 0.0, 1.0])
-
-
-def test_figure_7_shows_what_is_predicted_and_what_share_of_it_is_used():
+def test_figure_7_shows_the_predicted_angle_and_how_much_of_it_is_used():
     axis = theory.figure_7(step_steer()).get_axes()[0]
+    speed_kmh = np.asarray(axis.get_lines()[1].get_xdata())
     predicted, used = (np.asarray(line.get_ydata()) for line in axis.get_lines()[1:3])
+    single_track = SingleTrack(SingleTrackParameters(**VEHICLE["single_track"]))
+    np.testing.assert_allclose(predicted, [single_track.rear_prediction(v / 3.6)[0] for v in speed_kmh])
     np.testing.assert_allclose(used, 0.1 * predicted)
     assert predicted[0] < 0.0 < predicted[-1]
+
+
+def test_figure_9_shows_the_tolerance_function_of_the_controllers():
+    line = theory.figure_9(step_steer()).get_axes()[0].get_lines()[0]
+    errors = np.radians(np.asarray(line.get_xdata()))
+    np.testing.assert_allclose(line.get_ydata(), [tolerance(error, 0.002, 0.005) for error in errors], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("draw", "keys", "value"),
+    [
+        (theory.figure_7, ("single_track", "mass_kg"), "heavy"),
+        (theory.figure_7, ("single_track", "mass_kg"), -1.0),
+        (theory.figure_7, ("single_track", "rear_stiffness_Nprad"), 1.0),  # a car that oversteers
+        (theory.figure_7, ("controllers", "ars", "prediction_gain"), "all"),
+        (theory.figure_9, ("controllers", "afs", "corrector", "off_radps"), math.nan),
+        (theory.figure_9, ("controllers", "afs", "corrector"), [0.1, 0.2]),
+    ],
+)
+def test_damaged_parameters_are_refused(draw, keys, value):
+    run = step_steer()
+    vehicle = run.metadata["vehicle"] = copy.deepcopy(VEHICLE)
+    table = vehicle
+    for key in keys[:-1]:
+        table = table[key]
+    table[keys[-1]] = value
+    with pytest.raises(RecordingError):
+        draw(run)
 
 
 @pytest.mark.parametrize(("draw", "key"), [(theory.figure_7, "single_track"), (theory.figure_9, "controllers")])
