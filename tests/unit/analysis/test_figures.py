@@ -146,7 +146,9 @@ def test_figure_7_shows_the_predicted_angle_and_how_much_of_it_is_used():
 def test_figure_9_shows_the_tolerance_function_of_the_controllers():
     line = theory.figure_9(step_steer()).get_axes()[0].get_lines()[0]
     errors = np.radians(np.asarray(line.get_xdata()))
-    np.testing.assert_allclose(line.get_ydata(), [tolerance(error, 0.002, 0.005) for error in errors], atol=1e-9)
+    np.testing.assert_allclose(
+        np.asarray(line.get_ydata()), [tolerance(error, 0.002, 0.005) for error in errors], atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(
