@@ -77,6 +77,8 @@ class DriverCommand(NamedTuple):
         brake_pedal: Brake pedal position, 0 to 1.
         saturated: Whether the lock of the steering or a limit of the engine is active.
         wheel_torques: Torques of the wheels; where given, they stand for drive and brake.
+        gear: 1 forward; -1 reverse: the engine then drives backwards and brakes forwards; 0 with the clutch open,
+            whatever torque is demanded.
         front_steer_demand_rad: Steering wheel angle demanded, divided by the overall steering ratio: the angle at the
             road wheel [rad]. A driver of one's own leaves it out; the simulation fills it in.
     """
@@ -86,6 +88,7 @@ class DriverCommand(NamedTuple):
     brake_pedal: float = 0.0
     saturated: bool = False
     wheel_torques: WheelTorques | None = None
+    gear: int = 1
     front_steer_demand_rad: float = math.nan
 
 

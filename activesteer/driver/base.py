@@ -30,6 +30,18 @@ class Driver(Protocol):
         ...
 
 
+class Drive(Protocol):
+    """What a driver knows of engine and gearbox."""
+
+    def speed_radps(self, wheel_speeds_radps: tuple[float, float, float, float], /) -> float:
+        """Mean speed of the driven wheels [rad/s], which is what the engine turns with."""
+        ...
+
+    def limits_Nm(self, speed_radps: float, gear: int, /) -> tuple[float, float]:
+        """Least and greatest torque at all wheels together in a gear, 1 or -1; forward positive [N m]."""
+        ...
+
+
 @dataclass(frozen=True)
 class DriverSetup:
     """What a driver gets when he is made.
@@ -40,8 +52,8 @@ class DriverSetup:
         steering_ratio: Steering wheel angle over road-wheel angle [-].
         steering_wheel_limit_rad: Lock angle of the steering wheel [rad].
         rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None where there is no rack.
-        max_torque_Nm: Most drive torque, all wheels together [N m].
-        engine_brake_torque_Nm: Most braking torque of the engine, positive [N m].
+        drive: What engine and gearbox can give.
+        wheel_radius_m: Radius by which the engine's speed belongs to the car's [m].
         timestep_s: Time between two steps [s].
     """
 
@@ -50,6 +62,6 @@ class DriverSetup:
     steering_ratio: float
     steering_wheel_limit_rad: float
     rack_per_steering_wheel_m: float | None
-    max_torque_Nm: float
-    engine_brake_torque_Nm: float
+    drive: Drive
+    wheel_radius_m: float
     timestep_s: float

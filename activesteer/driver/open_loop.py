@@ -39,7 +39,7 @@ class OpenLoopDriver:
     @classmethod
     def from_vehicle(cls, setup: DriverSetup) -> OpenLoopDriver:
         """Makes the driver for a car."""
-        speed_hold = SpeedHold(setup.parameters, setup.max_torque_Nm, setup.engine_brake_torque_Nm, setup.timestep_s)
+        speed_hold = SpeedHold(setup.parameters, setup.drive, setup.wheel_radius_m, setup.timestep_s)
         return cls(speed_hold, setup.steering_ratio, setup.steering_wheel_limit_rad, setup.rack_per_steering_wheel_m)
 
     def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:
@@ -80,11 +80,13 @@ class OpenLoopDriver:
         elif angle < -self._limit_rad:
             angle, saturated = -self._limit_rad, True
         if reference.hold_speed:
-            torque = self.speed_hold.step(reference.speed_demand_mps, measurement.speed_mps)
+            torque = self.speed_hold.step(reference.speed_demand_mps, measurement)
             saturated = saturated or self.speed_hold.saturated
+            gear = 1 if reference.speed_demand_mps >= 0.0 else -1
         else:
             self.speed_hold.reset()
-            torque = 0.0
+            torque, gear = 0.0, 0
         return DriverCommand(
-            angle, torque, reference.brake_pedal, saturated, reference.wheel_torques, angle / self.steering_ratio
-        )
+            angle, torque, reference.brake_pedal, saturated, reference.wheel_torques, gear,
+            angle / self.steering_ratio,
+        )  # fmt: skip

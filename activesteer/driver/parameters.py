@@ -26,3 +26,12 @@ class DriverParameters:
     """Drive torque per speed error [N m s/m]: 1 km/h off asks for about 0.9 m/s2 of a 1.4 t car."""
     speed_integral_gain_Nmpm: Annotated[float, Range(0.0)] = 600.0
     """Drive torque per integrated speed error [N m/m]: drag is trimmed out within some seconds."""
+
+    spin_mps: Annotated[float, Range(0.1)] = 2.0
+    """How much faster than the car the driven wheels may turn before the foot goes back [m/s]; one hears the engine."""
+    spin_slip: Annotated[float, Range(0.01)] = 0.2
+    """And the share of the car's speed that is added to it [-]: beyond the slip of greatest force, 0.1 to 0.15."""
+    foot_lag_s: Annotated[float, Range(0.01, 2.0)] = 0.15
+    """Time constant with which the foot goes back [s]."""
+    foot_return_per_s: Annotated[float, Range(0.01, 10.0)] = 0.5
+    """How fast it presses down again, shares of the whole way per second [1/s]."""

@@ -1,10 +1,12 @@
-"""Speed hold: a PI controller on drive torque, limited by the engine."""
+"""Speed hold: a PI controller on drive torque, within what the engine gives and the driven wheels transmit."""
 
 from __future__ import annotations
 
 from typing import Final
 
+from activesteer.driver.base import Drive
 from activesteer.driver.parameters import DriverParameters
+from activesteer.signals import Measurement
 
 _STANDSTILL_MPS: Final = 0.05
 """Below this, a wish to stand still needs no torque [m/s]."""
@@ -15,45 +17,52 @@ class SpeedHold:
 
     A speed below zero engages the reverse gear: the engine then drives backwards and brakes forwards.
 
+    Where the engine runs away from the speed of the car, wheels spin: the driver takes the foot back while they do, and
+    presses further down again slowly when they roll.
+
     Attributes:
-        saturated: Whether the engine's limit was reached in the last step.
+        saturated: Whether the engine's limit was reached, or the foot taken back, in the last step.
     """
 
-    def __init__(
-        self, parameters: DriverParameters, max_torque_Nm: float, engine_brake_torque_Nm: float, timestep_s: float
-    ) -> None:
+    def __init__(self, parameters: DriverParameters, drive: Drive, wheel_radius_m: float, timestep_s: float) -> None:
         """Takes gains and limits.
 
         Args:
             parameters: Gains.
-            max_torque_Nm: Most drive torque [N m].
-            engine_brake_torque_Nm: Most braking torque of the engine, positive [N m].
+            drive: What the engine can give.
+            wheel_radius_m: Radius by which the driver relates the engine's speed to the car's [m].
             timestep_s: Time between two steps [s].
         """
         self._gain = parameters.speed_gain_Nmspm
         self._integral_gain = parameters.speed_integral_gain_Nmpm
-        self._forward = -engine_brake_torque_Nm, max_torque_Nm
-        self._reverse = -max_torque_Nm, engine_brake_torque_Nm
+        self._drive = drive
+        self._wheel_radius_m = wheel_radius_m
+        self._spin_mps = parameters.spin_mps
+        self._spin_slip = parameters.spin_slip
+        self._keep = max(0.0, 1.0 - timestep_s / parameters.foot_lag_s)
+        self._return = parameters.foot_return_per_s * timestep_s
         self._timestep_s = timestep_s
         self._integral_Nm = 0.0
+        self._pedal = 1.0
         self.saturated = False
 
-    def step(self, wanted_mps: float, speed_mps: float) -> float:
+    def step(self, wanted_mps: float, measurement: Measurement) -> float:
         """Drive torque for a speed.
 
         Args:
             wanted_mps: Speed to hold [m/s].
-            speed_mps: Speed measured [m/s].
+            measurement: What the car's sensors say: its speed, and those of its wheels.
 
         Returns:
             Torque at the driven wheels together [N m].
         """
-        if wanted_mps == 0.0 and abs(speed_mps) < _STANDSTILL_MPS:
+        speed = measurement.speed_mps
+        if wanted_mps == 0.0 and abs(speed) < _STANDSTILL_MPS:
             self.reset()
             return 0.0
-        error = wanted_mps - speed_mps
+        error = wanted_mps - speed
         torque = self._gain * error + self._integral_Nm
-        low, high = self._forward if wanted_mps >= 0.0 else self._reverse
+        low, high = self._limits(speed, measurement.wheel_speed_radps, torque, 1 if wanted_mps >= 0.0 else -1)
         if torque > high:
             self.saturated = True
             return high
@@ -64,7 +73,31 @@ class SpeedHold:
         self._integral_Nm += self._integral_gain * error * self._timestep_s
         return torque
 
+    def _limits(
+        self,
+        speed_mps: float,
+        wheel_speeds_radps: tuple[float, float, float, float],
+        torque_Nm: float,
+        gear: int,
+    ) -> tuple[float, float]:
+        """Least and greatest torque that the foot asks for, as far as the wheels do not spin [N m]."""
+        engine_radps = self._drive.speed_radps(wheel_speeds_radps)
+        low, high = self._drive.limits_Nm(engine_radps, gear)
+        overspeed = engine_radps * self._wheel_radius_m - speed_mps
+        if gear < 0:
+            overspeed, most, asked = -overspeed, -low, -torque_Nm
+        else:
+            most, asked = high, torque_Nm
+        if overspeed > self._spin_mps + self._spin_slip * abs(speed_mps):
+            # The foot comes back from where it is, not from the floor.
+            pedal = min(self._pedal, asked / most) if most > 0.0 else self._pedal
+            self._pedal = self._keep * max(pedal, 0.0)
+        elif self._pedal < 1.0:
+            self._pedal = min(1.0, self._pedal + self._return)
+        return (self._pedal * low, high) if gear < 0 else (low, self._pedal * high)
+
     def reset(self) -> None:
         """Forgets the trim, as when the driver takes his foot off."""
         self._integral_Nm = 0.0
+        self._pedal = 1.0
         self.saturated = False

@@ -14,6 +14,7 @@ from activesteer.maneuver import Maneuver, build_maneuver, filled_from_csv, mane
 from activesteer.resources import find_maneuver
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
 from activesteer.scenario.overrides import Override, applied, plain
+from activesteer.vehicle.powertrain import Drive
 
 
 @dataclass(frozen=True)
@@ -37,12 +38,14 @@ class Scenario:
         car = self.car.config
         return ControllerSetup(car.single_track, car.controllers, car.steering.ratio, self.maneuver.road.mu, timestep_s)
 
-    def driver_setup(self, timestep_s: float, rack_per_steering_wheel_m: float | None) -> DriverSetup:
+    def driver_setup(
+        self, timestep_s: float, rack_per_steering_wheel_m: float | None, wheel_radius_m: float
+    ) -> DriverSetup:
         """What drivers may know."""
         car = self.car.config
         return DriverSetup(
             car.single_track, car.driver, car.steering.ratio, car.steering.steering_wheel_limit_rad,
-            rack_per_steering_wheel_m, car.powertrain.max_torque_Nm, car.powertrain.engine_brake_torque_Nm, timestep_s,
+            rack_per_steering_wheel_m, Drive(car.powertrain), wheel_radius_m, timestep_s,
         )  # fmt: skip
 
 

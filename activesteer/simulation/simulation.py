@@ -58,7 +58,7 @@ class Simulation:
         """
         self.maneuver = maneuver = scenario.maneuver
         self.vehicle = vehicle = scenario.car.on(maneuver.road, timestep_s)
-        setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m)
+        setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
         self.driver: Driver = StandardDriver.from_vehicle(setup)
         self.controller: Controller = load_controller(controller, scenario.controller_setup(timestep_s))
         self._controller_name = controller

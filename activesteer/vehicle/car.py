@@ -23,6 +23,7 @@ from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.loading import find, load_model
 from activesteer.vehicle.native_forces import install_native_forces
 from activesteer.vehicle.parameters import VehicleParameters
+from activesteer.vehicle.powertrain import CLUTCH_OPEN
 
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _FASTEST_MPS: Final = 200.0
@@ -118,21 +119,22 @@ class Vehicle:
         self._sensed = data.sensordata[: last + 1]
         block = int(model.numeric_data[-fb.TRAILER_SIZE])
         self._areas_felt = model.numeric_data[block + fb.AREAS_FELT : block + fb.AREAS_FELT + 1]
+        self._block_gear = model.numeric_data[block + fb.GEAR : block + fb.GEAR + 1]
+        self._gear: float = CLUTCH_OPEN
         self._root = int(model.jnt_qposadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
         self._root_dof = int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
         self._yaw_dof = self._root_dof + 5
         self._spins = [
             int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_spin")]) for corner in CORNERS
         ]
+        self._spin_armature_kgm2 = model.dof_armature[self._spins].tolist()
         if self._root or self._root_dof:
             msg = "the free joint 'root' of the chassis must be the first joint of the model"
             raise ModelError(msg)
         powertrain, brakes = self.parameters.powertrain, self.parameters.brakes
-        front, rear = 0.5 * powertrain.front_share, 0.5 * (1.0 - powertrain.front_share)
-        shares = zip(CORNERS, (front, front, rear, rear), strict=True)
+        shares = zip(CORNERS, powertrain.wheel_shares, strict=True)
         self._drives = tuple((actuator(f"{corner}_drive"), share) for corner, share in shares if share > 0.0)
-        each = [actuator(f"{corner}_drive") for corner in CORNERS]
-        self._each_drive = tuple((index, int(model.actuator_actadr[index])) for index in each)
+        self._each_drive = tuple(actuator(f"{corner}_drive") for corner in CORNERS)
         torques = (brakes.front_torque_Nm, brakes.front_torque_Nm, brakes.rear_torque_Nm, brakes.rear_torque_Nm)
         self._brakes = tuple((actuator(f"{corner}_brake"), most) for corner, most in zip(CORNERS, torques, strict=True))
         self._ratio = self.parameters.steering.ratio
@@ -163,6 +165,13 @@ class Vehicle:
         data.time = 0.0
         mujoco.mj_forward(self.model, data)
         return self.measure()
+
+    @property
+    def wheel_radius_m(self) -> float:
+        """Mean height of the driven wheels' centres where the car now is, by their shares of the torque [m]."""
+        return sum(
+            share * self._rolling_radius(index) for index, share in enumerate(self.parameters.powertrain.wheel_shares)
+        )
 
     def _rolling_radius(self, corner: int) -> float:
         """Height of a wheel centre [m]: the settling before a manoeuvre corrects the rest."""
@@ -216,8 +225,12 @@ class Vehicle:
         ctrl[self._superposition] = steer.superposition_demand_rad * self._ratio
         left, right = self._rear
         ctrl[left] = ctrl[right] = steer.rear_steer_demand_rad
-        if command.drive_torque_demand_Nm != self._drive_torque_Nm:
-            self._drive_torque_Nm = torque = command.drive_torque_demand_Nm
+        gear = command.gear if command.wheel_torques is None else CLUTCH_OPEN
+        if gear != self._gear:
+            self._engage(gear)
+        torque = command.drive_torque_demand_Nm if gear != CLUTCH_OPEN else 0.0
+        if torque != self._drive_torque_Nm:
+            self._drive_torque_Nm = torque
             for index, share in self._drives:
                 ctrl[index] = share * torque
         if command.brake_pedal != self._brake:
@@ -229,11 +242,19 @@ class Vehicle:
         mujoco.mj_step(self.model, self.data)
         return self.measure(), self.motion()
 
+    def _engage(self, gear: int) -> None:
+        """Couples the engine to the driven wheels, each of which then carries its share of the inertia, or frees it."""
+        self._gear = self._block_gear[0] = gear
+        powertrain = self.parameters.powertrain
+        inertia_kgm2 = 0.0 if gear == CLUTCH_OPEN else powertrain.inertia_kgm2
+        for dof, own, share in zip(self._spins, self._spin_armature_kgm2, powertrain.wheel_shares, strict=True):
+            self.model.dof_armature[dof] = own + share * inertia_kgm2
+
     def _apply_torques(self, torques: WheelTorques) -> None:
-        """Torques of the wheels, one by one: drive torques at once, without the lag of the engine."""
-        ctrl, act = self._ctrl, self.data.act
-        for (index, state), torque in zip(self._each_drive, torques.drive_Nm, strict=True):
-            ctrl[index] = act[state] = torque
+        """Torques of the wheels, one by one: past the engine, so at once and whatever that can give."""
+        ctrl = self._ctrl
+        for index, torque in zip(self._each_drive, torques.drive_Nm, strict=True):
+            ctrl[index] = torque
         for (index, _), torque in zip(self._brakes, torques.brake_Nm, strict=True):
             ctrl[index] = torque
         # Whatever is commanded next in the usual way is to be written again.
@@ -331,8 +352,8 @@ class Vehicle:
     def restore_state(self, state: NDArray[np.float64]) -> None:
         """Puts a saved state back."""
         mujoco.mj_setState(self.model, self.data, state, _STATE)
-        # The step writes drive and brake only where they change; these values never occur, so it writes them now.
-        self._drive_torque_Nm = self._brake = math.nan
+        # The step writes drive, brake and gear only where they change; these values never occur, so it writes them now.
+        self._drive_torque_Nm = self._brake = self._gear = math.nan
 
     def dimensions(self) -> dict[str, float | list[float]]:
         """What an evaluation needs of the car's outline [m]: width, wheelbase, tracks and tyre widths, as designed."""

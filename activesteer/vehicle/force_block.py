@@ -24,8 +24,9 @@ TRAILER_SIZE: Final = 2
 (
     N_WHEELS, N_DAMPERS, N_DOFS, N_BODIES, N_USERDATA, N_ACTIVATIONS, N_CONTROLS, N_TENDONS, N_TENDON_JACOBIAN,
     CHASSIS_BODY, CHASSIS_ROOT, CHASSIS_N_DOFS, DRAG_Ns2pm2, AERO_X_m, AERO_Y_m, AERO_Z_m,
-    WHEELS_START, DAMPERS_START, ACTUATORS_START, N_AREAS, AREAS_START, AREAS_FELT, CHASSIS_DOFS, HEADER_SIZE,
-) = range(24)  # fmt: skip
+    WHEELS_START, DAMPERS_START, ACTUATORS_START, N_AREAS, AREAS_START, AREAS_FELT,
+    ENGINE_TORQUE_Nm, ENGINE_POWER_W, ENGINE_LIMIT_radps, ENGINE_DRAG_Nm, GEAR, CHASSIS_DOFS, HEADER_SIZE,
+) = range(29)  # fmt: skip
 
 MAX_CHAIN: Final = 32
 """Most degrees of freedom between the world and a wheel."""
@@ -33,8 +34,8 @@ MAX_CHAIN: Final = 32
 # One record per wheel; the chain of degrees of freedom follows.
 (
     W_BODY, W_ROOT, W_ACT_X, W_ACT_Y, W_ACT_Z, W_MU, W_PRESSURE_Pa, W_LOW_SPEED_mps, W_LOW_SPEED_DAMPING_Nspm,
-    W_TYRE_START, W_CHAIN_LENGTH, W_CHAIN,
-) = range(12)  # fmt: skip
+    W_TYRE_START, W_SPIN, W_DRIVE_SHARE, W_CHAIN_LENGTH, W_CHAIN,
+) = range(14)  # fmt: skip
 WHEEL_SIZE: Final = W_CHAIN + MAX_CHAIN
 
 # One record per damper: a tendon, its place in the sparse tendon Jacobian, and a piecewise linear curve.
@@ -48,7 +49,7 @@ DAMPER_SIZE: Final = D_FORCE + MAX_CURVE_POINTS
 # A_FIRST to A_HIGH hold what its kind needs; `loading._actuator` fills them.
 A_KIND, A_ACT, A_FIRST, A_SECOND, A_LOW, A_HIGH = range(6)
 ACTUATOR_SIZE: Final = 6
-KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE, KIND_FRICTION = 0.0, 1.0, 2.0, 3.0, 4.0
+KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE, KIND_FRICTION, KIND_DRIVE = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 ALONG_JOINT, ALONG_TENDON = 0.0, 1.0
 
 # One record per area of the road with a friction of its own: a rectangle in world axes [m]. They count while
@@ -79,6 +80,8 @@ class WheelEntry:
     low_speed_damping_Nspm: float
     chain: list[int]
     tyre: np.record
+    spin: int = 0
+    drive_share: float = 0.0
 
 
 @dataclass
@@ -102,6 +105,7 @@ class ForceBlock:
         chassis_chain: Degrees of freedom between the world and it.
         drag_Ns2pm2: Drag over the square of the speed.
         aero_point_m: Where drag acts, in the body's axes.
+        engine: The numbers of `powertrain.drive_limits`, and the gear at the beginning.
         wheels: The wheels.
         dampers: The dampers.
         actuators: One record per actuator, in the model's order.
@@ -113,6 +117,7 @@ class ForceBlock:
     chassis_chain: list[int]
     drag_Ns2pm2: float
     aero_point_m: tuple[float, float, float]
+    engine: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     wheels: list[WheelEntry] = field(default_factory=list)
     dampers: list[DamperEntry] = field(default_factory=list)
     actuators: list[tuple[float, float, float, float, float, float]] = field(default_factory=list)
@@ -136,7 +141,7 @@ class ForceBlock:
             len(self.wheels), len(self.dampers), model.nv, model.nbody, model.nuserdata, model.na, model.nu,
             model.ntendon, model.nJten, self.chassis_body, model.body_rootid[self.chassis_body],
             len(self.chassis_chain), self.drag_Ns2pm2, *self.aero_point_m, wheels_start, dampers_start, actuators_start,
-            len(self.areas), areas_start, 0.0,
+            len(self.areas), areas_start, 0.0, *self.engine,
         )  # fmt: skip
         block[CHASSIS_DOFS] = HEADER_SIZE
         block[HEADER_SIZE : HEADER_SIZE + len(self.chassis_chain)] = self.chassis_chain
@@ -145,7 +150,8 @@ class ForceBlock:
             record = block[self.wheel_start(index) : self.wheel_start(index + 1)]
             record[:W_CHAIN] = (
                 wheel.body, wheel.root, wheel.act_x, wheel.act_y, wheel.act_z, wheel.mu, wheel.pressure_Pa,
-                wheel.low_speed_mps, wheel.low_speed_damping_Nspm, tyre_start, len(wheel.chain),
+                wheel.low_speed_mps, wheel.low_speed_damping_Nspm, tyre_start, wheel.spin, wheel.drive_share,
+                len(wheel.chain),
             )  # fmt: skip
             record[W_CHAIN : W_CHAIN + len(wheel.chain)] = wheel.chain
             block[tyre_start : tyre_start + tyres[index].size] = tyres[index]

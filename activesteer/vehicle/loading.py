@@ -15,6 +15,7 @@ from activesteer.road.road import Road
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, DamperCurve, VehicleParameters
+from activesteer.vehicle.powertrain import CLUTCH_OPEN
 
 _USER_DYNAMICS: Final = int(mujoco.mjtDyn.mjDYN_USER)
 _RATES: Final = {"slip_x": fb.U_RATE_X, "slip_y": fb.U_RATE_Y, "slip_z": fb.U_RATE_Z}
@@ -62,11 +63,10 @@ def load_model(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Gives the drive its lag, brakes and friction their stiffness; forces follow the activation reached in a step."""
+    """Gives the drive its state, brakes and friction their stiffness; forces follow the activation at a step's end."""
     for actuator in spec.actuators:
         if actuator.name.endswith("_drive"):
-            actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
-            actuator.dynprm[0] = parameters.powertrain.lag_s
+            actuator.dyntype = mujoco.mjtDyn.mjDYN_USER
         actuator.actearly = int(actuator.dyntype) == _USER_DYNAMICS
         if actuator.name.endswith("_brake"):
             actuator.gainprm[0] = -parameters.brakes.stiffness_Nmprad
@@ -139,13 +139,20 @@ def _force_block(
     road: Road,
 ) -> fb.ForceBlock:
     chassis = find(model, mujoco.mjtObj.mjOBJ_BODY, "chassis")
-    aero = parameters.aerodynamics
+    aero, powertrain = parameters.aerodynamics, parameters.powertrain
     block = fb.ForceBlock(
         model=model,
         chassis_body=chassis,
         chassis_chain=chain_to(model, chassis),
         drag_Ns2pm2=0.5 * aero.air_density_kgpm3 * aero.drag_area_m2,
         aero_point_m=_triple(aero.pressure_point_m),
+        engine=(
+            powertrain.max_torque_Nm,
+            powertrain.max_power_W,
+            powertrain.max_wheel_speed_radps,
+            powertrain.engine_brake_torque_Nm,
+            CLUTCH_OPEN,
+        ),
     )
     for corner in CORNERS:
         front = corner.startswith("f")
@@ -187,6 +194,8 @@ def _wheel(
         pressure_Pa=pressure if pressure is not None else tyre["INFLPRES"],
         low_speed_mps=fitment.low_speed_mps,
         low_speed_damping_Nspm=fitment.low_speed_damping_Nspm,
+        spin=int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_spin")]),
+        drive_share=parameters.powertrain.wheel_shares[CORNERS.index(corner)],
         chain=chain,
         tyre=tyre.mounted_on("LEFT" if corner.endswith("l") else "RIGHT").record,
     )
@@ -221,6 +230,9 @@ def _actuator(
         wheel = CORNERS.index(corner)
         slot = wheel * fb.USERDATA_PER_WHEEL + _RATES[state]
         return (fb.KIND_SLIP, address, float(slot), 0.0, 0.0, 0.0)
+    if state == "drive":
+        share = parameters.powertrain.wheel_shares[CORNERS.index(corner)]
+        return (fb.KIND_DRIVE, address, share, parameters.powertrain.lag_s, 0.0, 0.0)
     if name.endswith("_brake"):
         brakes = parameters.brakes
         most = brakes.front_torque_Nm if name.startswith("f") else brakes.rear_torque_Nm
@@ -230,10 +242,11 @@ def _actuator(
         force, stiffness = _friction(name, parameters)
         part = int(model.actuator_trnid[index, 0])
         if int(model.actuator_trntype[index]) == mujoco.mjtTrn.mjTRN_TENDON:
-            vibration = parameters.friction.vibration_mps / math.sqrt(VIBRATION_AT_MPS)
-            return (fb.KIND_FRICTION, address, vibration, float(part), force / stiffness, fb.ALONG_TENDON)
-        # The rack: what shakes the wheels up and down hardly moves it.
-        return (fb.KIND_FRICTION, address, 0.0, float(model.jnt_dofadr[part]), force / stiffness, fb.ALONG_JOINT)
+            vibration, along = parameters.friction.vibration_mps / math.sqrt(VIBRATION_AT_MPS), fb.ALONG_TENDON
+        else:
+            # The rack: what shakes the wheels up and down hardly moves it.
+            vibration, along, part = 0.0, fb.ALONG_JOINT, int(model.jnt_dofadr[part])
+        return (fb.KIND_FRICTION, address, vibration, float(part), force / stiffness, along)
     lag, rate = (float(value) for value in model.actuator_dynprm[index, :2])
     if lag <= 0.0 or rate <= 0.0:
         msg = f"actuator {name!r}: dynprm is {lag:g} {rate:g}; a lag [s] and a rate limit [rad/s] above 0 are needed"

@@ -10,6 +10,7 @@ scalar product of its motion axis (`cdof`, about the centre of mass of the tree)
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 import mujoco
@@ -23,6 +24,7 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.dry_friction import friction_rate
 from activesteer.vehicle.engine_layout import EngineLayout, measure_engine_layout
 from activesteer.vehicle.native_memory import array_at, f64_pointer, pointer_to, word
+from activesteer.vehicle.powertrain import CLUTCH_OPEN, drive_limits
 
 _MARKER: Final = fb.MARKER
 _tyre_pointer: Final = pointer_to(from_dtype(TYRE_RECORD))
@@ -185,6 +187,40 @@ def _drag(block, xpos, xmat, com, cvel, cdof, qfrc):
     _apply(qfrc, cdof, chain, fx, fy, 0.0, -pz * fy, pz * fx, px * fy - py * fx)
 
 
+@inlined
+def _drive_rate(block, qvel, share, lag_s, command, state, timestep_s):
+    """Rate of a wheel's drive torque: a first-order lag, within what the engine can give at the speed of its wheels."""
+    if block[fb.GEAR] == CLUTCH_OPEN:
+        return (command - state) / timestep_s
+    speed = 0.0
+    for index in range(int(block[fb.N_WHEELS])):
+        wheel = block[int(block[fb.WHEELS_START]) + index * fb.WHEEL_SIZE :]
+        speed += wheel[fb.W_DRIVE_SHARE] * qvel[int(wheel[fb.W_SPIN])]
+    low, high = drive_limits(
+        speed,
+        block[fb.GEAR],
+        block[fb.ENGINE_TORQUE_Nm],
+        block[fb.ENGINE_POWER_W],
+        block[fb.ENGINE_LIMIT_radps],
+        block[fb.ENGINE_DRAG_Nm],
+    )
+    torque = state - (command - state) * math.expm1(-timestep_s / lag_s)
+    if share == 0.0:
+        # Not driven: nothing is commanded, and what came past the engine before dies away.
+        return (torque - state) / timestep_s
+    return (min(max(torque, share * low), share * high) - state) / timestep_s
+
+
+@inlined
+def _brake_rate(entry, qvel, command, state, timestep_s):
+    """Elasto-plastic friction: the pads wind up with the wheel and slip where the torque reaches the demand."""
+    speed = qvel[int(entry[fb.A_SECOND])]
+    # The drag of pads, bearings and seals is always there; it is also what keeps a car from creeping at rest.
+    limit = min(max(command, entry[fb.A_LOW]), entry[fb.A_HIGH]) / entry[fb.A_FIRST]
+    wound = min(max(state + timestep_s * speed, -limit), limit)
+    return (wound - state) / timestep_s
+
+
 def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any]:
     """Compiles the two callbacks, or loads them from numba's cache.
 
@@ -234,8 +270,11 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any]:
             rate = (command - state) / entry[fb.A_FIRST]
             return min(max(rate, -entry[fb.A_SECOND]), entry[fb.A_SECOND])
         timestep_s = carray(f64_pointer(model + m_timestep), (1,))[0]
-        if kind == fb.KIND_FRICTION:
-            qvel = array_at(data, d_qvel, int(block[fb.N_DOFS]))
+        qvel = array_at(data, d_qvel, int(block[fb.N_DOFS]))
+        rate = 0.0
+        if kind == fb.KIND_DRIVE:
+            rate = _drive_rate(block, qvel, entry[fb.A_FIRST], entry[fb.A_SECOND], command, state, timestep_s)
+        elif kind == fb.KIND_FRICTION:
             index = int(entry[fb.A_SECOND])
             if entry[fb.A_HIGH] == fb.ALONG_TENDON:
                 speed = array_at(data, d_ten_velocity, int(block[fb.N_TENDONS]))[index]
@@ -243,15 +282,10 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any]:
                 speed = qvel[index]
             # The free joint of the chassis is the first (`Vehicle` sees to it): its velocity in the world.
             vibration = entry[fb.A_FIRST] * (qvel[0] * qvel[0] + qvel[1] * qvel[1]) ** 0.25
-            return friction_rate(state, speed, vibration, entry[fb.A_LOW], timestep_s)
-        if kind == fb.KIND_BRAKE:
-            # Elasto-plastic friction: the pads wind up with the wheel and slip where the torque reaches the demand.
-            speed = array_at(data, d_qvel, int(block[fb.N_DOFS]))[int(entry[fb.A_SECOND])]
-            # The drag of pads, bearings and seals is always there; it is also what keeps a car from creeping at rest.
-            limit = min(max(command, entry[fb.A_LOW]), entry[fb.A_HIGH]) / entry[fb.A_FIRST]
-            wound = min(max(state + timestep_s * speed, -limit), limit)
-            return (wound - state) / timestep_s
-        return 0.0
+            rate = friction_rate(state, speed, vibration, entry[fb.A_LOW], timestep_s)
+        elif kind == fb.KIND_BRAKE:
+            rate = _brake_rate(entry, qvel, command, state, timestep_s)
+        return rate
 
     return passive, actuator_rate
 

@@ -108,16 +108,28 @@ class Brakes:
 
 @dataclass(frozen=True)
 class Powertrain:
-    """Torque at the driven wheels and where it goes."""
+    """Engine, gearbox and differentials: torque at the driven wheels and where it goes; see `powertrain`."""
 
     front_share: Share
     """Share of the drive torque at the front axle; each axle's part is split evenly [-]."""
-    max_torque_Nm: NotNegative
-    """Most drive torque at all wheels together [N m]."""
+    max_torque_Nm: Positive
+    """Most drive torque at all wheels together, in first gear [N m]."""
+    max_power_W: Positive
+    """Most power at all wheels together: the engine's less the losses of the gears [W]."""
     engine_brake_torque_Nm: NotNegative
-    """Most braking torque of the engine at all wheels together [N m]."""
+    """Drag of the engine at all wheels together, in first gear [N m]; less in the longer gears of higher speeds."""
+    max_wheel_speed_radps: Positive = 250.0
+    """Mean speed of the driven wheels at which the engine is at its rev limit in top gear [rad/s]."""
+    inertia_kgm2: NotNegative = 0.0
+    """Inertia of engine and gears at all driven wheels together, in a gear that stands for all [kg m2]."""
     lag_s: Annotated[float, Range(0.001, 2.0)] = 0.1
     """Time constant of the torque behind its demand: filling of the engine, twist of the driveline [s]."""
+
+    @property
+    def wheel_shares(self) -> tuple[float, float, float, float]:
+        """Share of the drive torque that each wheel gets [-], order of `CORNERS`."""
+        front, rear = 0.5 * self.front_share, 0.5 * (1.0 - self.front_share)
+        return front, front, rear, rear
 
 
 @dataclass(frozen=True)

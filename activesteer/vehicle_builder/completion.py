@@ -51,8 +51,10 @@ def complete(
         log.note("brakes", "2200 and 700 N m per wheel", "the compact's: 1.35 g of a car of 1430 kg, 76 % in front")
     powertrain = table.powertrain
     if powertrain is None:
-        powertrain = Powertrain(front_share=1.0, max_torque_Nm=1900.0, engine_brake_torque_Nm=350.0)
-        log.note("powertrain", "front-wheel drive, 1900 N m", "the compact's")
+        powertrain = Powertrain(
+            front_share=1.0, max_torque_Nm=3170.0, max_power_W=101e3, engine_brake_torque_Nm=345.0, inertia_kgm2=3.7
+        )
+        log.note("powertrain", "front-wheel drive, 101 kW and 3170 N m at the wheels", "the compact's")
     aero = table.aerodynamics
     if aero is None:
         middle = 0.5 * float(front.wheel_centre_m[0] + rear.wheel_centre_m[0])

@@ -6,6 +6,7 @@ import pytest
 
 from activesteer.driver import ConstantRadiusDriver, DriverParameters, OpenLoopDriver, SpeedHold
 from activesteer.signals import Measurement, Motion, Reference
+from tests.unit.driver.drives import DRIVE
 
 RATIO, WHEELBASE_M, LOCK_RAD, SPEED_MPS, STEP_S = 16.0, 2.6, 8.0, 15.0, 0.001
 MOTION = Motion(0.0, 0.0, 0.0, SPEED_MPS, 0.0, 0.0)
@@ -14,7 +15,7 @@ UNDERSTEER = 1.4
 
 
 def driver() -> ConstantRadiusDriver:
-    hold = SpeedHold(DriverParameters(), max_torque_Nm=1900.0, engine_brake_torque_Nm=350.0, timestep_s=STEP_S)
+    hold = SpeedHold(DriverParameters(), DRIVE, 0.31, STEP_S)
     return ConstantRadiusDriver(OpenLoopDriver(hold, RATIO, LOCK_RAD), WHEELBASE_M, STEP_S)
 
 

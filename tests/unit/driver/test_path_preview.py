@@ -10,6 +10,7 @@ import pytest
 from activesteer.driver import DriverParameters, OpenLoopDriver, PathPreviewDriver, SpeedHold
 from activesteer.road.path import Path
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+from tests.unit.driver.drives import DRIVE
 
 RATIO, LOCK_RAD, TIMESTEP_S = 16.0, 8.0, 0.001
 STRAIGHT = Path.through([0.0, 300.0], [0.0, 0.0])
@@ -26,7 +27,7 @@ def matrices(speed_mps: float) -> tuple[np.ndarray, np.ndarray]:
 
 def driver(parameters: DriverParameters | None = None) -> PathPreviewDriver:
     known = parameters or DriverParameters()
-    robot = OpenLoopDriver(SpeedHold(known, 1900.0, 350.0, TIMESTEP_S), RATIO, LOCK_RAD)
+    robot = OpenLoopDriver(SpeedHold(known, DRIVE, 0.31, TIMESTEP_S), RATIO, LOCK_RAD)
     return PathPreviewDriver(robot, matrices, known, TIMESTEP_S)
 
 

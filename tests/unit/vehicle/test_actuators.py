@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from activesteer.conventions import CORNERS
-from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.signals import DriverCommand, SteerCommand, WheelTorques
 from activesteer.vehicle import Vehicle
+from activesteer.vehicle.powertrain import Drive
 from tests.unit.vehicle.cars import activation, actuator, dof, floating, standing, step
 
 SERVOS = ("superposition", "rl_steer", "rr_steer")
@@ -174,8 +175,10 @@ def generalised(vehicle: Vehicle, name: str) -> np.ndarray:
 def test_drive_torque_reacts_on_the_chassis(corner: str) -> None:
     """The half-shaft bypasses the suspension: its joints carry the torque, the car as a whole gains nothing."""
     vehicle = floating()
-    # The torque lags behind its demand: here it has arrived.
-    vehicle.data.act[vehicle.model.actuator_actadr[actuator(vehicle, f"{corner}_drive")]] = 100.0
+    torques = WheelTorques(tuple(100.0 * (each == corner) for each in CORNERS), (0.0,) * 4)  # type: ignore[arg-type]
+    before = vehicle.data.qpos.copy()
+    vehicle.step(DriverCommand(wheel_torques=torques), SteerCommand())
+    vehicle.data.qpos[:], vehicle.data.qvel[:] = before, 0.0
     force = generalised(vehicle, f"{corner}_drive")
     root = dof(vehicle, "root")
     np.testing.assert_allclose(force[root : root + 6], 0.0, atol=1e-9)
@@ -186,19 +189,62 @@ def test_drive_torque_reacts_on_the_chassis(corner: str) -> None:
 
 def test_drive_torque_lags_behind_its_demand() -> None:
     vehicle = floating()
-    index = actuator(vehicle, "fl_drive")
-    vehicle.data.ctrl[index] = 100.0
-    step(vehicle, round(vehicle.parameters.powertrain.lag_s / vehicle.timestep_s))
-    assert vehicle.data.act[vehicle.model.actuator_actadr[index]] == pytest.approx(63.2, abs=0.7)
+    for _ in range(round(vehicle.parameters.powertrain.lag_s / vehicle.timestep_s)):
+        vehicle.step(DriverCommand(drive_torque_demand_Nm=200.0), SteerCommand())
+    assert activation(vehicle, "fl_drive") == pytest.approx(63.2, abs=0.1)
 
 
-@pytest.mark.parametrize("corner", CORNERS)
-def test_brake_torque_reacts_on_the_knuckle(corner: str) -> None:
-    """Between wheel and knuckle, so that the suspension's links must carry it: no other joint feels it."""
+def test_open_clutch_takes_the_torque_away_at_once() -> None:
     vehicle = floating()
-    vehicle.data.qvel[dof(vehicle, f"{corner}_spin")] = 30.0
-    force = generalised(vehicle, f"{corner}_brake")
-    spin = dof(vehicle, f"{corner}_spin")
-    assert force[spin] == pytest.approx(-100.0, rel=1e-6)
-    others = np.delete(force, [dof(vehicle, f"{each}_spin") for each in CORNERS])
-    np.testing.assert_allclose(others, 0.0, atol=1e-9)
+    for gear, torque_Nm in ((1, 86.5), (0, 0.0)):
+        for _ in range(round(2.0 * vehicle.parameters.powertrain.lag_s / vehicle.timestep_s)):
+            vehicle.step(DriverCommand(drive_torque_demand_Nm=200.0, gear=gear), SteerCommand())
+        assert activation(vehicle, "fl_drive") == pytest.approx(torque_Nm, abs=0.1)
+
+
+@pytest.mark.parametrize(("speed_radps", "gear"), [(0.0, 1), (20.0, 1), (80.0, 1), (-20.0, 1), (-20.0, -1)])
+@pytest.mark.parametrize("front_share", [1.0, 0.4])
+def test_the_drive_gives_what_the_engine_gives_at_the_mean_speed_of_its_wheels(speed_radps, gear, front_share) -> None:
+    vehicle = floating({"powertrain.front_share": front_share, "powertrain.lag_s": 0.001})
+    engine = vehicle.parameters.powertrain
+    turning = speed_radps * np.array([0.6, 1.4, 0.9, 1.1])
+    for demand_Nm in (1e5, -1e5):
+        vehicle.data.act[:] = 0.0
+        for _ in range(30):
+            vehicle.data.qvel[:] = 0.0
+            for corner, speed in zip(CORNERS, turning, strict=True):
+                vehicle.data.qvel[dof(vehicle, f"{corner}_spin")] = speed
+            vehicle.step(DriverCommand(drive_torque_demand_Nm=demand_Nm, gear=gear), SteerCommand())
+        given = [float(vehicle.data.actuator_force[actuator(vehicle, f"{corner}_drive")]) for corner in CORNERS]
+        low, high = Drive(engine).limits_Nm(speed_radps, gear)
+        expected = high if demand_Nm > 0.0 else low
+        np.testing.assert_allclose(given, expected * np.asarray(engine.wheel_shares), rtol=1e-9, atol=1e-9)
+        assert float(np.dot(given, turning)) <= engine.max_power_W * (1.0 + 1e-12)
+
+
+def test_torques_given_wheel_by_wheel_arrive_at_once_and_unlimited() -> None:
+    vehicle = floating()
+    torques = WheelTorques((9e3, -9e3, 8e3, 0.0), (0.0, 0.0, 0.0, 0.0))
+    vehicle.step(DriverCommand(wheel_torques=torques), SteerCommand())
+    given = [vehicle.data.actuator_force[actuator(vehicle, f"{corner}_drive")] for corner in CORNERS]
+    np.testing.assert_allclose(given, torques.drive_Nm, rtol=1e-12)
+
+
+def test_engine_turns_with_the_wheels_that_it_drives_while_the_clutch_is_closed() -> None:
+    """In the air: a torque from outside speeds up wheels and engine; the rear ones carry no engine."""
+    vehicle = floating({"powertrain.inertia_kgm2": 3.0})
+    data, rest = vehicle.data, vehicle.save_state()
+
+    def inertia_kgm2(corner: str, gear: int) -> float:
+        spin, faster = dof(vehicle, f"{corner}_spin"), []
+        for torque_Nm in (0.0, 10.0):
+            vehicle.restore_state(rest)
+            data.qfrc_applied[spin] = torque_Nm
+            vehicle.step(DriverCommand(gear=gear), SteerCommand())
+            faster.append(float(data.qacc[spin]))
+        return 10.0 / (faster[1] - faster[0])
+
+    for corner, engine_kgm2 in (("fl", 1.5), ("fr", 1.5), ("rl", 0.0), ("rr", 0.0)):
+        for gear in (1, -1):
+            added = inertia_kgm2(corner, gear) - inertia_kgm2(corner, 0)
+            assert added == pytest.approx(engine_kgm2, abs=1e-4)

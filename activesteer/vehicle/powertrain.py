@@ -1,0 +1,94 @@
+"""What an engine can give at the wheels it drives, in the gear that suits the speed best.
+
+The driver always finds the gear in which the engine gives most. Over all gears that is a constant torque, the first
+gear's, up to the speed at which the engine reaches its greatest power, and constant power above:
+
+    T(u) = min(T_max, P / u)          u: mean speed of the driven wheels in the direction of the gear
+
+Mean, because a differential hands on equal torques and turns with the mean of the speeds behind it; so power in is
+power out, whatever a single wheel does. At the speed limit (top gear, rev limiter) the torque fades to zero. With the
+foot off, the engine drags. The gear shortens its drag as it does its torque, T_drag(u) = T_drag min(1, P / (T_max u)),
+and near standstill the clutch opens. Against the gear, as when rolling back on a hill, the clutch slips: the drive
+pulls with up to T_max and does not drag.
+
+Engine and gears turn with the driven wheels, which so have more inertia, but not while the clutch is open.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from activesteer.compilation import compiled
+from activesteer.vehicle.parameters import Powertrain
+
+CLUTCH_OPEN: Final = 0
+"""The gear in which the engine is apart from the wheels; what torques they get is no matter of the engine."""
+
+_FADE: Final = 0.02
+"""Share of the speed limit over which the torque fades to zero."""
+_CLUTCH_SLIPS_radps: Final = 6.0
+"""Speed of the wheels below which the clutch slips, and the engine drags the less the slower they turn [rad/s]: that of
+idling at 800 1/min in first gear."""
+
+
+@compiled
+def drive_limits(
+    speed_radps: float, gear: int, torque_Nm: float, power_W: float, limit_radps: float, drag_Nm: float
+) -> tuple[float, float]:
+    """Least and greatest torque of the drive.
+
+    Args:
+        speed_radps: Mean speed of the driven wheels, forward positive [rad/s].
+        gear: 1 forward, -1 reverse.
+        torque_Nm: Most torque at all wheels together, T_max [N m].
+        power_W: Most power at the wheels, P [W].
+        limit_radps: Speed at which the drive gives no torque any more [rad/s].
+        drag_Nm: Drag of the engine at all wheels together, in first gear, T_drag [N m].
+
+    Returns:
+        Least and greatest torque at all wheels together, forward positive [N m].
+    """
+    speed = gear * speed_radps
+    high, low = torque_Nm, 0.0
+    if speed > 0.0:
+        longer = power_W / (torque_Nm * speed)
+        longer = longer if longer < 1.0 else 1.0
+        left = (limit_radps - speed) / (_FADE * limit_radps)
+        high *= longer * min(max(left, 0.0), 1.0)
+        low = -drag_Nm * longer * min(speed / _CLUTCH_SLIPS_radps, 1.0)
+    if gear > 0:
+        return low, high
+    return -high, -low
+
+
+class Drive:
+    """The drive as its driver knows it: what it can give at the speed that the wheels have."""
+
+    def __init__(self, parameters: Powertrain) -> None:
+        """Takes the parameters."""
+        self._share = parameters.wheel_shares
+        self._limits = (
+            parameters.max_torque_Nm,
+            parameters.max_power_W,
+            parameters.max_wheel_speed_radps,
+            parameters.engine_brake_torque_Nm,
+        )
+
+    def speed_radps(self, wheel_speeds_radps: tuple[float, float, float, float]) -> float:
+        """Mean speed of the driven wheels [rad/s], by what each gets of the torque.
+
+        Args:
+            wheel_speeds_radps: Speeds of the four wheels [rad/s], order of `CORNERS`.
+        """
+        fl, fr, rl, rr = self._share
+        a, b, c, d = wheel_speeds_radps
+        return fl * a + fr * b + rl * c + rr * d
+
+    def limits_Nm(self, speed_radps: float, gear: int) -> tuple[float, float]:
+        """Least and greatest torque at all wheels together, forward positive [N m].
+
+        Args:
+            speed_radps: Mean speed of the driven wheels [rad/s].
+            gear: 1 forward, -1 reverse.
+        """
+        return drive_limits(speed_radps, gear, *self._limits)
