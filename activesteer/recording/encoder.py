@@ -14,14 +14,16 @@ from activesteer.recording.container import ChunkData
 from activesteer.recording.protobuf import FixedMessage, timestamps
 from activesteer.recording.schemas import state_layout, transforms_layout
 
-_MESSAGE_HEAD = 22  # Bytes of a message record between its length and its data: channel, sequence, two times.
+MESSAGE_HEAD = 22
+"""Bytes of a message record between its length and its data: channel, sequence, two times."""
+
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 
 
 def message_record(channel_id: int, message: FixedMessage) -> FixedMessage:
     """Frame a message as an MCAP record; its first runs are the sequence number and the two times [ns]."""
     record = FixedMessage()
-    record.constant(struct.pack("<BQH", Opcode.MESSAGE, _MESSAGE_HEAD + len(message), channel_id))
+    record.constant(struct.pack("<BQH", Opcode.MESSAGE, MESSAGE_HEAD + len(message), channel_id))
     return record.block("<u4", 1).block("<u8", 2).append(message)
 
 

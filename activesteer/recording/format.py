@@ -14,6 +14,7 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from activesteer.errors import RecordingError
+from activesteer.recording.contents import check_metadata, check_metrics
 
 FORMAT_VERSION = 1
 """Raised when a reader of the version before could misread a file."""
@@ -49,28 +50,25 @@ def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict
         The values as JSON text, without the key `metrics`; and the metrics, as numbers in text.
 
     Raises:
-        RecordingError: a value cannot be represented, or a metric is no number.
+        RecordingError: a value cannot be represented or is not what its key stands for, or a metric is no number.
     """
     texts: dict[str, str] = {}
-    metrics: dict[str, str] = {}
+    metrics = metadata.get("metrics", {})
+    if not isinstance(metrics, Mapping):
+        message = f"metadata 'metrics' is a {type(metrics).__name__} in place of numbers by name"
+        raise RecordingError(message)
+    metrics = {name: value.item() if isinstance(value, np.generic) else value for name, value in metrics.items()}
+    check_metrics(metrics)
     for key, value in metadata.items():
         if key == "metrics":
-            if not isinstance(value, Mapping):
-                message = f"metadata 'metrics' is {value!r} in place of numbers by name"
-                raise RecordingError(message)
-            for name, number in value.items():
-                try:
-                    metrics[str(name)] = repr(float(number))
-                except (TypeError, ValueError):
-                    message = f"metric {name!r} is {number!r}, which is no number"
-                    raise RecordingError(message) from None
             continue
         try:
             texts[str(key)] = json.dumps(value, default=_plain, ensure_ascii=False)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, RecursionError) as error:
             message = f"metadata {key!r} cannot be kept as JSON: {error}"
             raise RecordingError(message) from None
-    return texts, metrics
+    check_metadata({key: json.loads(text) for key, text in texts.items()})
+    return texts, {name: repr(float(value)) for name, value in metrics.items()}
 
 
 def _plain(value: object) -> object:

@@ -11,6 +11,7 @@ Source: protobuf encoding specification, https://protobuf.dev/programming-guides
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,32 +154,32 @@ class FixedMessage:
             for run in self.runs
         ]
 
-    def parse(self, data: bytes, count: int, what: str) -> list[NDArray]:
-        """Return the numbers of messages that follow each other.
+    def parse(self, block: NDArray[np.uint8], what: str) -> list[NDArray]:
+        """Return the numbers of messages.
 
         Args:
-            data: The messages, end to end.
-            count: How many there are.
+            block: The messages, one a row, contiguous, shape (rows, length).
             what: Topic, for the error message.
 
         Returns:
-            Read-only views of `data`, one of shape (count, run.count) for each run.
+            Views of `block`, one of shape (rows, count) for each run.
 
         Raises:
             RecordingError: the messages do not have this layout.
         """
-        if len(data) != count * len(self.template):
-            message = f"{what}: {count} messages have {len(data)} bytes in place of {count} x {len(self.template)}"
-            raise RecordingError(message)
-        block = np.frombuffer(data, np.uint8).reshape(count, len(self.template))
-        fixed = np.ones(len(self.template), bool)
-        for run in self.runs:
-            width = np.dtype(run.dtype).itemsize
-            for start in range(run.offset, run.offset + run.count * run.stride, run.stride):
-                fixed[start : start + width] = False
-        expected = np.frombuffer(self.template, np.uint8)
-        wrong = np.flatnonzero((block[:, fixed] != expected[fixed]).any(axis=1))
+        template, constant = self._constants
+        wrong = np.flatnonzero(((block ^ template) & constant).any(axis=1))
         if len(wrong):
             message = f"{what}: message {wrong[0]} does not have the fields that its schema lists, in their order"
             raise RecordingError(message)
         return self.views(block)
+
+    @cached_property
+    def _constants(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """The message with all numbers zero, and a mask that is zero where the numbers are."""
+        mask = np.full(len(self.template), 255, np.uint8)
+        for run in self.runs:
+            width = np.dtype(run.dtype).itemsize
+            for start in range(run.offset, run.offset + run.count * run.stride, run.stride):
+                mask[start : start + width] = 0
+        return np.frombuffer(bytes(self.template), np.uint8), mask

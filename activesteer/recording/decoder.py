@@ -1,0 +1,163 @@
+"""The bytes of an MCAP chunk into rows of channel values and poses, a block at a time; the inverse of the encoder."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from mcap.opcode import Opcode
+from numpy.typing import NDArray
+
+from activesteer.errors import RecordingError
+from activesteer.recording.contents import MAX_FOREIGN_MESSAGES
+from activesteer.recording.encoder import MESSAGE_HEAD, message_record
+from activesteer.recording.protobuf import FixedMessage
+from activesteer.recording.format import TRANSFORMS_TOPIC
+from activesteer.recording.schemas import transforms_layout
+
+_RECORD: Final = struct.Struct("<BQH")
+"""Opcode and length of a record, and the channel id of a message."""
+_RECORD_HEAD: Final = 9
+_OTHERS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
+"""What else a chunk may hold: other tools repeat there what stands before it."""
+
+
+class Group(NamedTuple):
+    """The channels of one topic.
+
+    Attributes:
+        topic: Its name.
+        columns: Columns of its fields.
+        layout: Layout of its messages.
+    """
+
+    topic: str
+    columns: list[int]
+    layout: FixedMessage
+
+
+class Block(NamedTuple):
+    """What a chunk holds.
+
+    Attributes:
+        row_ns: Time of each row [ns], shape (n,).
+        columns: Values by column, as 32 or 64 bit numbers, shape (n,).
+        pose_ns: Time of each set of poses [ns], shape (k,).
+        positions_m: Positions of the bodies [m], shape (k, number of bodies, 3).
+        quaternions: Their orientations, w x y z, shape (k, number of bodies, 4).
+        others: Messages of other topics, by channel id.
+    """
+
+    row_ns: NDArray[np.uint64]
+    columns: Mapping[int, NDArray]
+    pose_ns: NDArray[np.uint64]
+    positions_m: NDArray[np.float64]
+    quaternions: NDArray[np.float64]
+    others: Mapping[int, list[bytes]]
+
+
+class BlockDecoder:
+    """Decodes the chunks of one file."""
+
+    def __init__(
+        self, groups: Mapping[int, Group], body_names: Sequence[str], transforms_id: int | None, others: Iterable[int]
+    ) -> None:
+        """Lay out the messages.
+
+        Args:
+            groups: By MCAP channel id.
+            body_names: Names of the bodies.
+            transforms_id: MCAP channel id of the poses; None where there are none.
+            others: MCAP channel ids of all other topics.
+        """
+        self.body_names = tuple(body_names)
+        self._groups = {number: (group, message_record(number, group.layout)) for number, group in groups.items()}
+        self._transforms_id = transforms_id
+        self._poses = message_record(transforms_id or 0, transforms_layout(body_names))
+        self._topics = {number: group.topic for number, group in groups.items()}
+        layouts = {number: record for number, (_, record) in self._groups.items()}
+        if transforms_id is not None:
+            layouts[transforms_id] = self._poses
+            self._topics[transforms_id] = TRANSFORMS_TOPIC
+        self._lengths = {number: len(layout) for number, layout in layouts.items()}
+        self._others = set(others)
+
+    def decode(self, data: bytes) -> Block:
+        """Decode the messages of a chunk.
+
+        Args:
+            data: The chunk, decompressed.
+
+        Raises:
+            RecordingError: a message is not what the schema of its topic says, or the topics do not fit each other.
+        """
+        starts, others = self._starts(data)
+        row_ns: NDArray[np.uint64] | None = None
+        columns: dict[int, NDArray] = {}
+        first = ""
+        for number, (group, layout) in self._groups.items():
+            _, times, *runs = layout.parse(_messages(data, starts[number], len(layout)), group.topic)
+            if row_ns is None:
+                row_ns, first = times[:, 0], group.topic
+            elif not np.array_equal(times[:, 0], row_ns):
+                message = f"{group.topic} and {first} do not have the same times"
+                raise RecordingError(message)
+            values = (run[:, place] for run in runs for place in range(run.shape[1]))
+            columns.update(zip(group.columns, values, strict=True))
+        poses = [] if self._transforms_id is None else starts[self._transforms_id]
+        _, times, *runs = self._poses.parse(_messages(data, poses, len(self._poses)), TRANSFORMS_TOPIC)
+        positions = np.empty((len(poses), len(self.body_names), 3))
+        quaternions = np.empty((len(poses), len(self.body_names), 4))
+        for body in range(len(self.body_names)):
+            _, position, rotation = runs[3 * body : 3 * body + 3]
+            positions[:, body] = position
+            quaternions[:, body, 1:] = rotation[:, :3]  # Foxglove's order is x y z w.
+            quaternions[:, body, 0] = rotation[:, 3]
+        row_ns = np.empty(0, np.uint64) if row_ns is None else row_ns
+        return Block(row_ns, columns, times[:, 0], positions, quaternions, others)
+
+    def _starts(self, data: bytes) -> tuple[dict[int, list[int]], dict[int, list[bytes]]]:
+        """Where the messages of each topic of ours begin, and those of other topics."""
+        starts: dict[int, list[int]] = {number: [] for number in self._lengths}
+        others: dict[int, list[bytes]] = {}
+        foreign = 0
+        lengths, unpack = self._lengths, _RECORD.unpack_from
+        position, end = 0, len(data)
+        while position < end:
+            try:
+                opcode, length, number = unpack(data, position)
+            except struct.error:
+                raise RecordingError("a record reaches beyond its chunk") from None
+            if opcode == Opcode.MESSAGE and lengths.get(number) == length + _RECORD_HEAD:
+                starts[number].append(position)
+            else:
+                if opcode not in _OTHERS and not (opcode == Opcode.MESSAGE and number in self._others):
+                    raise RecordingError(self._complaint(opcode, length, number))
+                foreign += 1
+                if foreign > MAX_FOREIGN_MESSAGES:
+                    raise RecordingError(f"more than {MAX_FOREIGN_MESSAGES} records in a chunk are none of ours")
+                if opcode == Opcode.MESSAGE:
+                    stop = position + _RECORD_HEAD + length
+                    others.setdefault(number, []).append(data[position + _RECORD_HEAD + MESSAGE_HEAD : stop])
+            position += _RECORD_HEAD + length
+        if position != end:
+            raise RecordingError(f"a record of {length} bytes reaches beyond its chunk")
+        return starts, others
+
+    def _complaint(self, opcode: int, length: int, number: int) -> str:
+        if opcode != Opcode.MESSAGE:
+            return f"a chunk holds a record with opcode {opcode}"
+        if number not in self._lengths:
+            return f"a message belongs to topic {number}, which does not exist"
+        needed = self._lengths[number] - _RECORD_HEAD
+        return f"{self._topics[number]}: a message has {length} bytes in place of {needed}"
+
+
+def _messages(data: bytes, starts: Sequence[int], length: int) -> NDArray[np.uint8]:
+    """Messages of the same length, one a row."""
+    if not starts:
+        return np.empty((0, length), np.uint8)
+    whole = np.frombuffer(data, np.uint8)
+    return np.lib.stride_tricks.sliding_window_view(whole, length)[np.asarray(starts)]
