@@ -1,8 +1,8 @@
 """Recordings: the channel table, the MCAP writer and reader, and `Recording`, the arrays of a run by channel name."""
 
 from activesteer.recording.channels import ChannelTable
-from activesteer.recording.reader import Poses
 from activesteer.recording.recording import Recording
+from activesteer.recording.rows import Poses
 from activesteer.recording.scene import Link, Primitive, ScenePart
 from activesteer.recording.writer import McapWriter, check_target
 

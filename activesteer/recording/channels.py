@@ -8,8 +8,11 @@ from collections.abc import Iterable, Iterator
 from activesteer.errors import RecordingError, nearest_names
 from activesteer.signals import Channel
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_GROUP = re.compile(r"[a-z][a-z0-9_]*")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,254}")
+_GROUP = re.compile(r"[a-z][a-z0-9_]{0,254}")
+_MAX_LETTERS = 1000
+TIME = "time_s"
+"""What the time is called in every export, and so no channel."""
 
 
 class ChannelTable:
@@ -31,12 +34,16 @@ class ChannelTable:
         self._channels = tuple(channels)
         self._index = {channel.name: column for column, channel in enumerate(self._channels)}
         for column, channel in enumerate(self._channels):
-            if not _NAME.fullmatch(channel.name):
-                message = f"channel name {channel.name!r}: allowed are letters, digits and '_', a letter first"
-                raise RecordingError(message)
+            if not _NAME.fullmatch(channel.name) or channel.name == TIME:
+                message = f"channel name {channel.name!r:.300}: allowed are letters, digits, '_', a letter first, but "
+                raise RecordingError(message + f"not {TIME!r}")
+            for text in (channel.unit, channel.meaning):
+                if not isinstance(text, str) or len(text) > _MAX_LETTERS or not text.isprintable():
+                    message = f"channel {channel.name!r}: unit and meaning are texts of one line, not {text!r:.100}"
+                    raise RecordingError(message)
             if not _GROUP.fullmatch(channel.group):
                 message = (
-                    f"group {channel.group!r} of channel {channel.name!r}: allowed are a to z, 0 to 9 and '_', "
+                    f"group {channel.group!r:.300} of channel {channel.name!r}: allowed are a to z, 0 to 9 and '_', "
                     "a letter first"
                 )
                 raise RecordingError(message)

@@ -35,6 +35,8 @@ from mcap.records import (
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import MCAP0_MAGIC
 
+from activesteer.recording.contents import MAX_EXPANSION
+
 _ZSTD_LEVEL = 1  # Level 3 takes twice the time and saves 3 % of the recorded run of a car.
 
 
@@ -119,9 +121,11 @@ class McapFile:
 
     def add_chunk(self, chunk: ChunkData) -> None:
         """Compress and write a chunk and the index of its messages, and hand them to the operating system."""
-        compressed = self._compressor.compress(chunk.records)
+        compressed, compression = self._compressor.compress(chunk.records), "zstd"
+        if len(chunk.records) > MAX_EXPANSION * len(compressed):
+            compressed, compression = chunk.records, ""
         record = Chunk(
-            compression="zstd",
+            compression=compression,
             data=compressed,
             message_start_time=chunk.start_ns,
             message_end_time=chunk.end_ns,

@@ -11,6 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from activesteer.errors import RecordingError
+from activesteer.road.course import course_of
+from activesteer.road.footprint import footprint_of
+from activesteer.road.recorded import fail, table_of, text
+from activesteer.road.road import road_of
 
 MAX_ROWS: Final = 20_000_000
 """Rows of a recording: five and a half hours at 1 ms, 160 MB for a channel in memory."""
@@ -33,193 +37,130 @@ MAX_PARTS: Final = 100_000
 """Parts of a scene; a car has some 60."""
 
 _MAX_NAME: Final = 5000
-"""Letters of a name; that of a controller is a path, which may have 4096."""
+"""Letters of the name of an entry or a controller; the latter has a path in it, which may have 4096."""
 _MAX_TEXT: Final = 100_000
 _MAX_DEPTH: Final = 16
 _MAX_ENTRIES: Final = 20_000
 """Named values in all tables of the metadata; a run has some 150."""
-_MAX_NUMBERS: Final = 5_000_000
+_MAX_ELEMENTS: Final = 5_000_000
 """Values in all lists of the metadata: a path with a point each centimetre for 20 km."""
-_FAR: Final = 1e7
-"""Largest coordinate of a course [m] and largest number of its kind."""
-_SHOWN_CHARACTERS: Final = 100
+_SHOWN: Final = 100
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,254}")
 
-Check = Callable[[Any, str], None]
-"""Takes a value and where it stands; raises `RecordingError`."""
+Check = Callable[[Any, str], object]
+"""Takes a value and its key; raises `RecordingError`."""
 
 
-def _wrong(where: str, value: object, needed: str) -> RecordingError:
-    text = repr(value) if isinstance(value, str | int | float | bool | None) else f"a {type(value).__name__}"
-    shown = text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 3] + "..."
-    return RecordingError(f"metadata '{where}' is {shown}, where {needed} is needed")
+def _name(value: Any, key: str) -> None:
+    if len(text(value, key)) > _MAX_NAME:
+        raise fail(key, f"has {len(value)} letters, at most {_MAX_NAME} are allowed")
 
 
-def _text(value: Any, where: str, most: int = _MAX_TEXT) -> None:
-    if not isinstance(value, str):
-        raise _wrong(where, value, "a text")
-    if len(value) > most:
-        raise _wrong(where, value, f"a text of at most {most} letters")
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        raise _wrong(where, value, "a text of whole letters") from None
-
-
-def _name(value: Any, where: str) -> None:
-    _text(value, where, _MAX_NAME)
-
-
-def _flag(value: Any, where: str) -> None:
+def _flag(value: Any, key: str) -> None:
     if not isinstance(value, bool):
-        raise _wrong(where, value, "true or false")
+        raise fail(key, f"is {value!r:.{_SHOWN}}, expected true or false")
 
 
-def _number(low: float = -_FAR, high: float = _FAR) -> Check:
-    def check(value: Any, where: str) -> None:
+def _number(low: float, high: float) -> Check:
+    def check(value: Any, key: str) -> None:
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise _wrong(where, value, f"a number from {low:g} to {high:g}")
+            raise fail(key, f"is {value!r:.{_SHOWN}}, expected a number from {low:g} to {high:g}")
 
     return check
 
 
-def _optional(check: Check) -> Check:
-    return lambda value, where: None if value is None else check(value, where)
-
-
-def _one_of(*names: str) -> Check:
-    def check(value: Any, where: str) -> None:
-        if not isinstance(value, str) or value not in names:
-            raise _wrong(where, value, " or ".join(repr(name) for name in names))
-
-    return check
-
-
-def _each(check: Check, least: int = 0, most: int = _MAX_NUMBERS) -> Check:
-    def elements(value: Any, where: str) -> None:
-        if not isinstance(value, list | tuple) or not least <= len(value) <= most:
-            raise _wrong(where, value, f"a list of {least} to {most} values")
-        for number, element in enumerate(value):
-            check(element, f"{where}[{number}]")
-
-    return elements
-
-
-def _table(needed: Mapping[str, Check] | None = None, **allowed: Check) -> Check:
-    """A table that has the needed keys, and may have the allowed ones and others."""
-    checks = {**(needed or {}), **allowed}
-
-    def check(value: Any, where: str) -> None:
-        if not isinstance(value, Mapping):
-            raise _wrong(where, value, "a table")
-        for key in needed or ():
-            if key not in value:
-                raise RecordingError(f"metadata '{where}' has no {key!r}")
-        for key, test in checks.items():
-            if key in value:
-                test(value[key], f"{where}.{key}")
-
-    return check
-
-
-def _named(check: Check) -> Check:
+def _all(check: Check) -> Check:
     """A table of which every value passes."""
 
-    def entries(value: Any, where: str) -> None:
-        if not isinstance(value, Mapping):
-            raise _wrong(where, value, "a table")
-        for key, entry in value.items():
-            check(entry, f"{where}.{key}")
+    def entries(value: Any, key: str) -> None:
+        for name, entry in table_of(value, key).items():
+            check(entry, f"{key}.{name}")
 
     return entries
 
 
-def _path(value: Any, where: str) -> None:
-    points = _each(_number(), least=2)
-    _table({"x_m": points, "y_m": points})(value, where)
-    if len(value["x_m"]) != len(value["y_m"]):
-        raise RecordingError(f"metadata '{where}' has {len(value['x_m'])} x_m and {len(value['y_m'])} y_m")
-
-
-_SIZE: Final = _number(1e-3, 100.0)
-_FRICTION: Final = _number(0.0, 100.0)
-_PATCH: Final = _table(
-    {"start_m": _number(), "end_m": _number(), "mu": _FRICTION}, side=_one_of("both", "left", "right")
-)
-_LANE: Final = _table({key: _number() for key in ("start_x_m", "end_x_m", "right_y_m", "left_y_m")}, name=_name)
-_CORRECTOR: Final = _table(corrector=_table(off_radps=_number(0.0), full_radps=_number(0.0)))
-
 SCHEMA: Final[Mapping[str, Check]] = {
     "complete": _flag,
-    "error": _text,
-    "metrics_error": _text,
+    "error": text,
+    "metrics_error": text,
     "controller": _name,
     "timestep_s": _number(1e-9, 1e3),
-    "maneuver": _table(
-        name=_name,
-        kind=_name,
-        title=_text,
-        road=_table(
-            mu=_FRICTION, mu_left=_optional(_FRICTION), mu_right=_optional(_FRICTION), patches=_each(_PATCH, most=1000)
-        ),
-    ),
-    "vehicle": _table(
-        name=_name,
-        single_track=_named(_number(1e-9, 1e12)),
-        controllers=_table(ars=_CORRECTOR, afs=_CORRECTOR),
-    ),
-    "overrides": _table(),
-    "versions": _named(_name),
-    "car": _table(
-        width_m=_SIZE, wheelbase_m=_SIZE, front_track_m=_SIZE, rear_track_m=_SIZE, tyre_width_m=_each(_SIZE, 2, 2)
-    ),
-    "course": _table(
-        {"path": _path, "lanes": _each(_LANE, most=10_000), "cones": _each(_each(_number(), 2, 2), most=100_000)},
-        last_gate_x_m=_optional(_number()),
-    ),
+    "overrides": table_of,
+    "versions": _all(_name),
+    "maneuver": table_of,
+    "maneuver.name": _name,
+    "maneuver.kind": _name,
+    "maneuver.title": text,
+    "vehicle": table_of,
+    "vehicle.name": _name,
+    "vehicle.single_track": _all(_number(1e-9, 1e12)),
+    "vehicle.controllers": _all(table_of),
+    "vehicle.controllers.ars.corrector": _all(_number(-1e12, 1e12)),
+    "vehicle.controllers.afs.corrector": _all(_number(-1e12, 1e12)),
+    "car": _all(lambda value, key: None if isinstance(value, list) else _number(1e-3, 100.0)(value, key)),
 }
-"""What the values of known keys must be. Other keys, here and in tables, may hold any JSON within the limits above."""
+"""What the values of known keys must be; those of road, course and car are known where these are described. Every key
+may be missing, and others may hold any JSON within the limits above."""
 
 
 def check_metadata(metadata: Mapping[str, Any]) -> None:
-    """Checks metadata as JSON gives them: their size, and the values of all keys in `SCHEMA`.
+    """Checks metadata as JSON gives them: their size, and the values of all known keys.
 
     Raises:
         RecordingError: a value is not what its key stands for, or too large.
     """
     _Sizes().check(metadata, "")
     for key, check in SCHEMA.items():
-        if key in metadata:
-            check(metadata[key], key)
+        value: Any = metadata
+        for part in key.split("."):
+            value = value.get(part, _MISSING) if isinstance(value, Mapping) else _MISSING
+        if value is not _MISSING:
+            check(value, key)
+    road_of(metadata)
+    course_of(metadata)
+    footprint_of(metadata)
+
+
+_MISSING: Final = object()
 
 
 class _Sizes:
     """Counts what there is of a tree of values."""
 
     def __init__(self) -> None:
-        self._entries = self._numbers = 0
+        self._entries = self._elements = 0
 
-    def check(self, value: Any, where: str, depth: int = 0) -> None:
+    def check(self, value: Any, key: str, depth: int = 0) -> None:
         if depth > _MAX_DEPTH:
-            raise RecordingError(f"metadata '{where[:_SHOWN_CHARACTERS]}' lie more than {_MAX_DEPTH} levels deep")
+            raise fail(key[:_SHOWN], f"lies more than {_MAX_DEPTH} levels deep")
         if isinstance(value, Mapping):
             self._entries += len(value)
             if self._entries > _MAX_ENTRIES:
                 raise RecordingError(f"the metadata have more than {_MAX_ENTRIES} entries")
-            for key, entry in value.items():
-                _text(key, where or "the name of an entry", _MAX_NAME)
-                self.check(entry, f"{where}.{key}" if where else key, depth + 1)
+            for name, entry in value.items():
+                _letters(name, key or "the name of an entry", _MAX_NAME)
+                self.check(entry, f"{key}.{name}" if key else name, depth + 1)
         elif isinstance(value, str):
-            _text(value, where)
+            _letters(value, key, _MAX_TEXT)
         elif isinstance(value, Sequence):
-            self._numbers += len(value)
-            if self._numbers > _MAX_NUMBERS:
-                raise RecordingError(f"the lists in the metadata have more than {_MAX_NUMBERS} values")
+            self._elements += len(value)
+            if self._elements > _MAX_ELEMENTS:
+                raise RecordingError(f"the lists in the metadata have more than {_MAX_ELEMENTS} values")
             for entry in value:
                 if entry.__class__ is not float:
-                    self.check(entry, where, depth + 1)
+                    self.check(entry, key, depth + 1)
         elif isinstance(value, int) and abs(value) > 2**63:
-            raise _wrong(where, value, "a number that 64 bit can hold")
+            raise fail(key, f"is a whole number of {value.bit_length()} bits, expected one of at most 64")
+
+
+def _letters(value: str, key: str, most: int) -> None:
+    """A text must not be too long, and have no half of a letter, which cannot be written anywhere."""
+    if len(value) > most:
+        raise fail(key[:_SHOWN], f"has {len(value)} letters, at most {most} are allowed")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise fail(ascii(key[:_SHOWN]), "is no text in UTF-8") from None
 
 
 def check_metrics(metrics: Mapping[str, Any]) -> None:
@@ -232,9 +173,9 @@ def check_metrics(metrics: Mapping[str, Any]) -> None:
         raise RecordingError(f"{len(metrics)} metrics, at most {MAX_CHANNELS} are allowed")
     for name, value in metrics.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise RecordingError(f"metric name {name!r:.{_SHOWN_CHARACTERS}}: letters, digits and '_', a letter first")
+            raise RecordingError(f"metric name {name!r:.{_SHOWN}}: letters, digits and '_', a letter first")
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise RecordingError(f"metric {name!r} is {value!r:.{_SHOWN_CHARACTERS}}, which is no number")
+            raise RecordingError(f"metric {name!r} is {value!r:.{_SHOWN}}, which is no number")
 
 
 def check_names(names: Sequence[Any], what: str, most: int) -> None:
@@ -247,7 +188,7 @@ def check_names(names: Sequence[Any], what: str, most: int) -> None:
         raise RecordingError(f"{len(names)} {what}, at most {most} are allowed")
     for name in names:
         if not isinstance(name, str) or not 0 < len(name) <= 255 or not name.isprintable():
-            raise RecordingError(f"{what}: {name!r:.{_SHOWN_CHARACTERS}} is no name of 1 to 255 letters")
+            raise RecordingError(f"{what}: {name!r:.{_SHOWN}} is no name of 1 to 255 letters")
 
 
 def check_numbers(values: Sequence[Any], what: str, low: float, high: float) -> None:
@@ -258,6 +199,4 @@ def check_numbers(values: Sequence[Any], what: str, low: float, high: float) -> 
     """
     for value in values:
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise RecordingError(f"{what}: {value!r:.{_SHOWN_CHARACTERS}} is no number from {low:g} to {high:g}")
-
-
+            raise RecordingError(f"{what}: {value!r:.{_SHOWN}} is no number from {low:g} to {high:g}")

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from activesteer.errors import RecordingError
 from activesteer.recording.contents import MAX_FOREIGN_MESSAGES
 from activesteer.recording.encoder import MESSAGE_HEAD, message_record
-from activesteer.recording.protobuf import FixedMessage
 from activesteer.recording.format import TRANSFORMS_TOPIC
+from activesteer.recording.protobuf import FixedMessage
 from activesteer.recording.schemas import transforms_layout
 
 _RECORD: Final = struct.Struct("<BQH")

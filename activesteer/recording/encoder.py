@@ -90,6 +90,11 @@ class BlockEncoder:
         self._row_count = 0
         self._pose_count = 0
 
+    @property
+    def row_bytes(self) -> int:
+        """Length of a row, without its poses."""
+        return len(self._rows.layout)
+
     def _column_slices(self, layout: FixedMessage) -> list[slice | list[int]]:
         """For each run of channel values, the columns that it takes; a slice where they are neighbours."""
         sources: list[slice | list[int]] = []

@@ -17,6 +17,7 @@ import numpy as np
 
 from activesteer.errors import RecordingError
 from activesteer.files import replacing
+from activesteer.recording.channels import TIME
 from activesteer.recording.format import metadata_texts
 
 if TYPE_CHECKING:
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from activesteer.recording.recording import Recording
-
-TIME: Final = "time_s"
-"""What the time is called in every export."""
 
 MATLAB_NAME_LENGTH: Final = 63
 """Longest name of a variable or field in MATLAB (`namelengthmax`)."""

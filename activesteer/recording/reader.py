@@ -1,29 +1,41 @@
-"""Reads a recording from an MCAP file, whole, cut short or damaged."""
+"""Reads a recording from an MCAP file, whole, cut short or damaged; all sizes that it declares are limited."""
 
 from __future__ import annotations
 
 import json
+import os
+import stat
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-import zstandard
 from google.protobuf.message import DecodeError
-from mcap.exceptions import McapError
+from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.records import Attachment, Channel, DataEnd, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from activesteer.errors import RecordingError
-from activesteer.files import reading
+from activesteer.files import reading, shown
 from activesteer.recording.channels import ChannelTable
+from activesteer.recording.contents import (
+    MAX_BODIES,
+    MAX_CHANNELS,
+    MAX_CHUNK_BYTES,
+    MAX_OTHER_BYTES,
+    MAX_OTHER_RECORDS,
+    MAX_ROWS,
+    check_metadata,
+    check_metrics,
+    check_names,
+)
+from activesteer.recording.decoder import Block, BlockDecoder, Group
 from activesteer.recording.format import (
     FORMAT_RECORD,
     FORMAT_VERSION,
@@ -34,42 +46,34 @@ from activesteer.recording.format import (
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
 )
+from activesteer.recording.rows import (
+    BROKEN,
+    FileRows,
+    Place,
+    Poses,
+    messages_of,
+    poses_of,
+    read_bytes,
+    values_of,
+)
 from activesteer.recording.scene import ScenePart, decode_scene
-from activesteer.recording.schemas import state_fields, transforms_layout
+from activesteer.recording.schemas import WORLD, state_fields
 from activesteer.signals import Channel as SignalChannel
 
-# What broken bytes make the libraries raise: CRCs, numbers cut short, bad text, absurd lengths, bad frames.
-_BROKEN = (
-    McapError,
-    ValueError,
-    struct.error,
-    MemoryError,
-    OverflowError,
-    RuntimeError,
-    LookupError,
-    TypeError,
-    DecodeError,
-    zstandard.ZstdError,
-    zlib.error,
-)
-_RECORD_HEAD = struct.Struct("<BQ")
-_MESSAGE_HEAD = struct.Struct("<BQHIQQ")
-
-
-class Poses(NamedTuple):
-    """Poses of the bodies in the world, over time.
-
-    Attributes:
-        time_s: Time [s], shape (k,).
-        names: Names of the bodies.
-        positions_m: Positions of the body frames [m], shape (k, number of bodies, 3).
-        quaternions: Orientations, w x y z, shape (k, number of bodies, 4).
-    """
-
-    time_s: NDArray[np.float64]
-    names: tuple[str, ...]
-    positions_m: NDArray[np.float64]
-    quaternions: NDArray[np.float64]
+MAX_LOADED_VALUES: Final = 2**25
+"""Values that are read at once, 256 MiB; those of a longer recording stay in the file until they are needed."""
+_RECORD: Final = struct.Struct("<BQ")
+_PIECE_BYTES: Final = 2**20
+_READ: Final = {
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.METADATA: Metadata,
+    Opcode.ATTACHMENT: Attachment,
+}
+"""Records that are kept; chunks are read later, and all others only repeat what these say."""
+_REFUSED: Final = (0, Opcode.FOOTER, Opcode.MESSAGE)
+"""No record, what stands only behind the end, and a message outside of a chunk."""
+_END_OF_TIME_NS: Final = 2**35 * 10**9
 
 
 class Contents(NamedTuple):
@@ -78,8 +82,8 @@ class Contents(NamedTuple):
     Attributes:
         channels: The channels.
         time_s: Time of each row [s], shape (n,).
-        values: Channel values, shape (n, number of channels).
-        poses: Poses of the bodies.
+        values: Channel values, shape (n, number of channels), or the rows of a long recording, still in the file.
+        poses: Poses of the bodies; None where they are still in the file.
         metadata: Metadata without metrics; `complete` tells whether the file was ended properly.
         metrics: Metrics by name.
         attachments: Attachments by name.
@@ -89,8 +93,8 @@ class Contents(NamedTuple):
 
     channels: ChannelTable
     time_s: NDArray[np.float64]
-    values: NDArray[np.float64]
-    poses: Poses
+    values: NDArray[np.float64] | FileRows
+    poses: Poses | None
     metadata: dict[str, Any]
     metrics: dict[str, float]
     attachments: dict[str, bytes]
@@ -99,26 +103,69 @@ class Contents(NamedTuple):
 
 
 @dataclass
-class _Raw:
-    """Records as they come, messages still encoded."""
+class _Records:
+    """The records of a file, chunks as places.
 
+    Attributes:
+        position: End of the records that were read.
+        crc: Checksum of all bytes up to there.
+        complete: The end of the data section was reached; what follows only repeats what is there.
+        damage: What is broken, and where.
+    """
+
+    position: int = len(MCAP0_MAGIC)
+    crc: int = zlib.crc32(MCAP0_MAGIC)
     schemas: dict[int, Schema] = field(default_factory=dict)
     topics: dict[int, Channel] = field(default_factory=dict)
     metadata: list[Metadata] = field(default_factory=list)
     attachments: dict[str, bytes] = field(default_factory=dict)
-    messages: dict[int, tuple[list[int], list[bytes]]] = field(default_factory=dict)
+    chunks: list[tuple[int, int]] = field(default_factory=list)
     complete: bool = False
     damage: str = ""
+    _bytes: int = 0
+    _count: int = 0
 
-    def add_message(self, channel_id: int, time_ns: int, data: bytes) -> None:
-        times, texts = self.messages.setdefault(channel_id, ([], []))
-        times.append(time_ns)
-        texts.append(data)
+    def read_next(self, descriptor: int, size: int) -> None:
+        """Read one record, and put the position behind it; where that fails, to where the record would have ended.
 
-    def encoded(self, channel_id: int) -> tuple[NDArray[np.uint64], bytes]:
-        """Log times [ns] and the messages of a topic, end to end."""
-        times, texts = self.messages.get(channel_id, ([], []))
-        return np.array(times, np.uint64), b"".join(texts)
+        Raises:
+            RecordingError: it is not allowed here, too large, or broken.
+        """
+        start, self.position = self.position, size + 1
+        head = read_bytes(descriptor, start, min(_RECORD.size, size - start))
+        opcode, length = _RECORD.unpack(head)
+        first = start + _RECORD.size
+        self.position = first + length
+        if opcode in _REFUSED:
+            raise RecordingError(f"a record has opcode {opcode}")
+        if self.position > size:
+            raise RecordingError(f"a record of {length} bytes reaches beyond the end")
+        if opcode in _READ:
+            self._take(opcode, read_bytes(descriptor, first, length))
+        elif opcode == Opcode.CHUNK:
+            self.chunks.append((first, length))
+        elif opcode == Opcode.DATA_END:
+            declared = DataEnd.read(ReadDataStream(BytesIO(read_bytes(descriptor, first, length)))).data_section_crc
+            self.complete = True
+            if declared not in (0, self.crc):
+                raise RecordingError(f"the checksum of the file is {self.crc} in place of {declared}")
+        self.crc = zlib.crc32(head, self.crc)
+        for piece in range(first, self.position, _PIECE_BYTES):
+            self.crc = zlib.crc32(read_bytes(descriptor, piece, min(_PIECE_BYTES, self.position - piece)), self.crc)
+
+    def _take(self, opcode: int, content: bytes) -> None:
+        self._bytes, self._count = self._bytes + len(content), self._count + 1
+        if self._bytes > MAX_OTHER_BYTES or self._count > MAX_OTHER_RECORDS:
+            raise RecordingError("attachments, schemas and metadata are larger than those of a recording may be")
+        record = _READ[Opcode(opcode)].read(ReadDataStream(BytesIO(content)))
+        if isinstance(record, Schema):
+            self.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self.topics[record.id] = record
+        elif isinstance(record, Metadata):
+            self.metadata.append(record)
+        else:
+            self.attachments[record.name] = record.data
 
 
 def read_mcap(path: Path) -> Contents:
@@ -133,125 +180,179 @@ def read_mcap(path: Path) -> Contents:
     Raises:
         RecordingError: the file cannot be opened, is no MCAP file or none of ours, or is damaged before its first row.
     """
-    with reading(path, RecordingError):
-        data = path.read_bytes()
-    raw = _records(path, data)
+    descriptor = _opened(path)
+    contents = None
     try:
-        return _decode(raw)
-    except RecordingError as error:
-        message = f"{path}: {error}"
-        if raw.damage:
-            message += f" ({raw.damage})"
-        raise RecordingError(message) from None
-    except _BROKEN as error:
-        message = f"{path} is damaged: {_words(error)}"
-        raise RecordingError(message) from None
-
-
-def _records(path: Path, data: bytes) -> _Raw:
-    """Collect all records up to the end of the data section; what follows only repeats them."""
-    raw = _Raw()
-    stream = BytesIO(data)
-    reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=None)
-    records = reader.records
-    start = 0
-    while True:
+        size = os.fstat(descriptor).st_size
+        if os.pread(descriptor, len(MCAP0_MAGIC), 0) != MCAP0_MAGIC:
+            raise RecordingError(f"{shown(path)} is not an MCAP file")
+        records = _records(descriptor, size)
         try:
-            record = next(records)
-        except _BROKEN as error:
-            if start == 0:
-                message = f"{path} is not an MCAP file: {_words(error)}"
-                raise RecordingError(message) from None
+            contents = _decode(descriptor, records)
+        except RecordingError as error:
+            damage = f" ({records.damage})" if records.damage else ""
+            raise RecordingError(f"{shown(path)}: {error}{damage}") from None
+    except (*BROKEN, DecodeError, LookupError, TypeError, AttributeError) as error:
+        raise RecordingError(f"{shown(path)} is damaged: {_words(error)}") from None
+    finally:
+        if contents is None or not isinstance(contents.values, FileRows):
+            os.close(descriptor)
+    return contents
+
+
+def _opened(path: Path) -> int:
+    """A file descriptor of a file; anything else may never end."""
+    with reading(path, RecordingError):
+        # Opening a pipe must not wait for whoever writes to it.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return descriptor
+    os.close(descriptor)
+    what = "Is a directory" if stat.S_ISDIR(mode) else "it is no file, but a device or a pipe"
+    raise RecordingError(f"cannot read {shown(path)}: {what}")
+
+
+def _records(descriptor: int, size: int) -> _Records:
+    """Collect all records up to the end of the data section."""
+    records = _Records()
+    while not records.complete:
+        start = records.position
+        try:
+            records.read_next(descriptor, size)
+        except (RecordingError, *BROKEN) as error:
             # A record that reaches beyond the end of the file is what a killed process leaves behind. A file that
             # goes on behind it, or that was ended properly, is damaged.
-            if stream.tell() < len(data) or data.endswith(MCAP0_MAGIC):
-                raw.damage = f"bytes {start} to {stream.tell()} cannot be read: {_words(error)}"
-            return raw
+            ended = os.pread(descriptor, len(MCAP0_MAGIC), size - len(MCAP0_MAGIC)) == MCAP0_MAGIC
+            if records.position <= size or ended:
+                records.damage = f"bytes {start} to {min(records.position, size)} cannot be read: {_words(error)}"
+            break
+    return records
+
+
+def _decode(descriptor: int, records: _Records) -> Contents:
+    metadata, metrics = _metadata(records)
+    topics: dict[str, Channel] = {}
+    for topic in records.topics.values():
+        if topic.topic in topics:
+            raise RecordingError(f"two topics are called {topic.topic!r:.100}")
+        topics[topic.topic] = topic
+    channels, groups = _channels(records, topics)
+    transforms, scene = topics.get(TRANSFORMS_TOPIC), topics.get(SCENE_TOPIC)
+    bodies = _bodies(transforms)
+    known = {*groups, *([] if transforms is None else [transforms.id])}
+    decoder = BlockDecoder(
+        groups,
+        bodies,
+        None if transforms is None else transforms.id,
+        [other for other in records.topics if other not in known],
+    )
+    check_names(list(records.attachments), "attachments", MAX_OTHER_RECORDS)
+    rows = _Rows(len(channels))
+    scenes: list[bytes] = []
+    for start, length in records.chunks:
         try:
-            if isinstance(record, DataEnd):
-                raw.complete = True
-                return raw
-            _take(raw, record)
-        except _BROKEN as error:
-            raw.damage = f"the chunk in bytes {start} to {stream.tell()} cannot be read: {_words(error)}"
-            return raw
-        start = stream.tell()
-
-
-def _take(raw: _Raw, record: object) -> None:
-    if isinstance(record, Chunk):
-        stream, length = get_chunk_data_stream(record, validate_crc=True)
-        for entry in _messages(stream.read(length)):
-            raw.add_message(*entry)
-    elif isinstance(record, Message):
-        raw.add_message(record.channel_id, record.log_time, record.data)
-    elif isinstance(record, Schema):
-        raw.schemas[record.id] = record
-    elif isinstance(record, Channel):
-        raw.topics[record.id] = record
-    elif isinstance(record, Metadata):
-        raw.metadata.append(record)
-    elif isinstance(record, Attachment):
-        raw.attachments[record.name] = record.data
-
-
-def _messages(data: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Channel id, log time [ns] and data of each message of a chunk; ten times as fast as `breakup_chunk`."""
-    position, end = 0, len(data)
-    while position < end:
-        opcode, length = _RECORD_HEAD.unpack_from(data, position)
-        stop = position + _RECORD_HEAD.size + length
-        if stop > end:
-            message = f"a record of {length} bytes reaches beyond its chunk"
-            raise ValueError(message)
-        if opcode == Opcode.MESSAGE:
-            _, _, number, _, log_time, _ = _MESSAGE_HEAD.unpack_from(data, position)
-            yield number, log_time, data[position + _MESSAGE_HEAD.size : stop]
-        position = stop
-
-
-def _decode(raw: _Raw) -> Contents:
-    metadata, metrics = _metadata(raw)
-    topics = {topic.topic: topic for topic in raw.topics.values()}
-    described: dict[int, SignalChannel] = {}
-    parts: list[tuple[str, list[int], NDArray[np.uint64], list[NDArray]]] = []
-    for name, topic in topics.items():
-        if name.startswith(STATE_TOPIC):
-            schema = raw.schemas[topic.schema_id]
-            names, layout = state_fields(schema.data, schema.name)
-            singles = [run.dtype == "<f4" for run in layout.runs for _ in range(run.count)]
-            columns: list[int] = []
-            for field_name, single in zip(names, singles, strict=True):
-                notes = json.loads(topic.metadata[field_name])
-                columns.append(int(notes["column"]))
-                described[columns[-1]] = SignalChannel(
-                    field_name, str(notes["unit"]), str(notes["meaning"]), name.removeprefix(STATE_TOPIC), single
-                )
-            time_ns, data = raw.encoded(topic.id)
-            parts.append((name, columns, time_ns, layout.parse(data, len(time_ns), name)))
-    if sorted(described) != list(range(sum(len(columns) for _, columns, _, _ in parts))):
-        message = "the columns of its channels are not numbered 0, 1, 2 ..."
-        raise RecordingError(message)
-    channels = ChannelTable(described[column] for column in sorted(described))
-    time_ns, values = _values(parts, len(channels))
+            data, crc = messages_of(_content(descriptor, start, length))
+            block = rows.add(Place(start, length, crc), data, decoder)
+        except (RecordingError, *BROKEN) as error:
+            records.damage = f"the chunk in bytes {start} to {start + length} cannot be read: {_words(error)}"
+            metadata["complete"] = False
+            break
+        scenes += block.others.get(scene.id, ()) if scene else ()
+    if len(scenes) > 1:
+        raise RecordingError(f"there are {len(scenes)} scenes")
+    parts = decode_scene(scenes[0]) if scenes else ()
+    values, poses = rows.collected(descriptor, decoder, list(channels))
     return Contents(
-        channels=channels,
-        time_s=time_ns / 1e9,
-        values=values,
-        poses=_poses(raw, topics.get(TRANSFORMS_TOPIC)),
-        metadata=metadata,
-        metrics=metrics,
-        attachments=raw.attachments,
-        scene=_scene(raw, topics.get(SCENE_TOPIC)),
-        damage=raw.damage,
+        channels, rows.time_s(), values, poses, metadata, metrics, records.attachments, parts, records.damage
     )
 
 
-def _metadata(raw: _Raw) -> tuple[dict[str, Any], dict[str, float]]:
+def _content(descriptor: int, start: int, length: int) -> bytes:
+    if length > MAX_CHUNK_BYTES:
+        raise RecordingError(f"it has {length} bytes, at most {MAX_CHUNK_BYTES} are allowed")
+    return read_bytes(descriptor, start, length)
+
+
+class _Rows:
+    """What the chunks give: their places, all times, and the blocks themselves as long as they are few."""
+
+    def __init__(self, channels: int) -> None:
+        self._width = max(channels, 1)
+        self._places: list[Place] = []
+        self._blocks: list[Block] | None = []
+        self._times: list[NDArray[np.uint64]] = []
+        self._rows = 0
+        self._last_ns = [-1, -1]
+
+    def add(self, place: Place, data: bytes, decoder: BlockDecoder) -> Block:
+        """Check a chunk and take what it gives; the place has no rows yet."""
+        block = decoder.decode(data)
+        for kind, time_ns in enumerate((block.row_ns, block.pose_ns)):
+            if not len(time_ns):
+                continue
+            if int(time_ns[0]) <= self._last_ns[kind] or (time_ns[1:] <= time_ns[:-1]).any():
+                raise RecordingError("times do not increase")
+            if int(time_ns[-1]) >= _END_OF_TIME_NS:
+                raise RecordingError(f"a time is {time_ns[-1] / 1e9:g} s")
+        if self._rows + len(block.row_ns) > MAX_ROWS:
+            raise RecordingError(f"there are more than {MAX_ROWS} rows")
+        for kind, time_ns in enumerate((block.row_ns, block.pose_ns)):
+            self._last_ns[kind] = int(time_ns[-1]) if len(time_ns) else self._last_ns[kind]
+        self._rows += len(block.row_ns)
+        self._places.append(place._replace(rows=len(block.row_ns), poses=len(block.pose_ns)))
+        self._times.append(block.row_ns.copy())
+        if self._rows * self._width > MAX_LOADED_VALUES:
+            self._blocks = None
+        elif self._blocks is not None:
+            self._blocks.append(block)
+        return block
+
+    def time_s(self) -> NDArray[np.float64]:
+        return np.concatenate(self._times or [np.empty(0, np.uint64)]) / 1e9
+
+    def collected(
+        self, descriptor: int, decoder: BlockDecoder, channels: list[SignalChannel]
+    ) -> tuple[NDArray[np.float64] | FileRows, Poses | None]:
+        """All values and poses, or where to get them later."""
+        if self._blocks is None:
+            return FileRows(descriptor, decoder, channels, self._places), None
+        sets = sum(place.poses for place in self._places)
+        return values_of(self._blocks, self._rows, len(channels)), poses_of(self._blocks, sets, decoder.body_names)
+
+
+def _channels(records: _Records, topics: Mapping[str, Channel]) -> tuple[ChannelTable, dict[int, Group]]:
+    described: dict[int, SignalChannel] = {}
+    groups: dict[int, Group] = {}
+    for name, topic in topics.items():
+        if not name.startswith(STATE_TOPIC):
+            continue
+        schema = records.schemas[topic.schema_id]
+        names, layout = state_fields(schema.data, schema.name)
+        if len(described) + len(names) > MAX_CHANNELS:
+            raise RecordingError(f"there are more than {MAX_CHANNELS} channels")
+        if not names:
+            raise RecordingError(f"topic {name!r:.100} has no channels")
+        singles = [run.dtype == "<f4" for run in layout.runs for _ in range(run.count)]
+        columns: list[int] = []
+        for field_name, single in zip(names, singles, strict=True):
+            notes = json.loads(topic.metadata[field_name])
+            column, unit, meaning = notes["column"], notes["unit"], notes["meaning"]
+            if column.__class__ is not int or column in described:
+                raise RecordingError(f"channel {field_name!r:.100} has column {column!r:.40}")
+            columns.append(column)
+            described[column] = SignalChannel(field_name, unit, meaning, name.removeprefix(STATE_TOPIC), single)
+        groups[topic.id] = Group(name, columns, layout)
+    if sorted(described) != list(range(len(described))):
+        raise RecordingError("the columns of its channels are not numbered 0, 1, 2 ...")
+    return ChannelTable(described[column] for column in sorted(described)), groups
+
+
+def _metadata(records: _Records) -> tuple[dict[str, Any], dict[str, float]]:
     found: int | None = None
     texts: dict[str, str] = {}
     metrics: dict[str, float] = {}
-    for record in raw.metadata:
+    for record in records.metadata:
         if record.name == FORMAT_RECORD:
             found = int(record.metadata["version"])
         elif record.name in (RUN_RECORD, RESULT_RECORD):
@@ -259,53 +360,29 @@ def _metadata(raw: _Raw) -> tuple[dict[str, Any], dict[str, float]]:
         elif record.name == METRICS_RECORD:
             metrics.update((name, float(number)) for name, number in record.metadata.items())
     if found is None:
-        message = "no recording of activesteer, or cut off before its first row"
-        raise RecordingError(message)
+        raise RecordingError("no recording of activesteer, or cut off before its first row")
     if found > FORMAT_VERSION:
-        message = f"format version {found}; this version of activesteer reads up to {FORMAT_VERSION}"
-        raise RecordingError(message)
-    metadata = {key: json.loads(text) for key, text in texts.items()}
-    metadata["complete"] = bool(metadata.get("complete", True)) and raw.complete
+        raise RecordingError(f"format version {found}; this version of activesteer reads up to {FORMAT_VERSION}")
+    metadata = {key: json.loads(text) for key, text in texts.items() if key != "metrics"}
+    check_metadata(metadata)
+    check_metrics(metrics)
+    metadata["complete"] = metadata.get("complete", True) and records.complete
     return metadata, metrics
 
 
-def _values(
-    parts: list[tuple[str, list[int], NDArray[np.uint64], list[NDArray]]], count: int
-) -> tuple[NDArray[np.uint64], NDArray[np.float64]]:
-    """Gather the columns of all groups: times [ns], shape (n,), and values, shape (n, count), columns contiguous."""
-    time_ns = parts[0][2] if parts else np.empty(0, np.uint64)
-    columns_first = np.empty((count, len(time_ns)))
-    for name, columns, times, runs in parts:
-        if not np.array_equal(times, time_ns):
-            message = f"{name} and {parts[0][0]} do not have the same times"
-            raise RecordingError(message)
-        used = 0
-        for run in runs:
-            columns_first[columns[used : used + run.shape[1]]] = run.T
-            used += run.shape[1]
-    return time_ns, columns_first.T
-
-
-def _poses(raw: _Raw, topic: Channel | None) -> Poses:
+def _bodies(topic: Channel | None) -> tuple[str, ...]:
     if topic is None:
-        return Poses(np.empty(0), (), np.empty((0, 0, 3)), np.empty((0, 0, 4)))
-    names = tuple(str(name) for name in json.loads(topic.metadata["bodies"]))
-    time_ns, data = raw.encoded(topic.id)
-    runs = transforms_layout(names).parse(data, len(time_ns), TRANSFORMS_TOPIC)
-    positions = np.empty((len(time_ns), len(names), 3))
-    quaternions = np.empty((len(time_ns), len(names), 4))
-    for body in range(len(names)):
-        _, position, rotation = runs[3 * body : 3 * body + 3]
-        positions[:, body] = position
-        quaternions[:, body, 1:] = rotation[:, :3]
-        quaternions[:, body, 0] = rotation[:, 3]
-    return Poses(time_ns / 1e9, names, positions, quaternions)
-
-
-def _scene(raw: _Raw, topic: Channel | None) -> tuple[ScenePart, ...]:
-    _, messages = raw.messages.get(topic.id, ([], [])) if topic else ([], [])
-    return tuple(primitive for message in messages for primitive in decode_scene(message))
+        return ()
+    names = json.loads(topic.metadata["bodies"])
+    if not isinstance(names, list):
+        raise RecordingError("its bodies are no list")
+    check_names(names, "bodies", MAX_BODIES)
+    if len({WORLD, *names}) != len(names) + 1:
+        raise RecordingError(f"body names must differ from each other and from {WORLD!r}")
+    return tuple(names)
 
 
 def _words(error: BaseException) -> str:
+    if isinstance(error, RecordingError):
+        return str(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -13,7 +13,8 @@ from activesteer.errors import RecordingError
 from activesteer.recording import export
 from activesteer.recording.arrays import nanoseconds, shaped
 from activesteer.recording.channels import ChannelTable
-from activesteer.recording.reader import Poses, read_mcap
+from activesteer.recording.reader import read_mcap
+from activesteer.recording.rows import FileRows, Poses, values_of
 from activesteer.recording.scene import ScenePart
 from activesteer.recording.writer import McapWriter
 from activesteer.signals import Channel
@@ -32,7 +33,6 @@ class Recording:
             was not ended properly, as after a killed process.
         metrics: Metrics by name, in the unit that ends their names.
         attachments: Files kept with the run, by name.
-        poses: Poses of all bodies.
         scene: What the car looks like: solids in body frames, and links between bodies.
     """
 
@@ -40,7 +40,7 @@ class Recording:
         self,
         channels: Iterable[Channel],
         time_s: ArrayLike,
-        values: ArrayLike,
+        values: ArrayLike | FileRows,
         *,
         poses: Poses | None = None,
         metadata: Mapping[str, Any] | None = None,
@@ -53,7 +53,7 @@ class Recording:
         Args:
             channels: The channels, in the order of the columns of `values`.
             time_s: Time of each row [s], increasing, >= 0, shape (n,). Kept in whole nanoseconds, as in a file.
-            values: Channel values, shape (n, number of channels).
+            values: Channel values, shape (n, number of channels); or the rows of a file, which are read when needed.
             poses: Poses of the bodies; none where omitted.
             metadata: Metadata; a key `metrics` in it is taken as the metrics.
             metrics: Metrics by name.
@@ -65,7 +65,8 @@ class Recording:
         """
         self._channels = channels if isinstance(channels, ChannelTable) else ChannelTable(channels)
         self._time_s = _frozen(nanoseconds(time_s, "time_s") / 1e9)
-        self._values = _frozen(shaped(values, "values", (len(self._time_s), len(self._channels))))
+        shape = (len(self._time_s), len(self._channels))
+        self._values = values if isinstance(values, FileRows) else _frozen(shaped(values, "values", shape))
         self.metadata: dict[str, Any] = {"complete": True, **(metadata or {})}
         found = self.metadata.pop("metrics", {})
         if not isinstance(found, Mapping):
@@ -74,14 +75,9 @@ class Recording:
         self.metrics: dict[str, float] = {**found, **(metrics or {})}
         self.attachments: dict[str, bytes] = dict(attachments or {})
         self.scene: tuple[ScenePart, ...] = tuple(scene)
-        given = Poses(np.empty(0), (), np.empty((0, 0, 3)), np.empty((0, 0, 4))) if poses is None else poses
-        count, bodies = len(np.asarray(given.time_s)), len(given.names)
-        self.poses = Poses(
-            _frozen(nanoseconds(given.time_s, "poses.time_s") / 1e9),
-            tuple(given.names),
-            _frozen(shaped(given.positions_m, "poses.positions_m", (count, bodies, 3))),
-            _frozen(shaped(given.quaternions, "poses.quaternions", (count, bodies, 4))),
-        )
+        if poses is None and not isinstance(self._values, FileRows):
+            poses = Poses(np.empty(0), (), np.empty((0, 0, 3)), np.empty((0, 0, 4)))
+        self._poses = None if poses is None else _checked(poses)
 
     @classmethod
     def open(cls, path: str | Path, *, recover: bool = False) -> Self:
@@ -138,13 +134,19 @@ class Recording:
         with McapWriter(
             path,
             self._channels,
-            self.poses.names,
+            self._values.body_names if isinstance(self._values, FileRows) else self.poses.names,
             {**self.metadata, "metrics": self.metrics},
             self.attachments,
             self.scene,
             overwrite=overwrite,
         ) as writer:
-            writer.write(self._time_s, self._values, self.poses.time_s, self.poses.positions_m, self.poses.quaternions)
+            if not isinstance(self._values, FileRows):
+                poses = self.poses
+                writer.write(self._time_s, self._values, poses.time_s, poses.positions_m, poses.quaternions)
+                return
+            for block in self._values.blocks():
+                values = values_of([block], len(block.row_ns), len(self._channels))
+                writer.write(block.row_ns / 1e9, values, block.pose_ns / 1e9, block.positions_m, block.quaternions)
 
     def to_dataframe(self) -> pd.DataFrame:
         """A pandas data frame; see `activesteer.recording.export.to_dataframe`."""
@@ -173,13 +175,24 @@ class Recording:
         return self._channels
 
     @property
+    def poses(self) -> Poses:
+        """Poses of all bodies, read-only."""
+        if self._poses is None:
+            assert isinstance(self._values, FileRows)
+            self._poses = _checked(self._values.poses())
+        return self._poses
+
+    @property
     def values(self) -> NDArray[np.float64]:
-        """All channel values, shape (n, number of channels), read-only."""
-        return self._values
+        """All channel values, shape (n, number of channels), read-only; of a long recording that is much memory."""
+        return _frozen(self._values.values()) if isinstance(self._values, FileRows) else self._values
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """Return a channel over time, shape (n,), read-only; `RecordingError` where there is none of that name."""
-        return self._values[:, self._channels.index(name)]
+        column = self._channels.index(name)
+        if isinstance(self._values, FileRows):
+            return _frozen(self._values.channel(column))
+        return self._values[:, column]
 
     def __contains__(self, name: object) -> bool:
         """Return whether a channel of that name exists."""
@@ -193,6 +206,16 @@ class Recording:
         """Show size and duration."""
         span = f"{self._time_s[0]:.3f} to {self._time_s[-1]:.3f} s" if len(self._time_s) else "no rows"
         return f"<Recording: {len(self._channels)} channels, {len(self._time_s)} rows, {span}>"
+
+
+def _checked(poses: Poses) -> Poses:
+    count, bodies = len(np.asarray(poses.time_s)), len(poses.names)
+    return Poses(
+        _frozen(nanoseconds(poses.time_s, "poses.time_s") / 1e9),
+        tuple(poses.names),
+        _frozen(shaped(poses.positions_m, "poses.positions_m", (count, bodies, 3))),
+        _frozen(shaped(poses.quaternions, "poses.quaternions", (count, bodies, 4))),
+    )
 
 
 def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:

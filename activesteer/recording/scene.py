@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import Any, Final, NamedTuple
 
@@ -12,11 +12,14 @@ from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message_factory import GetMessageClass
 
 from activesteer.errors import RecordingError
+from activesteer.recording.contents import MAX_PARTS, check_names, check_numbers
 from activesteer.recording.schemas import SCENE_SCHEMA, foxglove_schema
 
 _FIELDS = {"box": "cubes", "cylinder": "cylinders", "sphere": "spheres"}
 LINK_KINDS: Final = ("link", "spring", "damper")
 """What a `Link` can be."""
+_MAX_SIZE_M: Final = 1e4
+"""No part is larger, and none further from the origin of its body [m]."""
 _LINK_KEY: Final = "activesteer.link"
 """Key of an entity's metadata that makes it a link."""
 
@@ -84,7 +87,7 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
         parts: Solids and links.
 
     Raises:
-        RecordingError: a kind is unknown, or a number is missing or no number.
+        RecordingError: a kind is unknown, a name is none, or a number is missing, no number or out of range.
     """
     update = _scene_class()()
     entities: dict[str, Any] = {}
@@ -120,7 +123,9 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
     for part in parts:
         if isinstance(part, Link):
             _add_link(update, part)
-    return update.SerializeToString()
+    data = update.SerializeToString()
+    decode_scene(data)  # What a reader would refuse is refused here.
+    return data
 
 
 def _add_link(update: Any, link: Link) -> None:
@@ -163,10 +168,13 @@ def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
         data: A serialised foxglove.SceneUpdate.
 
     Raises:
+        RecordingError: it cannot be drawn; see `check_scene`.
         google.protobuf.message.DecodeError: it is none.
         ValueError, TypeError, KeyError: a link in it is broken.
     """
     update = _scene_class().FromString(data)
+    if len(update.entities) > MAX_PARTS:
+        raise RecordingError(f"a scene has {len(update.entities)} entities, at most {MAX_PARTS} are allowed")
     primitives: list[ScenePart] = []
     for entity in update.entities:
         primitives += [_link_of(json.loads(pair.value)) for pair in entity.metadata if pair.key == _LINK_KEY]
@@ -183,4 +191,27 @@ def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
                         (color.r, color.g, color.b, color.a),
                     )
                 )
+    check_scene(primitives)
     return tuple(primitives)
+
+
+def check_scene(parts: Sequence[ScenePart]) -> None:
+    """Checks that a scene can be drawn.
+
+    Raises:
+        RecordingError: a kind is unknown, a name is none, or a number is out of range.
+    """
+    check_names([part.body if isinstance(part, Primitive) else part.name for part in parts], "parts", MAX_PARTS)
+    for part in parts:
+        check_numbers(part.rgba, "colour", 0.0, 1.0)
+        if isinstance(part, Primitive):
+            check_numbers(part.size_m, f"size of a {part.kind} of {part.body}", 0.0, _MAX_SIZE_M)
+            check_numbers((*part.position_m, *part.quaternion), f"pose of a {part.kind}", -_MAX_SIZE_M, _MAX_SIZE_M)
+            continue
+        if part.kind not in LINK_KINDS:
+            raise RecordingError(f"{part.name}: link of kind {part.kind!r:.100}, known are: {', '.join(LINK_KINDS)}")
+        if len(part.points) < 2:
+            raise RecordingError(f"{part.name} has {len(part.points)} points, at least 2 are needed")
+        check_names([body for body, _ in part.points], f"bodies of {part.name}", MAX_PARTS)
+        numbers = [number for _, point in part.points for number in point]
+        check_numbers([*numbers, part.radius_m], f"place or radius of {part.name}", -_MAX_SIZE_M, _MAX_SIZE_M)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,10 +16,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from activesteer.errors import RecordingError
-from activesteer.files import reading, writing
+from activesteer.files import reading, shown, writing
 from activesteer.recording.arrays import nanoseconds, shaped
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.container import McapFile
+from activesteer.recording.contents import (
+    MAX_BODIES,
+    MAX_CHANNELS,
+    MAX_CHUNK_BYTES,
+    MAX_OTHER_BYTES,
+    MAX_OTHER_RECORDS,
+    MAX_ROWS,
+    check_names,
+)
 from activesteer.recording.encoder import BlockEncoder, one_message
 from activesteer.recording.format import (
     FORMAT_RECORD,
@@ -46,7 +56,10 @@ from activesteer.signals import Channel
 from activesteer.version import __version__
 
 _ROWS_PER_CHUNK = 1000
+_CHUNK_BYTES = MAX_CHUNK_BYTES // 8
+"""Size of a chunk of very wide rows, without poses."""
 _START_BYTES = 64
+_ERROR_LETTERS = 2000
 _BLOCKS_IN_FLIGHT = 1  # More would be lost when the process is killed, and held when the disk is slow.
 
 
@@ -92,9 +105,16 @@ class McapWriter:
         if len({WORLD, *self.body_names}) != len(self.body_names) + 1:
             message = f"body names must differ from each other and from {WORLD!r}: {', '.join(self.body_names)}"
             raise RecordingError(message)
+        if len(self.channels) > MAX_CHANNELS:
+            raise RecordingError(f"{len(self.channels)} channels, a recording has at most {MAX_CHANNELS}")
+        check_names(self.body_names, "bodies", MAX_BODIES)
+        check_names(list(attachments or {}), "attachments", MAX_OTHER_RECORDS)
+        if (size := sum(map(len, (attachments or {}).values()))) > MAX_OTHER_BYTES // 2:
+            raise RecordingError(f"the attachments have {size} bytes, at most {MAX_OTHER_BYTES // 2} are allowed")
         texts, metrics = metadata_texts(metadata or {})
         scene_data = encode_scene(scene)
         self._last_row_ns = self._last_pose_ns = -1
+        self._row_count = 0
         self._saved_ns = -1
         self._pending: list[tuple[int, Future[None]]] = []
         self._stream = _open(self.path, overwrite=overwrite)
@@ -174,9 +194,13 @@ class McapWriter:
         values = shaped(values, "values", (rows, len(self.channels)))
         positions = shaped(positions_m, "positions_m", (poses, bodies, 3))
         turns = shaped(quaternions, "quaternions", (poses, bodies, 4))
+        self._row_count += rows
+        if self._row_count > MAX_ROWS:
+            raise RecordingError(f"{self.path}: a recording has at most {MAX_ROWS} rows")
         pose_done = 0
-        for start in range(0, max(rows, min(poses, 1)), _ROWS_PER_CHUNK):
-            stop = start + _ROWS_PER_CHUNK
+        piece_rows = min(_ROWS_PER_CHUNK, max(1, _CHUNK_BYTES // max(1, self._encoder.row_bytes)))
+        for start in range(0, max(rows, min(poses, 1)), piece_rows):
+            stop = start + piece_rows
             # Poses up to the last row of the piece go with it; the last piece takes all that remain.
             pose_stop = poses if stop >= rows else int(np.searchsorted(pose_ns, row_ns[stop - 1], side="right"))
             piece, pose_piece = slice(start, stop), slice(pose_done, pose_stop)
@@ -221,11 +245,21 @@ class McapWriter:
                 if metrics:
                     self._file.add_metadata(METRICS_RECORD, metrics)
                 self._file.finish()
+                self._check_place()
                 self._stream.close()
             except OSError as error:
                 raise self._failure(error) from error
         finally:
             self._abandon()
+
+    def _check_place(self) -> None:
+        """Look whether what was written can be found where it was asked for."""
+        try:
+            there = os.path.samestat(self.path.stat(), os.fstat(self._stream.fileno()))
+        except FileNotFoundError:
+            there = False
+        if not there:
+            raise RecordingError(f"{shown(self.path)} was deleted or replaced while it was written: nothing is saved")
 
     def __enter__(self) -> Self:
         """Return the writer."""
@@ -239,7 +273,9 @@ class McapWriter:
             self.close()
             return
         try:
-            self.close({"complete": False, "error": f"{type(error).__name__}: {error}"})
+            # An exception of another's may say anything at any length.
+            text = f"{type(error).__name__}: {error}"[:_ERROR_LETTERS].encode(errors="replace").decode()
+            self.close({"complete": False, "error": text})
         except RecordingError as second:
             error.add_note(f"The recording could not be ended properly either: {second}")
 
@@ -301,6 +337,31 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
 
 
 def _open(path: Path, *, overwrite: bool) -> BinaryIO:
+    """A new file that no one else can write to as long as it is open; it takes the place of one that exists.
+
+    Whoever has opened the old one keeps it: it is deleted, not changed.
+    """
     check_target(path, overwrite=overwrite)
     with writing(path, RecordingError):
-        return path.open("wb" if overwrite else "xb")
+        if path.is_file():
+            with path.open("rb") as old:
+                _lock(old, path)
+                with suppress(PermissionError):  # A file that may be written to in a folder that may not.
+                    Path(os.path.realpath(path)).unlink()
+        stream = path.open("wb" if overwrite else "xb")
+    try:
+        _lock(stream, path)
+    except RecordingError:
+        stream.close()
+        raise
+    return stream
+
+
+def _lock(stream: BinaryIO, path: Path) -> None:
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        message = f"cannot write {shown(path)}: another run or program is writing it"
+        raise RecordingError(message) from None
+    except OSError:
+        return  # A file system without locks.

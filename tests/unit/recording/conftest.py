@@ -37,7 +37,11 @@ def recording(channels: list[Channel], rng: np.random.Generator) -> Recording:
         time_s,
         rng.normal(size=(rows, len(channels))) * 10.0 ** rng.integers(-6, 6, len(channels)),
         poses=poses,
-        metadata={"maneuver": "step_steer", "controller": "ars", "parameters": {"mass_kg": 1400.0, "list": [1, None]}},
+        metadata={
+            "maneuver": {"name": "step_steer"},
+            "controller": "ars",
+            "parameters": {"mass_kg": 1400.0, "list": [1, None]},
+        },
         metrics={"yaw_rate_overshoot": 0.125, "tb_s": float("nan")},
         attachments={"compact.xml": b"<mujoco/>", "empty.tir": b""},
         scene=[

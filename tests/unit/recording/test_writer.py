@@ -76,7 +76,7 @@ def test_an_exception_in_the_run_keeps_what_was_written(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
 
     def run() -> None:
-        with McapWriter(path, SPEED, metadata={"maneuver": "step_steer"}) as writer:
+        with McapWriter(path, SPEED, metadata={"maneuver": {"name": "step_steer"}}) as writer:
             writer.write([0.0, 0.1], [[1.0], [2.0]])
             message = "no more road"
             raise ArithmeticError(message)
@@ -86,7 +86,7 @@ def test_an_exception_in_the_run_keeps_what_was_written(tmp_path: Path) -> None:
     opened = Recording.open(path)
     assert opened["v_mps"].tolist() == [1.0, 2.0]
     assert opened.metadata == {
-        "maneuver": "step_steer",
+        "maneuver": {"name": "step_steer"},
         "complete": False,
         "error": "ArithmeticError: no more road",
     }

@@ -1,0 +1,271 @@
+"""Rows of a recording that stay in their file until somebody needs them: a channel at a time, or a block at a time."""
+
+from __future__ import annotations
+
+import os
+import struct
+import weakref
+import zlib
+from collections import OrderedDict
+from collections.abc import Iterable, Iterator, Sequence
+from io import BytesIO
+from itertools import count
+from typing import Final, NamedTuple
+
+import lz4.frame
+import numpy as np
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.records import Chunk
+from numpy.typing import NDArray
+
+from activesteer.errors import RecordingError
+from activesteer.recording.contents import MAX_CHUNK_BYTES, MAX_EXPANSION
+from activesteer.recording.decoder import Block, BlockDecoder
+from activesteer.signals import Channel
+
+MAX_CACHED_BYTES: Final = 2**29
+"""Channels of all open files together that stay in memory, as they are in the files."""
+_READ_BYTES: Final = 2**27
+"""How much is read at once: neighbours of the channel that was asked for come with it, since the whole file has to be
+decompressed for a single one."""
+_SMALL_BYTES: Final = 2**16
+"""A chunk up to this size may be as small as it likes when compressed."""
+
+BROKEN: Final = (
+    McapError, struct.error, UnicodeDecodeError, ValueError, OverflowError, RuntimeError, MemoryError,
+    zstandard.ZstdError, OSError,
+)  # fmt: skip
+"""What broken bytes make the libraries raise."""
+
+
+class Poses(NamedTuple):
+    """Poses of the bodies in the world, over time.
+
+    Attributes:
+        time_s: Time [s], shape (k,).
+        names: Names of the bodies.
+        positions_m: Positions of the body frames [m], shape (k, number of bodies, 3).
+        quaternions: Orientations, w x y z, shape (k, number of bodies, 4).
+    """
+
+    time_s: NDArray[np.float64]
+    names: tuple[str, ...]
+    positions_m: NDArray[np.float64]
+    quaternions: NDArray[np.float64]
+
+
+class Place(NamedTuple):
+    """Where a chunk is in its file, and what it holds.
+
+    Attributes:
+        start: First byte of the content of its record.
+        length: Length of that [byte].
+        crc: Checksum of its messages.
+        rows: Number of rows.
+        poses: Number of sets of poses.
+    """
+
+    start: int
+    length: int
+    crc: int
+    rows: int = 0
+    poses: int = 0
+
+
+def read_bytes(descriptor: int, start: int, length: int) -> bytes:
+    """Bytes of an open file.
+
+    Raises:
+        RecordingError: they are not there.
+    """
+    pieces = []
+    while length > 0:
+        piece = os.pread(descriptor, length, start)
+        if not piece:
+            raise RecordingError(f"the file ends at byte {start}")
+        pieces.append(piece)
+        start, length = start + len(piece), length - len(piece)
+    return b"".join(pieces)
+
+
+def messages_of(content: bytes) -> tuple[bytes, int]:
+    """The messages of a chunk, decompressed, and their checksum; what the record declares is a limit, not a wish.
+
+    Args:
+        content: Content of its record.
+
+    Raises:
+        RecordingError: it is larger than allowed, or not what it declares to be.
+    """
+    try:
+        chunk = Chunk.read(ReadDataStream(BytesIO(content)))
+        size, packed = chunk.uncompressed_size, len(chunk.data)
+        if size > MAX_CHUNK_BYTES or size > max(_SMALL_BYTES, MAX_EXPANSION * packed):
+            raise RecordingError(f"a chunk of {packed} bytes would become {size}")
+        data = _decompressed(chunk.compression, chunk.data, size)
+    except BROKEN as error:
+        raise RecordingError(f"{type(error).__name__}: {error}") from None
+    if len(data) != size:
+        raise RecordingError(f"a chunk has {len(data)} bytes in place of {size}")
+    crc = zlib.crc32(data)
+    if chunk.uncompressed_crc not in (0, crc):
+        raise RecordingError(f"a checksum is {crc} in place of {chunk.uncompressed_crc}")
+    return data, crc
+
+
+def _decompressed(compression: str, data: bytes, size: int) -> bytes:
+    if compression == "":
+        return data
+    if compression == "zstd":
+        # A frame may declare another size than its record, and would get as much memory.
+        if zstandard.frame_content_size(data) not in (-1, size):
+            raise RecordingError("a chunk is not as large as it declares to be")
+        return zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES).decompress(data, max_output_size=size)
+    if compression == "lz4":
+        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+    raise RecordingError(f"a chunk is compressed by {compression!r:.40}; known are zstd and lz4")
+
+
+def values_of(blocks: Iterable[Block], rows: int, channels: int) -> NDArray[np.float64]:
+    """All values of blocks with so many rows, shape (rows, channels), columns contiguous."""
+    values = np.empty((rows, channels), order="F")
+    done = 0
+    for block in blocks:
+        stop = done + len(block.row_ns)
+        for column, part in block.columns.items():
+            values[done:stop, column] = part
+        done = stop
+    return values
+
+
+def poses_of(blocks: Iterable[Block], sets: int, body_names: tuple[str, ...]) -> Poses:
+    """All poses of blocks with so many sets of them."""
+    bodies = len(body_names)
+    poses = Poses(np.empty(sets), body_names, np.empty((sets, bodies, 3)), np.empty((sets, bodies, 4)))
+    done = 0
+    for block in blocks:
+        stop = done + len(block.pose_ns)
+        poses.time_s[done:stop] = block.pose_ns / 1e9
+        poses.positions_m[done:stop] = block.positions_m
+        poses.quaternions[done:stop] = block.quaternions
+        done = stop
+    return poses
+
+
+class FileRows:
+    """The rows of an open file. The file may be replaced or deleted meanwhile; one that is changed is an error."""
+
+    def __init__(
+        self, descriptor: int, decoder: BlockDecoder, channels: Sequence[Channel], places: list[Place]
+    ) -> None:
+        """Take over the file.
+
+        Args:
+            descriptor: File descriptor; closed with this object.
+            decoder: Decoder of its chunks.
+            channels: The channels.
+            places: Its chunks, all of them checked.
+        """
+        self._descriptor = descriptor
+        self._decoder = decoder
+        self._types = [np.dtype("<f4" if channel.single else "<f8") for channel in channels]
+        self._places = places
+        self._rows = sum(place.rows for place in places)
+        self._token = next(_tokens)
+        weakref.finalize(self, _release, descriptor, self._token)
+
+    def blocks(self) -> Iterator[Block]:
+        """The chunks one after the other.
+
+        Raises:
+            RecordingError: the file was changed since it was opened.
+        """
+        for place in self._places:
+            try:
+                data, crc = messages_of(read_bytes(self._descriptor, place.start, place.length))
+            except (RecordingError, OSError) as error:
+                raise RecordingError(f"the file was changed since it was opened: {error}") from None
+            if crc != place.crc:
+                raise RecordingError("the file was changed since it was opened")
+            yield self._decoder.decode(data)
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return self._rows
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the bodies whose poses are recorded."""
+        return self._decoder.body_names
+
+    def channel(self, column: int) -> NDArray[np.float64]:
+        """The values of a channel, shape (n,)."""
+        found = _cache.get(self._token, column)
+        if found is None:
+            found = self._load(self._neighbours(column))[0]
+        return found.astype(np.float64)
+
+    def values(self) -> NDArray[np.float64]:
+        """The values of all channels, shape (n, number of channels)."""
+        return values_of(self.blocks(), self._rows, len(self._types))
+
+    def poses(self) -> Poses:
+        """The poses of all bodies."""
+        return poses_of(self.blocks(), sum(place.poses for place in self._places), self._decoder.body_names)
+
+    def _neighbours(self, column: int) -> list[int]:
+        """The column, and those that follow it, as far as one reading goes."""
+        chosen, size = [column], 0
+        for other in range(column + 1, len(self._types)):
+            size += self._rows * self._types[other].itemsize
+            if size > _READ_BYTES:
+                break
+            chosen.append(other)
+        return chosen
+
+    def _load(self, columns: list[int]) -> list[NDArray]:
+        arrays = [np.empty(self._rows, self._types[column]) for column in columns]
+        done = 0
+        for block in self.blocks():
+            stop = done + len(block.row_ns)
+            for column, array in zip(columns, arrays, strict=True):
+                array[done:stop] = block.columns[column]
+            done = stop
+        for column, array in zip(columns, arrays, strict=True):
+            _cache.put(self._token, column, array)
+        return arrays
+
+
+class _Cache:
+    """Channels of open files; those that were not used for the longest time go first."""
+
+    def __init__(self) -> None:
+        self._arrays: OrderedDict[tuple[int, int], NDArray] = OrderedDict()
+        self._size = 0
+
+    def get(self, token: int, column: int) -> NDArray | None:
+        if (token, column) in self._arrays:
+            self._arrays.move_to_end((token, column))
+        return self._arrays.get((token, column))
+
+    def put(self, token: int, column: int, array: NDArray) -> None:
+        if (token, column) not in self._arrays:
+            self._size += array.nbytes
+        self._arrays[token, column] = array
+        while self._size > MAX_CACHED_BYTES and self._arrays:
+            self._size -= self._arrays.popitem(last=False)[1].nbytes
+
+    def drop(self, token: int) -> None:
+        for key in [key for key in self._arrays if key[0] == token]:
+            self._size -= self._arrays.pop(key).nbytes
+
+
+_cache = _Cache()
+_tokens = count()
+
+
+def _release(descriptor: int, token: int) -> None:
+    os.close(descriptor)
+    _cache.drop(token)
