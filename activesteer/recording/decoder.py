@@ -143,7 +143,7 @@ class BlockDecoder:
                     others.setdefault(number, []).append(data[position + _RECORD_HEAD + MESSAGE_HEAD : stop])
             position += _RECORD_HEAD + length
         if position != end:
-            raise RecordingError(f"a record of {length} bytes reaches beyond its chunk")
+            raise RecordingError("a record reaches beyond its chunk")
         return starts, others
 
     def _complaint(self, opcode: int, length: int, number: int) -> str:

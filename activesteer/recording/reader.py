@@ -22,7 +22,7 @@ from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from activesteer.errors import RecordingError
-from activesteer.files import reading, shown
+from activesteer.files import reading, shown_path
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.contents import (
     MAX_BODIES,
@@ -181,21 +181,22 @@ def read_mcap(path: Path) -> Contents:
         RecordingError: the file cannot be opened, is no MCAP file or none of ours, or is damaged before its first row.
     """
     descriptor = _opened(path)
-    contents = None
+    kept = False
     try:
         size = os.fstat(descriptor).st_size
         if os.pread(descriptor, len(MCAP0_MAGIC), 0) != MCAP0_MAGIC:
-            raise RecordingError(f"{shown(path)} is not an MCAP file")
+            raise RecordingError(f"{shown_path(path)} is not an MCAP file")
         records = _records(descriptor, size)
         try:
             contents = _decode(descriptor, records)
         except RecordingError as error:
             damage = f" ({records.damage})" if records.damage else ""
-            raise RecordingError(f"{shown(path)}: {error}{damage}") from None
+            raise RecordingError(f"{shown_path(path)}: {error}{damage}") from None
+        kept = isinstance(contents.values, FileRows)
     except (*BROKEN, DecodeError, LookupError, TypeError, AttributeError) as error:
-        raise RecordingError(f"{shown(path)} is damaged: {_words(error)}") from None
+        raise RecordingError(f"{shown_path(path)} is damaged: {_words(error)}") from None
     finally:
-        if contents is None or not isinstance(contents.values, FileRows):
+        if not kept:
             os.close(descriptor)
     return contents
 
@@ -210,7 +211,7 @@ def _opened(path: Path) -> int:
         return descriptor
     os.close(descriptor)
     what = "Is a directory" if stat.S_ISDIR(mode) else "it is no file, but a device or a pipe"
-    raise RecordingError(f"cannot read {shown(path)}: {what}")
+    raise RecordingError(f"cannot read {shown_path(path)}: {what}")
 
 
 def _records(descriptor: int, size: int) -> _Records:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from activesteer.errors import RecordingError
-from activesteer.files import reading, shown, writing
+from activesteer.files import reading, shown_path, writing
 from activesteer.recording.arrays import nanoseconds, shaped
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.container import McapFile
@@ -259,7 +259,9 @@ class McapWriter:
         except FileNotFoundError:
             there = False
         if not there:
-            raise RecordingError(f"{shown(self.path)} was deleted or replaced while it was written: nothing is saved")
+            raise RecordingError(
+                f"{shown_path(self.path)} was deleted or replaced while it was written: nothing is saved"
+            )
 
     def __enter__(self) -> Self:
         """Return the writer."""
@@ -361,7 +363,7 @@ def _lock(stream: BinaryIO, path: Path) -> None:
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        message = f"cannot write {shown(path)}: another run or program is writing it"
+        message = f"cannot write {shown_path(path)}: another run or program is writing it"
         raise RecordingError(message) from None
     except OSError:
         return  # A file system without locks.
