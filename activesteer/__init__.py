@@ -11,8 +11,9 @@ if TYPE_CHECKING:
     from activesteer.recording import Recording
     from activesteer.signals import DriverCommand, Measurement, SteerCommand
     from activesteer.simulation.runner import simulate
+    from activesteer.studies.study import study
 
-__all__ = ["DriverCommand", "Measurement", "Recording", "SteerCommand", "__version__", "simulate"]
+__all__ = ["DriverCommand", "Measurement", "Recording", "SteerCommand", "__version__", "simulate", "study"]
 
 # Imported at first use: engine and compiler take a second, which help and lists of names need not wait for.
 _HOMES = {
@@ -21,6 +22,7 @@ _HOMES = {
     "Measurement": "activesteer.signals",
     "SteerCommand": "activesteer.signals",
     "simulate": "activesteer.simulation.runner",
+    "study": "activesteer.studies.study",
 }
 
 

@@ -80,6 +80,7 @@ def all_commands() -> Commands:
         report,
         reproduce,
         run,
+        study,
         tyre,
         validate,
         vehicle,
@@ -94,7 +95,7 @@ def all_commands() -> Commands:
         "drive": (listing, run, watch),
         "look": (info, report, replay, video),
         "car": (vehicle, tyre, kc),
-        "study": (identify, linearise),
+        "study": (study, identify, linearise),
         "prove": (reproduce, figures, validate, bench),
     }.items():
         commands.begin_group(title)

@@ -122,7 +122,7 @@ class Source:
                 name = ".".join((_numbered(".".join(above), elements), last)) if above else last
                 elements[name] = elements.get(name, -1) + 1
                 found = table = f"{name}.{elements[name]}"
-            elif pair := re.match(r"\s*([\w.-]+)\s*=", line):
+            elif pair := re.match(r"""\s*["']?([\w.-]+)["']?\s*=""", line):
                 found = f"{table}.{pair.group(1)}" if table else pair.group(1)
             else:
                 continue

@@ -84,6 +84,10 @@ class PlaybackError(ActiveSteerError):
     """A recording cannot be shown: no viewer, no display, or a file that cannot be written."""
 
 
+class StudyError(ActiveSteerError):
+    """A study cannot be begun, gone on with, or shown."""
+
+
 def shown(value: object) -> str:
     """A value as an error message repeats it: as Python writes it, a path as it is; of a long one beginning and end."""
     if isinstance(value, os.PathLike):

@@ -1,4 +1,4 @@
-"""Finds the models and manoeuvres, in a checkout, in an editable install and in an installed wheel.
+"""Finds the models, manoeuvres and studies, in a checkout, in an editable install and in an installed wheel.
 
 In a wheel they travel inside the package, in `_data/`; in a checkout they lie beside the package, at the top.
 """
@@ -8,7 +8,15 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError, nearest_names, shown
+from activesteer.errors import (
+    ActiveSteerError,
+    ManeuverError,
+    ModelError,
+    ParameterError,
+    StudyError,
+    nearest_names,
+    shown,
+)
 from activesteer.files import is_file, user_path, why_no_file
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -44,6 +52,18 @@ def maneuvers_dir() -> Path:
         ManeuverError: the installation is incomplete.
     """
     return _data_dir("maneuvers", ManeuverError)
+
+
+def studies_dir() -> Path:
+    """The directory with the study files.
+
+    Returns:
+        Absolute path of an existing directory.
+
+    Raises:
+        StudyError: the installation is incomplete.
+    """
+    return _data_dir("studies", StudyError)
 
 
 def list_maneuvers() -> list[str]:
@@ -112,6 +132,21 @@ def check_own(file: Path) -> None:
     """
     if file.resolve().is_relative_to(_PACKAGE) or {"site-packages", "dist-packages"} & set(file.resolve().parts):
         raise ParameterError(f"{file} belongs to an installed package; copy it to a place of your own")
+
+
+def find_study(name_or_path: str | os.PathLike[str]) -> Path:
+    """The file of a study.
+
+    Args:
+        name_or_path: Name of a study that comes with the package, or the path of a .toml file; see `find_maneuver`.
+
+    Returns:
+        Path of an existing file.
+
+    Raises:
+        StudyError: there is no such study or file; the message names the nearest ones.
+    """
+    return _find(name_or_path, studies_dir(), "study", StudyError)
 
 
 def _names(directory: Path) -> list[str]:

@@ -132,6 +132,14 @@ def add_jobs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one per processor)")
 
 
+def add_scheduler(parser: argparse.ArgumentParser) -> None:
+    """Adds `--scheduler`."""
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS",
+        help="work on a Dask cluster instead: tcp://host:8786, or the file of `dask scheduler --scheduler-file`",
+    )  # fmt: skip
+
+
 def add_pace(parser: argparse.ArgumentParser) -> None:
     """Adds `--speed`, the pace of what is shown."""
     parser.add_argument(

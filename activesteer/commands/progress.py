@@ -1,11 +1,17 @@
-"""A bar on the terminal, gone when the work ends; silent where standard error is none."""
+"""Bars on the terminal, gone when the work ends."""
 
 from __future__ import annotations
 
 import sys
-from typing import Final
+import time
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from activesteer.studies.study import StudyProgress
 
 _CELLS: Final = 30
+_LINE_EVERY_S: Final = 10.0
+"""How often a log gets a line [s]."""
 
 
 class ProgressBar:
@@ -38,3 +44,47 @@ class ProgressBar:
             line = f"{self._label} [{'#' * filled}{' ' * (_CELLS - filled)}] {share:4.0%} {note}"
             print("\r" + line.ljust(self._width), end="", file=sys.stderr, flush=True)
             self._width = max(self._width, len(line))
+
+
+class RunCounter:
+    """Shows how many of many runs are done, how fast, and how long the rest takes.
+
+    A bar in a terminal; elsewhere, as in the log of a batch job, a line now and then.
+    """
+
+    def __init__(self, label: str, *, quiet: bool) -> None:
+        """Takes what stands before the bar.
+
+        Args:
+            label: The words.
+            quiet: Whether to show nothing.
+        """
+        self._bar = ProgressBar(label, quiet=quiet)
+        self._as_lines = not quiet and not sys.stderr.isatty()
+        self._begun_s = self._said_s = time.monotonic()
+
+    def __enter__(self) -> RunCounter:
+        """Begins to count the time."""
+        self._begun_s = self._said_s = time.monotonic()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Wipes the bar."""
+        self._bar.__exit__()
+
+    def __call__(self, counted: StudyProgress) -> None:
+        """Shows the state."""
+        now_s = time.monotonic()
+        words = _words(counted, now_s - self._begun_s)
+        self._bar(counted.done / counted.total, words)
+        if self._as_lines and (now_s - self._said_s >= _LINE_EVERY_S or counted.done == counted.total):
+            print(words, file=sys.stderr, flush=True)
+            self._said_s = now_s
+
+
+def _words(counted: StudyProgress, elapsed_s: float) -> str:
+    rate = counted.here / max(elapsed_s, 1e-6)
+    left_s = round((counted.total - counted.done) / rate) if rate > 0.0 else 0
+    clock = f"{left_s // 3600}:{left_s // 60 % 60:02}:{left_s % 60:02}"
+    failed = f", {counted.failed} failed" if counted.failed else ""
+    return f"{counted.done}/{counted.total} runs, {rate:.3g} runs/s, {clock} left{failed}"

@@ -1,0 +1,76 @@
+"""`activesteer study`: many runs from one file, on this machine or a cluster, interrupted and gone on with at will."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler
+from activesteer.commands.output import print_json
+from activesteer.commands.progress import RunCounter
+from activesteer.errors import StudyError
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("study", help="drive many runs over varied parameters; say how far they are")
+    parser.add_argument("study", metavar="STUDY_OR_DIR", help="a study file or its name, or the folder of a study")
+    add_output(parser, "DIR", "folder for the results; a study that is there is gone on with")
+    add_jobs(parser)
+    add_scheduler(parser)
+    parser.add_argument("--limit", type=int, metavar="N", help="make at most N runs now and leave the rest")
+    parser.add_argument("--status", action="store_true", help="only say how far the study in DIR is")
+    add_json(parser)
+    parser.set_defaults(action=_study)
+
+
+def _study(options: argparse.Namespace) -> int:
+    if options.limit is not None and options.limit < 1:
+        raise StudyError(f"--limit {options.limit}: at least 1 is needed")
+    given = Path(options.study)
+    folder = options.output or (given if given.is_dir() else None)
+    if folder is None:
+        raise StudyError(f"-o DIR is needed: where the results of {options.study} go")
+    if options.status:
+        return _status(folder, as_json=options.json)
+    from activesteer.studies.store import RESULTS, read_environment
+    from activesteer.studies.study import study
+
+    if given.is_dir():
+        read_environment(given)  # says what is wrong with a folder that is none of a study
+    with RunCounter("study", quiet=options.json) as counter:
+        study(
+            given / "study.toml" if given.is_dir() else options.study,
+            output=folder,
+            jobs=options.jobs,
+            scheduler=options.scheduler,
+            limit=options.limit,
+            progress=counter,
+        )
+    result = folder / RESULTS
+    if options.json:
+        print_json(_progress_of(folder) | {"results": str(result) if result.exists() else None})
+        return 0
+    _status(folder, as_json=False)
+    print(f"results: {result}" if result.exists() else f"not finished; go on with `activesteer study {folder}`")
+    return 0
+
+
+def _progress_of(folder: Path) -> dict[str, Any]:
+    from activesteer.studies.store import Store
+
+    return {"folder": str(folder), **Store(folder, ()).progress().to_json()}
+
+
+def _status(folder: Path, *, as_json: bool) -> int:
+    progress = _progress_of(folder)
+    if as_json:
+        print_json(progress)
+        return 0
+    counts = ", ".join(f"{number} {status}" for status, number in progress["by_status"].items()) or "none"
+    at_work = "; a process is at work" if progress["running"] else ""
+    print(f"{progress['done']} of {progress['total']} runs are done: {counts}{at_work}")
+    for error, number in progress["errors"].items():
+        print(f"{number:6}  {error}")
+    return 0

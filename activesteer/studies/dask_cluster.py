@@ -1,0 +1,144 @@
+"""The workers of a Dask cluster, behind the interface of `workers.Workers`."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Future
+from pathlib import Path
+from typing import Any, Final
+
+from activesteer.errors import StudyError
+
+_CONNECT_S: Final = 10
+_WORKERS_S: Final = 30
+"""How long the first worker of a cluster is waited for [s]."""
+_TASKS_A_WORKER: Final = 4
+_SAME: Final = ("distributed", "dask", "cloudpickle", "msgpack")
+"""Packages of which client, scheduler and workers need the same version."""
+
+
+class DaskCluster:
+    """A cluster, reached by its client.
+
+    Workers may come and go. One thread of a worker drives at a time, because the engine's callbacks belong to a
+    process; so a worker is best started with one thread.
+
+    Attributes:
+        in_flight: How many tasks the cluster should have at a time.
+    """
+
+    def __init__(self, client: Any) -> None:
+        """Looks at the cluster; the client stays the caller's.
+
+        Args:
+            client: A `distributed.Client`.
+
+        Raises:
+            StudyError: there is no worker, or versions differ.
+        """
+        self._client = client
+        self._executor = client.get_executor(pure=False)
+        try:
+            client.wait_for_workers(1, timeout=_WORKERS_S)
+            found = client.get_versions()
+        except Exception as reason:
+            raise StudyError(f"the cluster at {client.scheduler.address} has no worker: {_line(reason)}") from reason
+        _compare_versions(found)
+        self.in_flight = 0
+        self._count()
+
+    def _count(self) -> None:
+        self.in_flight = max(8, _TASKS_A_WORKER * len(self._client.nthreads()))
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """See `Workers`."""
+        return self._executor.submit(function, *arguments)
+
+    def died(self, error: BaseException) -> bool:
+        """The scheduler reports a task that several workers died of, and cancels one that it lost."""
+        return type(error).__name__ == "KilledWorker" or isinstance(error, CancelledError)
+
+    def replace(self) -> None:
+        """The cluster replaces its workers itself; whether it is still there is looked at here.
+
+        Raises:
+            StudyError: the scheduler is gone.
+        """
+        try:
+            self._client.wait_for_workers(1, timeout=_WORKERS_S)
+        except Exception as reason:
+            told = "the scheduler or its workers are gone; what is finished is kept, start the study again to go on"
+            raise StudyError(told) from reason
+        self._count()
+
+    def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
+        """See `Workers`; one worker of a machine goes first, so that kernels are compiled once."""
+        hosts: dict[str, list[str]] = {}
+        for address in self._client.nthreads():
+            hosts.setdefault(address.rpartition(":")[0], []).append(address)
+        for addresses in ([each[0] for each in hosts.values()], [one for each in hosts.values() for one in each[1:]]):
+            if not addresses:
+                continue
+            answers = self._client.run(check, *arguments, workers=addresses, on_error="return")
+            for address, answer in answers.items():
+                problem = answer if isinstance(answer, str) else f"{type(answer).__name__}: {_line(answer)}"
+                if problem:
+                    return f"worker {address}: {problem}"
+        return ""
+
+    def close(self, *, abandon: bool) -> None:
+        """Takes back what has not begun."""
+        with contextlib.suppress(Exception):  # where the cluster is gone there is nothing to take back
+            self._executor.shutdown(wait=not abandon, cancel_futures=True)
+
+
+@contextlib.contextmanager
+def connected(scheduler: str) -> Iterator[Any]:
+    """A client of a running scheduler.
+
+    Args:
+        scheduler: Its address, as tcp://host:8786, or the scheduler file that it wrote.
+
+    Yields:
+        The client.
+
+    Raises:
+        StudyError: it cannot be reached, or `distributed` is not installed.
+    """
+    try:
+        from distributed import Client  # noqa: PLC0415 - an extra
+    except ImportError as reason:
+        raise StudyError("--scheduler needs Dask; install activesteer[cluster]") from reason
+    if "://" in scheduler:
+        where: dict[str, Any] = {"address": scheduler}
+    elif Path(scheduler).is_file():
+        where = {"scheduler_file": scheduler}
+    else:
+        raise StudyError(f"--scheduler {scheduler}: is no address, as tcp://host:8786, and no scheduler file")
+    try:
+        client = Client(**where, timeout=_CONNECT_S)
+    except Exception as reason:  # whatever the network, the address or the file has against it
+        raise StudyError(f"--scheduler {scheduler}: cannot be reached: {_line(reason)}") from reason
+    with client:
+        yield client
+
+
+def _compare_versions(found: dict[str, Any]) -> None:
+    """Client, scheduler and workers must speak the same language; of activesteer itself, the workers are asked."""
+    here = found["client"]
+    others = {"the scheduler": found["scheduler"]} | {f"worker {key}": value for key, value in found["workers"].items()}
+    for who, theirs in others.items():
+        ours, other = here["packages"], (theirs or {}).get("packages", {})
+        wrong = [
+            f"{name} {other.get(name)}, here {ours.get(name)}" for name in _SAME if other.get(name) != ours.get(name)
+        ]
+        python = [str(packages.get("python", "")).split(".")[:2] for packages in (ours, other)]
+        if python[0] != python[1]:
+            wrong.append(f"Python {other.get('python')}, here {ours.get('python')}")
+        if wrong:
+            raise StudyError(f"{who} has other versions: {'; '.join(wrong)}")
+
+
+def _line(reason: BaseException) -> str:
+    return (str(reason).splitlines() or [type(reason).__name__])[0][:200]

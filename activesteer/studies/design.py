@@ -1,0 +1,208 @@
+"""Which combinations of the factors' values are driven: a grid, a list of cases, or a sample."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from activesteer.config import Range, Source
+from activesteer.errors import StudyError, nearest_names, shown
+from activesteer.studies.factors import Factor, Value
+
+DESIGNS: Final = ("grid", "list", "sobol", "latin_hypercube", "random", "saltelli", "morris")
+"""Kinds of design."""
+FOR_INDICES: Final = ("saltelli", "morris")
+"""Designs that SALib makes for its sensitivity indices; every factor must be sampled."""
+MORRIS_LEVELS: Final = 4
+
+
+@dataclass(frozen=True)
+class DesignTable:
+    """The table [design] of a study file."""
+
+    kind: str = ""
+    """One of `DESIGNS`; by itself `list` where cases are given, `grid` where every factor is one, else `sobol`."""
+    samples: Annotated[int, Range(1, 10_000_000)] = 0
+    """Size of the sample; of `saltelli` the base sample (D + 2 runs each), of `morris` trajectories (D + 1 each)."""
+    paired: bool = True
+    """Whether all controllers are driven with the same sample."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Combinations, as columns: a million of them take little memory.
+
+    Attributes:
+        columns: Key -> value in every combination; a case of a list that does not name a key has None there.
+    """
+
+    columns: dict[str, list[Value]]
+    count: int
+
+    def __len__(self) -> int:
+        """Number of combinations."""
+        return self.count
+
+    def __getitem__(self, number: int) -> dict[str, Value]:
+        """One combination as overrides."""
+        return {key: value for key, values in self.columns.items() if (value := values[number]) is not None}
+
+
+def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: int = 0) -> Samples:
+    """The combinations of a design.
+
+    The factors that are a grid are crossed with each other and with the sample of the rest, so that each of their
+    values meets the same sample.
+
+    Args:
+        factors: What is varied.
+        kind: One of `DESIGNS` but `list`.
+        count: Size of the sample; without meaning for a grid.
+        seed: Of the random numbers.
+        stream: Which of several independent samples of the same seed.
+
+    Returns:
+        The combinations.
+
+    Raises:
+        StudyError: `saltelli` or `morris` without SALib.
+    """
+    grids = [factor for factor in factors if factor.kind == "grid"]
+    sampled = [factor for factor in factors if factor.kind != "grid"]
+    if sampled:
+        unit = _unit_sample(kind, len(sampled), count, [seed, stream] if stream else [seed])
+        columns: dict[str, list[Value]] = {
+            factor.key: [*factor.from_unit(unit[:, place])] for place, factor in enumerate(sampled)
+        }
+        inner = len(unit)
+    else:
+        columns, inner = {}, 1
+    crossed = list(itertools.product(*(factor.values for factor in grids)))
+    found: dict[str, list[Value]] = {}
+    for factor in factors:
+        if factor.kind == "grid":
+            place = grids.index(factor)
+            found[factor.key] = [values[place] for values in crossed for _ in range(inner)]
+        else:
+            found[factor.key] = columns[factor.key] * len(crossed)
+    return Samples(found, len(crossed) * inner)
+
+
+def _unit_sample(kind: str, dimensions: int, count: int, seed: list[int]) -> NDArray[np.float64]:
+    """Points of the unit cube, shape (points, dimensions)."""
+    rng = np.random.default_rng(seed)
+    if kind == "random":
+        return rng.random((count, dimensions))
+    if kind == "latin_hypercube":
+        return qmc.LatinHypercube(dimensions, rng=rng).random(count)
+    if kind == "sobol":
+        # The whole power of 2 is drawn, since a sequence cut short is balanced all the same as far as it goes.
+        return qmc.Sobol(dimensions, rng=rng).random_base2(math.ceil(math.log2(count)))[:count]
+    problem = {
+        "num_vars": dimensions,
+        "names": [str(i) for i in range(dimensions)],
+        "bounds": [[0.0, 1.0]] * dimensions,
+    }
+    try:
+        from SALib.sample import morris, sobol  # noqa: PLC0415 - an extra
+    except ImportError as reason:
+        raise StudyError(f"design.kind: {kind} needs SALib; install activesteer[study]") from reason
+    number = int(rng.integers(2**31))
+    if kind == "saltelli":
+        return np.asarray(sobol.sample(problem, count, calc_second_order=False, seed=number))
+    return np.asarray(morris.sample(problem, count, num_levels=MORRIS_LEVELS, seed=number))
+
+
+def cases(given: Iterable[Mapping[str, Any]]) -> Samples:
+    """A list of cases, each naming the keys that it sets."""
+    rows = list(given)
+    keys = dict.fromkeys(key for row in rows for key in row)
+    return Samples({key: [row.get(key) for row in rows] for key in keys}, len(rows))
+
+
+def read_cases(path: Path) -> Samples:
+    """A list of cases from a CSV file: its header holds the keys, an empty cell leaves a key as it is.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The cases; a cell is a number or true or false where it can be read as one, else a text.
+
+    Raises:
+        StudyError: the file cannot be read, has no rows, or a row of another length.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = [row for row in csv.reader(file) if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as reason:
+        raise StudyError(f"design.cases: cannot read {path}: {reason}") from reason
+    header, *body = [[cell.strip() for cell in row] for row in rows] or [[]]
+    if not body:
+        raise StudyError(f"design.cases: {path.name} holds no cases; a header with keys and rows of values are needed")
+    if len(set(header)) != len(header) or "" in header:
+        raise StudyError(f"design.cases: {path.name}, line 1: every column needs a key of its own, found {header}")
+    for number, row in enumerate(body, 2):
+        if len(row) != len(header):
+            raise StudyError(f"design.cases: {path.name}, row {number}: has {len(row)} cells, the header {len(header)}")
+    return cases({key: _cell(cell) for key, cell in zip(header, row, strict=True) if cell} for row in body)
+
+
+def _cell(text: str) -> Value:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool, source: Source) -> DesignTable:
+    """The design with its kind chosen and everything about it checked.
+
+    Args:
+        table: What the study file says.
+        factors: What is varied.
+        has_cases: Whether a list of cases is given.
+        source: For error messages.
+
+    Returns:
+        The design.
+
+    Raises:
+        ActiveSteerError: parts of it do not belong together.
+    """
+    all_grids = all(factor.kind == "grid" for factor in factors)
+    kind = table.kind or ("list" if has_cases else "grid" if all_grids else "sobol")
+    where = ("design", "kind")
+    if kind not in DESIGNS:
+        raise source.fail(where, f"there is no design {shown(kind)}; {nearest_names(kind, DESIGNS)}")
+    if has_cases != (kind == "list"):
+        wanted = "needs design.cases" if kind == "list" else f"design.cases belongs to a list, not to {kind}"
+        raise source.fail(where, wanted)
+    if kind == "list" and factors:
+        raise source.fail(("factors",), "a list of cases names its keys itself; leave [factors] out")
+    if kind == "grid" and not all_grids:
+        other = next(factor for factor in factors if factor.kind != "grid")
+        raise source.fail(where, f"is grid, but {other.key} is {other.kind}; give a grid there or another design")
+    if kind in ("grid", "list"):
+        if table.samples:
+            raise source.fail(("design", "samples"), f"belongs to a sample, not to a {kind}")
+        return DesignTable(kind, 0, table.paired)
+    if all_grids:
+        raise source.fail(where, f"is {kind}, but every factor is a grid; leave it out, or give a distribution")
+    if kind in FOR_INDICES and any(factor.kind == "grid" for factor in factors):
+        raise source.fail(where, f"{kind} samples every factor; write choice in place of grid")
+    if not table.samples:
+        raise source.fail(("design", "samples"), f"{kind} needs the size of the sample")
+    if kind == "saltelli" and table.samples & (table.samples - 1):
+        raise source.fail(("design", "samples"), f"is {table.samples}; saltelli needs a power of 2")
+    return DesignTable(kind, table.samples, table.paired)

@@ -1,0 +1,168 @@
+"""What a study varies: a key of the manoeuvre or of the vehicle, and the values that it takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from activesteer.config import Source
+from activesteer.errors import nearest_names, shown
+
+KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
+"""The one of these keys that a factor's table must have."""
+_OPTIONS: Final = {"choice": ("weights",), "normal": ("truncate",)}
+_DEFAULT_TRUNCATION: Final = 3.0
+"""Where a normal distribution is cut off by itself, in standard deviations."""
+
+Value = Any
+"""A number, a text, true or false, or a list of these."""
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A key and its values.
+
+    Attributes:
+        key: Dotted key, as for `--set`.
+        kind: One of `KINDS`.
+        values: Those of a grid or a choice.
+        weights: Probability of each value of a choice.
+        low: Lower end of a range.
+        high: Upper end of a range.
+        mean: Of a normal distribution before it is truncated.
+        deviation: Standard deviation of that.
+    """
+
+    key: str
+    kind: str
+    values: tuple[Value, ...] = ()
+    weights: tuple[float, ...] = ()
+    low: float = 0.0
+    high: float = 0.0
+    mean: float = 0.0
+    deviation: float = 0.0
+
+    def from_unit(self, unit: NDArray[np.float64]) -> list[Value]:
+        """Values at cumulative probabilities: what turns a sample of the unit cube into one of the study.
+
+        Args:
+            unit: Probabilities, 0 to 1, shape (n,).
+
+        Returns:
+            As many values.
+        """
+        if self.kind in ("grid", "choice"):
+            weights = self.weights or [1.0] * len(self.values)
+            ends = np.cumsum(weights) / np.sum(weights)
+            places = np.minimum(np.searchsorted(ends, unit, side="right"), len(self.values) - 1)
+            return [self.values[place] for place in places]
+        if self.kind == "normal":
+            below, above = ndtr((np.array([self.low, self.high]) - self.mean) / self.deviation)
+            found = self.mean + self.deviation * ndtri(below + unit * (above - below))
+        elif self.kind == "log_uniform":
+            found = self.low * (self.high / self.low) ** unit
+        else:
+            found = self.low + unit * (self.high - self.low)
+        return np.clip(found, self.low, self.high).tolist()
+
+    @property
+    def extremes(self) -> tuple[Value, ...]:
+        """Values that all others lie between, or all of them where they have no order."""
+        return self.values or (self.low, self.high)
+
+    def to_table(self) -> dict[str, Any]:
+        """The table that `read_factor` takes."""
+        if self.values:
+            table: dict[str, Any] = {self.kind: list(self.values)}
+            return table | ({"weights": list(self.weights)} if self.weights else {})
+        if self.kind == "normal":
+            return {"normal": [self.mean, self.deviation], "truncate": [self.low, self.high]}
+        return {self.kind: [self.low, self.high]}
+
+
+def read_factor(key: str, table: object, source: Source) -> Factor:
+    """A factor from its table in a study file.
+
+    Args:
+        key: The key that is varied.
+        table: `{ grid = [70, 80] }`, `{ choice = ["a", "b"], weights = [1, 2] }`, `{ uniform = [low, high] }`,
+            `{ log_uniform = [low, high] }` or `{ normal = [mean, deviation], truncate = [low, high] }`; a normal
+            distribution is cut off at three standard deviations where no bounds are given.
+        source: For error messages.
+
+    Returns:
+        The factor.
+
+    Raises:
+        ActiveSteerError: the table is wrong.
+    """
+    where = ("factors", key)
+    if not isinstance(table, Mapping):
+        raise source.fail(
+            where, f"{shown(table)} is no table; {{ uniform = [low, high] }} or another of {_listed()} is needed"
+        )
+    kinds = [name for name in table if name in KINDS]
+    if len(kinds) != 1:
+        wrong = next((name for name in table if name not in KINDS), "")
+        hint = f"; {nearest_names(wrong, KINDS)}" if wrong and not kinds else ""
+        raise source.fail(where, f"exactly one of {_listed()} is needed{hint}")
+    kind = kinds[0]
+    for name in table:
+        if name != kind and name not in _OPTIONS.get(kind, ()):
+            allowed = ", ".join(_OPTIONS.get(kind, ())) or "nothing else"
+            raise source.fail((*where, name), f"does not belong to {kind}; beside it may stand: {allowed}")
+    given = table[kind]
+    if kind in ("grid", "choice"):
+        return _listed_values(key, kind, given, table.get("weights"), source)
+    first, second = _pair(given, source, (*where, kind))
+    if kind == "normal":
+        if second <= 0.0:
+            raise source.fail((*where, kind), f"the standard deviation is {second:g}; it must be above 0")
+        around = (first - _DEFAULT_TRUNCATION * second, first + _DEFAULT_TRUNCATION * second)
+        low, high = _pair(table["truncate"], source, (*where, "truncate")) if "truncate" in table else around
+        if low >= high or ndtr((low - first) / second) == ndtr((high - first) / second):
+            raise source.fail(
+                (*where, "truncate"), f"between {low:g} and {high:g} there is nothing of the distribution"
+            )
+        return Factor(key, kind, low=low, high=high, mean=first, deviation=second)
+    if first >= second:
+        raise source.fail((*where, kind), f"the lower end {first:g} is not below the upper end {second:g}")
+    if kind == "log_uniform" and first <= 0.0:
+        raise source.fail((*where, kind), f"the lower end is {first:g}; it must be above 0")
+    return Factor(key, kind, low=first, high=second)
+
+
+def _listed() -> str:
+    return ", ".join(KINDS)
+
+
+def _listed_values(key: str, kind: str, given: object, weights: object, source: Source) -> Factor:
+    where = ("factors", key, kind)
+    if not isinstance(given, Sequence) or isinstance(given, str) or not given:
+        raise source.fail(where, f"{shown(given)} is no list of values")
+    if any(given.count(value) > 1 for value in given):
+        raise source.fail(where, "a value stands in it twice")
+    if weights is None:
+        return Factor(key, kind, tuple(given))
+    place = ("factors", key, "weights")
+    if not isinstance(weights, Sequence) or len(weights) != len(given):
+        raise source.fail(place, f"as many weights as values are needed: {len(given)}")
+    if not all(_is_number(weight) and weight >= 0.0 for weight in weights) or sum(weights) <= 0.0:
+        raise source.fail(place, f"{shown(list(weights))} are no weights: at least 0, not all of them 0")
+    return Factor(key, kind, tuple(given), tuple(float(weight) for weight in weights))
+
+
+def _pair(given: object, source: Source, where: Sequence[str]) -> tuple[float, float]:
+    if not isinstance(given, Sequence) or len(given) != 2 or not all(map(_is_number, given)):
+        raise source.fail(where, f"{shown(given)} is not two finite numbers")
+    return float(given[0]), float(given[1])
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,215 @@
+"""All runs of a study, in their order, and whether its keys mean what they say, before anything is driven."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from activesteer.analysis.claims import SYSTEMS
+from activesteer.controllers import load_controller
+from activesteer.errors import ActiveSteerError
+from activesteer.scenario import FileOrTable, Scenario, describe, resolve
+from activesteer.studies.design import Samples
+from activesteer.studies.run_identity import digest
+from activesteer.studies.run_task import Request, Settings, present_inputs
+from activesteer.studies.study_file import StudyFile
+
+_LABELS: Final = ("name", "title")
+"""Keys of manoeuvres and vehicles that only words depend on."""
+
+
+class Plan:
+    """The runs: for each manoeuvre and vehicle every sample, and for each sample every controller.
+
+    Attributes:
+        study: The study.
+        settings: What all runs share.
+        samples: The combinations of factors, one set for all controllers or one for each.
+        digest: Hash of everything that decides the result of the study.
+    """
+
+    def __init__(self, study: StudyFile, folder: Path | None = None) -> None:
+        """Checks the study and lays its runs out.
+
+        Args:
+            study: The study.
+            folder: Where recordings go, where some are kept.
+
+        Raises:
+            ActiveSteerError: a manoeuvre, vehicle or controller is not found or wrong; a key does not exist, changes
+                nothing, or can take a value that is not allowed.
+        """
+        self.study = study
+        self.samples = study.samples()
+        labelled = {
+            "maneuvers": _labelled(study, "maneuvers", study.maneuvers),
+            "vehicles": _labelled(study, "vehicles", study.vehicles),
+            "controllers": _labelled(study, "controllers", study.controllers),
+        }
+        self.settings = Settings(
+            **labelled,
+            overrides=study.overrides,
+            seed=study.seed,
+            timestep_s=study.timestep_s,
+            metrics=study.metrics,
+            recordings=study.recordings,
+            folder=None if study.recordings == "none" else folder,
+            claims=study.claims,
+            expected={},
+        )
+        _check(study, self.samples)
+        self.settings.expected.update(present_inputs(self.settings))
+        table = {key: value for key, value in study.to_table().items() if key not in (*labelled, "title", "tune")}
+        table["design"] = [samples.columns for samples in self.samples]
+        table |= {key: [label for label, _ in labelled[key]] for key in labelled}
+        self.digest = digest({"study": table, "inputs": self.settings.expected})
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        shared = self.settings
+        return len(shared.maneuvers) * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
+
+    def request(self, run: int) -> Request:
+        """A run by its number."""
+        shared = self.settings
+        place, controller = divmod(run, len(shared.controllers))
+        place, sample = divmod(place, len(self.samples[0]))
+        maneuver, vehicle = divmod(place, len(shared.vehicles))
+        samples = self.samples[controller if len(self.samples) > 1 else 0]
+        return Request(run, sample, maneuver, vehicle, controller, samples[sample])
+
+    def requests(self, runs: Iterable[int]) -> list[Request]:
+        """Several runs by their numbers."""
+        return [self.request(run) for run in runs]
+
+
+def _labelled(study: StudyFile, key: str, items: Sequence[Any]) -> tuple[tuple[str, Any], ...]:
+    """Every item with the name that it has in the result: without folders, so that it is the same on every machine."""
+    labels = [_label(item) for item in items]
+    for label in labels:
+        if labels.count(label) > 1:
+            raise study.source.fail((key,), f"two of them have the name {label!r}, which tells runs apart")
+    return tuple(zip(labels, items, strict=True))
+
+
+def _label(item: FileOrTable) -> str:
+    if isinstance(item, Mapping):
+        return str(item.get("name") or "table")
+    path, colon, class_name = str(item).rpartition(":")
+    if colon:
+        return f"{Path(path).name}:{class_name}"
+    return Path(item).stem if str(item).endswith(".toml") else str(item)
+
+
+def _check(study: StudyFile, samples: Sequence[Samples]) -> None:
+    """Every key exists in every manoeuvre and vehicle, allows its extreme values, and changes something."""
+    if study.claims and not set(SYSTEMS) <= set(study.controllers):
+        raise study.source.fail(("claims",), f"needs the controllers {', '.join(SYSTEMS)}")
+    first = samples[0][0] if len(samples[0]) else {}
+    effective: set[str] = set()
+    for maneuver in study.maneuvers:
+        for vehicle in study.vehicles:
+            base = _resolved(study, maneuver, vehicle, {**study.overrides, **first})
+            for controller in study.controllers:
+                load_controller(controller, base.controller_setup(study.timestep_s))
+            for key, values in _extremes(study, samples).items():
+                described = [
+                    _leaves(_resolved(study, maneuver, vehicle, _with(key, value, {**study.overrides, **first}), key))
+                    for value in values
+                ]
+                changed = {leaf for other in described for leaf in _differing(described[0], other)}
+                if len(values) == 1 or any(_is_read(leaf, base, study.controllers) for leaf in changed):
+                    effective.add(key)
+    for key in study.keys:
+        if key not in effective:
+            place = ("design", "cases", key) if study.case_list else ("factors", key)
+            raise study.source.fail(place, "changes nothing in any of the study's runs")
+
+
+def _resolved(
+    study: StudyFile, maneuver: FileOrTable, vehicle: FileOrTable, overrides: Mapping[str, Any], key: str = ""
+) -> Scenario:
+    try:
+        return resolve(maneuver, vehicle, overrides)
+    except ActiveSteerError as error:
+        error.add_note(f"in {_label(maneuver)} with {_label(vehicle)}" + (f", factor {key}" if key else ""))
+        raise
+
+
+def _with(key: str, value: Any, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """The overrides with one of them replaced, in their order; left out where it is None."""
+    return {other: given for other, given in {**overrides, key: value}.items() if given is not None}
+
+
+def _extremes(study: StudyFile, samples: Sequence[Samples]) -> dict[str, list[Any]]:
+    """Key -> values that all others lie between, or all of them where they have no order; None where it is not set."""
+    if study.case_list is None:
+        return {factor.key: list(factor.extremes) for factor in study.factors}
+    found: dict[str, list[Any]] = {}
+    for key, column in samples[0].columns.items():
+        present = [value for value in column if value is not None]
+        numbers = all(isinstance(value, (int, float)) for value in present)
+        different = {str(value): value for value in present}
+        found[key] = sorted({min(present), max(present)}) if numbers else list(different.values())
+        if len(present) < len(column):
+            found[key].append(None)  # there it is as the files have it
+    return found
+
+
+def _leaves(scenario: Scenario) -> dict[str, Any]:
+    """Everything that a run depends on, by dotted key."""
+    return dict(_walk(describe(scenario) | {"overrides": {}, "files": scenario.files}, ""))
+
+
+def _walk(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _walk(item, f"{path}.{key}" if path else str(key))
+    elif isinstance(value, list):
+        for number, item in enumerate(value):
+            yield from _walk(item, f"{path}.{number}")
+    else:
+        yield path, value
+
+
+def _differing(a: Mapping[str, Any], b: Mapping[str, Any]) -> set[str]:
+    return {key for key in a.keys() | b.keys() if a.get(key) != b.get(key)}
+
+
+def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
+    """Whether a value takes part in any of the runs: gains need their controller, the view of a path needs a path."""
+    part, first, *rest = [*leaf.split("."), "", ""]
+    follows_path = scenario.maneuver.course is not None
+    if part == "files":
+        return True
+    if first in _LABELS:
+        return False
+    others = [name for name in controllers if name != "none"]
+    own = any(":" in name for name in controllers)  # a user's controller may look at everything
+    if part == "vehicle" and first == "controllers":
+        return own or rest[0] in others or (rest[0] == "desired_yaw_rate" and bool(others))
+    if part == "vehicle" and first == "single_track":
+        return bool(others) or follows_path or scenario.maneuver.settling_reference().curvature_demand_1pm is not None
+    if part == "vehicle" and first == "driver":
+        return follows_path or rest[0].startswith("speed_")
+    return True
+
+
+def task_size(runs: int, controllers: int, in_flight: int) -> int:
+    """How many runs a task has: 8 to 64, enough tasks that all workers end together, and whole samples.
+
+    Args:
+        runs: Runs of the study.
+        controllers: Runs of a sample.
+        in_flight: Tasks that the workers have at a time.
+
+    Returns:
+        Runs a task; fewer than 8 only where the study is small.
+    """
+    wanted = int(np.clip(runs // (8 * in_flight), 8, 64))
+    if runs < 8 * in_flight:
+        wanted = max(1, runs // in_flight)
+    return max(controllers, wanted // controllers * controllers)

@@ -1,0 +1,283 @@
+"""What a worker does: a few runs after each other, each of which becomes a row of the result."""
+
+from __future__ import annotations
+
+import fnmatch
+import functools
+import tempfile
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from activesteer.analysis.claims import SCENARIOS
+from activesteer.errors import ActiveSteerError, StudyError
+from activesteer.files import make_folder, writing
+from activesteer.recording import Recording
+from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.simulation.runner import prepared, run_scenario
+from activesteer.studies.run_identity import controller_digest, deciding_versions, digest, files_digest, run_id
+from activesteer.vehicle.native_forces import install_native_forces
+
+_ERROR_CHARACTERS: Final = 500
+"""What a row keeps of an error's text."""
+_engine = threading.Lock()
+"""The engine's callbacks belong to the process: of a worker's threads, one drives at a time."""
+
+
+class Status(StrEnum):
+    """How a run ended."""
+
+    OK = "ok"
+    UNEVALUATED = "unevaluated"
+    """It was driven to its end, but there are no metrics; `error` says why."""
+    FAILED = "failed"
+    """It could not be begun, or ended early."""
+    CRASHED = "crashed"
+    """The process died that drove it, every time."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What all runs of a study share; small, because it travels with every task.
+
+    Attributes:
+        maneuvers: Label and name, path or table of each manoeuvre.
+        vehicles: The same of each vehicle.
+        controllers: Label and name or file of each controller.
+        overrides: What is the same in all runs.
+        seed: Of the study.
+        timestep_s: Step of the simulation [s].
+        metrics: Patterns of the metrics that are kept; all where empty.
+        recordings: `none`, `failed`, `all`, or n for every n-th sample.
+        folder: Where recordings go.
+        claims: Whether the paper's claims are checked for every sample.
+        expected: Hash of the files of each pair of manoeuvre and vehicle, of each controller, and the versions, as the
+            study began with them.
+    """
+
+    maneuvers: tuple[tuple[str, FileOrTable], ...]
+    vehicles: tuple[tuple[str, FileOrTable], ...]
+    controllers: tuple[tuple[str, str], ...]
+    overrides: dict[str, Any]
+    seed: int
+    timestep_s: float
+    metrics: tuple[str, ...]
+    recordings: str | int
+    folder: Path | None
+    claims: bool
+    expected: dict[str, str]
+
+
+class Request(NamedTuple):
+    """One run.
+
+    Attributes:
+        run: Its number in the study.
+        sample: Number of the combination of factors.
+        maneuver: Number of the manoeuvre.
+        vehicle: Number of the vehicle.
+        controller: Number of the controller.
+        factors: Values of the factors.
+    """
+
+    run: int
+    sample: int
+    maneuver: int
+    vehicle: int
+    controller: int
+    factors: dict[str, Any]
+
+
+Row = dict[str, Any]
+
+
+def present_inputs(settings: Settings) -> dict[str, str]:
+    """The hashes of `Settings.expected`, of what is found here.
+
+    Raises:
+        ActiveSteerError: something is not found.
+    """
+    found = {f"version of {key}": value for key, value in deciding_versions().items()}
+    for maneuver, maneuver_file in settings.maneuvers:
+        for vehicle, vehicle_file in settings.vehicles:
+            scenario = resolve(maneuver_file, vehicle_file, settings.overrides)
+            found[f"files of {maneuver} and {vehicle}"] = files_digest(scenario)
+    for label, controller in settings.controllers:
+        found[f"controller {label}"] = controller_digest(controller)
+    return found
+
+
+def differences(settings: Settings) -> str:
+    """What is not here as the study began with it, in words; empty where all is."""
+    try:
+        here = present_inputs(settings)
+    except ActiveSteerError as error:
+        return str(error)
+    wrong = [key for key, value in settings.expected.items() if here.get(key) != value]
+    return f"not as where the study was begun: {', '.join(wrong)}" if wrong else ""
+
+
+def drive(settings: Settings, requests: Sequence[Request]) -> list[Row]:
+    """Makes some runs.
+
+    Args:
+        settings: What all runs of the study share.
+        requests: The runs; those of one sample stand together, so that what must be found by driving is found once.
+
+    Returns:
+        A row for each.
+    """
+    with _engine:
+        if problem := _problem(digest({"expected": settings.expected}), settings):
+            return [failed_row(settings, request, Status.FAILED, problem) for request in requests]
+        rows: list[Row] = []
+        place = 0
+        while place < len(requests):
+            group = [other for other in requests[place:] if _same_drive(other, requests[place])]
+            rows += _drive_sample(settings, group)
+            place += len(group)
+        return rows
+
+
+_seen: dict[str, str] = {}
+
+
+def _problem(key: str, settings: Settings) -> str:
+    """Whether this worker has what the study began with; looked at once a process."""
+    if key not in _seen:
+        _seen[key] = differences(settings)
+    return _seen[key]
+
+
+def _same_drive(a: Request, b: Request) -> bool:
+    return (a.maneuver, a.vehicle, a.sample, a.factors) == (b.maneuver, b.vehicle, b.sample, b.factors)
+
+
+def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
+    """The runs of one sample: the same car on the same road with one controller after the other."""
+    first = requests[0]
+    maneuver, vehicle = settings.maneuvers[first.maneuver], settings.vehicles[first.vehicle]
+    overrides = {**settings.overrides, **first.factors}
+    try:
+        scenario = resolve(maneuver[1], vehicle[1], overrides)
+        if not any(isinstance(value, str) for value in first.factors.values()):
+            key = f"files of {maneuver[0]} and {vehicle[0]}"
+            if files_digest(scenario) != settings.expected[key]:
+                raise StudyError(f"{key}: changed while the study ran")
+        ready = prepared(scenario, settings.timestep_s)
+    except ActiveSteerError as error:
+        return [failed_row(settings, request, Status.FAILED, _told(error)) for request in requests]
+    rows = []
+    recordings: dict[str, Recording] = {}
+    for request in requests:
+        label, controller = settings.controllers[request.controller]
+        row = _row(settings, request)
+        row["run_id"] = run_id(scenario, controller, settings.seed, settings.timestep_s)
+        recording = _drive_one(settings, request, row, ready, controller)
+        if settings.claims and recording is not None:
+            recordings[label] = recording
+        rows.append(row)
+    if settings.claims:
+        claims = _claims(maneuver[0], recordings)
+        for row in rows:
+            row.update(claims)
+    return rows
+
+
+def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, controller: str) -> Recording | None:
+    """Makes one run and fills its row; what it recorded, where it came to its end."""
+    path = _recording_path(settings, request)
+    every = settings.recordings
+    keeps = every == "all" or (isinstance(every, int) and request.sample % every == 0)
+    try:
+        recording = run_scenario(ready, controller, path=path if keeps else None, timestep_s=settings.timestep_s)
+    except ActiveSteerError as error:
+        row |= {"status": Status.FAILED.value, "error": _told(error)}
+        if every == "failed" and path is not None and error.recording is not None and len(error.recording):
+            try:
+                error.recording.save(path)
+            except ActiveSteerError as reason:
+                row["error"] = f"{row['error']}; {reason}"
+        return None
+    if problem := recording.metadata.get("metrics_error"):
+        row |= {"status": Status.UNEVALUATED.value, "error": str(problem)[:_ERROR_CHARACTERS]}
+        return None
+    row["status"] = Status.OK.value
+    row.update((name, float(value)) for name, value in recording.metrics.items() if _is_kept(settings.metrics, name))
+    return recording
+
+
+def _recording_path(settings: Settings, request: Request) -> Path | None:
+    if settings.folder is None or settings.recordings == "none":
+        return None
+    return settings.folder / recording_name(
+        request.run, settings.maneuvers[request.maneuver][0], settings.controllers[request.controller][0]
+    )
+
+
+def recording_name(run: int, maneuver: str, controller: str) -> str:
+    """Name of the file of a run's recording."""
+    word = "".join(letter if letter.isalnum() or letter in "._-" else "_" for letter in controller)
+    return f"{run:07d}-{maneuver}-{word}.mcap"
+
+
+@functools.lru_cache(maxsize=4096)
+def _is_kept(patterns: tuple[str, ...], name: str) -> bool:
+    return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _claims(maneuver: str, recordings: Mapping[str, Recording]) -> dict[str, float]:
+    """Column -> 1 where a claim of the paper holds for the sample, else 0; empty where a run is missing."""
+    try:
+        return {f"claim_{claim.id}": float(claim.passed) for claim in SCENARIOS[maneuver](recordings)}
+    except (KeyError, ActiveSteerError):
+        return {}
+
+
+def failed_row(settings: Settings, request: Request, status: Status, problem: str) -> Row:
+    """The row of a run that was not driven to its end."""
+    return _row(settings, request) | {"status": status.value, "error": problem}
+
+
+def _row(settings: Settings, request: Request) -> Row:
+    return {
+        "run": request.run,
+        "run_id": "",
+        "sample": request.sample,
+        "maneuver": settings.maneuvers[request.maneuver][0],
+        "vehicle": settings.vehicles[request.vehicle][0],
+        "controller": settings.controllers[request.controller][0],
+        **request.factors,
+        "status": Status.FAILED.value,
+        "error": "",
+    }
+
+
+def _told(error: ActiveSteerError) -> str:
+    text = "; ".join([f"{type(error).__name__}: {error}", *getattr(error, "__notes__", [])])
+    return text[:_ERROR_CHARACTERS]
+
+
+def prepare_worker(settings: Settings) -> str:
+    """Compiles what is compiled, and looks whether this machine can make the runs.
+
+    Args:
+        settings: What all runs of the study share.
+
+    Returns:
+        What stands against it, in words; nothing where all is well.
+    """
+    if problem := differences(settings):
+        return problem
+    install_native_forces()
+    if settings.folder is None:
+        return ""
+    try:
+        make_folder(settings.folder, StudyError)
+        with writing(settings.folder, StudyError), tempfile.TemporaryFile(dir=settings.folder):
+            return ""
+    except StudyError as error:
+        return str(error)

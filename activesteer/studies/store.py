@@ -1,0 +1,333 @@
+"""The folder of a study: what it is, which runs are done, and in the end all of them in one file.
+
+    DIR/study.toml         the study as it is run, with absolute paths
+    DIR/environment.json   hash of everything that decides the result, versions, machine
+    DIR/parts/             FIRST-LAST.parquet of each finished task, until all are joined
+    DIR/results.parquet    one row a run
+    DIR/recordings/        what is kept of the runs
+
+A file is written aside and renamed, so that it is there as a whole or not at all.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import platform
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from activesteer.errors import StudyError
+from activesteer.files import make_folder, reading, replacing, write_text
+from activesteer.studies.column_units import unit_of
+from activesteer.studies.run_identity import versions
+from activesteer.studies.run_task import Row
+
+try:
+    import fcntl
+except ImportError:  # there is none on Windows
+    fcntl = None
+
+RESULTS: Final = "results.parquet"
+_ROW_GROUP: Final = 65536
+IDENTITY: Final = ("run", "run_id", "sample", "maneuver", "vehicle", "controller")
+"""Columns that say which run a row is of; the factors follow them."""
+OUTCOME: Final = ("status", "error")
+"""Columns behind the factors; the metrics follow them."""
+_TYPES: Final = {"run": pa.int64(), "sample": pa.int64()} | dict.fromkeys(
+    ("run_id", "maneuver", "vehicle", "controller", "status", "error"), pa.string()
+)
+
+
+class Progress(NamedTuple):
+    """How far a study is.
+
+    Attributes:
+        total: Runs of the study.
+        done: Runs that have a row.
+        by_status: How they ended: status -> number.
+        errors: The most frequent errors and their numbers.
+        running: Whether a process is at work on it.
+    """
+
+    total: int
+    done: int
+    by_status: dict[str, int]
+    errors: dict[str, int]
+    running: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {**self._asdict(), "missing": self.total - self.done}
+
+
+class Store:
+    """A study's folder, held by one process at a time."""
+
+    def __init__(self, folder: Path, factors: Sequence[str]) -> None:
+        """Opens nothing; see `opened`.
+
+        Args:
+            folder: The folder.
+            factors: Keys that are varied: the columns between identity and outcome.
+        """
+        self.folder = folder
+        self._factors = tuple(factors)
+        self._parts = folder / "parts"
+
+    @contextlib.contextmanager
+    def opened(self, study_toml: str, identity: str, total: int) -> Iterator[Store]:
+        """Makes the folder, or goes on with the study that is in it.
+
+        Args:
+            study_toml: The study as it is run.
+            identity: Hash of everything that decides its result.
+            total: Number of its runs.
+
+        Raises:
+            StudyError: the folder cannot be written, another process works in it, or it holds another study.
+        """
+        make_folder(self._parts, StudyError)
+        with _locked(self.folder / ".lock"):
+            about = {"digest": identity, "runs": total, "versions": versions(), "platform": platform.platform()}
+            path = self.folder / "environment.json"
+            if path.exists():
+                _compare(read_environment(self.folder), about, self.folder)
+            else:
+                if any(self.folder.glob("*.parquet")) or any(self._parts.iterdir()):
+                    raise StudyError(f"{self.folder} holds results, but not what they are of; use a new folder")
+                write_text(self.folder / "study.toml", study_toml, StudyError)
+                write_text(path, json.dumps(about, indent=2) + "\n", StudyError)
+            for left in self._parts.glob(".*"):  # of a process that was killed while it wrote
+                left.unlink(missing_ok=True)
+            yield self
+
+    def missing(self, total: int) -> list[range]:
+        """Runs that have no row yet, as ranges of their numbers."""
+        if (self.folder / RESULTS).exists():
+            return []
+        found, begin = [], 0
+        for first, last in self._spans():
+            if first > begin:
+                found.append(range(begin, first))
+            begin = max(begin, last + 1)
+        return [*found, range(begin, total)] if begin < total else found
+
+    def write(self, rows: Sequence[Row]) -> None:
+        """Keeps the rows of a finished task, which are of consecutive runs.
+
+        Raises:
+            StudyError: they cannot be written.
+        """
+        name = f"{rows[0]['run']:09d}-{rows[-1]['run']:09d}.parquet"
+        with replacing(self._parts / name, StudyError) as path:
+            pq.write_table(self._table(rows), path)
+
+    def join(self) -> Path:
+        """Makes one file of all parts, in the order of the runs; the parts are deleted.
+
+        Returns:
+            The file.
+
+        Raises:
+            StudyError: it cannot be written, or a part cannot be read.
+        """
+        target = self.folder / RESULTS
+        if not target.exists():
+            paths = self._paths()
+            schema = self._joined_schema(paths)
+            with replacing(target, StudyError) as path, pq.ParquetWriter(path, schema) as writer:
+                for batch in _batched((_fitted(table, schema) for table in _tables(paths)), _ROW_GROUP):
+                    writer.write_table(batch, row_group_size=_ROW_GROUP)
+        shutil.rmtree(self._parts, ignore_errors=True)
+        return target
+
+    def read(self) -> pa.Table:
+        """All rows so far, in the order of the runs.
+
+        Raises:
+            StudyError: a file cannot be read.
+        """
+        if (self.folder / RESULTS).exists():
+            return next(_tables([self.folder / RESULTS]))
+        paths = self._paths()
+        schema = self._joined_schema(paths)
+        return pa.concat_tables([schema.empty_table(), *(_fitted(table, schema) for table in _tables(paths))])
+
+    def progress(self) -> Progress:
+        """How far the study is.
+
+        Raises:
+            StudyError: a file cannot be read.
+        """
+        about = read_environment(self.folder)
+        counts: dict[str, int] = {}
+        errors: dict[str, int] = {}
+        joined = self.folder / RESULTS
+        for table in _tables([joined] if joined.exists() else self._paths(), ["status", "error"]):
+            for column, found in (("status", counts), ("error", errors)):
+                for entry in table[column].combine_chunks().value_counts().to_pylist():
+                    if entry["values"]:
+                        found[entry["values"]] = found.get(entry["values"], 0) + entry["counts"]
+        most = dict(sorted(errors.items(), key=lambda item: -item[1])[:10])
+        return Progress(about["runs"], sum(counts.values()), counts, most, _is_locked(self.folder / ".lock"))
+
+    def _spans(self) -> list[tuple[int, int]]:
+        return sorted(
+            (int(first), int(last)) for first, _, last in (path.stem.partition("-") for path in self._paths())
+        )
+
+    def _paths(self) -> list[Path]:
+        return sorted(self._parts.glob("[0-9]*.parquet"))
+
+    def _table(self, rows: Sequence[Row]) -> pa.Table:
+        names = dict.fromkeys([*IDENTITY, *self._factors, *OUTCOME, *(name for row in rows for name in row)])
+        columns = {}
+        for name in names:
+            values = [row.get(name) for row in rows]
+            if name in _TYPES:
+                columns[name] = pa.array(values, _TYPES[name])
+            elif name in self._factors:
+                columns[name] = _factor_column(values)
+            else:
+                columns[name] = pa.array(values, pa.float64(), from_pandas=False)
+        fields = [pa.field(name, column.type, metadata={"unit": unit_of(name)}) for name, column in columns.items()]
+        return pa.Table.from_arrays(list(columns.values()), schema=pa.schema(fields))
+
+    def _joined_schema(self, paths: Iterable[Path]) -> pa.Schema:
+        """The columns of all parts; a factor that is whole numbers in one and not in another becomes a float."""
+        fields: dict[str, pa.Field] = {}
+        for path in paths:
+            with _refusing(path):
+                for field in pq.read_schema(path):
+                    known = fields.get(field.name)
+                    fields[field.name] = field if known is None else known.with_type(_common(known.type, field.type))
+        if not fields:
+            return self._table([]).schema
+        return pa.schema(list(fields.values()))
+
+
+def read_environment(folder: Path) -> dict[str, Any]:
+    """What a study's folder says of itself.
+
+    Raises:
+        StudyError: there is no study in it, or it cannot be read.
+    """
+    path = folder / "environment.json"
+    if not path.is_file():
+        raise StudyError(f"{folder} holds no study; make one with `activesteer study STUDY.toml -o {folder}`")
+    with reading(path, StudyError):
+        text = path.read_text(encoding="utf-8", errors="replace")
+    try:
+        about = json.loads(text)
+        return {"digest": str(about["digest"]), "runs": int(about["runs"]), "versions": dict(about["versions"])}
+    except (ValueError, KeyError, TypeError) as reason:
+        raise StudyError(f"{path}: is damaged: {reason}") from reason
+
+
+def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
+    if stored["digest"] == now["digest"]:
+        return
+    changed = [
+        f"{key} {stored['versions'].get(key)} in place of {value}"
+        for key, value in now["versions"].items()
+        if key in ("activesteer", "source", "mujoco") and stored["versions"].get(key) != value
+    ]
+    why = f" (made with {', '.join(changed)})" if changed else ": file, inputs or seed differ"
+    raise StudyError(f"{folder} holds another study{why}; use a new folder, or delete this one")
+
+
+def _factor_column(values: Sequence[Any]) -> pa.Array:
+    """Numbers, texts or truth values; anything else as JSON."""
+    try:
+        numbers = any(isinstance(value, float) for value in values)
+        plain = [float(value) if numbers and value is not None else value for value in values]
+        if not any(isinstance(value, (list, dict)) for value in plain):
+            return pa.array(plain)
+    except (TypeError, ValueError, pa.ArrowInvalid, pa.ArrowTypeError):
+        pass
+    return pa.array([None if value is None else json.dumps(value) for value in values], pa.string())
+
+
+def _common(a: pa.DataType, b: pa.DataType) -> pa.DataType:
+    if a == b or pa.types.is_null(b):
+        return a
+    if pa.types.is_null(a):
+        return b
+    both_numbers = all(pa.types.is_integer(kind) or pa.types.is_floating(kind) for kind in (a, b))
+    return pa.float64() if both_numbers else pa.string()
+
+
+def _fitted(table: pa.Table, schema: pa.Schema) -> pa.Table:
+    """The table with the columns of the schema; those that it lacks are empty."""
+    present = set(table.column_names)
+    columns = [
+        table[field.name].cast(field.type) if field.name in present else pa.nulls(len(table), field.type)
+        for field in schema
+    ]
+    return pa.Table.from_arrays(columns, schema=schema)
+
+
+def _tables(paths: Iterable[Path], columns: list[str] | None = None) -> Iterator[pa.Table]:
+    for path in paths:
+        with _refusing(path):
+            table = pq.read_table(path, columns=columns)
+        yield table
+
+
+@contextlib.contextmanager
+def _refusing(path: Path) -> Iterator[None]:
+    try:
+        with reading(path, StudyError):
+            yield
+    except pa.ArrowException as reason:
+        raise StudyError(f"cannot read {path}: {reason}") from reason
+
+
+def _batched(tables: Iterable[pa.Table], rows: int) -> Iterator[pa.Table]:
+    """The same rows in tables of equal length, so that the file does not depend on how the work was divided."""
+    waiting: list[pa.Table] = []
+    count = 0
+    for table in tables:
+        waiting.append(table)
+        count += len(table)
+        while count >= rows:
+            joined = pa.concat_tables(waiting).combine_chunks()
+            yield joined.slice(0, rows)
+            waiting, count = [joined.slice(rows)], count - rows
+    if count:
+        yield pa.concat_tables(waiting).combine_chunks()
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Holds the folder; where the file system knows no locks, nobody is kept out."""
+    try:
+        file = path.open("w")
+    except OSError as reason:
+        raise StudyError(f"cannot write {path}: {reason.strerror}") from reason
+    with file:
+        if fcntl is not None:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as reason:
+                raise StudyError(f"{path.parent}: another process works on this study") from reason
+            except OSError:
+                pass
+        yield
+
+
+def _is_locked(path: Path) -> bool:
+    if fcntl is None or not path.exists():
+        return False
+    with contextlib.suppress(OSError), path.open("r+") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
