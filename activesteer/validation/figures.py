@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from markupsafe import Markup
 
 from activesteer.plotting import new_figure
 from activesteer.quantities import quantity_of
@@ -28,12 +29,12 @@ _CROSS: Final = (("rack", "ay"), ("ay", "r"), ("ay", "roll"), ("ay", "beta"))
 _AXIS_NAMES: Final = _SHOWN | {"rack": ("rack [mm] (- steers left)", 1e3)}
 
 
-def as_svg(figure: Figure) -> str:
-    """The picture as an SVG element, to stand in a page."""
+def as_svg(figure: Figure) -> Markup:
+    """The picture as an SVG element, to stand in a page; matplotlib escapes its texts."""
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata={"Date": None})
     svg = text.getvalue()
-    return svg[svg.index("<svg") :]
+    return Markup(svg[svg.index("<svg") :])
 
 
 def _style(axis: Axes) -> None:

@@ -24,7 +24,7 @@ def test_validate_writes_page_json_and_every_run(tmp_path: Path, capsys: pytest.
     assert "comparisons keep their tolerance" in capsys.readouterr().out
     page = (tmp_path / "validation.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 2 + 2 * 11
-    assert "http-equiv" not in page
+    assert "default-src 'none'" in page
     assert "<script" not in page
     assert json.loads((tmp_path / "validation.json").read_text(encoding="utf-8"))["comparisons"]
     runs = sorted((tmp_path / "runs").glob("*.csv"))

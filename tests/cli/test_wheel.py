@@ -52,8 +52,9 @@ def test_wheel_holds_models_and_maneuvers_and_no_tests(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     for wanted in (
         "activesteer/py.typed",
-        "activesteer/analysis/report/assets/page.js",
-        "activesteer/analysis/report/assets/uPlot.LICENSE",
+        "activesteer/pages/templates/report.html",
+        "activesteer/pages/templates/page.css",
+        "activesteer/pages/templates/uPlot.LICENSE",
         "activesteer/_data/maneuvers/step_steer.toml",
         "activesteer/_data/models/vehicles/compact.toml",
         "activesteer/_data/models/mjcf/compact/compact.xml",

@@ -1,6 +1,7 @@
 """The report of runs: one HTML page with scorecard, plots to zoom into, metrics, parameters; it works offline.
 
-The plots are drawn in the browser by uPlot (https://github.com/leeoniya/uPlot, MIT), of which a copy is in `assets`.
+The plots are drawn in the browser by uPlot (https://github.com/leeoniya/uPlot, MIT), of which a copy is in
+`activesteer/pages/templates`.
 """
 
 from activesteer.analysis.report.page import report_page, write_report

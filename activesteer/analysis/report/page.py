@@ -2,26 +2,41 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Mapping, Sequence
-from html import escape
-from importlib.resources import files
+from collections.abc import Mapping
 from pathlib import Path
-from string import Template
-from typing import Final
+from typing import Final, NamedTuple
 
-from activesteer.analysis.report import tables
+from activesteer.analysis.claims.scorecard import Verdict, number_lines
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.judgement import Judgement, judge
-from activesteer.analysis.report.parameters import rows
+from activesteer.analysis.report.parameters import Row, rows
 from activesteer.analysis.report.runs import Group, entry, groups_of
+from activesteer.analysis.report.tables import MetricRow, file_rows, metric_rows, metric_titles, verdict_counts
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
+from activesteer.pages import render
 from activesteer.recording import Recording
-from activesteer.version import __version__
 
 TITLE: Final = "activesteer report"
+_VERDICT_CLASS: Final = {
+    Verdict.PASSED: "passed",
+    Verdict.FAILED: "failed",
+    Verdict.NOT_REPRODUCED: "known",
+    Verdict.UNEXPECTED: "passed",
+}
+
+
+class _Section(NamedTuple):
+    """What the page says of one manoeuvre; the names are those of the template."""
+
+    anchor: str
+    group: Group
+    judgement: Judgement
+    metric_titles: list[str]
+    metrics: list[MetricRow]
+    parameters: list[Row]
+    names: list[str]
 
 
 def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[str]) -> Path:
@@ -52,89 +67,37 @@ def report_page(recordings: Mapping[str, Recording]) -> str:
         RecordingError: a recording has no rows.
     """
     groups = groups_of(recordings)
-    judgements = [judge(group) for group in groups]
-    anchors = [f"group-{number}" for number in range(1, len(groups) + 1)]
-    sections = [
-        _section(group, anchor, judgement) for group, anchor, judgement in zip(groups, anchors, judgements, strict=True)
-    ]
-    data = [{"anchor": anchor, **plots(group)} for group, anchor in zip(groups, anchors, strict=True)]
-    return Template(_asset("page.html")).substitute(
-        title=escape(_title(groups)),
-        summary=_summary(groups, anchors, judgements),
-        sections="".join(sections),
-        common=_common(groups),
-        version=escape(__version__),
-        styles=_asset("uPlot.min.css") + _asset("page.css"),
-        # Inside a script element `</script` ends it, and `<!--<script` makes the browser look for the end elsewhere.
-        data=json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
-        library=_asset("uPlot.iife.min.js"),
-        licence=escape(" ".join(_asset("uPlot.LICENSE").split())),
-        script=_asset("page.js"),
-    )
-
-
-def _title(groups: Sequence[Group]) -> str:
-    return f"{TITLE}: {groups[0].title}" if len(groups) == 1 else TITLE
-
-
-def _summary(groups: Sequence[Group], anchors: Sequence[str], judgements: Sequence[Judgement]) -> str:
-    cards = [judgement.scorecard for judgement in judgements]
-    runs = [run for group in groups for run in group.runs]
-    vehicles = dict.fromkeys(entry(run.recording, "vehicle", "name") or "?" for run in runs)
-    lines = [
-        f"{len(runs)} run{'s' * (len(runs) > 1)} of {len(groups)} manoeuvre{'s' * (len(groups) > 1)}, "
-        f"vehicle{'s' * (len(vehicles) > 1)} {escape(', '.join(vehicles))}."
-    ]
-    if verdicts := tables.verdict_counts(cards):
-        counts = ", ".join(f"<b>{number}</b> {verdict.value}" for verdict, number in verdicts.items())
-        lines.append(f"Of {sum(verdicts.values())} claims of the paper: {counts}.")
-    incomplete = "".join(
-        f'<p class="failed"><b>Incomplete:</b> {escape(run.source)}: {escape(problem)}</p>'
-        for run in runs
-        if (problem := run.problem)
-    )
-    contents = tables.contents(list(zip(groups, anchors, cards, strict=True)))
-    return f"<p>{' '.join(lines)}</p>{incomplete}{contents}"
-
-
-def _section(group: Group, anchor: str, judgement: Judgement) -> str:
-    parts = [f'<section id="{anchor}" class="group"><h2>{escape(group.title)}</h2>']
-    parts.append(f'<div class="toolbar" data-group="{anchor}"></div>')
-    parts.append(f'<div class="plots" data-group="{anchor}"><noscript>The plots need JavaScript.</noscript></div>')
-    if judgement.scorecard.judged:
-        parts.append("<h3>What the paper claims</h3>" + tables.claims(judgement.scorecard, anchor))
-    elif judgement.obstacle:
-        parts.append(f'<p class="quiet">The claims of the paper are not judged: {escape(judgement.obstacle)}.</p>')
-    if metrics := tables.metrics(group):
-        parts.append(f"<h3>Metrics</h3>{metrics}")
-    for run in group.runs:
-        if problem := run.recording.metadata.get("metrics_error"):
-            parts.append(f"<p>{escape(run.name)}: no metrics: {escape(str(problem))}</p>")
-    found = rows([run.recording for run in group.runs], "controller", "maneuver", "timestep_s")
-    names = [run.name for run in group.runs]
-    parts.append(_folded("Manoeuvre: parameters", tables.parameters(found, names)))
-    return "".join([*parts, "</section>"])
-
-
-def _common(groups: Sequence[Group]) -> str:
-    """What belongs to all runs: the vehicle, the files, and the versions that they were made with."""
+    sections = [_section(group, f"group-{number}") for number, group in enumerate(groups, start=1)]
     several = len(groups) > 1
-    named = [(f"{group.name} {run.name}" if several else run.name, run) for group in groups for run in group.runs]
-    recordings, names = [run.recording for _, run in named], [name for name, _ in named]
-    vehicle, versions = rows(recordings, "vehicle"), rows(recordings, "versions")
-    parts = []
-    if differing := [row for row in vehicle if row.differs]:
-        parts.append(f"<h3>Vehicle: what the runs differ in</h3>{tables.parameters(differing, names)}")
-    same = [row for row in vehicle if not row.differs]
-    parts.append(_folded("Vehicle: parameters of all runs", tables.parameters(same, names)))
-    parts.append(f"<h3>Files</h3>{tables.files(groups)}")
-    parts.append(f"<h3>Versions</h3>{tables.parameters(versions, names)}")
-    return "".join(parts)
+    runs = [run for group in groups for run in group.runs]
+    every = [run.recording for run in runs]
+    file_titles, files = file_rows(groups)
+    return render(
+        "report.html",
+        title=TITLE if several else f"{TITLE}: {groups[0].title}",
+        runs=runs,
+        sections=sections,
+        vehicles=list(dict.fromkeys(entry(recording, "vehicle", "name") or "?" for recording in every)),
+        verdicts=verdict_counts(section.judgement.scorecard for section in sections),
+        verdict_class=_VERDICT_CLASS,
+        number_lines=number_lines,
+        names=[f"{group.name} {run.name}" if several else run.name for group in groups for run in group.runs],
+        vehicle=rows(every, "vehicle"),
+        versions=rows(every, "versions"),
+        file_titles=file_titles,
+        files=files,
+        data=[{"anchor": section.anchor, **plots(section.group)} for section in sections],
+    )
 
 
-def _folded(title: str, content: str) -> str:
-    return f"<details><summary>{escape(title)}</summary>{content}</details>"
-
-
-def _asset(name: str) -> str:
-    return files("activesteer.analysis.report").joinpath("assets", name).read_text(encoding="utf-8")
+def _section(group: Group, anchor: str) -> _Section:
+    recordings = [run.recording for run in group.runs]
+    return _Section(
+        anchor,
+        group,
+        judge(group),
+        metric_titles(group),
+        metric_rows(group),
+        rows(recordings, "controller", "maneuver", "timestep_s"),
+        [run.name for run in group.runs],
+    )

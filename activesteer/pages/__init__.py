@@ -1,0 +1,43 @@
+"""HTML pages that need nothing but themselves: jinja2 templates over one frame and one stylesheet, no network."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from activesteer.version import __version__
+
+
+def render(template: str, **content: Any) -> str:
+    """A page.
+
+    Args:
+        template: File name of the template.
+        **content: What it shows. Text is escaped, `| tojson` writes data that a script can read, and markup made
+            elsewhere must be a `Markup`.
+    """
+    return _environment().get_template(template).render(content)
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("activesteer.pages"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    # The filter escapes `<`, `>`, `&` and quotes; JSON has no nan, which must not come out as something else.
+    environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "separators": (",", ":"), "allow_nan": False}
+    environment.globals |= {"version": __version__, "asset": _asset}
+    return environment
+
+
+def _asset(name: str) -> Markup:
+    """A file of ours as it is: stylesheets and scripts."""
+    loader = PackageLoader("activesteer.pages")
+    return Markup(loader.get_source(_environment(), name)[0])

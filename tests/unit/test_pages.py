@@ -1,0 +1,82 @@
+"""Pages: whatever stands in a recording or a reference stays text."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jinja2 import UndefinedError
+
+from activesteer.analysis.report import report_page
+from activesteer.pages import render
+from activesteer.validation.comparison import Comparison
+from activesteer.validation.kinematics import Curves
+from activesteer.validation.page import page
+from activesteer.validation.programme import Validation
+from activesteer.validation.reference import ReferenceData
+from activesteer.validation.study import Response
+from tests.unit.analysis.made_up import step_steer
+from tests.unit.analysis.made_up_files import recording_of
+
+EVIL = "--></title></style></script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{ version }}{% raise %}"
+
+
+def scripts(text: str) -> int:
+    return len(re.findall(r"<script\b", text))
+
+
+def result(word: str) -> Validation:
+    reference = ReferenceData(word, word, word, (0.0, 0.0, 0.0), Path(), (), (word,))
+    rows = [Comparison(word, word, word, 1.0, 2.0, -1.0, 0.5), Comparison("rack", word, "m", 1.0, 1.0, 0.0, None)]
+    x = np.linspace(0.0, 1.0, 5)
+    curves = [Curves("rack", word, word, x, x, x, 0.1 + 0.0 * x)]
+    return Validation(reference, rows, curves, {}, {})
+
+
+def test_names_of_controller_and_manoeuvre_in_a_report_stay_text():
+    plain, evil = (
+        report_page({word: recording_of(step_steer(), f"my.py:{word}", {"name": word, "title": word})})
+        for word in ("plain", EVIL)
+    )
+    assert scripts(evil) == scripts(plain)
+    assert "<img" not in evil
+    assert "{{ version }}" in evil
+
+
+def test_names_in_a_validation_stay_text():
+    pytest.importorskip("matplotlib")
+    studies = {EVIL: [Response(EVIL, *([1.0] * 6))]}
+    evil = page(result(EVIL), studies)
+    assert scripts(evil) == 0
+    assert "<img" not in evil
+    assert evil.count("<svg") == 1
+    assert 'class="outside"' in evil
+
+
+def test_both_pages_have_one_frame_and_one_stylesheet():
+    pytest.importorskip("matplotlib")
+    texts = [report_page({"a": recording_of(step_steer())}), page(result("plain"), {})]
+    frames = [re.search(r"<meta http-equiv.*?>", text, re.DOTALL) for text in texts]
+    styles = [re.search(r":root \{.*?</style>", text, re.DOTALL) for text in texts]
+    assert frames[0]
+    assert frames[1]
+    assert frames[0][0] == frames[1][0]
+    assert styles[0]
+    assert styles[1]
+    assert styles[0][0] == styles[1][0]
+
+
+def test_json_in_a_page_comes_back_and_opens_nothing():
+    data = report_page({"a": recording_of(step_steer(), EVIL)})
+    found = re.search(r'id="data">(.*?)</script>', data, re.DOTALL)
+    assert found
+    assert "<" not in found[1]
+    assert json.loads(found[1])[0]["runs"][0]["name"] == EVIL.rpartition(":")[2]
+
+
+def test_what_a_template_needs_must_be_given():
+    with pytest.raises(UndefinedError):
+        render("validation.html")
