@@ -8,7 +8,7 @@ READY := $(VENV)/.ready-demo
 READY_DEV := $(VENV)/.ready-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all lint format docs wheel clean clean-kernels
+.PHONY: help demo test test-all pytest pictures lint format docs wheel clean clean-kernels
 
 help:  ## what there is
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 24
@@ -16,11 +16,20 @@ help:  ## what there is
 demo: $(READY)  ## the paper's scenarios with three steering systems: scorecard, MCAP files and figures in demo/
 	$(BIN)/activesteer reproduce --figures -o demo
 
-test: lint  ## lint, types, module borders, and every test that is not slow
-	$(BIN)/python -m pytest -m "not slow"
+test: MARK := -m "not slow"
+test: $(READY_DEV) pictures  ## lint, types, module borders, and every test that is not slow
+	$(MAKE) --no-print-directory -j2 lint pytest MARK='$(MARK)'
 
-test-all: lint  ## the same with the slow tests
-	$(BIN)/python -m pytest
+test-all: $(READY_DEV) pictures  ## the same with the slow tests
+	$(MAKE) --no-print-directory -j2 lint pytest
+
+# A test process for each processor, up to four: each takes about a gigabyte, and more shorten little.
+pytest: $(READY_DEV)
+	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadgroup --no-loadscope-reorder $(MARK)
+
+# Drivers and browser for tests of pictures, where root and apt-get can install them; else those tests are skipped.
+pictures:
+	@tools/install_for_pictures.sh
 
 lint: $(READY_DEV)  ## ruff, pyright, import-linter
 	$(BIN)/ruff check .

@@ -1,12 +1,52 @@
-"""What all tests share: a seeded generator, and no network."""
+"""What all tests share: a seeded generator, no network, and how they are spread over processes."""
 
 from __future__ import annotations
 
 import socket
-from typing import Any
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 import pytest
+
+ROOT: Final = Path(__file__).resolve().parents[1]
+
+# With several processes (pytest-xdist), the tests of a file stay together and share its fixtures. These folders stay
+# together as a whole, since they share dear ones (all runs of the paper; the viewer) ...
+TOGETHER: Final = ("tests/reproduction/", "tests/render/")
+# ... and each test of these files is by itself: a page or a signal each.
+BY_ITSELF: Final = ("tests/docs/test_documents.py", "tests/cli/test_stopping.py")
+# What takes long is begun first, so that no process is left with it in the end.
+LONG_FIRST: Final = (
+    *TOGETHER[:1],
+    *BY_ITSELF[:1],
+    "tests/cli/test_w",
+    "tests/cli/test_v",
+    "tests/cli/",
+    "tests/examples/",
+)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Several processes must not all compile the same at once: it is done for them before they start."""
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        drive = "from activesteer import simulate; simulate('step_steer', 'ars', overrides={'duration_s': 1.5})"
+        subprocess.run([sys.executable, "-c", drive], cwd=ROOT, check=True)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if not hasattr(config, "workerinput"):
+        return
+    for item in items:
+        file = item.location[0]
+        group = next((folder for folder in TOGETHER if file.startswith(folder)), file)
+        item.add_marker(pytest.mark.xdist_group(item.nodeid if file in BY_ITSELF else group))
+    order = dict(zip(LONG_FIRST, range(len(LONG_FIRST)), strict=True))
+    items.sort(
+        key=lambda item: next((place for start, place in order.items() if item.location[0].startswith(start)), 99)
+    )
 
 
 @pytest.fixture
