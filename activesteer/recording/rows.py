@@ -27,7 +27,7 @@ from activesteer.signals import Channel
 
 MAX_CACHED_BYTES: Final = 2**29
 """Channels of all open files together that stay in memory, as they are in the files."""
-_READ_BYTES: Final = 2**27
+_READ_BYTES: Final = 2**28
 """How much is read at once: neighbours of the channel that was asked for come with it, since the whole file has to be
 decompressed for a single one."""
 _SMALL_BYTES: Final = 2**16
@@ -204,7 +204,8 @@ class FileRows:
         """The values of a channel, shape (n,)."""
         found = _cache.get(self._token, column)
         if found is None:
-            found = self._load(self._neighbours(column))[0]
+            columns = self._neighbours(column)
+            found = self._load(columns)[columns.index(column)]
         return found.astype(np.float64)
 
     def values(self) -> NDArray[np.float64]:
@@ -216,14 +217,10 @@ class FileRows:
         return poses_of(self.blocks(), sum(place.poses for place in self._places), self._decoder.body_names)
 
     def _neighbours(self, column: int) -> list[int]:
-        """The column, and those that follow it, as far as one reading goes."""
-        chosen, size = [column], 0
-        for other in range(column + 1, len(self._types)):
-            size += self._rows * self._types[other].itemsize
-            if size > _READ_BYTES:
-                break
-            chosen.append(other)
-        return chosen
+        """The columns that are read with one: as many as one reading takes, in fixed pieces of the table."""
+        width = max(1, _READ_BYTES // (4 * max(self._rows, 1)))  # most channels have 32 bit
+        first = column - column % width
+        return list(range(first, min(first + width, len(self._types))))
 
     def _load(self, columns: list[int]) -> list[NDArray]:
         arrays = [np.empty(self._rows, self._types[column]) for column in columns]
