@@ -20,6 +20,8 @@ MAX_ROWS: Final = 20_000_000
 """Rows of a recording: five and a half hours at 1 ms, 160 MB for a channel in memory."""
 MAX_CHANNELS: Final = 10_000
 """Channels of a recording; a car has some 150."""
+MAX_FILE_BYTES: Final = 2**35
+"""Size of a file: 20 million rows have some 15 GB. A file of holes may have any size, and would be read without end."""
 MAX_CHUNK_BYTES: Final = 2**26
 """Size of a chunk, compressed or not: one second of a car is 1 MB."""
 MAX_EXPANSION: Final = 200

@@ -28,6 +28,7 @@ from activesteer.recording.contents import (
     MAX_BODIES,
     MAX_CHANNELS,
     MAX_CHUNK_BYTES,
+    MAX_FILE_BYTES,
     MAX_OTHER_BYTES,
     MAX_OTHER_RECORDS,
     MAX_ROWS,
@@ -141,6 +142,9 @@ class _Records:
         if self.position > size:
             raise RecordingError(f"a record of {length} bytes reaches beyond the end")
         if opcode in _READ:
+            self._bytes, self._count = self._bytes + length, self._count + 1
+            if self._bytes > MAX_OTHER_BYTES or self._count > MAX_OTHER_RECORDS:
+                raise RecordingError("attachments, schemas and metadata are larger than those of a recording may be")
             self._take(opcode, read_bytes(descriptor, first, length))
         elif opcode == Opcode.CHUNK:
             self.chunks.append((first, length))
@@ -154,9 +158,6 @@ class _Records:
             self.crc = zlib.crc32(read_bytes(descriptor, piece, min(_PIECE_BYTES, self.position - piece)), self.crc)
 
     def _take(self, opcode: int, content: bytes) -> None:
-        self._bytes, self._count = self._bytes + len(content), self._count + 1
-        if self._bytes > MAX_OTHER_BYTES or self._count > MAX_OTHER_RECORDS:
-            raise RecordingError("attachments, schemas and metadata are larger than those of a recording may be")
         record = _READ[Opcode(opcode)].read(ReadDataStream(BytesIO(content)))
         if isinstance(record, Schema):
             self.schemas[record.id] = record
@@ -186,6 +187,8 @@ def read_mcap(path: Path) -> Contents:
         size = os.fstat(descriptor).st_size
         if os.pread(descriptor, len(MCAP0_MAGIC), 0) != MCAP0_MAGIC:
             raise RecordingError(f"{shown_path(path)} is not an MCAP file")
+        if size > MAX_FILE_BYTES:
+            raise RecordingError(f"{shown_path(path)} has {size} bytes, a recording at most {MAX_FILE_BYTES}")
         records = _records(descriptor, size)
         try:
             contents = _decode(descriptor, records)
