@@ -76,6 +76,7 @@ def all_commands() -> Commands:
         kc,
         linearise,
         listing,
+        recover,
         replay,
         report,
         reproduce,
@@ -93,7 +94,7 @@ def all_commands() -> Commands:
     commands = Commands(f"activesteer {__version__}")
     for title, modules in {
         "drive": (listing, run, watch),
-        "look": (info, report, replay, video),
+        "look": (info, report, replay, video, recover),
         "car": (vehicle, tyre, kc),
         "study": (study, identify, linearise),
         "prove": (reproduce, figures, validate, bench),

@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from activesteer.commands.arguments import add_recording
+from activesteer.commands.output import print_plain
 
 
 def add_to(commands: Any) -> None:
@@ -23,20 +24,20 @@ def _info(options: argparse.Namespace) -> int:
     metadata = recording.metadata
     time_s = recording.time_s
     span = f"{time_s[0]:.3f} to {time_s[-1]:.3f} s, {len(time_s)} steps" if len(time_s) else "no steps"
-    print(f"{options.file}: {span}")
+    print_plain(f"{options.file}: {span}")
     for key in ("maneuver", "vehicle"):
         table = metadata.get(key, {})
-        print(f"{key}: {table.get('name', '?')} {table.get('title', '')}".rstrip())
-    print(f"controller: {metadata.get('controller', '?')}")
+        print_plain(f"{key}: {table.get('name', '?')} {table.get('title', '')}".rstrip())
+    print_plain(f"controller: {metadata.get('controller', '?')}")
     for key in ("overrides", "versions"):
         if metadata.get(key):
-            print(f"{key}: " + ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
+            print_plain(f"{key}: " + ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
     if not metadata.get("complete", True):
-        print(f"INCOMPLETE: {metadata.get('error', 'the run did not end properly')}")
+        print_plain(f"INCOMPLETE: {metadata.get('error', 'the run did not end properly')}")
     if recording.metrics:
         print(comparison({"metrics": recording.metrics}))
     print("channels:")
     for channel in recording.channels:
         print(f"  {channel.name:32} {channel.unit or '-':6} {channel.meaning}")
-    print("attachments: " + ", ".join(recording.attachments))
+    print_plain("attachments: " + ", ".join(recording.attachments))
     return 0

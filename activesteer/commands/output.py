@@ -18,6 +18,11 @@ def print_json(value: Any) -> None:
     print(json.dumps(_finite(value), indent=2))
 
 
+def print_plain(text: str) -> None:
+    """Prints a line that comes from a file; what would move the cursor or change colours is shown instead."""
+    print("".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text))
+
+
 def _finite(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _finite(item) for key, item in value.items()}

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.exceptions import McapError
+from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
@@ -82,6 +83,28 @@ def test_rerun_opens_what_a_killed_run_left(controller, tmp_path):
     done = subprocess.run([binary, *words], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "run.rrd").stat().st_size > 10_000
+
+
+def test_recovered_file_of_a_killed_run_opens_in_readers_that_seek(call, controller, tmp_path):
+    body = "if self.steps > 1700:\n    import os\n    os.kill(os.getpid(), 9)\nreturn SteerCommand()"
+    activesteer(tmp_path, "run", "slalom", "-c", controller(body), "--set", "settle_s=0", "-o", "run.mcap")
+    left, whole = tmp_path / "run.mcap", tmp_path / "whole.mcap"
+    done = call("recover", left, "-o", whole)
+    before, after = Recording.open(left), Recording.open(whole)
+    assert done.status == 0
+    assert done.out == f"{whole}: {len(before)} steps up to {before.time_s[-1]:.3f} s\n"
+    assert np.array_equal(after.values, before.values)
+    assert np.array_equal(after.poses.positions_m, before.poses.positions_m)
+    assert (after.metadata, after.attachments, after.scene) == (before.metadata, before.attachments, before.scene)
+    assert after.metadata["complete"] is False
+    with whole.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert summary.statistics.message_end_time >= (len(before) - 1) * 1_000_000
+    refused = call("recover", left, "-o", left)
+    assert refused.status == 1
+    assert "is the file that is to be recovered" in refused.err
 
 
 def test_disk_that_fills_up_ends_the_run_with_what_was_saved(tmp_path):
