@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from activesteer.maneuver import LaneChange, SineWithDwell, Slalom
-from activesteer.resources import list_maneuvers
+from activesteer.resources import find_maneuver, list_maneuvers
 from activesteer.scenario import resolve
 
 
@@ -72,3 +73,10 @@ def test_slalom_has_the_spacing_that_suits_its_speed():
     maneuver = resolve("slalom").maneuver
     assert isinstance(maneuver, Slalom)
     assert maneuver.cones.spacing_m == 36.0
+
+
+@pytest.mark.parametrize("name", list_maneuvers())
+def test_road_is_stated(name: str) -> None:
+    """What "dry" means is no default of the program: every file says its friction, for the whole road or by side."""
+    road = tomllib.loads(find_maneuver(name).read_text(encoding="utf-8")).get("road", {})
+    assert "mu" in road or {"mu_left", "mu_right"} <= road.keys()
