@@ -23,7 +23,6 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Mapping
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -33,7 +32,7 @@ from activesteer.analysis.claims import SCENARIOS, SYSTEMS
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
 from activesteer.simulation.runner import prepared, run_scenario
-from activesteer.studies.reproduction import worker_pool
+from activesteer.studies.workers import in_parallel
 
 RANGES: Final = {
     "desired_yaw_rate.max_lateral_acceleration_mps2": (7.8, 8.8),  # about what dry tyres transmit
@@ -110,7 +109,7 @@ def _cost(scenario: str, run: Recording, none: Recording) -> float:
     return cost + sum(share(name) for name in names) + out
 
 
-def search(pool: ProcessPoolExecutor, count: int, rounds: int) -> list[Judged]:
+def search(jobs: int | None, count: int, rounds: int) -> list[Judged]:
     """Samples, and samples again around the best; best first."""
     low, high = (np.array(ends) for ends in zip(*RANGES.values(), strict=True))
     centre, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -118,7 +117,7 @@ def search(pool: ProcessPoolExecutor, count: int, rounds: int) -> list[Judged]:
     for number in range(rounds):
         points = qmc.Sobol(len(RANGES), rng=number).random(count)
         sets = np.clip(centre + (2.0 * points - 1.0) * half, low, high)
-        found += pool.map(judge, [tuple(float(f"{value:.3g}") for value in row) for row in sets.tolist()])
+        found += in_parallel(judge, [(tuple(float(f"{value:.3g}") for value in row),) for row in sets.tolist()], jobs)
         found.sort()
         centre, half = np.array(found[0].values), half * _SHRINK
         print(
@@ -134,8 +133,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3, metavar="N", help="default: 3")
     parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one per processor)")
     options = parser.parse_args()
-    with worker_pool(options.jobs) as pool:
-        found = search(pool, options.runs, options.rounds)
+    found = search(options.jobs, options.runs, options.rounds)
     for judged in found[:10]:
         values = dict(zip(RANGES, judged.values, strict=True))
         print(f"{judged.cost:.3f}  failing: {' '.join(judged.failing) or 'none'}  {values}")

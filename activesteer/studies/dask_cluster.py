@@ -49,7 +49,7 @@ class DaskCluster:
         self._count()
 
     def _count(self) -> None:
-        self.in_flight = max(8, _TASKS_A_WORKER * len(self._client.nthreads()))
+        self.in_flight = max(32, _TASKS_A_WORKER * len(self._client.nthreads()))
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """See `Workers`."""

@@ -6,12 +6,8 @@ from the files, not from what the processes hold.
 
 from __future__ import annotations
 
-import contextlib
-import multiprocessing
 import os
-import signal
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -23,6 +19,7 @@ from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation.runner import prepared, run_scenario
 from activesteer.simulation.simulation import Simulation
+from activesteer.studies.workers import TaskQueue, in_parallel, workers_for
 
 Progress = Callable[[str, int, int], None]
 """Called with what was finished, how many runs are, and how many there are in all."""
@@ -134,25 +131,20 @@ def _drive(
     scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
 ) -> Iterator[_Outcome]:
     """Makes all runs and tells each as it ends; what a search must find first is found once for the three systems."""
-    with worker_pool(jobs) as pool:
-        searches = {pool.submit(prepared, scenario): name for name, scenario in scenarios.items()}
-        runs: dict[Future[Any], tuple[str, str]] = {}
-        while searches or runs:
-            finished, _ = wait([*searches, *runs], return_when=FIRST_COMPLETED)
-            for future in finished:
-                if future in searches:
-                    name = searches.pop(future)
-                    try:
-                        scenario = future.result()
-                    except ActiveSteerError as error:
-                        yield from (_Outcome(name, system, str(error)) for system in SYSTEMS)
-                        continue
-                    runs |= {
-                        pool.submit(_run, scenario, system, paths[name][system]): (name, system) for system in SYSTEMS
-                    }
-                else:
-                    name, system = runs.pop(future)
-                    yield _Outcome(name, system, str(future.result()))
+    with workers_for(jobs) as workers:
+        queue = TaskQueue(workers)
+        for name, scenario in scenarios.items():
+            queue.add((name, None), prepared, scenario)
+        for (name, system), value, error in queue.outcomes():
+            if error is not None and not isinstance(error, ActiveSteerError):
+                raise error
+            if system is not None:
+                yield _Outcome(name, system, str(error or value))
+            elif error is not None:
+                yield from (_Outcome(name, system, str(error)) for system in SYSTEMS)
+            else:
+                for other in SYSTEMS:
+                    queue.add((name, other), _run, value, other, paths[name][other])
 
 
 def _run(scenario: Scenario, system: str, path: Path) -> str:
@@ -162,45 +154,6 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
     except ActiveSteerError as error:
         return "; ".join([str(error), *getattr(error, "__notes__", [])])
     return ""
-
-
-@contextlib.contextmanager
-def worker_pool(jobs: int | None = None) -> Iterator[ProcessPoolExecutor]:
-    """Processes that share nothing with this one, started afresh: the engine's callbacks belong to a process.
-
-    Where the work ends early, by an error, what has not begun is not begun, and what runs is waited for. Ctrl-C, which
-    a terminal sends to every process, reaches this one alone: it decides. Then the others are ended at once.
-
-    Args:
-        jobs: How many; as many as there are processors where not given.
-
-    Raises:
-        ParameterError: fewer than one.
-    """
-    if jobs is not None and jobs < 1:
-        msg = f"--jobs {jobs}: at least 1 is needed"
-        raise ParameterError(msg)
-    pool = _DeafPool(jobs or os.cpu_count() or 1, multiprocessing.get_context("spawn"))
-    try:
-        yield pool
-    except KeyboardInterrupt:
-        for process in multiprocessing.active_children():
-            process.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-class _DeafPool(ProcessPoolExecutor):
-    """Processes that never see a Ctrl-C, not even while they start: what is blocked here stays blocked there."""
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """As that of the base, which starts processes here as they are needed."""
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            return super().submit(fn, *args, **kwargs)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _Car(NamedTuple):
@@ -263,17 +216,17 @@ def robustness(
         for label, vary in _VARIATIONS.items()
         for name, scenario in scenarios.items()
     ]
+
+    def tell(place: int, done: int) -> None:
+        if progress is not None:
+            progress(f"{tasks[place][0]}: {tasks[place][1]}", done, len(tasks))
+
+    found = in_parallel(_claims_of, [(name, vehicle, changes) for _, name, changes in tasks], jobs, tell)
     table: dict[str, dict[str, bool]] = {}
-    with worker_pool(jobs) as pool:
-        futures = {pool.submit(_claims_of, name, vehicle, changes): (label, name) for label, name, changes in tasks}
-        while futures:
-            for future in wait(futures, return_when=FIRST_COMPLETED).done:
-                label, name = futures.pop(future)
-                for claim in future.result():
-                    table.setdefault(claim.id, {})[label] = claim.passed
-                if progress is not None:
-                    progress(f"{label}: {name}", len(tasks) - len(futures), len(tasks))
-    return {claim: {label: found[label] for label in _VARIATIONS} for claim, found in sorted(table.items())}
+    for (label, *_), claims in zip(tasks, found, strict=True):
+        for claim in claims:
+            table.setdefault(claim.id, {})[label] = claim.passed
+    return dict(sorted(table.items()))
 
 
 def _claims_of(name: str, vehicle: FileOrTable, changes: Mapping[str, Any]) -> list[Claim]:

@@ -91,7 +91,7 @@ def study(
         store = stack.enter_context(Store(folder, parsed.keys).opened(parsed.to_toml(), plan.digest, len(plan)))
         missing = store.missing(len(plan))
         if missing:
-            workers = stack.enter_context(workers_for(jobs, client=client, scheduler=scheduler, abandon=True))
+            workers = stack.enter_context(workers_for(jobs, client=client, scheduler=scheduler))
             # What would go wrong in every run is found out before the first of them.
             if problem := workers.everywhere(prepare_worker, plan.settings):
                 raise StudyError(problem)

@@ -12,7 +12,7 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, ProcessPoolExecutor, wait
 from multiprocessing import connection
 from typing import Any, Final, NamedTuple, Protocol
@@ -267,17 +267,14 @@ class TaskQueue:
 
 
 @contextlib.contextmanager
-def workers_for(
-    jobs: int | None = None, *, client: Any = None, scheduler: str | None = None, abandon: bool = False
-) -> Iterator[Workers]:
-    """The workers that the arguments name.
+def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str | None = None) -> Iterator[Workers]:
+    """The workers that the arguments name; where the body ends early, what they do is abandoned.
 
     Args:
         jobs: Processes of this machine, as many as there are processors for us where not given; with 1 the work is done
             in this process.
         client: A `distributed.Client` instead.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
-        abandon: Whether tasks are abandoned where the body ends early; else what runs is ended properly.
 
     Yields:
         The workers.
@@ -301,8 +298,38 @@ def workers_for(
             yield workers
             early = False
         finally:
-            workers.close(abandon=abandon and early)
+            workers.close(abandon=early)
 
 
 def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_parallel(
+    function: Callable[..., Any],
+    arguments: Sequence[tuple[Any, ...]],
+    jobs: int | None = None,
+    told: Callable[[int, int], None] = lambda _place, _done: None,
+) -> list[Any]:
+    """Calls a function with each set of arguments, spread over processes.
+
+    Args:
+        function: A function of a module, so that it pickles.
+        arguments: Its arguments, one tuple a call.
+        jobs: Number of processes; that of the processors where not given. With 1 all is done in this process.
+        told: Called after each call with the place of its arguments and how many calls are done.
+
+    Returns:
+        What it returned, in the order of the arguments.
+
+    Raises:
+        ParameterError: fewer than one job.
+        BaseException: what a call raised.
+    """
+    results: dict[int, Any] = {}
+    with workers_for(jobs) as workers:
+        tasks = ((place, function, *each) for place, each in enumerate(arguments))
+        for outcome in TaskQueue(workers).outcomes(tasks):
+            results[outcome.key] = outcome.result()
+            told(outcome.key, len(results))
+    return [results[place] for place in range(len(arguments))]

@@ -14,8 +14,9 @@ from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder, replacing, write_text
 from activesteer.road.road import Road
-from activesteer.scenario import load_car, resolve
-from activesteer.simulation.runner import prepared, run_scenario
+from activesteer.scenario import load_car
+from activesteer.simulation.runner import simulate
+from activesteer.studies.workers import in_parallel
 from activesteer.validation.comparison import Comparison, to_json
 from activesteer.validation.kinematics import Curves, compare_kinematics
 from activesteer.validation.motion import reference_columns
@@ -64,6 +65,7 @@ def validate(
     more: Path | None = None,
     timestep_s: float = DEFAULT_TIMESTEP_S,
     unknown_runs: bool = True,
+    jobs: int | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> Validation:
     """Compares a car with the same car in another multibody code.
@@ -73,6 +75,7 @@ def validate(
         more: Folder with further reference runs, NAME.csv in the same columns.
         timestep_s: Step of our simulation [s].
         unknown_runs: Whether runs are driven whose reference is not known.
+        jobs: Number of processes; that of the processors where not given.
         progress: Called with the share that is done and what comes next.
 
     Returns:
@@ -96,14 +99,20 @@ def validate(
     tell(1, "static")
     comparisons = [*compare_static(vehicle, data), *rows, *compare_tyre(car.tyres[0], data)]
     runs = {}
-    for number, run in enumerate(driven):
-        tell(number + 2, run)
-        one = prepared(resolve(data.maneuver(run), data.vehicle), timestep_s)
-        recording = run_scenario(one, timestep_s=timestep_s)
-        runs[run] = reference_columns(recording, data.point_from_cg_m)
+    found = in_parallel(
+        _columns, [(data, run, timestep_s) for run in driven], jobs, lambda place, done: tell(done + 2, driven[place])
+    )
+    for run, columns in zip(driven, found, strict=True):
+        runs[run] = columns
         if run in references:
-            comparisons += compare_run(run, runs[run], references[run])
+            comparisons += compare_run(run, columns, references[run])
     return Validation(data, comparisons, curves, runs, references)
+
+
+def _columns(data: ReferenceData, run: str, timestep_s: float) -> Table:
+    """One of our runs, in the columns of the reference."""
+    recording = simulate(data.maneuver(run), vehicle=data.vehicle, timestep_s=timestep_s)
+    return reference_columns(recording, data.point_from_cg_m)
 
 
 def write_json(result: Validation, path: Path) -> Path:

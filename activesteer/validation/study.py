@@ -9,6 +9,7 @@ import numpy as np
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.simulation.runner import simulate
+from activesteer.studies.workers import in_parallel
 from activesteer.validation.motion import reference_columns
 from activesteer.validation.reference import ReferenceData
 
@@ -55,40 +56,41 @@ class Response(NamedTuple):
         return changes | {"peak_time_s": self.peak_time_s - other.peak_time_s}
 
 
-def step_sizes(data: ReferenceData, run: str, tell: Callable[[str], None] = lambda _: None) -> list[Response]:
+def step_sizes(
+    data: ReferenceData, run: str, tell: Callable[[str], None] = lambda _: None, jobs: int | None = None
+) -> list[Response]:
     """The same step steer at several steps of the engine, the shortest first.
 
     Args:
         data: The reference.
         run: A step steer of it.
-        tell: Called with what comes next.
+        tell: Called with what is done.
+        jobs: Number of processes; that of the processors where not given.
 
     Returns:
         A response for each step.
     """
-    found = []
-    for step_s in _STEPS_S:
-        tell(f"step size {1e3 * step_s:g} ms")
-        found.append(_response(data, run, f"{1e3 * step_s:g} ms", {}, step_s))
-    return found
+    names = [f"{1e3 * step_s:g} ms" for step_s in _STEPS_S]
+    tasks = [(data, run, name, {}, step_s) for name, step_s in zip(names, _STEPS_S, strict=True)]
+    return in_parallel(_response, tasks, jobs, lambda place, _: tell(f"step size {names[place]}"))
 
 
-def conventions(data: ReferenceData, run: str, tell: Callable[[str], None] = lambda _: None) -> list[Response]:
+def conventions(
+    data: ReferenceData, run: str, tell: Callable[[str], None] = lambda _: None, jobs: int | None = None
+) -> list[Response]:
     """The same step steer with the tyre evaluated as the other code does, and less so.
 
     Args:
         data: The reference.
         run: A step steer of it.
-        tell: Called with what comes next.
+        tell: Called with what is done.
+        jobs: Number of processes; that of the processors where not given.
 
     Returns:
         A response for each of `VARIANTS`.
     """
-    found = []
-    for name, overrides in VARIANTS.items():
-        tell(name)
-        found.append(_response(data, run, name, overrides, DEFAULT_TIMESTEP_S))
-    return found
+    tasks = [(data, run, name, overrides, DEFAULT_TIMESTEP_S) for name, overrides in VARIANTS.items()]
+    return in_parallel(_response, tasks, jobs, lambda place, _: tell(tasks[place][2]))
 
 
 def _response(data: ReferenceData, run: str, name: str, overrides: Mapping[str, Any], step_s: float) -> Response:

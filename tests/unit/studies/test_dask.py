@@ -1,0 +1,149 @@
+"""Studies on a Dask cluster: a scheduler and two workers, each a process of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import psutil
+import pytest
+
+from activesteer import study
+from activesteer.errors import StudyError
+from activesteer.studies.workers import TaskQueue, workers_for
+from tests.unit.studies.short import short_study, write_controller
+
+MU = tuple(0.7 + 0.01 * number for number in range(20))
+
+
+class Cluster(NamedTuple):
+    """A scheduler and its workers.
+
+    Attributes:
+        file: The scheduler file.
+        workers: Their processes.
+    """
+
+    file: Path
+    workers: list[subprocess.Popen[bytes]]
+
+
+def _dask(*words: object) -> subprocess.Popen[bytes]:
+    path = os.pathsep.join([str(Path.cwd()), os.environ.get("PYTHONPATH", "")])
+    return subprocess.Popen(
+        [sys.executable, "-m", "dask", *map(str, words)],
+        env=os.environ | {"PYTHONPATH": path},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory) -> Iterator[Cluster]:
+    file = tmp_path_factory.mktemp("dask") / "scheduler.json"
+    common = ("--scheduler-file", file, "--host", "127.0.0.1", "--no-dashboard")
+    processes = [_dask("scheduler", "--port", 0, *common)]
+    try:
+        processes += [_dask("worker", "--nthreads", 1, *common) for _ in range(2)]
+        deadline = time.monotonic() + 60
+        while not file.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        yield Cluster(file, processes[1:])
+    finally:
+        for process in reversed(processes):
+            for child in psutil.Process(process.pid).children(recursive=True):
+                child.kill()
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_same_bits_as_this_process(cluster, tmp_path):
+    table = short_study(*MU, controllers=["none", "ars"])
+    study(table, output=tmp_path / "dask", scheduler=str(cluster.file), limit=7)
+    study(table, output=tmp_path / "dask", scheduler=str(cluster.file))
+    study(table, output=tmp_path / "serial", jobs=1)
+    assert (tmp_path / "dask/results.parquet").read_bytes() == (tmp_path / "serial/results.parquet").read_bytes()
+
+
+@pytest.mark.slow
+def test_a_worker_of_a_cluster_that_dies_is_replaced(cluster, tmp_path):
+    path = write_controller(tmp_path, MU[5], str(tmp_path / "once"))
+    rows = study(short_study(*MU, controllers=[f"{path}:Kills"]), scheduler=str(cluster.file)).to_pylist()
+    assert (tmp_path / "once").exists()
+    assert {row["status"] for row in rows} == {"ok"}
+
+
+@pytest.mark.slow
+def test_a_controller_that_differs_on_a_worker_is_told_before_the_first_run(cluster, tmp_path, monkeypatch):
+    monkeypatch.setattr("activesteer.studies.plan.present_inputs", lambda _: {"controller mine.py:Mine": "another"})
+    with pytest.raises(StudyError, match=r"worker tcp.*controller mine.py:Mine"):
+        study(short_study(*MU), output=tmp_path, scheduler=str(cluster.file))
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_dies_ends_the_study_with_what_is_finished(tmp_path):
+    common = ("--scheduler-file", tmp_path / "scheduler.json", "--host", "127.0.0.1", "--no-dashboard")
+    processes = [_dask("scheduler", "--port", 0, *common), _dask("worker", "--nthreads", 1, "--no-nanny", *common)]
+    try:
+        while not (tmp_path / "scheduler.json").exists():
+            time.sleep(0.1)
+
+        def kill(progress: Any) -> None:
+            for process in processes:
+                process.send_signal(signal.SIGKILL)
+
+        with pytest.raises(StudyError, match="gone"):
+            study(
+                short_study(*MU), output=tmp_path / "s", scheduler=str(tmp_path / "scheduler.json"), progress=kill
+            )  # fmt: skip
+        assert study(short_study(*MU), output=tmp_path / "s", jobs=1).num_rows == len(MU)
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def _free_port() -> int:
+    with socket.socket() as here:
+        here.bind(("127.0.0.1", 0))
+        return here.getsockname()[1]
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(StudyError, match="cannot be reached"):
+        study(short_study(*MU[:2]), output=tmp_path, scheduler=f"tcp://127.0.0.1:{_free_port()}")
+
+
+def test_what_is_no_address_is_told(tmp_path):
+    with pytest.raises(StudyError, match="no address"):
+        study(short_study(*MU[:2]), output=tmp_path, scheduler="nowhere")
+
+
+def _same(value: int) -> int:
+    return value
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ten_thousand_tasks_come_back_each_once(jobs):
+    with workers_for(jobs) as workers:
+        tasks = ((number, _same, number) for number in range(10_000))
+        found = [(outcome.key, outcome.value) for outcome in TaskQueue(workers).outcomes(tasks)]
+    assert sorted(found) == [(number, number) for number in range(10_000)]
+
+
+@pytest.mark.slow
+def test_ten_thousand_tasks_come_back_from_a_cluster_each_once(cluster):
+    with workers_for(scheduler=str(cluster.file)) as workers:
+        tasks = ((number, abs, -number) for number in range(10_000))
+        found = [(outcome.key, outcome.value) for outcome in TaskQueue(workers).outcomes(tasks)]
+    assert sorted(found) == [(number, number) for number in range(10_000)]
