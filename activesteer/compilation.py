@@ -66,6 +66,25 @@ def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[C
     return decorate
 
 
+def compiled_call(result: types.Type, *arguments: types.Type) -> Callable[[Callable[..., Any]], Any]:
+    """Decorator: the function as native code of one signature, compiled now; while it runs, other threads may.
+
+    Args:
+        result: Type that it returns.
+        arguments: Types of its arguments; what it is called with is converted.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        dispatcher: Any = njit(error_model="numpy", nogil=True)(function)
+        if hasattr(dispatcher, "enable_caching"):
+            dispatcher._cache = _cache_of(function)
+            dispatcher.compile(result(*arguments))
+            dispatcher.disable_compile()
+        return dispatcher
+
+    return decorate
+
+
 class _ContentCache(FunctionCache):
     """numba's cache of one function, under a name that holds the content of all its sources."""
 

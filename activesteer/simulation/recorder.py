@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from operator import attrgetter
 from typing import Final
 
@@ -52,6 +53,7 @@ _CONTROLLER_CHANNELS: Final = {
 }
 """Field of `SteerCommand` -> its channel."""
 CONTROL_CHANNELS: Final = (*_DRIVER_CHANNELS.values(), *_CONTROLLER_CHANNELS.values())
+_CONTROL_ROW: Final = struct.Struct(f"{len(CONTROL_CHANNELS)}d")
 _driver_row, _controller_row = attrgetter(*_DRIVER_CHANNELS), attrgetter(*_CONTROLLER_CHANNELS)
 
 
@@ -60,6 +62,7 @@ class Recorder:
 
     Attributes:
         channels: The table of channels.
+        row_address: Where the vehicle leaves the row of the next step.
     """
 
     def __init__(self, vehicle: Vehicle, steps: int, writer: McapWriter | None = None, *, keep: bool = True) -> None:
@@ -81,9 +84,10 @@ class Recorder:
         capacity = steps if keep else min(self._block_rows, steps)
         # By column, because that is how it is filled and read.
         self._values = np.empty((capacity, len(self.channels)), order="F")
-        self._raw = vehicle.raw_rows(min(self._block_rows, steps))
+        self._raw = vehicle.raw_rows(self._block_rows)
         self._control = np.empty((len(self._raw.sensordata), len(CONTROL_CHANNELS)))
-        self._copies = tuple(zip(self._raw, vehicle.live_arrays(), strict=True))
+        self.row_address = self._block_address = self._raw.sensordata.ctypes.data
+        self._row_bytes = self._raw.sensordata.strides[0]
         self._pose_every = max(1, round(POSE_INTERVAL_S / vehicle.timestep_s))
         data, bodies = vehicle.data, len(vehicle.body_names)
         poses = -(-capacity // self._pose_every) + 1
@@ -95,7 +99,9 @@ class Recorder:
         self._rows = self._flushed = self._first = 0
 
     def record(self, command: DriverCommand, steer: SteerCommand) -> None:
-        """Takes the row of the step that was just made; its values are those of the instant at which it began.
+        """Takes the row of the step that was just made, which the vehicle has left at `row_address`.
+
+        Its values are those of the instant at which the step began.
 
         Args:
             command: What the driver did.
@@ -103,14 +109,13 @@ class Recorder:
         """
         count = self._rows
         row = count - self._flushed
-        for rows, live in self._copies:
-            rows[row] = live
-        self._control[row] = (*_driver_row(command), *_controller_row(steer))
+        _CONTROL_ROW.pack_into(self._control, row * _CONTROL_ROW.size, *_driver_row(command), *_controller_row(steer))
         if count % self._pose_every == 0:
             pose = count // self._pose_every - self._poses_before(self._first)
             self._positions[pose] = self._xpos
             self._quaternions[pose] = self._xquat
         self._rows = count + 1
+        self.row_address += self._row_bytes
         if row + 1 == self._block_rows:
             self.flush()
 
@@ -133,6 +138,7 @@ class Recorder:
         values[:, split:] = self._control[:count]
         poses = self._poses_between(first, last)
         self._flushed = last
+        self.row_address = self._block_address
         if self._writer is not None:
             self._writer.write(self._times(first, last), values, poses.time_s, poses.positions_m, poses.quaternions)
         if not self._keep:

@@ -18,9 +18,6 @@ from activesteer.signals import Measurement, Motion, Reference, SteerCommand
 from activesteer.simulation.recorder import Recorder
 from activesteer.vehicle import engine_warnings_held
 
-_CHECK_EVERY_STEPS = 100
-"""How often the engine is asked for warnings; the speed is looked at in every step."""
-
 
 class SavedState(NamedTuple):
     """Everything that a simulation continues from."""
@@ -100,11 +97,9 @@ class Simulation:
                 steer = controller.step(command, measurement)
                 if steer.__class__ is not SteerCommand or not is_sane(steer):
                     check_command(steer, self._controller_name)
-                measurement, motion = vehicle.step(command, steer)
+                measurement, motion = vehicle.step(command, steer, recorder.row_address if recorder else 0)
                 if recorder is not None:
                     recorder.record(command, steer)
-                if step % _CHECK_EVERY_STEPS == 0:
-                    vehicle.check()
         self._step, self._measurement, self._motion = self._step + steps, measurement, motion
         vehicle.check()
 

@@ -18,16 +18,16 @@ from activesteer.road.road import Road
 from activesteer.signals import DriverCommand, Measurement, Motion, SteerCommand, WheelTorques
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle import native_step
 from activesteer.vehicle.channels import ChannelMap, RawRows
 from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.loading import find, load_model
 from activesteer.vehicle.native_forces import install_native_forces
+from activesteer.vehicle.native_step import FASTEST_MPS, Places, sensed, step_plan
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-_FASTEST_MPS: Final = 200.0
-"""No car of ours goes faster; a speed beyond it, or none at all, is a run that has diverged [m/s]."""
 
 
 @contextlib.contextmanager
@@ -101,29 +101,26 @@ class Vehicle:
             return int(model.sensor_adr[find(model, mujoco.mjtObj.mjOBJ_SENSOR, name)])
 
         self._ctrl = data.ctrl
-        self._qvel = data.qvel
-        self._steering_wheel = actuator("steering_wheel")
-        self._superposition = actuator("superposition")
-        self._rear = actuator("rl_steer"), actuator("rr_steer")
-        self._accelerometer = sensor("cg_accelerometer")
-        self._velocimeter = sensor("cg_velocimeter")
-        self._angles = tuple(
-            sensor(name) for name in ("steering_wheel_angle", "superposition_angle", "rl_steer_angle", "rr_steer_angle")
-        )
-        self._wheel_speed = sensor("fl_wheel_speed")
-        position, velocity, turned = (sensor(name) for name in ("cg_position", "cg_velocity", "chassis_orientation"))
-        self._position = data.sensordata[position : position + 2]
-        self._velocity = data.sensordata[velocity : velocity + 2]
-        self._orientation = data.sensordata[turned : turned + 4]
-        last = max(self._wheel_speed + 3, *self._angles, self._velocimeter, self._accelerometer + 1)
-        self._sensed = data.sensordata[: last + 1]
+        self._places = Places(
+            *(actuator(name) for name in ("steering_wheel", "superposition", "rl_steer", "rr_steer")),
+            *(
+                sensor(name)
+                for name in (
+                    "cg_velocimeter", "cg_accelerometer", "steering_wheel_angle", "superposition_angle",
+                    "rl_steer_angle", "rr_steer_angle", "fl_wheel_speed", "cg_position", "cg_velocity",
+                    "chassis_orientation",
+                )
+            ),
+            yaw_dof=int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")]) + 5,
+        )  # fmt: skip
+        self._plan = step_plan(model, data, self.live_arrays(), self._places, self.parameters.steering.ratio)
+        self._plan_address = self._plan.ctypes.data
         block = int(model.numeric_data[-fb.TRAILER_SIZE])
         self._areas_felt = model.numeric_data[block + fb.AREAS_FELT : block + fb.AREAS_FELT + 1]
         self._block_gear = model.numeric_data[block + fb.GEAR : block + fb.GEAR + 1]
         self._gear: float = CLUTCH_OPEN
         self._root = int(model.jnt_qposadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
         self._root_dof = int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
-        self._yaw_dof = self._root_dof + 5
         self._spins = [
             int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_spin")]) for corner in CORNERS
         ]
@@ -137,7 +134,6 @@ class Vehicle:
         self._each_drive = tuple(actuator(f"{corner}_drive") for corner in CORNERS)
         torques = (brakes.front_torque_Nm, brakes.front_torque_Nm, brakes.rear_torque_Nm, brakes.rear_torque_Nm)
         self._brakes = tuple((actuator(f"{corner}_brake"), most) for corner, most in zip(CORNERS, torques, strict=True))
-        self._ratio = self.parameters.steering.ratio
         self._drive_torque_Nm = 0.0
         self._brake = 0.0
 
@@ -207,24 +203,21 @@ class Vehicle:
         site = self.data.site_xpos[self.model.site("cg").id]
         return float(site[0]), float(site[1])
 
-    def step(self, command: DriverCommand, steer: SteerCommand) -> tuple[Measurement, Motion]:
+    def step(self, command: DriverCommand, steer: SteerCommand, row_address: int = 0) -> tuple[Measurement, Motion]:
         """Applies the commands and advances the engine by one step.
 
         Args:
             command: What the driver does.
             steer: What the controller adds.
+            row_address: Where the row of this step goes, in a block of `raw_rows`; 0 where none is wanted.
 
         Returns:
             What the sensors then say, and where the car is; see `measure` and `motion`.
 
         Raises:
-            SimulationDiverged: the speed is not finite or beyond all reason.
+            SimulationDiverged: the engine warns, or something recorded is not finite or beyond all reason.
         """
         ctrl = self._ctrl
-        ctrl[self._steering_wheel] = command.steering_wheel_demand_rad
-        ctrl[self._superposition] = steer.superposition_demand_rad * self._ratio
-        left, right = self._rear
-        ctrl[left] = ctrl[right] = steer.rear_steer_demand_rad
         gear = command.gear if command.wheel_torques is None else CLUTCH_OPEN
         if gear != self._gear:
             self._engage(gear)
@@ -239,8 +232,16 @@ class Vehicle:
                 ctrl[index] = command.brake_pedal * torque
         if command.wheel_torques is not None:
             self._apply_torques(command.wheel_torques)
-        mujoco.mj_step(self.model, self.data)
-        return self.measure(), self.motion()
+        numbers = native_step.step(
+            self._plan_address,
+            row_address,
+            command.steering_wheel_demand_rad,
+            steer.superposition_demand_rad,
+            steer.rear_steer_demand_rad,
+        )
+        if not numbers[0]:
+            self.check()
+        return sensed(numbers)
 
     def _engage(self, gear: int) -> None:
         """Couples the engine to the driven wheels, each of which then carries its share of the inertia, or frees it."""
@@ -280,38 +281,22 @@ class Vehicle:
         step's length: it is taken from the state (the gyro's third axis is that of the chassis).
 
         Raises:
-            SimulationDiverged: the speed is not finite or beyond all reason.
+            SimulationDiverged: see `check`.
         """
-        values = self._sensed.tolist()
-        speed = values[self._velocimeter]
-        if not -_FASTEST_MPS < speed < _FASTEST_MPS:
-            msg = f"the speed is {speed:g} m/s at {self.data.time:.3f} s"
-            raise SimulationDiverged(msg)
-        wheel, added, left, right = self._angles
-        spin = self._wheel_speed
-        return Measurement(
-            self.data.time,
-            speed,
-            float(self._qvel[self._yaw_dof]),
-            values[self._accelerometer + 1],
-            values[self._accelerometer],
-            values[wheel],
-            0.5 * (values[left] + values[right]),
-            values[added] / self._ratio,
-            (values[spin], values[spin + 1], values[spin + 2], values[spin + 3]),
-        )
+        return self._sense()[0]
 
     def motion(self) -> Motion:
         """Where the car is and how it moves, at the instant at which the last step began; the yaw rate at its end."""
-        x, y = self._position.tolist()
-        east, north = self._velocity.tolist()
-        w, qx, qy, qz = self._orientation.tolist()
-        yaw = math.atan2(2.0 * (w * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        return Motion(x, y, yaw, cos * east + sin * north, cos * north - sin * east, float(self._qvel[self._yaw_dof]))
+        return self._sense()[1]
+
+    def _sense(self) -> tuple[Measurement, Motion]:
+        numbers = native_step.sense(self._plan_address)
+        if not numbers[0]:
+            self.check()
+        return sensed(numbers)
 
     def check(self) -> None:
-        """Looks for warnings of the engine and for a state that is not finite.
+        """Looks for warnings of the engine and for what is not finite.
 
         Raises:
             SimulationDiverged: there is one.
@@ -330,10 +315,19 @@ class Vehicle:
         if not np.isfinite(data.act).all():
             msg = f"an activation (slip of a tyre, angle of a servo) is not finite at {data.time:.3f} s"
             raise SimulationDiverged(msg)
+        speed = data.sensordata[self._places.velocimeter]
+        if not -FASTEST_MPS < speed < FASTEST_MPS:
+            raise SimulationDiverged(f"the speed is {speed:g} m/s at {data.time:.3f} s")
+        for name, live in zip(RawRows._fields, self.live_arrays(), strict=True):
+            if not np.isfinite(live).all():
+                raise SimulationDiverged(f"what is recorded of {name} is not finite at {data.time:.3f} s")
 
     def raw_rows(self, count: int) -> RawRows:
-        """Empty rows for `count` steps, to be filled from `live_arrays`."""
-        return RawRows(*(np.empty((count, live.size)) for live in self.live_arrays()))
+        """Empty rows for `count` steps: `live_arrays`, one behind the other in one block, as `step` fills them."""
+        live = self.live_arrays()
+        ends = np.cumsum([array.size for array in live])
+        block = np.empty((count, ends[-1]))
+        return RawRows(*(block[:, end - array.size : end] for array, end in zip(live, ends, strict=True)))
 
     def live_arrays(self) -> tuple[NDArray[np.float64], ...]:
         """The engine's arrays in the order of `RawRows`."""

@@ -8,6 +8,7 @@ numpy views report, and with distinctive values planted in a small model. A seco
 from __future__ import annotations
 
 import ctypes
+import functools
 from typing import Final, NamedTuple
 
 import mujoco
@@ -39,7 +40,7 @@ _DATA_ARRAYS: Final = (
 
 
 class EngineLayout(NamedTuple):
-    """Byte offsets inside mjModel (`m_`) and mjData (`d_`); all name the pointer to an array but the first two."""
+    """Byte offsets inside mjModel (`m_`) and mjData (`d_`): pointers to arrays, but for the first two and the last."""
 
     m_nnumericdata: int
     m_timestep: int
@@ -56,6 +57,7 @@ class EngineLayout(NamedTuple):
     d_ten_velocity: int
     d_cvel: int
     d_qfrc_passive: int
+    d_time: int
 
 
 def _probe(numbers: int, timestep_s: float) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -95,13 +97,21 @@ def _find(address: int, wanted: int, limit_bytes: int, what: str) -> int:
 
 def _measure(model: mujoco.MjModel, data: mujoco.MjData, numbers: int) -> EngineLayout:
     m, d = model._address, data._address
-    step_bits = int(np.float64(model.opt.timestep).view(np.uint64))
+    data.time = 7.0 / model.opt.timestep
+    step_bits, time_bits = (int(np.float64(value).view(np.uint64)) for value in (model.opt.timestep, data.time))
     return EngineLayout(
         _find(m, numbers, _MODEL_BYTES, "mjModel.nnumericdata"),
         _find(m, step_bits, _MODEL_BYTES, "mjModel.opt.timestep"),
         _find(m, model.numeric_data.ctypes.data, _MODEL_BYTES, "mjModel.numeric_data"),
         *(_find(d, getattr(data, name).ctypes.data, _DATA_BYTES, f"mjData.{name}") for name in _DATA_ARRAYS),
+        d_time=_find(d, time_bits, _DATA_BYTES, "mjData.time"),
     )
+
+
+@functools.cache
+def engine_layout() -> EngineLayout:
+    """The offsets, found once in a process; see `measure_engine_layout`."""
+    return measure_engine_layout()
 
 
 def measure_engine_layout() -> EngineLayout:

@@ -22,7 +22,7 @@ from activesteer.tyre.kernels.contact import tyre_on_road
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.dry_friction import friction_rate
-from activesteer.vehicle.engine_layout import EngineLayout, measure_engine_layout
+from activesteer.vehicle.engine_layout import EngineLayout, engine_layout
 from activesteer.vehicle.native_memory import array_at, f64_pointer, pointer_to, word
 from activesteer.vehicle.powertrain import CLUTCH_OPEN, drive_limits
 
@@ -228,7 +228,7 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any]:
     """
     (
         m_count, m_timestep, m_numbers, d_qvel, d_act, d_ctrl, d_userdata, d_xpos, d_xmat, d_com, d_cdof, d_ten_j,
-        d_ten_velocity, d_cvel, d_qfrc,
+        d_ten_velocity, d_cvel, d_qfrc, _,
     ) = layout  # fmt: skip
 
     @compiled_callback(types.void, types.intp, types.intp)
@@ -312,7 +312,7 @@ def install_native_forces() -> None:
             )
             raise ModelError(msg)
     if not _installed:
-        compiled = _make_callbacks(measure_engine_layout())
+        compiled = _make_callbacks(engine_layout())
         _installed.extend(callback.ctypes for callback in compiled)
     for (_, present, install), ours in zip(slots, _installed, strict=True):
         if present is None:

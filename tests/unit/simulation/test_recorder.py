@@ -61,6 +61,7 @@ def test_channels_that_the_interface_promises_are_there():
 def test_commands_are_recorded_as_they_were_given():
     simulated = simulation()
     recorder = Recorder(simulated.vehicle, 3)
+    simulated.vehicle.step(COMMAND, STEER, recorder.row_address)
     recorder.record(COMMAND, STEER)
     values = [column(recorder, channel.name)[0] for channel in CONTROL_CHANNELS]
     assert values == [0.02, 150.0, 0.25, 1.0, -0.01, 0.003, 0.2, 0.004, -0.014, 1.0]

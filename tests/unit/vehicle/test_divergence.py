@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 from activesteer.errors import SimulationDiverged
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
-from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.signals import Measurement, Motion
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle import Vehicle
@@ -57,11 +58,11 @@ def spoil(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Vehicle], None
             rebase(vehicle)
             under_way.append(True)
 
-        def spoiled(vehicle: Vehicle, command: DriverCommand, steer: SteerCommand) -> None:
+        def spoiled(vehicle: Vehicle, *inputs: Any) -> tuple[Measurement, Motion]:
             if under_way and abs(vehicle.data.time - SPOILED_S) < 0.5 * vehicle.timestep_s:
                 change(vehicle)
                 under_way.clear()
-            step(vehicle, command, steer)
+            return step(vehicle, *inputs)
 
         monkeypatch.setattr(Vehicle, "rebase", started)
         monkeypatch.setattr(Vehicle, "step", spoiled)

@@ -23,10 +23,12 @@ def test_every_offset_leads_to_the_car_s_own_array() -> None:
     model, data = vehicle.model, vehicle.data
     layout = measure_engine_layout()
     for field in layout._fields:
-        if field.startswith("d_"):
+        if field.startswith("d_") and field != "d_time":
             array = getattr(data, field.removeprefix("d_"))
             assert word(data._address + getattr(layout, field)) == array.ctypes.data, field
     assert word(model._address + layout.m_numeric_data) == model.numeric_data.ctypes.data
+    data.time = 12.25
+    assert ctypes.c_double.from_address(data._address + layout.d_time).value == data.time
     assert ctypes.c_double.from_address(model._address + layout.m_timestep).value == model.opt.timestep
     count = ctypes.c_int64.from_address(model._address + layout.m_nnumericdata).value
     assert count == model.numeric_data.size

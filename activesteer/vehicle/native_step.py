@@ -1,0 +1,224 @@
+"""One step of the engine in one native call: commands in, a row for the recorder and what the sensors say out.
+
+The call holds no lock of Python's. All that it needs stands in a `STEP_PLAN`, addresses and indices that a vehicle
+looks up once; so the compiled code is the same for every car.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+import mujoco
+import numpy as np
+from llvmlite import ir
+from mujoco import _functions
+from numba import carray, from_dtype, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from activesteer.compilation import compiled_call, inlined
+from activesteer.signals import Measurement, Motion
+from activesteer.vehicle.engine_layout import engine_layout
+from activesteer.vehicle.native_memory import f64_pointer, pointer_to
+
+FASTEST_MPS: Final = 200.0
+"""No car of ours goes faster; a speed beyond it, or none at all, is a run that has diverged [m/s]."""
+
+_SOURCES: Final = 7
+_WARNINGS: Final = len(mujoco.mjtWarning.__members__) - 1
+_EXPONENT: Final = 0x7FF0000000000000
+"""Bits of a float64 that are all set where it is not finite, and only there."""
+
+
+class Places(NamedTuple):
+    """Where in the engine's arrays the step finds what it needs."""
+
+    steering_wheel: int
+    """Control of the steering wheel; so the next three."""
+    superposition: int
+    rear_left: int
+    rear_right: int
+    velocimeter: int
+    """First place in `sensordata`; so the following."""
+    accelerometer: int
+    steering_wheel_angle: int
+    superposition_angle: int
+    rear_left_angle: int
+    rear_right_angle: int
+    wheel_speed: int
+    position: int
+    velocity: int
+    orientation: int
+    yaw_dof: int
+    """Place of the yaw rate in `qvel`."""
+
+
+_ADDRESSES: Final = ("mj_step", "model", "data", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata")
+STEP_PLAN: Final = np.dtype(
+    (
+        np.record,
+        [
+            *((name, np.intp) for name in (*_ADDRESSES, *Places._fields)),
+            ("ratio", np.float64),
+            ("sources", np.intp, (_SOURCES,)),
+            ("sizes", np.intp, (_SOURCES,)),
+        ],
+    )
+)
+_plan_pointer: Final = pointer_to(from_dtype(STEP_PLAN))
+_bits_pointer: Final = pointer_to(types.int64)
+_counter_pointer: Final = pointer_to(types.int32)
+
+
+def step_plan(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    recorded: Sequence[NDArray[np.float64]],
+    places: Places,
+    ratio: float,
+) -> NDArray[Any]:
+    """Looks up all addresses.
+
+    Args:
+        model: The car.
+        data: Its state; both must outlive the plan.
+        recorded: The engine's arrays that a row is copied from, in its order.
+        places: Where the step finds what it needs.
+        ratio: Overall steering ratio.
+
+    Returns:
+        The plan, shape (1,), at an address that stays.
+    """
+    plan = np.zeros(1, STEP_PLAN)
+    values: Mapping[str, int] = {
+        "mj_step": ctypes.cast(ctypes.CDLL(_functions.__file__).mj_step, ctypes.c_void_p).value or 0,
+        "model": model._address,
+        "data": data._address,
+        "time": data._address + engine_layout().d_time,
+        "warnings": data.warning.number.ctypes.data,
+        "qvel": data.qvel.ctypes.data,
+        "n_dofs": model.nv,
+        "ctrl": data.ctrl.ctypes.data,
+        "sensordata": data.sensordata.ctypes.data,
+        **places._asdict(),
+    }
+    for name, value in values.items():
+        plan[name] = value
+    plan["ratio"] = ratio
+    plan["sources"] = [array.ctypes.data for array in recorded]
+    plan["sizes"] = [array.size for array in recorded]
+    return plan
+
+
+@intrinsic
+def _call(_typing_context, function, model, data):
+    """Calls a C function at an address with two pointers."""
+    signature = types.void(types.intp, types.intp, types.intp)
+
+    def generate(context, builder: ir.IRBuilder, _signature, arguments):
+        address, *pointers = arguments
+        kind = ir.FunctionType(ir.VoidType(), [pointer.type for pointer in pointers])
+        builder.call(builder.inttoptr(address, kind.as_pointer()), pointers)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@inlined
+def _all_finite(address, size):
+    bits = carray(_bits_pointer(address), (size,))
+    bad = False
+    for index in range(size):
+        bad |= (bits[index] & _EXPONENT) == _EXPONENT
+    return not bad
+
+
+@inlined
+def _sense(plan):
+    """What `Sensed` holds, as numbers."""
+    s = carray(f64_pointer(plan.sensordata), (plan.sizes[0],))
+    yaw_rate = carray(f64_pointer(plan.qvel), (plan.n_dofs,))[plan.yaw_dof]
+    speed = s[plan.velocimeter]
+    sane = -FASTEST_MPS < speed < FASTEST_MPS and _all_finite(plan.qvel, plan.n_dofs)
+    for index in range(_SOURCES):
+        sane &= _all_finite(plan.sources[index], plan.sizes[index])
+    warnings = carray(_counter_pointer(plan.warnings), (2 * _WARNINGS,))
+    for index in range(_WARNINGS):
+        sane &= warnings[2 * index] == 0
+    w, x, y, z = s[plan.orientation], s[plan.orientation + 1], s[plan.orientation + 2], s[plan.orientation + 3]
+    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    east, north = s[plan.velocity], s[plan.velocity + 1]
+    return (
+        1.0 if sane else 0.0,
+        carray(f64_pointer(plan.time), (1,))[0],
+        speed,
+        yaw_rate,
+        s[plan.accelerometer + 1],
+        s[plan.accelerometer],
+        s[plan.steering_wheel_angle],
+        0.5 * (s[plan.rear_left_angle] + s[plan.rear_right_angle]),
+        s[plan.superposition_angle] / plan.ratio,
+        s[plan.wheel_speed], s[plan.wheel_speed + 1], s[plan.wheel_speed + 2], s[plan.wheel_speed + 3],
+        s[plan.position], s[plan.position + 1], yaw, cos * east + sin * north, cos * north - sin * east, yaw_rate,
+    )  # fmt: skip
+
+
+_NUMBERS: Final = types.UniTuple(types.float64, 19)
+
+
+@compiled_call(_NUMBERS, types.intp)
+def sense(plan_address):
+    """What the sensors say now.
+
+    Args:
+        plan_address: Address of a `STEP_PLAN`.
+
+    Returns:
+        What `sensed` reads.
+    """
+    return _sense(carray(_plan_pointer(plan_address), (1,))[0])
+
+
+@compiled_call(_NUMBERS, types.intp, types.intp, types.float64, types.float64, types.float64)
+def step(plan_address, row_address, steering_wheel_rad, superposition_rad, rear_steer_rad):
+    """Writes the steering's inputs, makes one step of the engine and reads everything.
+
+    Args:
+        plan_address: Address of a `STEP_PLAN`.
+        row_address: Where the recorded arrays are copied to, one behind the other; 0 for nowhere.
+        steering_wheel_rad: Steering wheel angle demanded [rad].
+        superposition_rad: Angle demanded of the front superposition, at the road wheel [rad].
+        rear_steer_rad: Rear wheel angle demanded [rad].
+
+    Returns:
+        What `sensed` reads.
+    """
+    plan = carray(_plan_pointer(plan_address), (1,))[0]
+    ctrl = f64_pointer(plan.ctrl)
+    ctrl[plan.steering_wheel] = steering_wheel_rad
+    ctrl[plan.superposition] = superposition_rad * plan.ratio
+    ctrl[plan.rear_left] = rear_steer_rad
+    ctrl[plan.rear_right] = rear_steer_rad
+    _call(plan.mj_step, plan.model, plan.data)  # pyright: ignore[reportCallIssue] - numba adds the context
+    if row_address != 0:
+        row = f64_pointer(row_address)
+        place = 0
+        for index in range(_SOURCES):
+            source = f64_pointer(plan.sources[index])
+            for item in range(plan.sizes[index]):
+                row[place + item] = source[item]
+            place += plan.sizes[index]
+    return _sense(plan)
+
+
+def sensed(numbers: tuple[float, ...]) -> tuple[Measurement, Motion]:
+    """Measurement and motion from what `sense` and `step` return behind the first number."""
+    # Made without the class's own `__new__`, which costs as much as the engine's sensors: this happens every step.
+    return (
+        tuple.__new__(Measurement, (*numbers[1:9], numbers[9:13])),
+        tuple.__new__(Motion, numbers[13:]),
+    )

@@ -1,0 +1,98 @@
+"""The native step does what the engine's own interface does, and says when something is wrong."""
+
+from __future__ import annotations
+
+import threading
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer.conventions import CORNERS
+from activesteer.errors import SimulationDiverged
+from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.vehicle import Vehicle
+from activesteer.vehicle.channels import RawRows
+from tests.unit.vehicle.cars import standing
+
+COMMAND, STEER = DriverCommand(0.4, 300.0, 0.0), SteerCommand(0.01, 0.02)
+
+
+def _rolling() -> Vehicle:
+    vehicle = standing()
+    vehicle.start(20.0)
+    return vehicle
+
+
+def test_a_step_is_the_engine_s_own() -> None:
+    ours, bare = _rolling(), _rolling()
+    for vehicle in (ours, bare):
+        vehicle.step(COMMAND, STEER)
+    for _ in range(20):
+        ours.step(COMMAND, STEER)
+    for _ in range(20):
+        mujoco.mj_step(bare.model, bare.data)
+    assert bare.data.time == ours.data.time
+    for name in ("qpos", "qvel", "act", "sensordata", "userdata"):
+        assert getattr(bare.data, name).tobytes() == getattr(ours.data, name).tobytes(), name
+
+
+def test_a_row_is_a_copy_of_the_engine_s_arrays() -> None:
+    vehicle = _rolling()
+    rows = vehicle.raw_rows(3)
+    for row in range(3):
+        vehicle.step(COMMAND, STEER, rows.sensordata[row].ctypes.data)
+        for name, live in zip(RawRows._fields, vehicle.live_arrays(), strict=True):
+            np.testing.assert_array_equal(getattr(rows, name)[row], live, err_msg=name)
+
+
+def test_what_a_step_returns_is_what_the_sensors_say() -> None:
+    vehicle = _rolling()
+    for _ in range(50):
+        vehicle.step(COMMAND, STEER)
+    measurement, motion = vehicle.step(COMMAND, STEER)
+    assert (measurement, motion) == (vehicle.measure(), vehicle.motion())
+    assert type(measurement).__name__ == "Measurement"
+    sensor = {name: vehicle.data.sensor(name).data for name in ("cg_velocimeter", "cg_accelerometer", "cg_position")}
+    assert measurement.speed_mps == sensor["cg_velocimeter"][0]
+    assert (measurement.ax_mps2, measurement.ay_mps2) == tuple(sensor["cg_accelerometer"][:2])
+    assert (motion.x_m, motion.y_m) == tuple(sensor["cg_position"][:2])
+    assert measurement.wheel_speed_radps == tuple(
+        vehicle.data.sensor(f"{corner}_wheel_speed").data[0] for corner in CORNERS
+    )
+    assert motion.speed_mps == pytest.approx(20.0, rel=0.01)
+
+
+@pytest.mark.parametrize("kind", range(len(mujoco.mjtWarning.__members__) - 1))
+def test_any_warning_of_the_engine_ends_it(kind: int) -> None:
+    vehicle = _rolling()
+    vehicle.step(COMMAND, STEER)
+    vehicle.data.warning[kind].number = 1
+    with pytest.raises(SimulationDiverged, match="warns"):
+        vehicle.step(COMMAND, STEER)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("name", ["userdata", "sensordata", "ten_length", "actuator_force"])
+def test_whatever_is_recorded_has_to_be_finite(name: str, value: float) -> None:
+    vehicle = _rolling()
+    vehicle.step(COMMAND, STEER)
+    getattr(vehicle.data, name)[-1] = value
+    with pytest.raises(SimulationDiverged, match=name):
+        vehicle.measure()
+
+
+def test_cars_step_in_threads_as_they_do_alone() -> None:
+    cars = [_rolling() for _ in range(3)]
+
+    def drive(vehicle: Vehicle) -> None:
+        for _ in range(300):
+            vehicle.step(COMMAND, STEER)
+
+    threads = [threading.Thread(target=drive, args=(car,)) for car in cars[1:]]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    drive(cars[0])
+    assert {car.data.qpos.tobytes() for car in cars} == {cars[0].data.qpos.tobytes()}
