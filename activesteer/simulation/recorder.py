@@ -109,7 +109,9 @@ class Recorder:
         """
         count = self._rows
         row = count - self._flushed
-        _CONTROL_ROW.pack_into(self._control, row * _CONTROL_ROW.size, *_driver_row(command), *_controller_row(steer))
+        _CONTROL_ROW.pack_into(
+            self._control.data, row * _CONTROL_ROW.size, *_driver_row(command), *_controller_row(steer)
+        )
         if count % self._pose_every == 0:
             pose = count // self._pose_every - self._poses_before(self._first)
             self._positions[pose] = self._xpos
