@@ -14,6 +14,9 @@ from __future__ import annotations
 
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 CORNERS: Final = ("fl", "fr", "rl", "rr")
 """Corner names in the order of every per-corner array: front left, front right, rear left, rear right."""
 
@@ -28,3 +31,16 @@ SYSTEM_LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering",
 
 RUN_COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
 """Colours of the three systems, then of other runs; colour-blind readers can tell them apart (Okabe and Ito, 2008)."""
+
+
+def yaw_of(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Yaw angle of a body, the heading of its x axis in the road plane.
+
+    Args:
+        quaternions: Orientations w x y z, of length 1, shape (..., 4).
+
+    Returns:
+        Angle [rad], left positive, shape (...).
+    """
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

@@ -22,7 +22,7 @@ AFTER_S: Final = 1.0
 """Time after the beginning of braking at which the car is compared with its circle [s]."""
 STANDSTILL_MPS: Final = 1.0
 """Speed at which braking counts as ended [m/s]."""
-LEAST_YAW_RATE_RADPS: Final = math.radians(0.5)
+MIN_YAW_RATE_RADPS: Final = math.radians(0.5)
 """Below this yaw rate before the brake the car goes straight on [rad/s]."""
 
 
@@ -53,10 +53,10 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     speed_mps, ay_mps2, yaw_rate_radps = (
         float(np.mean(recording[name][before])) for name in ("speed_mps", "ay_mps2", "yaw_rate_radps")
     )
-    if not abs(yaw_rate_radps) >= LEAST_YAW_RATE_RADPS:
+    if not abs(yaw_rate_radps) >= MIN_YAW_RATE_RADPS:
         raise RecordingError(
             f"the recording holds no braking in a turn: the yaw rate before the brake is "
-            f"{math.degrees(yaw_rate_radps):.3g} deg/s, at least {math.degrees(LEAST_YAW_RATE_RADPS):.3g} are needed"
+            f"{math.degrees(yaw_rate_radps):.3g} deg/s, at least {math.degrees(MIN_YAW_RATE_RADPS):.3g} are needed"
         )
     side, radius_m = math.copysign(1.0, yaw_rate_radps), abs(speed_mps / yaw_rate_radps)
     after_s = float(time_s[begin]) + AFTER_S

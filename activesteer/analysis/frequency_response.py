@@ -26,7 +26,7 @@ OUTPUTS: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 """Channels whose response is evaluated."""
 HALF_BAND_LINES: Final = 2
 """Lines to either side that are summed into one value."""
-LEAST_SPECTRUM: Final = 1e-3
+MIN_SPECTRUM: Final = 1e-3
 """Share of its largest amplitude that the input must have at a frequency for a response there to mean something."""
 LOWEST_Hz: Final = 0.2
 HIGHEST_Hz: Final = 4.0
@@ -84,7 +84,7 @@ def frequency_response(
     power_y = (np.abs(y[band]) ** 2).sum(axis=1)
     cross = (u[band].conj() * y[band]).sum(axis=1)
     largest = float((np.abs(u) ** 2).max())
-    missing = ~(power_u > LEAST_SPECTRUM**2 * largest)
+    missing = ~(power_u > MIN_SPECTRUM**2 * largest)
     if missing.any():
         raise RecordingError(
             f"the steering ({input_channel}) does not contain {asked[missing][0]:.3g} Hz: "

@@ -12,7 +12,7 @@ from activesteer.conventions import CORNERS
 SIGNALS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("roll", "rad"))
 """Channels that are evaluated: name and unit suffix."""
 
-LEAST_LOAD_N: Final = 100.0
+MIN_LOAD_N: Final = 100.0
 """Vertical load below which a tyre carries nothing that matters and its force ratio is not looked at [N]."""
 
 
@@ -40,7 +40,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
 
 def _friction_used(recording: RecordingLike, corner: str) -> float:
     fx_N, fy_N, fz_N = (np.asarray(recording[f"{corner}_tyre_f{axis}_N"], dtype=np.float64) for axis in "xyz")
-    loaded = fz_N > LEAST_LOAD_N
+    loaded = fz_N > MIN_LOAD_N
     if not loaded.any():
         return 0.0
     return float((np.hypot(fx_N, fy_N)[loaded] / fz_N[loaded]).max())

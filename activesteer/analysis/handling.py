@@ -35,7 +35,7 @@ DEPARTURE: Final = 0.05
 """Share by which the steer angle departs from the line where the linear range ends."""
 SMOOTHING_S: Final = 0.5
 """Window of the moving average that limits are read from [s]."""
-LEAST_SPEED_MPS: Final = 1.0
+MIN_SPEED_MPS: Final = 1.0
 """Slower than this, curvature is not evaluated [m/s]."""
 
 
@@ -138,7 +138,7 @@ def evaluate(recording: RecordingLike, car: Car | None = None) -> Handling:
     first = int(np.argmax(smoothed > FIT_MPS2[0]))
     rising = np.zeros(len(ay), dtype=bool)
     rising[first : top + 1] = True
-    fit = rising & (smoothed <= FIT_MPS2[1]) & (speed > LEAST_SPEED_MPS)
+    fit = rising & (smoothed <= FIT_MPS2[1]) & (speed > MIN_SPEED_MPS)
     if smoothed[top] < FIT_MPS2[1] or fit.sum() < 10:
         raise RecordingError(
             f"the run reaches {smoothed[top]:.3g} m/s2 of lateral acceleration; gradients are fitted from "
@@ -147,7 +147,7 @@ def evaluate(recording: RecordingLike, car: Car | None = None) -> Handling:
     wheel = side * channel("steering_wheel_rad")
     steer = wheel / car.steering_ratio
     yaw_rate = side * channel("yaw_rate_radps")
-    curvature = yaw_rate / np.maximum(speed, LEAST_SPEED_MPS)
+    curvature = yaw_rate / np.maximum(speed, MIN_SPEED_MPS)
     sideslip = side * channel("sideslip_rad")
 
     def gradient(values: Array) -> float:

@@ -68,7 +68,7 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
     Track: `track_deviation_max_m`, `track_deviation_rms_m`, distance of the front axle centre from the path over the
     whole run. Lanes: `lane_overstep_m`, by how much a wheel gets beyond a lane at most (below 0: smallest distance to a
     side), `all_wheels_in_lanes` (1 or 0); `cones_hit`, `cone_distance_min_m`. Tyres: `tyre_use_max`, `tyre_use_mean`,
-    share of the available friction that is used, over all wheels and the whole run. `speed_loss_mps`: speed at the
+    fraction of the available friction that is used, over all wheels and the whole run. `speed_loss_mps`: speed at the
     beginning less the lowest; `speed_end_mps`.
 
     A slalom also has `track_amplitude_m` (half of the distance between the leftmost and the rightmost place of the

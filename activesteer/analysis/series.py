@@ -20,7 +20,7 @@ RATE_SPAN_S: Final = 0.01
 """Time over which a rate of change is taken [s]."""
 
 PEAK_MARGIN: Final = 0.005
-"""A maximum less than this share above the steady-state value is no peak."""
+"""A maximum less than this fraction above the steady-state value is no peak."""
 
 
 class StepResponse(NamedTuple):
@@ -80,8 +80,8 @@ def crossing_time(time_s: Array, values: Array, level: float) -> float:
     if rising.size == 0:
         return math.nan
     i = int(rising[0])
-    share = (level - values[i]) / (values[i + 1] - values[i])
-    return float(time_s[i] + share * (time_s[i + 1] - time_s[i]))
+    fraction = (level - values[i]) / (values[i + 1] - values[i])
+    return float(time_s[i] + fraction * (time_s[i + 1] - time_s[i]))
 
 
 def largest_rate(values: Array, timestep_s: float) -> float:

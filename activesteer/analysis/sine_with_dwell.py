@@ -37,7 +37,7 @@ THRESHOLD_RAD: Final = math.radians(5.0)
 LONGEST_CREEP_S: Final = 0.1
 """A wheel that takes longer than this from the threshold to the centre creeps; its line is then drawn on [s]."""
 PEAK_PROMINENCE: Final = 0.02
-"""A local maximum of the yaw rate counts as a peak when it stands out by this share of the largest one."""
+"""A local maximum of the yaw rate counts as a peak when it stands out by this fraction of the largest one."""
 INSTANTS_S: Final = (1.0, 1.75)
 """Times after the completion of steer at which the yaw rate is compared with its peak [s]."""
 DISPLACEMENT_TIME_S: Final = 1.07
@@ -149,8 +149,8 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
             f"{math.degrees(abs(float(angle[-1]))):.3g} deg when the run ends"
         )
     end = start + int(below[0])
-    share = (angle[end - 1] - THRESHOLD_RAD) / (angle[end - 1] - angle[end])
-    near_s = float(time_s[end - 1] + share * (time_s[end] - time_s[end - 1]))
+    fraction = (angle[end - 1] - THRESHOLD_RAD) / (angle[end - 1] - angle[end])
+    near_s = float(time_s[end - 1] + fraction * (time_s[end] - time_s[end - 1]))
     centre_s = crossing_time(time_s[end - 1 :], -angle[end - 1 :], 0.0)
     if centre_s - near_s <= LONGEST_CREEP_S:
         return centre_s
@@ -158,7 +158,7 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
     if above.size == 0:
         raise RecordingError(
             f"the second half of the sine with dwell stays below {math.degrees(2.0 * THRESHOLD_RAD):.3g} deg: "
-            "its completion cannot be told"
+            "its completion cannot be determined"
         )
     return near_s + (near_s - float(time_s[above[-1]]))
 

@@ -20,7 +20,7 @@ from activesteer.errors import RecordingError
 STEADY_WINDOW_S: Final = 1.0
 """Length of the window at the end of the run whose mean is the steady-state value [s]."""
 
-LEAST_STEP_RAD: Final = math.radians(0.5)
+MIN_STEP_RAD: Final = math.radians(0.5)
 """Smallest final steering wheel angle that counts as a step [rad]."""
 
 
@@ -117,10 +117,10 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
 
 def _step_time(time_s: np.ndarray, steering_rad: np.ndarray) -> float:
     final_rad = float(np.mean(steering_rad[time_s >= time_s[-1] - STEADY_WINDOW_S]))
-    if not abs(final_rad) >= LEAST_STEP_RAD:
+    if not abs(final_rad) >= MIN_STEP_RAD:
         raise RecordingError(
             f"the recording holds no step steer: the steering wheel ends at {math.degrees(final_rad):.3g} deg, "
-            f"at least {math.degrees(LEAST_STEP_RAD):.3g} deg to either side are needed"
+            f"at least {math.degrees(MIN_STEP_RAD):.3g} deg to either side are needed"
         )
     step_time_s = crossing_time(time_s, math.copysign(1.0, final_rad) * steering_rad, 0.5 * abs(final_rad))
     if math.isnan(step_time_s):

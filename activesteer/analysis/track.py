@@ -50,10 +50,10 @@ def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> A
     signed = np.empty(len(points))
     for piece in (np.maximum(nearest - 1, 0), np.minimum(nearest, last)):
         along, start = pieces[piece] / lengths[piece, None], points - corners[piece]
-        share = np.einsum("ij,ij->i", start, along)
+        along_m = np.einsum("ij,ij->i", start, along)
         low = np.where(piece == 0, -math.inf, 0.0)
         high = np.where(piece == last, math.inf, lengths[piece])
-        offset = start - np.clip(share, low, high)[:, None] * along
+        offset = start - np.clip(along_m, low, high)[:, None] * along
         distance = np.linalg.norm(offset, axis=1)
         left = along[:, 0] * start[:, 1] - along[:, 1] * start[:, 0]
         closer = distance < best

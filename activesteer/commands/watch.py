@@ -48,17 +48,17 @@ def _watch(options: argparse.Namespace) -> int:
 def _show(scenario: Any, controller: str, speed: float) -> None:
     import mujoco.viewer
 
-    from activesteer.simulation.live_view import Pacer, drive, stage_for
+    from activesteer.simulation.live_view import Pacer, drive, scene_for
     from activesteer.simulation.simulation import Simulation
 
     simulation = Simulation(scenario, controller)
-    stage = stage_for(simulation, scenario.maneuver)
+    scene = scene_for(simulation, scenario.maneuver)
     with (
         _threads_joined(),
-        mujoco.viewer.launch_passive(stage.model, stage.data, show_left_ui=False, show_right_ui=False) as viewer,
+        mujoco.viewer.launch_passive(scene.model, scene.data, show_left_ui=False, show_right_ui=False) as viewer,
     ):
         pacer = Pacer(speed)
-        driven = drive(simulation, stage, viewer, pacer)
+        driven = drive(simulation, scene, viewer, pacer)
         slow = f", {pacer.lost_s:.1f} s slower than the clock" if pacer.lost_s >= 0.1 else ""
         if not driven.finished:
             print(f"closed at {driven.simulated_s:.1f} s{slow}", file=sys.stderr)

@@ -8,13 +8,14 @@ from typing import Any, Final
 import numpy as np
 import rerun as rr
 
-from activesteer.playback.geometry import about_vertical, heading, xyzw
+from activesteer.conventions import yaw_of
+from activesteer.playback.geometry import about_vertical, xyzw
 from activesteer.playback.runs import CHASSIS, Run
 from activesteer.playback.timeline import times
 from activesteer.recording import Primitive
 
 _GHOST_LINE_M: Final = 0.012
-"""Radius of the lines that draw the car of another run: solids would hide what they share their place with [m]."""
+"""Radius of the lines that draw the car of another run: solids would hide what is in the same place [m]."""
 _SEE_THROUGH: Final = 0.5
 """Solids with less opacity are the shell of the body, which takes the colour of the run where there are several."""
 
@@ -37,7 +38,7 @@ def send_car(stream: rr.RecordingStream, run: Run, *, tinted: bool) -> None:
         stream.send_columns(body_path(run, body), when, moved)
     chassis = poses.names.index(CHASSIS)
     place = poses.positions_m[run.poses, chassis] * (1.0, 1.0, 0.0)
-    turn = about_vertical(heading(poses.quaternions[run.poses, chassis]))
+    turn = about_vertical(yaw_of(poses.quaternions[run.poses, chassis]))
     stream.send_columns(
         f"{run.name}/chase",
         when,

@@ -9,8 +9,9 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from activesteer.conventions import yaw_of
 from activesteer.playback.car import rgb
-from activesteer.playback.geometry import heading, rotated
+from activesteer.playback.geometry import rotated
 from activesteer.playback.runs import CHASSIS, Run
 from activesteer.playback.timeline import times
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, course_of
@@ -150,7 +151,7 @@ def _outline(run: Run) -> Array:
             axis = rotated(turn, (0.0, 1.0, 0.0))
             angle = np.arctan2(-axis[:, 0], axis[:, 1])
         else:
-            angle = heading(turn)
+            angle = yaw_of(turn)
         cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
         x, y = np.array(points).T
         return _flat(np.stack([at[:, :1] + cos * x - sin * y, at[:, 1:2] + sin * x + cos * y], axis=-1))

@@ -24,12 +24,6 @@ def rotated(quaternions: Array, point: ArrayLike) -> Array:
     return vector + w * cross + np.cross(axis, cross)
 
 
-def heading(quaternions: Array) -> Array:
-    """Angle of a body's x axis about the vertical [rad], shape (n,), left positive."""
-    forward = rotated(quaternions, (1.0, 0.0, 0.0))
-    return np.arctan2(forward[:, 1], forward[:, 0])
-
-
 def about_vertical(angle_rad: Array) -> Array:
     """Quaternions x y z w of turns about the vertical, shape (n, 4)."""
     zero = np.zeros_like(angle_rad)

@@ -122,7 +122,7 @@ def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
     Args:
         stream: Where to.
         run: The run.
-        alone: Whether it is the only run: the lines of several are told apart by the colours of the runs.
+        alone: Whether it is the only run: the lines of several are distinguished by the colours of the runs.
     """
     when = times(run.recording.time_s[run.rows])
     for plot in (*MOTION, *WHEELS, *links(run)):
@@ -176,7 +176,7 @@ def views(plots: Sequence[Plot], runs: Sequence[Run]) -> list[rrb.TimeSeriesView
 
 
 def views_by_corner(plot: Plot, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
-    """A view for each wheel of a plot of the wheels, where the lines of the runs are told apart by their colours."""
+    """A view for each wheel of a plot of the wheels, where the lines of the runs are distinguished by their colours."""
     shown = []
     for line in plot.series:
         present = [run for run in runs if run.has(line.channel)]

@@ -79,7 +79,7 @@ def force_arrows(run: Run) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 
 def use_colours(friction_use: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Colours 0xrrggbbff for shares of the available friction."""
+    """Colours 0xrrggbbff for fractions of the available friction."""
     red, green, blue = (
         np.interp(np.nan_to_num(friction_use, nan=0.0), _USE, [colour[part] for colour in _USE_COLOURS])
         .round()

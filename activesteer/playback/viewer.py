@@ -136,8 +136,8 @@ def _reason(log: str) -> str:
     lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", log).splitlines() if line.strip()]
     if any("DISPLAY is set" in line or "connection to X server" in line for line in lines):
         return "there is no display"
-    told = [line for line in lines if "error" in line.lower() or "panic" in line.lower()] or lines
-    return told[-1] if told else "it said nothing"
+    reported = [line for line in lines if "error" in line.lower() or "panic" in line.lower()] or lines
+    return reported[-1] if reported else "it said nothing"
 
 
 def _free_port() -> int:

@@ -1,4 +1,4 @@
-"""A drive while it happens: the simulation, held to the pace of a clock, and the stage on which it is seen."""
+"""A drive while it happens: the simulation, held to the pace of a clock, and the scene on which it is seen."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from activesteer.maneuver import Maneuver
 from activesteer.quantities import quantity_of
 from activesteer.simulation.appearance import scene_of
 from activesteer.simulation.simulation import Simulation
-from activesteer.video import Car, Stage
+from activesteer.video import Car, RenderScene
 from activesteer.video.gauges import MIN_SPEED_MPS
 
 FRAME_S: Final = 0.016
 """Least time from one picture to the next [s]: a screen shows 60 a second."""
-_MOST_S: Final = 0.1
+_MAX_S: Final = 0.1
 """Most time from one picture to the next [s]: where drawing or simulating takes longer, the drive becomes slower
 than the clock, instead of ever more jerky."""
 _TURN_S: Final = 0.4
@@ -84,14 +84,14 @@ class Pacer:
         if passed_s < FRAME_S:
             self._sleep(FRAME_S - passed_s)
             passed_s = FRAME_S
-        elif passed_s > _MOST_S:
-            self._start_s += passed_s - _MOST_S
-            self.lost_s += passed_s - _MOST_S
-            passed_s = _MOST_S
+        elif passed_s > _MAX_S:
+            self._start_s += passed_s - _MAX_S
+            self.lost_s += passed_s - _MAX_S
+            passed_s = _MAX_S
         return shown_s + passed_s * self._speed
 
 
-class Driven(NamedTuple):
+class DriveResult(NamedTuple):
     """How a drive went that somebody watched.
 
     Attributes:
@@ -105,8 +105,8 @@ class Driven(NamedTuple):
     finished: bool
 
 
-def stage_for(simulation: Simulation, maneuver: Maneuver) -> Stage:
-    """The stage for a simulation's car.
+def scene_for(simulation: Simulation, maneuver: Maneuver) -> RenderScene:
+    """The scene for a simulation's car.
 
     Args:
         simulation: The simulation.
@@ -116,10 +116,10 @@ def stage_for(simulation: Simulation, maneuver: Maneuver) -> Stage:
         PlaybackError: the car cannot be drawn.
     """
     vehicle = simulation.vehicle
-    return Stage([Car(scene_of(vehicle.model), vehicle.body_names)], maneuver.course, maneuver.road)
+    return RenderScene([Car(scene_of(vehicle.model), vehicle.body_names)], maneuver.course, maneuver.road)
 
 
-def drive(simulation: Simulation, stage: Stage, viewer: Viewer, pacer: Pacer) -> Driven:
+def drive(simulation: Simulation, scene: RenderScene, viewer: Viewer, pacer: Pacer) -> DriveResult:
     """Drives a manoeuvre from its beginning to its end, or until the window is closed, and shows it.
 
     The engine that simulates and the model that is drawn are two: whatever is done in the window, such as pulling at
@@ -127,8 +127,8 @@ def drive(simulation: Simulation, stage: Stage, viewer: Viewer, pacer: Pacer) ->
 
     Args:
         simulation: The simulation, at its beginning.
-        stage: Where its car is the only one.
-        viewer: The viewer of the stage.
+        scene: Where its car is the only one.
+        viewer: The viewer of the scene.
         pacer: Holds the pace.
 
     Raises:
@@ -142,18 +142,18 @@ def drive(simulation: Simulation, stage: Stage, viewer: Viewer, pacer: Pacer) ->
         viewer.set_texts((None, None, *_texts(simulation, now_s)))
         # All in one: a picture drawn between would have the camera of one instant and the car of another.
         with viewer.lock():
-            stage.place(0, vehicle.data.xpos[1:], vehicle.data.xquat[1:])
-            stage.update()
+            scene.place(0, vehicle.data.xpos[1:], vehicle.data.xquat[1:])
+            scene.update()
             follow(viewer.cam, now_s)
             viewer.sync()
         pictures += 1
         if done >= simulation.steps:
-            return Driven(now_s, pictures, finished=True)
+            return DriveResult(now_s, pictures, finished=True)
         target = round(pacer.next(now_s) / timestep_s)
         steps = max(1, min(target, simulation.steps) - done)
         simulation.advance(steps)
         done += steps
-    return Driven(done * timestep_s, pictures, finished=False)
+    return DriveResult(done * timestep_s, pictures, finished=False)
 
 
 class _Follow:

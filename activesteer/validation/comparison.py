@@ -22,8 +22,8 @@ class Comparison:
         reference: The reference there.
         error: Difference, in the sense of `kind`.
         tolerance: How large its size may be; None where the two codes mean different things, and only the difference
-            is told.
-        kind: `relative`: error and tolerance are shares (0.02 is 2 %), of the reference or of what `quantity` says;
+            is reported.
+        kind: `relative`: error and tolerance are fractions (0.02 is 2 %), of the reference or of what `quantity` says;
             `absolute`: they are in the unit.
     """
 
@@ -68,7 +68,7 @@ class Comparison:
 
 
 def relative(run: str, quantity: str, unit: str, ours: float, reference: float, tolerance: float | None) -> Comparison:
-    """A comparison whose error is a share of the reference."""
+    """A comparison whose error is a fraction of the reference."""
     error = ours / reference - 1.0 if reference else math.inf
     return Comparison(run, quantity, unit, ours, reference, error, tolerance, "relative")
 

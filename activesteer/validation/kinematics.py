@@ -17,7 +17,7 @@ from activesteer.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-_MOST_TRAVEL_MM: Final = 65.0
+_MAX_TRAVEL_MM: Final = 65.0
 _STEP_MM: Final = 5.0
 _TRAVEL_TOLERANCES: Final = {
     "toe_in": ("deg", 0.03),
@@ -31,7 +31,7 @@ _TRAVEL_TOLERANCES: Final = {
 _FORCE_TOLERANCE: Final = 0.01
 _STEER_TOLERANCE: Final = 0.005
 _STEER_FROM_MM: Final = 5.0
-"""Rack travel from which on a share of the steer angle means something [mm]."""
+"""Rack travel from which on a fraction of the steer angle means something [mm]."""
 
 
 class Curves(NamedTuple):
@@ -133,7 +133,7 @@ def compare_kinematics(vehicle: Vehicle, data: ReferenceData) -> tuple[list[Comp
 
 def _travel(rig: _Rig, reference: Table) -> tuple[list[Comparison], list[Curves]]:
     points: list[list[dict[str, float]]] = [[], []]
-    for travel in np.arange(-_MOST_TRAVEL_MM, _MOST_TRAVEL_MM + 0.1, _STEP_MM):
+    for travel in np.arange(-_MAX_TRAVEL_MM, _MAX_TRAVEL_MM + 0.1, _STEP_MM):
         rig.set(float(travel))
         for axle in (0, 1):
             points[axle].append(rig.left(axle))

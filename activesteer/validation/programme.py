@@ -76,7 +76,7 @@ def validate(
         timestep_s: Step of our simulation [s].
         unknown_runs: Whether runs are driven whose reference is not known.
         jobs: Number of processes; that of the processors where not given.
-        progress: Called with the share that is done and what comes next.
+        progress: Called with the fraction that is done and what comes next.
 
     Returns:
         The comparisons.
@@ -88,19 +88,19 @@ def validate(
     references = {run: table for run in data.runs if (table := data.run(run)) is not None}
     driven = data.runs if unknown_runs else list(references)
 
-    def tell(done: int, what: str) -> None:
+    def report(done: int, what: str) -> None:
         if progress is not None:
             progress(done / (len(driven) + 2), what)
 
-    tell(0, "rig")
+    report(0, "rig")
     car = load_car(data.vehicle)
     vehicle = car.on(Road(mu=_FRICTION), timestep_s)
     rows, curves = compare_kinematics(vehicle, data)
-    tell(1, "static")
+    report(1, "static")
     comparisons = [*compare_static(vehicle, data), *rows, *compare_tyre(car.tyres[0], data)]
     runs = {}
     found = in_parallel(
-        _columns, [(data, run, timestep_s) for run in driven], jobs, lambda place, done: tell(done + 2, driven[place])
+        _columns, [(data, run, timestep_s) for run in driven], jobs, lambda place, done: report(done + 2, driven[place])
     )
     for run, columns in zip(driven, found, strict=True):
         runs[run] = columns

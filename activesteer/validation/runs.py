@@ -26,7 +26,7 @@ SPEED_TOLERANCE: Final = 0.005
 _STEADY_S: Final = 0.5
 """Length of the end of a run that counts as its steady state [s]."""
 _STEADY_CHANGE: Final = 0.01
-"""A quantity is steady where it changes by less than this share of its range in that time."""
+"""A quantity is steady where it changes by less than this fraction of its range in that time."""
 
 
 class Quantity(NamedTuple):

@@ -24,7 +24,7 @@ _TOLERANCES: Final = {
     "spring_length": ("mm", 0.3),
     "half_track": ("mm", 0.15),
 }
-"""Quantity -> unit and tolerance of the difference; the others are compared by their shares."""
+"""Quantity -> unit and tolerance of the difference; the others are compared by their relative error."""
 _SHARES: Final = {"load": 0.01, "side_force_inwards": 0.02}
 
 

@@ -47,7 +47,7 @@ class Response(NamedTuple):
     steady_roll_rad: float
 
     def relative_to(self, other: Response) -> dict[str, float]:
-        """Changes against another response, as shares; of the time, in seconds."""
+        """Changes against another response, as fractions; of the time, in seconds."""
         changes = {
             key: mine / theirs - 1.0
             for key, mine, theirs in zip(self._fields[1:], self[1:], other[1:], strict=True)
@@ -57,14 +57,14 @@ class Response(NamedTuple):
 
 
 def step_sizes(
-    data: ReferenceData, run: str, tell: Callable[[str], None] = lambda _: None, jobs: int | None = None
+    data: ReferenceData, run: str, report: Callable[[str], None] = lambda _: None, jobs: int | None = None
 ) -> list[Response]:
     """The same step steer at several steps of the engine, the shortest first.
 
     Args:
         data: The reference.
         run: A step steer of it.
-        tell: Called with what is done.
+        report: Called with what is done.
         jobs: Number of processes; that of the processors where not given.
 
     Returns:
@@ -72,25 +72,25 @@ def step_sizes(
     """
     names = [f"{1e3 * step_s:g} ms" for step_s in _STEPS_S]
     tasks = [(data, run, name, {}, step_s) for name, step_s in zip(names, _STEPS_S, strict=True)]
-    return in_parallel(_response, tasks, jobs, lambda place, _: tell(f"step size {names[place]}"))
+    return in_parallel(_response, tasks, jobs, lambda place, _: report(f"step size {names[place]}"))
 
 
 def conventions(
-    data: ReferenceData, run: str, tell: Callable[[str], None] = lambda _: None, jobs: int | None = None
+    data: ReferenceData, run: str, report: Callable[[str], None] = lambda _: None, jobs: int | None = None
 ) -> list[Response]:
     """The same step steer with the tyre evaluated as the other code does, and less so.
 
     Args:
         data: The reference.
         run: A step steer of it.
-        tell: Called with what is done.
+        report: Called with what is done.
         jobs: Number of processes; that of the processors where not given.
 
     Returns:
         A response for each of `VARIANTS`.
     """
     tasks = [(data, run, name, overrides, DEFAULT_TIMESTEP_S) for name, overrides in VARIANTS.items()]
-    return in_parallel(_response, tasks, jobs, lambda place, _: tell(tasks[place][2]))
+    return in_parallel(_response, tasks, jobs, lambda place, _: report(tasks[place][2]))
 
 
 def _response(data: ReferenceData, run: str, name: str, overrides: Mapping[str, Any], step_s: float) -> Response:

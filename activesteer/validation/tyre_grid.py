@@ -21,7 +21,7 @@ _THEIR_LIMIT: Final = 1.5608
 _SHIFTS: Final = 0.1
 """Room for the horizontal shifts, which stand beside the slip [in units of B times slip]."""
 _UNJUDGED: Final = ("inclined_3deg", "beyond_their_limits")
-"""Blocks in which the other code does not follow the formula; the difference is told all the same."""
+"""Blocks in which the other code does not follow the formula; the difference is reported all the same."""
 _KEYS: Final = ("fx_N", "fy_N", "mz_Nm", "friction_x", "friction_y", "slip_stiffness_N", "cornering_stiffness_Nprad")
 _SPEED_MPS: Final = 22.22
 
@@ -34,8 +34,8 @@ def compare_tyre(tyre: TyreParameters, data: ReferenceData) -> list[Comparison]:
         data: The reference.
 
     Returns:
-        Largest differences as shares of the peaks, block by block; what lies beyond the other code's limits without a
-        tolerance.
+        Largest differences as fractions of the peaks, block by block; what lies beyond the other code's limits without
+        a tolerance.
     """
     rows = data.texts("tyre_grid")
     numbers = {key: np.array([float(row[key]) for row in rows]) for key in rows[0] if key != "side"}

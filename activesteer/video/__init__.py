@@ -1,6 +1,6 @@
-"""Films of recordings, drawn with MuJoCo from recordings alone, and the stage that they are played on."""
+"""Films of recordings, drawn with MuJoCo from recordings alone, and the scene that they are played on."""
 
-from activesteer.video.film import Film, Made, Settings, make_film
-from activesteer.video.stage import Car, Stage
+from activesteer.video.film import Film, FilmInfo, Settings, make_film
+from activesteer.video.render_scene import Car, RenderScene
 
-__all__ = ["Car", "Film", "Made", "Settings", "Stage", "make_film"]
+__all__ = ["Car", "Film", "FilmInfo", "RenderScene", "Settings", "make_film"]

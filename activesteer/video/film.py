@@ -20,11 +20,11 @@ from activesteer.video.cameras import view
 from activesteer.video.encoder import check, encoder, frame_rate
 from activesteer.video.gauges import Dials, Gauges
 from activesteer.video.offscreen import Offscreen
-from activesteer.video.stage import Car, Stage
+from activesteer.video.render_scene import Car, RenderScene
 from activesteer.video.track import Track
 
 COLOURS: Final = ("#c9ccd1", *RUN_COLOURS[1:])
-"""Those of the plots, but for the first: a near-black car could hardly be told from its tyres and the road."""
+"""Those of the plots, but for the first: a near-black car could hardly be distinguished from its tyres and the road."""
 _ALONE: Final = "#3a76b8"
 """Colour of a car that is compared with none."""
 _SAMPLES: Final = 6
@@ -61,10 +61,10 @@ class Settings:
 
 
 class Film:
-    """A stage with the cars of some recordings, and a camera; to be used in a `with` block."""
+    """The scene with the cars of some recordings, and a camera; to be used in a `with` block."""
 
     def __init__(self, recordings: Mapping[str, Recording], settings: Settings) -> None:
-        """Builds the stage.
+        """Builds the scene.
 
         Args:
             recordings: By what they are called. The camera follows the car of the first; those of the others are
@@ -89,7 +89,7 @@ class Film:
         ]
         first = next(iter(recordings.values()))
         maneuver = first.metadata.get("maneuver", {})
-        self._stage = Stage(cars, course_of(first.metadata), road_of(first.metadata), settings.size)
+        self._scene = RenderScene(cars, course_of(first.metadata), road_of(first.metadata), settings.size)
         dials = [
             Dials(recording, SYSTEM_LABELS.get(name, name), colour)
             for (name, recording), colour in zip(recordings.items(), colours, strict=True)
@@ -106,7 +106,7 @@ class Film:
         Raises:
             PlaybackError: nothing can be drawn here.
         """
-        self._canvas = Offscreen(self._stage.model, self.settings.size)
+        self._canvas = Offscreen(self._scene.model, self.settings.size)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -137,10 +137,10 @@ class Film:
             msg = "a film is drawn in a `with` block"
             raise RuntimeError(msg)
         for number, track in enumerate(self._tracks):
-            self._stage.place(number, *track.poses(time_s))
-        self._stage.update()
+            self._scene.place(number, *track.poses(time_s))
+        self._scene.update()
         self._view.aim(self._camera, time_s)
-        return self._gauges.draw(self._canvas.draw(self._stage.data, self._camera), time_s, self._note)
+        return self._gauges.draw(self._canvas.draw(self._scene.data, self._camera), time_s, self._note)
 
     def pictures(self, times_s: Sequence[float] | NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
         """Pictures of several instants."""
@@ -148,7 +148,7 @@ class Film:
             yield self.picture(float(time_s))
 
 
-class Made(NamedTuple):
+class FilmInfo(NamedTuple):
     """What a film has become: pictures, and how many of them are shown in a second."""
 
     pictures: int
@@ -160,14 +160,14 @@ def make_film(
     path: Path,
     settings: Settings | None = None,
     progress: Callable[[float], Any] | None = None,
-) -> Made:
+) -> FilmInfo:
     """Draws a film of recordings and writes it to a file.
 
     Args:
         recordings: See `Film`.
         path: The file, ending in .mp4 or .gif; one that exists is replaced when the new one is whole.
         settings: Camera, size, speed.
-        progress: Called after each picture with the share that is done, 0 to 1.
+        progress: Called after each picture with the fraction that is done, 0 to 1.
 
     Raises:
         ParameterError: a setting or the file's ending is wrong.
@@ -185,7 +185,7 @@ def make_film(
                 file.write(pixels)
                 if progress is not None:
                     progress(number / len(times))
-    return Made(len(times), rate)
+    return FilmInfo(len(times), rate)
 
 
 def _colours(recordings: Mapping[str, Recording]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Pictures of a stage without a window."""
+"""Pictures of a scene without a window."""
 
 from __future__ import annotations
 

@@ -7,10 +7,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.conventions import yaw_of
 from activesteer.errors import PlaybackError
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint, footprint_of
-from activesteer.video.stage import CHASSIS
+from activesteer.video.render_scene import CHASSIS
 
 Array = NDArray[np.float64]
 
@@ -48,8 +49,7 @@ class Track:
         self._positions_m = poses.positions_m[whole]
         self._quaternions = poses.quaternions[whole]
         self.start_s, self.end_s = float(self._time_s[0]), float(self._time_s[-1])
-        w, x, y, z = self._quaternions[:, poses.names.index(CHASSIS)].T
-        self._heading_rad = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        self._heading_rad = np.unwrap(yaw_of(self._quaternions[:, poses.names.index(CHASSIS)]))
         self._steady_rad = _smooth(self._time_s, self._heading_rad)
         self._middle_m = -0.5 * (footprint_of(recording.metadata) or Footprint()).wheelbase_m
 
@@ -66,12 +66,12 @@ class Track:
         after = min(max(int(np.searchsorted(self._time_s, time_s, side="right")), min(1, last)), last)
         before = max(after - 1, 0)
         span = self._time_s[after] - self._time_s[before]
-        share = min(max((time_s - self._time_s[before]) / span, 0.0), 1.0) if span > 0.0 else 0.0
-        positions = (1.0 - share) * self._positions_m[before] + share * self._positions_m[after]
+        fraction = min(max((time_s - self._time_s[before]) / span, 0.0), 1.0) if span > 0.0 else 0.0
+        positions = (1.0 - fraction) * self._positions_m[before] + fraction * self._positions_m[after]
         # Between two poses the quickest, a wheel, turns by less than a radian: the chord is as good as the arc.
         first, second = self._quaternions[before], self._quaternions[after]
         sign = np.where(np.einsum("ij,ij->i", first, second) < 0.0, -1.0, 1.0)[:, None]
-        turned = (1.0 - share) * first + share * sign * second
+        turned = (1.0 - fraction) * first + fraction * sign * second
         return positions, turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
     def heading(self, time_s: float, *, steady: bool = False) -> float:

@@ -5,7 +5,7 @@ import argparse
 import pytest
 
 from activesteer.commands.video import _size
-from tests.unit.playback.made_up import circle
+from tests.unit.playback.synthetic import circle
 
 
 def refused(told, *texts: str) -> None:

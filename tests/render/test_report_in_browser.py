@@ -14,7 +14,7 @@ import pytest
 
 from activesteer.analysis.report import write_report
 from activesteer.conventions import RUN_COLOURS
-from tests.unit.analysis.made_up_files import lane_changes, step_steers
+from tests.unit.analysis.synthetic_files import lane_changes, step_steers
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -231,7 +231,7 @@ def test_plots_follow_the_width_of_the_window(open_page):
     page = open_page(**DESK)
     figure = plot(page, "Yaw rate")
     page.set_viewport_size({"width": 900, "height": 900})
-    # The page's policy allows no code from text, so that the browser cannot be told to wait: it is asked again.
+    # The page's policy allows no code from text, so that the browser cannot be determined to wait: it is asked again.
     deadline = time.monotonic() + 5.0
     while (box := figure.locator(".uplot").bounding_box()) and box["width"] >= 450 and time.monotonic() < deadline:
         page.wait_for_timeout(100)

@@ -18,8 +18,8 @@ from activesteer.validation.page import page
 from activesteer.validation.programme import Validation
 from activesteer.validation.reference import ReferenceData
 from activesteer.validation.study import Response
-from tests.unit.analysis.made_up import step_steer
-from tests.unit.analysis.made_up_files import recording_of
+from tests.unit.analysis.synthetic import step_steer
+from tests.unit.analysis.synthetic_files import recording_of
 
 EVIL = "--></title></style></script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{ version }}{% raise %}"
 

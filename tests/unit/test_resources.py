@@ -12,7 +12,7 @@ from activesteer.errors import ManeuverError, ModelError, ParameterError
 
 @pytest.fixture
 def checkout(tmp_path, monkeypatch) -> Path:
-    """A made-up checkout with two manoeuvres and one vehicle."""
+    """A synthetic checkout with two manoeuvres and one vehicle."""
     for file in ("maneuvers/step_steer.toml", "maneuvers/slalom.toml", "models/vehicles/compact.toml"):
         path = tmp_path / file
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""A claim of the paper with what it was decided on, and what all of them share."""
+"""A claim of the paper with what it was decided on, and what all of them have in common."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def pick(runs: Runs, *metrics: str) -> dict[str, float]:
 
 
 def lowered(runs: Runs, metric: str, most: float, system: str) -> bool:
-    """Whether a system brings a metric down to at most a share of the value without control.
+    """Whether a system brings a metric down to at most a part of the value without control.
 
     Never where one of them is nan, or where there is nothing to bring down.
     """

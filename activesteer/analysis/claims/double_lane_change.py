@@ -19,8 +19,8 @@ from activesteer.analysis.source import RecordingLike, read_course
 
 ALIKE_M: Final = 0.5
 """Tracks look alike when they are nowhere further apart than this [m]."""
-PEAK_SHARE: Final = 0.9
-"""A system lowers a peak when it brings it down to this share."""
+PEAK_FRACTION: Final = 0.9
+"""A system lowers a peak when it brings it down to this fraction."""
 PEAKS: Final = ("yaw_rate_peak_abs_radps", "sideslip_peak_abs_rad")
 
 
@@ -66,7 +66,7 @@ def _peaks(runs: Runs) -> Claim:
         "L3",
         "Each system lowers the peaks of yaw rate and sideslip.",
         "The largest magnitudes of yaw rate and of sideslip of ars and of afs are at most "
-        f"{100.0 * PEAK_SHARE:.0f} % of those of none.",
-        all(lowered(runs, metric, PEAK_SHARE, system) for metric in PEAKS for system in SYSTEMS_WITH_CONTROL),
+        f"{100.0 * PEAK_FRACTION:.0f} % of those of none.",
+        all(lowered(runs, metric, PEAK_FRACTION, system) for metric in PEAKS for system in SYSTEMS_WITH_CONTROL),
         pick(runs, *PEAKS),
     )

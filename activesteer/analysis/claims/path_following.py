@@ -1,4 +1,4 @@
-"""What the claims about lane changes and slalom share: the oscillation after the last gate, and windows in words."""
+"""What the claims about lane changes and slalom have in common: oscillation after the last gate, windows in words."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from activesteer.analysis.claims.claim import Claim, Runs, lowered, pick
 from activesteer.analysis.path_following import AFTER_S
 
 CALMED: Final = 0.5
-"""A system calms an oscillation when it brings its root mean square down to this share."""
+"""A system calms an oscillation when it brings its root mean square down to this fraction."""
 AFTER: Final = ("yaw_rate_after_gates_rms_radps", "sideslip_after_gates_rms_rad")
 SYSTEMS_WITH_CONTROL: Final = ("ars", "afs")
 

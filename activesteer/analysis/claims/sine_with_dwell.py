@@ -23,14 +23,14 @@ from activesteer.analysis.source import RecordingLike
 
 LOST_SIDESLIP_RAD: Final = math.radians(20.0)
 """Beyond this sideslip angle a car is lost [rad]."""
-LEAST_ANGLE_RAD: Final = math.radians(0.1)
+MIN_ANGLE_RAD: Final = math.radians(0.1)
 """Two added angles are compared where both are larger than this [rad]."""
-OPPOSITE_SHARE: Final = 0.9
+OPPOSITE_FRACTION: Final = 0.9
 """Share of this time in which they must be opposite."""
-LEAST_COMMON_S: Final = 0.1
+MIN_COMMON_S: Final = 0.1
 """Time for which both must be that large at all [s]."""
 
-SHARES: Final = ("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share")
+RATIOS: Final = ("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share")
 SIDESLIP: Final = "sideslip_peak_abs_rad"
 _LIMITS: Final = " and ".join(
     f"{100.0 * limit:.0f} % {instant_s:.2f} s" for limit, instant_s in zip(RATIO_LIMITS, INSTANTS_S, strict=True)
@@ -62,14 +62,14 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
 
 def _lost(runs: Runs) -> Claim:
     none = runs["none"]
-    failed = any(none[share] > limit for share, limit in zip(SHARES, RATIO_LIMITS, strict=True))
+    failed = any(none[ratio] > limit for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True))
     return Claim(
         "D1",
         "Without control the car is lost.",
         f"The yaw rate of none is above at least one of the limits of FMVSS 126 ({_LIMITS} after the completion of "
         f"steer), and its sideslip goes beyond {math.degrees(LOST_SIDESLIP_RAD):.0f} deg.",
         failed and none[SIDESLIP] > LOST_SIDESLIP_RAD,
-        {f"none_{metric}": none[metric] for metric in (*SHARES, SIDESLIP)},
+        {f"none_{metric}": none[metric] for metric in (*RATIOS, SIDESLIP)},
     )
 
 
@@ -80,17 +80,17 @@ def _kept(runs: Runs, number: str, system: str, text: str) -> Claim:
         text,
         f"The magnitude of the yaw rate of {system} is at most {_LIMITS} after the completion of steer, of its first "
         "peak after the steering reversal (FMVSS 126).",
-        all(abs(run[share]) <= limit for share, limit in zip(SHARES, RATIO_LIMITS, strict=True)),
-        {f"{system}_{share}": run[share] for share in SHARES},
+        all(abs(run[ratio]) <= limit for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True)),
+        {f"{system}_{ratio}": run[ratio] for ratio in RATIOS},
     )
 
 
 def _opposite(recordings: Mapping[str, RecordingLike]) -> Claim:
     """D4, from the angles that the controllers demand: what the hinges give under load is nothing that they add."""
     rear, front, step_s = _added_angles(recordings["ars"], recordings["afs"])
-    both = (np.abs(rear) > LEAST_ANGLE_RAD) & (np.abs(front) > LEAST_ANGLE_RAD)
+    both = (np.abs(rear) > MIN_ANGLE_RAD) & (np.abs(front) > MIN_ANGLE_RAD)
     common_s = float(np.count_nonzero(both)) * step_s
-    share = float(np.mean(rear[both] * front[both] < 0.0)) if both.any() else math.nan
+    fraction = float(np.mean(rear[both] * front[both] < 0.0)) if both.any() else math.nan
     scale = float(np.sqrt(np.sum(rear**2) * np.sum(front**2)))
     correlation = float(np.sum(rear * front)) / scale if scale > 0.0 else math.nan
     return Claim(
@@ -98,12 +98,12 @@ def _opposite(recordings: Mapping[str, RecordingLike]) -> Claim:
         "The angles that the two systems add have opposite signs.",
         f"From the steering reversal to {INSTANTS_S[-1]:.2f} s after the completion of steer, the rear angle demanded "
         "by ars times the angle demanded by afs integrates to less than 0, and while both are larger than "
-        f"{math.degrees(LEAST_ANGLE_RAD):.1f} deg, at least {LEAST_COMMON_S:.1f} s in all, they are opposite for "
-        f"{100.0 * OPPOSITE_SHARE:.0f} % of the time.",
-        correlation < 0.0 and common_s >= LEAST_COMMON_S and share >= OPPOSITE_SHARE,
+        f"{math.degrees(MIN_ANGLE_RAD):.1f} deg, at least {MIN_COMMON_S:.1f} s in all, they are opposite for "
+        f"{100.0 * OPPOSITE_FRACTION:.0f} % of the time.",
+        correlation < 0.0 and common_s >= MIN_COMMON_S and fraction >= OPPOSITE_FRACTION,
         {
             "added_angles_correlation": correlation,
-            "added_angles_opposite_share": share,
+            "added_angles_opposite_share": fraction,
             "added_angles_common_s": common_s,
         },
     )
@@ -127,6 +127,6 @@ def _effective(runs: Runs) -> Claim:
         "Rear steering is somewhat more effective than front superposition.",
         "The peak of the sideslip of ars and the magnitude of its yaw rate ratio 1.00 s after the completion of steer "
         "are not larger than those of afs.",
-        ars[SIDESLIP] <= afs[SIDESLIP] and abs(ars[SHARES[0]]) <= abs(afs[SHARES[0]]),
-        {f"{system}_{metric}": runs[system][metric] for metric in (SIDESLIP, SHARES[0]) for system in ("ars", "afs")},
+        ars[SIDESLIP] <= afs[SIDESLIP] and abs(ars[RATIOS[0]]) <= abs(afs[RATIOS[0]]),
+        {f"{system}_{metric}": runs[system][metric] for metric in (SIDESLIP, RATIOS[0]) for system in ("ars", "afs")},
     )

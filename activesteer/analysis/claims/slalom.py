@@ -17,7 +17,7 @@ from activesteer.analysis.claims.path_following import SYSTEMS_WITH_CONTROL, cal
 from activesteer.analysis.source import RecordingLike
 
 NOT_REDUCED: Final = 0.95
-"""An amplitude is not reduced when it stays above this share of the one without control."""
+"""An amplitude is not reduced when it stays above this fraction of the one without control."""
 TRACK: Final = "track_amplitude_m"
 AMPLITUDES: Final = ("yaw_rate_gates_rms_radps", "sideslip_gates_rms_rad")
 STEERING: Final = "steering_wheel_gates_rms_rad"

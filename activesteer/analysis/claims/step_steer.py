@@ -19,7 +19,7 @@ from activesteer.analysis.source import RecordingLike
 DELAY_TOLERANCE_S: Final = 0.005
 """A response time counts as longer when it is longer by more than this [s]: five steps of the controller."""
 
-LEAST_ANGLE_RAD: Final = math.radians(0.01)
+MIN_ANGLE_RAD: Final = math.radians(0.01)
 """A settled angle smaller than this has no sign [rad]."""
 
 
@@ -73,7 +73,7 @@ def _rear_angle(runs: Runs) -> Claim:
         "The rear wheels settle turned against the front wheels.",
         "The steady-state rear angle of ars, less that of none (the give of the hinges), has the sign opposite to that "
         "of the front wheels.",
-        rear_rad * front_rad < 0.0 and abs(rear_rad) > LEAST_ANGLE_RAD,
+        rear_rad * front_rad < 0.0 and abs(rear_rad) > MIN_ANGLE_RAD,
         {"ars_added_rear_steer_steady_state_rad": rear_rad, "ars_front_steer_steady_state_rad": front_rad},
     )
 
@@ -86,7 +86,7 @@ def _front_angle(runs: Runs) -> Claim:
         "The superposed angle adds to the driver's.",
         "The steady-state superposition angle of afs, less that of none (the give of the gear), has the sign of the "
         "steering wheel angle.",
-        added_rad * wheel_rad > 0.0 and abs(added_rad) > LEAST_ANGLE_RAD,
+        added_rad * wheel_rad > 0.0 and abs(added_rad) > MIN_ANGLE_RAD,
         {"afs_added_superposition_steady_state_rad": added_rad, "afs_steering_wheel_steady_state_rad": wheel_rad},
     )
 

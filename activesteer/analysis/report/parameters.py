@@ -32,7 +32,7 @@ def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
 
     Args:
         recordings: The runs.
-        tables: Keys of the metadata: tables, or single values. The entries of a single one are told without its name.
+        tables: Keys of the metadata: tables, or single values. The entries of a single one are given without its name.
     """
     flat = [dict(_flat(_chosen(run.metadata, tables))) for run in recordings]
     found = []

@@ -13,7 +13,7 @@ from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
 
-MOST_RUNS: Final = 60
+MAX_RUNS: Final = 60
 """More runs than this make a page that nobody can read, and that a browser is slow to open."""
 
 
@@ -81,11 +81,11 @@ def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
         recordings: By where they come from.
 
     Raises:
-        ParameterError: there is none, or there are more than `MOST_RUNS`.
+        ParameterError: there is none, or there are more than `MAX_RUNS`.
         RecordingError: a recording has no rows.
     """
-    if not 1 <= len(recordings) <= MOST_RUNS:
-        raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MOST_RUNS}")
+    if not 1 <= len(recordings) <= MAX_RUNS:
+        raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MAX_RUNS}")
     by_maneuver: dict[str, dict[str, Recording]] = {}
     for source, recording in recordings.items():
         if len(recording) == 0:

@@ -9,12 +9,12 @@ import pytest
 
 from activesteer.analysis.metrics import metrics
 from activesteer.errors import RecordingError
-from tests.unit.analysis.made_up import MadeUp
+from tests.unit.analysis.synthetic import SyntheticRun
 
 RADIUS_M, SPEED_MPS, BRAKE_S, DECELERATION_MPS2 = 100.0, 25.0, 1.0, 5.0
 
 
-def braking(side: float = 1.0, turn_in: float = 0.0, duration_s: float = 4.0, outside_m: float = 0.0) -> MadeUp:
+def braking(side: float = 1.0, turn_in: float = 0.0, duration_s: float = 4.0, outside_m: float = 0.0) -> SyntheticRun:
     """A car on a circle brakes at 1 s; its yaw rate then is above that of the circle by `turn_in` rad/s."""
     time_s = np.arange(round(duration_s * 1000.0) + 1) * 0.001
     since_s = np.maximum(time_s - BRAKE_S, 0.0)
@@ -33,7 +33,7 @@ def braking(side: float = 1.0, turn_in: float = 0.0, duration_s: float = 4.0, ou
         "speed_mps": speed,
         "brake_pedal": np.where(since_s > 0.0, 0.5, 0.0),
     }
-    return MadeUp(time_s, channels, "brake_in_turn")
+    return SyntheticRun(time_s, channels, "brake_in_turn")
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

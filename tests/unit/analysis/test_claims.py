@@ -8,7 +8,7 @@ import pytest
 
 from activesteer.analysis.claims import Claim, step_steer_claims
 from activesteer.errors import ParameterError
-from tests.unit.analysis.made_up import MadeUp, second_order, step_steer
+from tests.unit.analysis.synthetic import SyntheticRun, second_order, step_steer
 
 
 def good() -> dict[str, dict[str, Any]]:
@@ -22,7 +22,7 @@ def good() -> dict[str, dict[str, Any]]:
 
 
 def check(arguments: dict[str, dict[str, Any]], side: float = 1.0) -> dict[str, Claim]:
-    runs: dict[str, MadeUp] = {system: step_steer(side=side, **words) for system, words in arguments.items()}
+    runs: dict[str, SyntheticRun] = {system: step_steer(side=side, **words) for system, words in arguments.items()}
     return {claim.id: claim for claim in step_steer_claims(runs)}
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from activesteer.analysis.claims import SCENARIOS, Claim, claims_for
 from activesteer.errors import ParameterError
-from tests.unit.analysis.made_up import along_path, offset_track, slalom, step_steer
+from tests.unit.analysis.synthetic import along_path, offset_track, slalom, step_steer
 
 Arguments = dict[str, dict[str, Any]]
 

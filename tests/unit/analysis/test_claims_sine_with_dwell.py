@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.analysis.claims import SCENARIOS, Claim
 from activesteer.errors import ParameterError
-from tests.unit.analysis.made_up import COMPLETION_S, REVERSAL_S, sine_with_dwell
+from tests.unit.analysis.synthetic import COMPLETION_S, REVERSAL_S, sine_with_dwell
 
 
 def good() -> dict[str, dict[str, Any]]:

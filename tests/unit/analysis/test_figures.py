@@ -12,7 +12,7 @@ from activesteer.analysis.figures import BY_SCENARIO, draw_all, figure_for, theo
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 from activesteer.theory.tolerance import tolerance
-from tests.unit.analysis.made_up import (
+from tests.unit.analysis.synthetic import (
     COMPLETION_S,
     LANES,
     VEHICLE,

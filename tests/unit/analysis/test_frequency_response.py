@@ -1,4 +1,4 @@
-"""Frequency response of a made-up run: a first-order lag behind a sine sweep."""
+"""Frequency response of a synthetic run: a first-order lag behind a sine sweep."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import pytest
 
 from activesteer.analysis.frequency_response import OUTPUTS, frequency_response, metrics
 from activesteer.errors import RecordingError
-from tests.unit.analysis.made_up import MadeUp
+from tests.unit.analysis.synthetic import SyntheticRun
 
 STEP_S, LAG_S, GAIN = 0.001, 0.15, 0.3
 
 
-def sweep(rng: np.random.Generator | None = None, last_Hz: float = 6.0) -> MadeUp:
+def sweep(rng: np.random.Generator | None = None, last_Hz: float = 6.0) -> SyntheticRun:
     time_s = np.arange(40000) * STEP_S
     t = np.clip(time_s - 0.5, 0.0, 36.0)
     growth = math.log(last_Hz / 0.1) / 36.0
@@ -27,7 +27,9 @@ def sweep(rng: np.random.Generator | None = None, last_Hz: float = 6.0) -> MadeU
         answer[row] = decay * answer[row - 1] + (1 - decay) * GAIN * 0.5 * (wheel[row] + wheel[row - 1])
     noise = 0.0 if rng is None else rng.normal(0.0, 0.02, len(answer))
     channels = dict.fromkeys(OUTPUTS, answer + noise)
-    return MadeUp(time_s, {**channels, "steering_wheel_demand_rad": wheel, "speed_mps": np.full_like(wheel, 22.0)})
+    return SyntheticRun(
+        time_s, {**channels, "steering_wheel_demand_rad": wheel, "speed_mps": np.full_like(wheel, 22.0)}
+    )
 
 
 def test_lag_is_found_in_gain_and_phase():

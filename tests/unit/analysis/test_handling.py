@@ -1,4 +1,4 @@
-"""Steady-state handling of made-up runs, whose gradients are known."""
+"""Steady-state handling of synthetic runs, whose gradients are known."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import pytest
 
 from activesteer.analysis.handling import Car, car_of, evaluate, metrics
 from activesteer.errors import RecordingError
-from tests.unit.analysis.made_up import MadeUp
+from tests.unit.analysis.synthetic import SyntheticRun
 
 CAR = Car(1.1, 1.5, 16.0)
 EG, ROLL, REAR = 0.0045, 0.009, 0.004
-"""Gradients of the made-up car [rad/(m/s2)]."""
+"""Gradients of the synthetic car [rad/(m/s2)]."""
 
 
 def run(
     kind: str = "slowly_increasing_steer", side: float = 1.0, knee_mps2: float = 4.0, top_mps2: float = 8.0
-) -> MadeUp:
+) -> SyntheticRun:
     """Lateral acceleration rises to its limit; above the knee, the steer angle grows faster than the line."""
     time_s = np.arange(40001) * 0.001
     ay = np.minimum(time_s / 35.0, 1.0) * top_mps2
@@ -31,7 +31,7 @@ def run(
         "ay_mps2": ay, "steering_wheel_rad": CAR.steering_ratio * steer, "yaw_rate_radps": curvature * speed,
         "roll_rad": ROLL * ay, "sideslip_rad": sideslip,
     }  # fmt: skip
-    recording = MadeUp(time_s, {name: side * values for name, values in channels.items()}, kind)
+    recording = SyntheticRun(time_s, {name: side * values for name, values in channels.items()}, kind)
     recording.channels |= {"vx_mps": speed, "speed_mps": speed}
     recording.metadata["vehicle"] = {
         "single_track": {"cg_to_front_m": 1.1, "cg_to_rear_m": 1.5}, "steering": {"ratio": 16.0},

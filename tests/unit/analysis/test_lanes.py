@@ -11,25 +11,25 @@ from activesteer.analysis.lanes import all_wheels_in_lanes, cone_distances, lane
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.road.course import CONE_RADIUS_M
 from activesteer.road.footprint import FRONT_OVERHANG_M, REAR_OVERHANG_M
-from tests.unit.analysis.made_up import LANES, WHEELBASE_M, WIDTH_M, MadeUp, along_path, offset_track
+from tests.unit.analysis.synthetic import LANES, WHEELBASE_M, WIDTH_M, SyntheticRun, along_path, offset_track
 
 HALF_M = 0.75 + 0.1
 """From the middle of the car to the outer side of a tyre [m]."""
 
 
-def straight(y_m: float, **words) -> MadeUp:
+def straight(y_m: float, **words) -> SyntheticRun:
     return along_path(lambda x: np.full_like(x, y_m), **words)
 
 
-def overstep(run: MadeUp) -> float:
+def overstep(run: SyntheticRun) -> float:
     return lane_overstep(run, read_course(run), read_footprint(run))
 
 
-def kept(run: MadeUp) -> bool:
+def kept(run: SyntheticRun) -> bool:
     return all_wheels_in_lanes(run, read_course(run), read_footprint(run))
 
 
-def distances(run: MadeUp) -> np.ndarray:
+def distances(run: SyntheticRun) -> np.ndarray:
     return cone_distances(run, read_course(run), read_footprint(run))
 
 

@@ -10,12 +10,12 @@ from activesteer.analysis.figures import figure_2
 from activesteer.analysis.frequency_response import OUTPUTS
 from activesteer.analysis.linear_plots import draw_bode, draw_root_locus
 from activesteer.errors import ParameterError
-from tests.unit.analysis.made_up import step_steer
+from tests.unit.analysis.synthetic import step_steer
 from tests.unit.analysis.test_frequency_response import sweep
 
 
 def system(speed_mps: float = 20.0) -> control.StateSpace:
-    """A made-up oscillator whose damping falls with speed; all outputs are its position."""
+    """A synthetic oscillator whose damping falls with speed; all outputs are its position."""
     a = np.array([[0.0, 1.0], [-81.0, -200.0 / speed_mps]])
     return control.StateSpace(
         a, [[0.0], [81.0]], np.tile([1.0, 0.0], (4, 1)), np.zeros((4, 1)),

@@ -11,12 +11,12 @@ from activesteer.analysis import general, step_response
 from activesteer.analysis.metrics import metrics
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
-from tests.unit.analysis.made_up import MadeUp, step_steer
+from tests.unit.analysis.synthetic import SyntheticRun, step_steer
 
 TIME_S = np.arange(2001) * 0.001
 
 
-def wave(kind: str = "straight") -> MadeUp:
+def wave(kind: str = "straight") -> SyntheticRun:
     channels = {
         "yaw_rate_radps": 0.3 * np.sin(2.0 * np.pi * TIME_S),
         "ay_mps2": -5.0 * np.sin(2.0 * np.pi * TIME_S),
@@ -28,7 +28,7 @@ def wave(kind: str = "straight") -> MadeUp:
     for corner in CORNERS:
         channels |= {f"{corner}_tyre_f{axis}_N": np.zeros_like(TIME_S) for axis in "xy"}
         channels[f"{corner}_tyre_fz_N"] = np.full_like(TIME_S, 4000.0)
-    return MadeUp(TIME_S, channels, kind)
+    return SyntheticRun(TIME_S, channels, kind)
 
 
 def test_step_steer_gets_the_metrics_of_iso_7401():

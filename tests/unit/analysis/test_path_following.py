@@ -10,7 +10,7 @@ import pytest
 from activesteer.analysis.metrics import metrics
 from activesteer.analysis.path_following import evaluate
 from activesteer.errors import RecordingError
-from tests.unit.analysis.made_up import SLALOM_CONES, SPEED_MPS, along_path, offset_track, slalom
+from tests.unit.analysis.synthetic import SLALOM_CONES, SPEED_MPS, along_path, offset_track, slalom
 
 SINE_RMS = 1.0 / math.sqrt(2.0)
 

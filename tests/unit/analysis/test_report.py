@@ -18,8 +18,8 @@ from activesteer.analysis.report.runs import groups_of
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
 from activesteer.signals import Channel
-from tests.unit.analysis.made_up import step_steer
-from tests.unit.analysis.made_up_files import lane_changes, recording_of, sines, step_steers
+from tests.unit.analysis.synthetic import step_steer
+from tests.unit.analysis.synthetic_files import lane_changes, recording_of, sines, step_steers
 
 VOID = {"meta", "link", "br"}
 
@@ -91,7 +91,7 @@ def test_same_runs_give_the_same_page(page):
 
 def test_runs_are_grouped_by_manoeuvre_in_the_papers_order(page):
     words = Page(page).words
-    assert "6 runs of 3 manoeuvres, vehicle made_up." in words
+    assert "6 runs of 3 manoeuvres, vehicle synthetic." in words
     data = data_of(page)
     assert [group["name"] for group in data] == ["step_steer", "sine_with_dwell", "cones"]
     assert [run["name"] for run in data[0]["runs"]] == ["none", "ars", "afs"]

@@ -10,7 +10,7 @@ from scipy.signal import savgol_filter
 
 from activesteer.analysis.series import crossing_time, lag, largest_rate, rate_rms, rms, smooth, step_response, timestep
 from activesteer.errors import RecordingError
-from tests.unit.analysis.made_up import first_order, second_order
+from tests.unit.analysis.synthetic import first_order, second_order
 
 TIME_S = np.arange(6001) * 0.001
 

@@ -10,7 +10,7 @@ import pytest
 from activesteer.analysis.metrics import metrics
 from activesteer.analysis.sine_with_dwell import steering
 from activesteer.errors import RecordingError
-from tests.unit.analysis.made_up import COMPLETION_S, REVERSAL_S, SINE_BEGIN_S, MadeUp, sine_with_dwell
+from tests.unit.analysis.synthetic import COMPLETION_S, REVERSAL_S, SINE_BEGIN_S, SyntheticRun, sine_with_dwell
 
 FILTER_S = 0.02
 """By how much the 10 Hz filter may move an instant at a corner of the steering [s]."""
@@ -110,7 +110,7 @@ def test_a_run_that_ends_early_has_no_ratio():
     assert math.isnan(values["yaw_rate_after_1750ms_share"])
 
 
-def changed(steering_wheel) -> MadeUp:
+def changed(steering_wheel) -> SyntheticRun:
     run = sine_with_dwell()
     run.channels["steering_wheel_rad"] = steering_wheel(run["steering_wheel_rad"])
     return run

@@ -6,7 +6,7 @@ import pytest
 
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.errors import RecordingError
-from tests.unit.analysis.made_up import LANES, SLALOM_CONES, along_path, slalom, step_steer
+from tests.unit.analysis.synthetic import LANES, SLALOM_CONES, along_path, slalom, step_steer
 
 
 def test_course_and_car_are_read():

@@ -1,4 +1,4 @@
-"""Metrics of a step steer from made-up recordings."""
+"""Metrics of a step steer from synthetic recordings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.analysis import step_response
 from activesteer.errors import RecordingError
-from tests.unit.analysis.made_up import RAMP_S, STEP_S, MadeUp, first_order, second_order, step_steer
+from tests.unit.analysis.synthetic import RAMP_S, STEP_S, SyntheticRun, first_order, second_order, step_steer
 
 SIGNED = ("_steady_state_", "_peak_rad", "_peak_mps2")
 
@@ -70,8 +70,8 @@ def test_overshoot_grows_when_damping_falls():
     assert loose > tight > 0.0
 
 
-def with_steering(values: np.ndarray, run: MadeUp) -> MadeUp:
-    return MadeUp(run.time_s, {**run.channels, "steering_wheel_rad": values})
+def with_steering(values: np.ndarray, run: SyntheticRun) -> SyntheticRun:
+    return SyntheticRun(run.time_s, {**run.channels, "steering_wheel_rad": values})
 
 
 def test_straight_driving_is_no_step():

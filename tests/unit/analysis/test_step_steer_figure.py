@@ -10,7 +10,7 @@ import pytest
 
 from activesteer.analysis.figures import step_steer_figure
 from activesteer.errors import ParameterError, RecordingError
-from tests.unit.analysis.made_up import step_steer
+from tests.unit.analysis.synthetic import step_steer
 
 
 def three():

@@ -6,7 +6,7 @@ import math
 
 from activesteer.analysis import step_response
 from activesteer.analysis.tables import comparison
-from tests.unit.analysis.made_up import step_steer
+from tests.unit.analysis.synthetic import step_steer
 
 
 def test_values_stand_under_their_run():

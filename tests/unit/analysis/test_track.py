@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.track import first_at, largest_difference, path_distance, track_over_x
-from tests.unit.analysis.made_up import along_path
+from tests.unit.analysis.synthetic import along_path
 
 
 def distance(x: float, y: float, path: list[tuple[float, float]]) -> float:

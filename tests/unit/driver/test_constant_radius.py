@@ -11,7 +11,7 @@ from tests.unit.driver.drives import DRIVE
 RATIO, WHEELBASE_M, LOCK_RAD, SPEED_MPS, STEP_S = 16.0, 2.6, 8.0, 15.0, 0.001
 MOTION = Motion(0.0, 0.0, 0.0, SPEED_MPS, 0.0, 0.0)
 UNDERSTEER = 1.4
-"""Steer angle over Ackermann angle of the made-up car."""
+"""Steer angle over Ackermann angle of the synthetic car."""
 
 
 def driver() -> ConstantRadiusDriver:

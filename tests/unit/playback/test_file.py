@@ -17,9 +17,9 @@ from activesteer.playback import runs_of, save
 from activesteer.playback.course import extent, map_bounds
 from activesteer.playback.tyres import FORCE_SCALE_NPM, force_arrows, use_colours
 from activesteer.recording import Recording
-from tests.unit.playback import made_up
-from tests.unit.playback.made_up import COURSE, circle
+from tests.unit.playback import synthetic
 from tests.unit.playback.rrd import Rrd
+from tests.unit.playback.synthetic import COURSE, circle
 
 
 def saved(folder: Path, recordings: Mapping[str, Recording], **options: Any) -> Rrd:
@@ -48,9 +48,9 @@ def test_the_wheels_spin_and_steer(tmp_path: Path) -> None:
         for body in ("fl_wheel", "chassis")
     )
     step = (wheel[1:] * wheel[:-1].inv()).magnitude()
-    assert np.allclose(step, 0.01 * made_up.SPEED_MPS / made_up.WHEEL_RADIUS_M, rtol=0.01)
+    assert np.allclose(step, 0.01 * synthetic.SPEED_MPS / synthetic.WHEEL_RADIUS_M, rtol=0.01)
     axis = chassis.inv().apply(wheel.apply((0.0, 1.0, 0.0)))
-    assert np.allclose(np.arctan2(-axis[:, 0], axis[:, 1]), made_up.STEER_RAD, atol=1e-5)
+    assert np.allclose(np.arctan2(-axis[:, 0], axis[:, 1]), synthetic.STEER_RAD, atol=1e-5)
 
 
 def test_the_camera_follows_and_stays_level(tmp_path: Path) -> None:
@@ -71,14 +71,14 @@ def test_links_reach_from_body_to_body_and_springs_are_as_long_as_their_ends_are
     lengths = rrd.numbers("/ars/scene/links", "Cylinders3D:lengths")
     turns = rrd.numbers("/ars/scene/links", "Cylinders3D:quaternions")
     chassis = Rotation.from_quat(recording.poses.quaternions[:, 0], scalar_first=True)
-    for number, (x, y) in enumerate(made_up.WHEELS.values()):
+    for number, (x, y) in enumerate(synthetic.WHEELS.values()):
         inner = recording.poses.positions_m[:, 0] + chassis.apply((x, 0.5 * y, 0.25))
         outer = recording.poses.positions_m[:, number + 1]
         assert np.allclose(centres[:, number], 0.5 * (inner + outer), atol=1e-5)
         along = Rotation.from_quat(turns[:, number]).apply((0.0, 0.0, 1.0)) * lengths[:, number, None]
         assert np.allclose(np.abs(along), np.abs(outer - inner), atol=1e-5)
         top = recording.poses.positions_m[:, 0] + chassis.apply((x, 0.8 * y, 0.8))
-        corner = list(made_up.WHEELS)[number]
+        corner = list(synthetic.WHEELS)[number]
         scale = rrd.numbers(f"/ars/scene/springs/{corner}_spring", "Transform3D:scale")[:, 0]
         assert np.allclose(scale[:, 2], np.linalg.norm(top - outer, axis=1), atol=1e-5)
         assert (scale[:, :2] == 1.0).all()
@@ -89,9 +89,9 @@ def test_force_arrows_stand_at_the_contact_points_and_turn_with_the_wheels() -> 
     (run,) = runs_of({"ars": recording})
     origins, vectors = force_arrows(run)
     assert np.allclose(origins[:, 1, 0], recording["fr_contact_x_m"][run.rows], atol=1e-5)
-    assert np.allclose(np.linalg.norm(vectors, axis=-1), made_up.FY_N / FORCE_SCALE_NPM, rtol=1e-5)
+    assert np.allclose(np.linalg.norm(vectors, axis=-1), synthetic.FY_N / FORCE_SCALE_NPM, rtol=1e-5)
     # A side force points a quarter turn to the left of where the wheel points.
-    for wheel, steer in ((0, made_up.STEER_RAD), (3, 0.0)):
+    for wheel, steer in ((0, synthetic.STEER_RAD), (3, 0.0)):
         angle = np.unwrap(np.arctan2(vectors[:, wheel, 1], vectors[:, wheel, 0]))
         assert np.allclose(angle, recording["yaw_rad"][run.rows] + steer + 0.5 * math.pi, atol=1e-5)
 
@@ -115,7 +115,7 @@ def test_plots_are_in_degrees_and_hold_the_recorded_values(tmp_path: Path) -> No
         assert np.allclose(rrd.time_s(f"/ars/plots/{channel}"), recording.time_s[run.rows])
     together = rrd.numbers("/ars/plots/tyre_fy_N", "Scalars:scalars")
     assert together.shape == (len(run.rows), 4)
-    assert together == pytest.approx(1e-3 * made_up.FY_N)  # kN
+    assert together == pytest.approx(1e-3 * synthetic.FY_N)  # kN
 
 
 def test_an_angle_that_nobody_asked_for_is_not_plotted(tmp_path: Path) -> None:
@@ -170,7 +170,7 @@ def test_the_car_on_the_map_is_where_it_was_with_its_wheels_steered(tmp_path: Pa
     assert np.allclose(wheel.mean(axis=1), recording.poses.positions_m[:, 1, :2], atol=1e-4)
     along = wheel[:, 1] - wheel[:, 0]
     angle = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
-    assert np.allclose(angle, recording["yaw_rad"][::10] + made_up.STEER_RAD, atol=1e-4)
+    assert np.allclose(angle, recording["yaw_rad"][::10] + synthetic.STEER_RAD, atol=1e-4)
 
 
 def test_a_recording_without_some_channels_or_links_shows_the_rest(tmp_path: Path) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from activesteer.playback.geometry import about_vertical, between, heading, rotated, xyzw
+from activesteer.conventions import yaw_of
+from activesteer.playback.geometry import about_vertical, between, rotated, xyzw
 
 
 def test_rotated_against_scipy(rng: np.random.Generator) -> None:
@@ -18,7 +19,7 @@ def test_rotated_against_scipy(rng: np.random.Generator) -> None:
 def test_heading_is_the_yaw_of_a_rolled_and_pitched_body() -> None:
     yaw = np.linspace(-3.0, 3.0, 13)
     turns = Rotation.from_euler("ZYX", np.column_stack([yaw, np.full(13, 0.05), np.full(13, -0.1)]))
-    assert np.allclose(heading(turns.as_quat(scalar_first=True)), yaw)
+    assert np.allclose(yaw_of(turns.as_quat(scalar_first=True)), yaw)
     assert np.allclose(Rotation.from_quat(about_vertical(yaw)).as_rotvec()[:, 2], yaw)
 
 

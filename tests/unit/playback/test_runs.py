@@ -10,7 +10,7 @@ from activesteer.errors import RecordingError
 from activesteer.playback import runs_of
 from activesteer.playback.runs import COLOURS
 from activesteer.recording import Poses, Recording
-from tests.unit.playback.made_up import circle
+from tests.unit.playback.synthetic import circle
 
 
 def test_the_three_systems_have_their_order_numbers_and_colours_whatever_the_order_of_the_files() -> None:

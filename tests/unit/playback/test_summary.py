@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from activesteer.playback import runs_of
 from activesteer.playback.summary import summary
-from tests.unit.playback.made_up import circle
+from tests.unit.playback.synthetic import circle
 
 
 def test_scenario_systems_and_metrics_side_by_side() -> None:

@@ -1,4 +1,4 @@
-"""A small made-up recording: two seconds at 100 Hz, three groups that are interleaved in the table."""
+"""A small synthetic recording: two seconds at 100 Hz, three groups that are interleaved in the table."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from activesteer.scenario import resolve
-from activesteer.simulation.live_view import FRAME_S, Pacer, drive, stage_for
+from activesteer.simulation.live_view import FRAME_S, Pacer, drive, scene_for
 from activesteer.simulation.simulation import Simulation
 
 
@@ -66,7 +66,7 @@ def watched(duration_s: float = 0.5, speed: float = 1.0, **look: Any):
         scenario, maneuver=scenario.maneuver.search.accept(0.8)
     )  # instead of searching for it
     simulation, clock = Simulation(scenario), Clock()
-    stage = stage_for(simulation, scenario.maneuver)
+    stage = scene_for(simulation, scenario.maneuver)
     viewer, pacer = Viewer(stage, clock, **look), Pacer(speed, clock, clock.sleep)
     return drive(simulation, stage, viewer, pacer), viewer, clock, pacer, simulation
 

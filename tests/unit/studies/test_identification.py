@@ -16,7 +16,7 @@ from activesteer.resources import find_vehicle
 from activesteer.scenario import load_car
 from activesteer.studies.identification import Identification, single_track_response, write_single_track
 from activesteer.theory.single_track import SingleTrack
-from tests.unit.analysis.made_up import step_steer
+from tests.unit.analysis.synthetic import step_steer
 
 DEGPG = math.radians(1.0) / 9.81
 PARAMETERS = SingleTrackParameters(1400.0, 2100.0, 1.1, 1.5, 90e3, 140e3, 23.0)

@@ -9,7 +9,7 @@ import pytest
 from activesteer.errors import ParameterError
 from activesteer.video.cameras import view
 from activesteer.video.track import Track
-from tests.unit.playback.made_up import RADIUS_M, SPEED_MPS, circle
+from tests.unit.playback.synthetic import RADIUS_M, SPEED_MPS, circle
 
 
 def eye(name: str, time_s: float, corner: str = "fl") -> tuple[np.ndarray, np.ndarray]:

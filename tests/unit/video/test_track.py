@@ -9,7 +9,7 @@ from activesteer.errors import PlaybackError
 from activesteer.recording import Poses, Recording
 from activesteer.signals import Channel
 from activesteer.video.track import Track
-from tests.unit.playback.made_up import RADIUS_M, SPEED_MPS, WHEELS, circle
+from tests.unit.playback.synthetic import RADIUS_M, SPEED_MPS, WHEELS, circle
 
 CHANNEL = [Channel("x_m", "m", "", "vehicle")]
 

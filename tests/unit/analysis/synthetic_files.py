@@ -1,4 +1,4 @@
-"""Recordings as they come from a file, made of the formulas in `made_up`."""
+"""Recordings as they come from a file, made of the formulas in `synthetic`."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 
 from activesteer.recording import Recording
 from activesteer.signals import Channel
-from tests.unit.analysis.made_up import MadeUp, along_path, sine_with_dwell, step_steer
+from tests.unit.analysis.synthetic import SyntheticRun, along_path, sine_with_dwell, step_steer
 
 CORNERS = ("fl", "fr", "rl", "rr")
 
 
 def recording_of(
-    run: MadeUp,
+    run: SyntheticRun,
     controller: str = "none",
     maneuver: Mapping[str, Any] | None = None,
     metrics: Mapping[str, float] | None = None,
     **metadata: Any,
 ) -> Recording:
-    """A recording with the channels and metadata of a made-up run."""
+    """A recording with the channels and metadata of a synthetic run."""
     channels = [Channel(name, "", "", "vehicle", single=False) for name in run.channels]
     loads = [Channel(f"{corner}_tyre_fz_N", "N", "", "corners") for corner in CORNERS]
     values = np.column_stack([*run.channels.values(), *(np.full_like(run.time_s, 3000.0) for _ in CORNERS)])
@@ -29,7 +29,7 @@ def recording_of(
         **run.metadata,
         "controller": controller,
         "maneuver": {"name": run.metadata["maneuver"]["kind"], **run.metadata["maneuver"], **(maneuver or {})},
-        "vehicle": {"name": "made_up", **run.metadata["vehicle"]},
+        "vehicle": {"name": "synthetic", **run.metadata["vehicle"]},
         "versions": {"activesteer": "0.0.1"},
         "timestep_s": 0.001,
         **metadata,

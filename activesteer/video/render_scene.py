@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.conventions import yaw_of
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.course import Course
@@ -59,7 +60,7 @@ _BASE: Final = """
 
 
 class Car(NamedTuple):
-    """A car on the stage.
+    """A car on the scene.
 
     Attributes:
         parts: What it looks like.
@@ -76,7 +77,7 @@ class Car(NamedTuple):
     ghost: bool = False
 
 
-class Stage:
+class RenderScene:
     """Road, course and cars.
 
     Attributes:
@@ -136,8 +137,7 @@ class Stage:
         data, chassis = self.data, self._chassis[car]
         data.mocap_pos[self._mocap[car]] = positions_m
         data.mocap_quat[self._mocap[car]] = quaternions
-        w, x, y, z = quaternions[chassis]
-        half = 0.5 * np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        half = 0.5 * yaw_of(quaternions[chassis])
         data.mocap_pos[self._shadow[car]] = positions_m[chassis, 0], positions_m[chassis, 1], 0.0
         data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
 

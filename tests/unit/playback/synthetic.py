@@ -1,4 +1,4 @@
-"""A made-up car: a chassis and four wheels that drive a left-hand circle, one link and one spring at each wheel."""
+"""A synthetic car: a chassis and four wheels that drive a left-hand circle, one link and one spring at each wheel."""
 
 from __future__ import annotations
 

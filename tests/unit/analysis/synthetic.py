@@ -10,7 +10,7 @@ import numpy as np
 from activesteer.errors import RecordingError
 
 STEP_S = 1.0
-"""Time at which the steering wheel of the made-up runs passes half of its final angle [s]."""
+"""Time at which the steering wheel of the synthetic runs passes half of its final angle [s]."""
 
 RAMP_S = 0.1
 """Duration of its ramp [s]."""
@@ -29,7 +29,7 @@ VEHICLE: dict[str, Any] = {
 """What the metadata of a run say of its vehicle, as far as the analysis reads it."""
 
 
-class MadeUp:
+class SyntheticRun:
     """A recording of arrays that were computed, not driven."""
 
     def __init__(self, time_s: np.ndarray, channels: Mapping[str, np.ndarray], kind: str = "step_steer") -> None:
@@ -71,7 +71,7 @@ def step_steer(
     superposition_rad: float = 0.0,
     duration_s: float = 7.0,
     timestep_s: float = 0.001,
-) -> MadeUp:
+) -> SyntheticRun:
     """A step steer to the left (side 1) or right (-1): everything steps at `STEP_S`, to the given final values."""
     time_s = np.arange(round(duration_s / timestep_s) + 1) * timestep_s
     since_s = time_s - STEP_S
@@ -90,7 +90,7 @@ def step_steer(
         "sideslip_rad": sideslip_rad * first_order(since_s, 0.3),
     }
     mirrored = {name: side * values for name, values in channels.items()}
-    return MadeUp(time_s, {**mirrored, "speed_mps": np.full_like(time_s, 22.0)})
+    return SyntheticRun(time_s, {**mirrored, "speed_mps": np.full_like(time_s, 22.0)})
 
 
 SINE_BEGIN_S = 0.5
@@ -98,7 +98,7 @@ SINE_Hz = 0.7
 DWELL_S = 0.5
 REVERSAL_S = SINE_BEGIN_S + 0.5 / SINE_Hz
 COMPLETION_S = SINE_BEGIN_S + 1.0 / SINE_Hz + DWELL_S
-"""Times of the made-up sine with dwell [s]."""
+"""Times of the synthetic sine with dwell [s]."""
 
 
 def sine_with_dwell(
@@ -114,7 +114,7 @@ def sine_with_dwell(
     ay_mps2: float = 8.0,
     creep_s: float = 0.0,
     duration_s: float = 6.0,
-) -> MadeUp:
+) -> SyntheticRun:
     """A sine with dwell: the yaw rate follows the second half to its peak, stays, and passes the two shares given.
 
     Args:
@@ -161,7 +161,7 @@ def sine_with_dwell(
     }
     mirrored = {name: side * values for name, values in channels.items()}
     speed = {"speed_mps": np.full_like(time_s, 22.0), "x_m": 22.0 * time_s}
-    return MadeUp(time_s, {**mirrored, **speed}, "sine_with_dwell")
+    return SyntheticRun(time_s, {**mirrored, **speed}, "sine_with_dwell")
 
 
 SPEED_MPS = 20.0
@@ -169,7 +169,7 @@ WIDTH_M, WHEELBASE_M, TRACK_M, TYRE_M = 1.8, 2.6, 1.5, 0.2
 LANES = (("entry", 30.0, 45.0, -1.2, 1.2), ("offset", 75.0, 100.0, 2.2, 4.8), ("exit", 125.0, 155.0, -1.4, 1.4))
 LANE_KEYS = ("name", "start_x_m", "end_x_m", "right_y_m", "left_y_m")
 LAST_GATE_M = 155.0
-"""Course and car of the made-up runs along a path."""
+"""Course and car of the synthetic runs along a path."""
 
 Track = Callable[[np.ndarray], np.ndarray]
 
@@ -195,7 +195,7 @@ def along_path(
     friction_use: float = 0.5,
     stops_m: float | None = None,
     duration_s: float = 12.0,
-) -> MadeUp:
+) -> SyntheticRun:
     """A run at `SPEED_MPS` whose front axle centre follows a track; yaw rate and sideslip are sines of their own.
 
     Args:
@@ -244,7 +244,7 @@ def along_path(
         channels[f"{corner}_contact_x_m"] = x + ahead * cos - left * sin
         channels[f"{corner}_contact_y_m"] = y + ahead * sin + left * cos
         channels[f"{corner}_friction_use"] = np.full_like(x, friction_use if corner == "fl" else 0.5 * friction_use)
-    run = MadeUp(time_s, channels, kind)
+    run = SyntheticRun(time_s, channels, kind)
     path_x = np.arange(0.0, 300.0, 0.5)
     run.metadata["course"] = {
         "path": {"x_m": path_x.tolist(), "y_m": (path or track)(path_x).tolist()},
@@ -262,7 +262,7 @@ def along_path(
 SLALOM_CONES = tuple((40.0 + 30.0 * i, 0.0) for i in range(5))
 
 
-def slalom(amplitude_m: float = 1.5, **words: Any) -> MadeUp:
+def slalom(amplitude_m: float = 1.5, **words: Any) -> SyntheticRun:
     """A sine around `SLALOM_CONES`, the first one passed on its left."""
 
     def track(x_m: np.ndarray) -> np.ndarray:

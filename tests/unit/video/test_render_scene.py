@@ -10,9 +10,9 @@ from activesteer.errors import PlaybackError, RecordingError
 from activesteer.recording import Primitive
 from activesteer.road.course import Course
 from activesteer.road.road import Road, RoadPatch
-from activesteer.video import Car, Film, Settings, Stage
+from activesteer.video import Car, Film, RenderScene, Settings
 from activesteer.video.track import Track
-from tests.unit.playback.made_up import circle
+from tests.unit.playback.synthetic import circle
 
 COURSE = {
     "path": {"x_m": [0.0, 50.0, 100.0], "y_m": [0.0, 0.0, 20.0]},
@@ -21,9 +21,9 @@ COURSE = {
 }
 
 
-def stage(*cars: Car, **more) -> Stage:
+def stage(*cars: Car, **more) -> RenderScene:
     run = circle()
-    return Stage(cars or [Car(run.scene, run.poses.names)], **more)
+    return RenderScene(cars or [Car(run.scene, run.poses.names)], **more)
 
 
 def test_bodies_are_where_they_are_put():
