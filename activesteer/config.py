@@ -6,7 +6,8 @@ key: `road.patches.0.mu` is the `mu` of the first [[road.patches]]. A range is w
 `Annotated[float, Range(low, high)]`. Inside, everything is SI and radians; in a file a key may carry an edge unit
 instead: `speed_kmh` fills `speed_mps`, `angle_deg` fills `angle_rad`.
 
-A class may name, in `KEY_HINTS`, keys that people look for in vain, and what to say to them.
+A class may name, in `KEY_HINTS`, keys that people look for in vain, and what to say to them; and in `OVERRULED`, keys
+that have no effect where other keys have certain values: key -> {other key: its value, None for any}.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import re
 import tomllib
 import types
 import typing
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -301,6 +302,48 @@ def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:
     if (inner := _element_of(hint)) is not None and rest:
         return (name, rest[0], *field_path(inner, rest[1:]))
     return (name, *rest)
+
+
+def check_overruled(cls: type, table: Mapping[str, Any], source: Source, given: Iterable[Sequence[str]]) -> None:
+    """No key may be given that others make ineffective; see `OVERRULED`.
+
+    Args:
+        cls: Dataclass that the table will become.
+        table: The table.
+        source: For error messages.
+        given: Keys that were given, each as the names that lead to it.
+
+    Raises:
+        ActiveSteerError: there is such a key; the message names both.
+    """
+    for path in given:
+        owner, within = cls, table
+        for key in path[:-1]:
+            inner = _dataclass_in(typing.get_type_hints(owner).get(key))
+            if inner is None or not isinstance(within := within.get(key, {}), Mapping):
+                break
+            owner = inner
+        else:
+            fields = _fields(owner)
+            values = {name: field.default for name, field in fields.items()}
+            values |= {field_in_unit(key, fields)[0]: value for key, value in within.items()}
+            rule = getattr(owner, "OVERRULED", {}).get(field_in_unit(path[-1], fields)[0])
+            if rule and all(_holds(values[other], wanted) for other, wanted in rule.items()):
+                by = " and ".join(f"{other} = {shown(values[other])}" for other in rule)
+                raise source.fail(path, f"has no effect beside {by}; leave one out", within.get(path[-1]))
+
+
+def _holds(value: object, wanted: object) -> bool:
+    return value not in (None, dataclasses.MISSING) if wanted is None else value == wanted
+
+
+def leaf_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    """The keys of all values of a table, each as the names that lead to it."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from ((str(key), *below) for below in leaf_keys(value))
+        else:
+            yield (str(key),)
 
 
 def key_hint(cls: type, key: str) -> str | None:

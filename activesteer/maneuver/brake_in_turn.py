@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
@@ -18,6 +18,8 @@ from activesteer.signals import Reference
 @dataclass(frozen=True)
 class TurnInput:
     """The steering wheel on the way into the turn."""
+
+    OVERRULED: ClassVar = {"lateral_acceleration_mps2": {"steering_wheel_rad": None}}
 
     start_s: Annotated[float, Range(0.0)] = 0.5
     """When it begins to turn [s]."""

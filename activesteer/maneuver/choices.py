@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from activesteer.errors import ManeuverError
+from activesteer.errors import ManeuverError, shown
 
 SIDES: Final = {"left": 1.0, "right": -1.0}
 """Name of a side -> sign of y, of steering and of yaw there (ISO 8855)."""
@@ -26,6 +26,6 @@ def check_choice(key: str, value: str, allowed: Iterable[str]) -> None:
     """
     words = list(allowed)
     if value not in words:
-        shown = ", ".join(repr(word) for word in words[:-1])
-        msg = f"{key}: is {value!r}; allowed are {shown} and {words[-1]!r}"
-        raise ManeuverError(msg)
+        known = ", ".join(repr(word) for word in words[:-1])
+        problem = f"is {shown(value)}; allowed are {known} and {words[-1]!r}"
+        raise ManeuverError(problem, key=key, value=value, allowed=words)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 
@@ -37,6 +37,8 @@ PATHS: Final = ("middle", "least_jerk")
 @dataclass(frozen=True)
 class LaneLayout:
     """The lanes and how they are driven."""
+
+    OVERRULED: ClassVar = {"margin_m": {"path": "middle"}}
 
     standard: str = "iso_3888_1"
     """Whose lanes: `iso_3888_1` (double lane change) or `iso_3888_2` (obstacle avoidance)."""

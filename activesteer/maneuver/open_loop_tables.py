@@ -42,15 +42,17 @@ class SteeringTable:
     """Positions of the rack instead, from the centre, positive steers left [m]."""
 
     def __post_init__(self) -> None:
-        """Both columns at once would contradict each other.
+        """Both columns at once would contradict each other, and times alone say nothing.
 
         Raises:
-            ManeuverError: both are given.
+            ManeuverError: both are given, or times alone.
         """
         if self.steering_wheel_rad is not None and self.rack_m is not None:
             msg = "steering_wheel_rad and rack_m are two ways to say where the front wheels go; leave one out"
             raise ManeuverError(msg)
         if self.steering_wheel_rad is None and self.rack_m is None:
+            if self.time_s != (0.0,):
+                raise ManeuverError("given without angles; add steering_wheel_deg or rack_m", key="time_s")
             object.__setattr__(self, "steering_wheel_rad", (0.0,) * len(self.time_s))
 
     @property

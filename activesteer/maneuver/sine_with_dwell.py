@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 from activesteer.config import Range
 from activesteer.conventions import GRAVITY_MPS2
@@ -26,6 +26,8 @@ _RAMP_S: Final = 20.5
 @dataclass(frozen=True)
 class DwellInput:
     """The sine with dwell at the steering wheel."""
+
+    OVERRULED: ClassVar = {"amplitude_factor": {"steering_wheel_rad": None}}
 
     start_s: Annotated[float, Range(0.0)] = 0.5
     """When it begins [s]."""

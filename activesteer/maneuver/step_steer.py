@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
@@ -20,6 +20,8 @@ _SEARCH_S: Final = 4.5
 @dataclass(frozen=True)
 class StepInput:
     """The step at the steering wheel."""
+
+    OVERRULED: ClassVar = {"lateral_acceleration_mps2": {"steering_wheel_rad": None}}
 
     start_s: Annotated[float, Range(0.0)] = 0.5
     """When the steering wheel begins to turn [s]."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, ClassVar, Final, NamedTuple
 
 from activesteer.config import Range, Source, build
 from activesteer.errors import ManeuverError, RecordingError, nearest_names
@@ -68,6 +68,8 @@ class Area(NamedTuple):
 @dataclass(frozen=True)
 class Road:
     """What the wheels roll on; keys of the table [road] in a manoeuvre file."""
+
+    OVERRULED: ClassVar = {"mu": {"mu_left": None, "mu_right": None}}
 
     mu: Friction = 1.0
     """Friction relative to the one of the tyre files [-]."""

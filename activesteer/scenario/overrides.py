@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from activesteer.config import Source, field_path, merged
+from activesteer.config import Source, check_overruled, field_path, merged
 from activesteer.errors import ParameterError, shown
 
 
@@ -65,7 +65,9 @@ def applied(
         if above[:shorter] == below[:shorter]:
             problem = f"replaces what {one.given} gives; leave one of the two out"
             raise ParameterError(problem, key=other.given, value=other.value, overridden=True)
+    changed = frozenset(".".join(override.path) for override in overrides)
     for override in overrides:
         given = Source("", error=ParameterError, overridden=frozenset({".".join(override.path)}))
         table = merged(cls, table, override.path, override.value, given)
-    return dict(table), replace(source, overridden=frozenset(".".join(override.path) for override in overrides))
+    check_overruled(cls, table, Source("", error=ParameterError, overridden=changed), [one.path for one in overrides])
+    return dict(table), replace(source, overridden=changed)

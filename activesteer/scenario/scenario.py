@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
-from activesteer.config import key_hint, key_paths, to_table
+from activesteer.config import check_overruled, key_hint, key_paths, leaf_keys, to_table
 from activesteer.controllers import ControllerSetup
 from activesteer.driver import DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, nearest_names
@@ -74,6 +74,9 @@ def resolve(
     """
     table, source, folder, files = read_table(maneuver, "maneuver", find_maneuver, ManeuverError)
     kind = maneuver_class(table, source)
+    if folder is not None:
+        # A table may come from a recording, which holds both what was asked for and what it led to.
+        check_overruled(kind, table, source, leaf_keys(table))
     changes = plain(overrides)
     sorted_out: dict[str, list[Override]] = {part: [] for part in _PARTS}
     for key, value in changes.items():

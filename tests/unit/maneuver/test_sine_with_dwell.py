@@ -79,7 +79,7 @@ def test_amplitude_by_factor_asks_for_the_ramp_of_fmvss_126():
     ("keys", "told"),
     [
         ({"steer": {"steering_wheel_deg": None}}, r"steer: steering_wheel_deg \(.*\) or amplitude_factor .* is needed"),
-        ({"steer": {"direction": "up"}}, r"steer: direction: is 'up'; allowed are 'left' and 'right'"),
+        ({"steer": {"direction": "up"}}, r"steer\.direction: is 'up'; allowed are 'left' and 'right'"),
         ({"steer": {"frequency_Hz": 0.0}}, r"steer\.frequency_Hz: 0\.0 is out of range; allowed is 0\.1 to 5"),
         ({"steer": {"steering_wheel_deg": -100}}, r"steer\.steering_wheel_deg: -100 is out of range; allowed is 0 to "),
         ({"drive": "brake"}, r"drive: is 'brake'; allowed are 'hold_speed' and 'coast'"),

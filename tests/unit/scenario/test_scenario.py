@@ -223,7 +223,7 @@ def test_files_are_kept_for_the_recording():
 
 @pytest.mark.parametrize("maneuver", list_maneuvers())
 def test_described_scenario_resolves_to_itself(maneuver):
-    scenario = resolve(maneuver, overrides={"road.mu": 0.5})
+    scenario = resolve(maneuver, overrides={"road.grade": 0.05})
     table = json.loads(json.dumps(describe(scenario)))
     again = resolve(table["maneuver"], table["vehicle"])
     assert (again.maneuver, again.car.config, again.car.mjcf) == (

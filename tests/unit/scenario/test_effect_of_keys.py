@@ -1,0 +1,125 @@
+"""Every key of a manoeuvre does something, or says which other key takes its effect away."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from activesteer.config import key_paths, to_table
+from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
+from activesteer.maneuver import Maneuver
+from activesteer.resources import list_maneuvers
+from activesteer.scenario import resolve
+
+LABELS = ("kind", "name", "title", "steering_csv", "drive_csv", "path.csv")
+"""Keys that name things."""
+BRAKED_ALL_THE_TIME = {("hill_hold", "drive"), ("parking", "drive")}
+"""The drive is off while the brake is pressed, as the key's description says."""
+NUMBERS = (0.0, 0.05, 0.3, 0.7, 1.0, 1.7, 3.1, 5.0, 12.0, 33.0, 61.0)
+
+
+def seen(maneuver: Maneuver) -> str:
+    """All that driver and wheels will meet: references over time, friction where the car drives, path, lanes, cones."""
+    times = np.linspace(0.0, maneuver.duration_s, 300)
+    search = maneuver.search
+    if search is not None:
+        maneuver = search.accept(1.0)
+    road, course = maneuver.road, maneuver.course
+    frictions = []
+    for x in np.linspace(0.0, maneuver.duration_s * abs(maneuver.speed_mps), 200):
+        for y in (-2.0, 2.0):
+            inside = [area.mu for area in road.areas() if _inside(area, x, y)]
+            frictions.append(inside[-1] if inside else road.mu)
+    met: list[Any] = [[maneuver.reference(time) for time in times], maneuver.settling_reference(), maneuver.settle_s]
+    met += [maneuver.duration_s, maneuver.speed_mps, frictions, road.grade]
+    met += [None if course is None else course.to_table()]
+    met += [None if search is None else [search.lateral_acceleration_mps2, search.accept(1.0), search.probe]]
+    return json.dumps([to_table(one) for one in met], default=str)
+
+
+def _inside(area: Any, x: float, y: float) -> bool:
+    return area.start_m <= x < area.end_m and area.right_m < y <= area.left_m
+
+
+def candidates(maneuver: str, key: str) -> Iterator[Any]:
+    """Values that the key may have."""
+    try:
+        resolve(maneuver, overrides={key: "?"})
+    except ActiveSteerError as error:
+        if isinstance(error.allowed, (list, tuple)) and all(isinstance(word, str) for word in error.allowed):
+            yield from error.allowed
+    yield from NUMBERS
+    yield from (number for number in (2, 4, 9))
+    yield from ([low, low + 0.5] for low in (0.0, 0.5))
+    yield [0.0]
+    yield [{"start_m": 1.0, "end_m": 50.0, "mu": 0.123}]
+
+
+ONE_OF_A_KIND = ("step_steer", "sine_with_dwell", "split_mu_braking", "constant_radius")
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in ONE_OF_A_KIND else pytest.param(name, marks=pytest.mark.slow) for name in list_maneuvers()]
+)
+def test_every_key_of_a_manoeuvre_changes_what_is_driven_or_is_refused(name):
+    usual = resolve(name).maneuver
+    silent, before = [], seen(usual)
+    for path in key_paths(type(usual)):
+        if path in LABELS or path.endswith(("_deg", "_kmh", "_degps", "_g")):
+            continue
+        key, changed, accepted = f"maneuver.{path}", False, 0
+        for value in candidates(name, key):
+            try:
+                other = resolve(name, overrides={key: value}).maneuver
+            except ActiveSteerError:
+                continue
+            accepted += 1
+            if seen(other) != before:
+                changed = True
+                break
+        if accepted > 1 and not changed and (name, path) not in BRAKED_ALL_THE_TIME:
+            silent.append(path)
+    assert silent == []
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides", "key", "other"),
+    [
+        ("split_mu_braking", {"road.mu": 0.2}, "road.mu", "mu_left"),
+        ("standstill", {"road.mu_left": 0.5, "road.mu_right": 0.4, "road.mu": 0.2}, "road.mu", "mu_right"),
+        (
+            "step_steer",
+            {"steer.steering_wheel_deg": 50, "steer.lateral_acceleration_g": 0.3},
+            "steer.lateral_acceleration_g",
+            "steering_wheel_rad",
+        ),
+        (
+            "sine_with_dwell",
+            {"steer.amplitude_factor": 3.0, "steer.steering_wheel_rad": 1.0},
+            "steer.amplitude_factor",
+            "steering_wheel_rad",
+        ),
+        ("double_lane_change", {"lane.path": "middle", "lane.margin_m": 0.1}, "lane.margin_m", "'middle'"),
+    ],
+)
+def test_key_without_effect_is_answered_with_the_one_that_overrules_it(name, overrides, key, other):
+    with pytest.raises(ParameterError) as told:
+        resolve(name, overrides=overrides)
+    assert told.value.key == key
+    assert "has no effect beside" in told.value.problem
+    assert other in told.value.problem
+
+
+def test_file_with_a_key_without_effect_is_answered_with_its_line(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        'kind = "step_steer"\nspeed_kmh = 80\nduration_s = 3\n[steer]\n'
+        "lateral_acceleration_g = 0.4\nsteering_wheel_deg = 30\n"
+    )
+    with pytest.raises(ManeuverError) as told:
+        resolve(file)
+    assert (told.value.line, told.value.key) == (5, "steer.lateral_acceleration_g")
