@@ -37,8 +37,7 @@ def save(runs: Sequence[Run], path: Path, *, compare: bool = False) -> None:
     try:
         path.open("wb").close()
     except OSError as error:
-        msg = f"cannot write {path}: {error.strerror or error}"
-        raise PlaybackError(msg) from None
+        raise PlaybackError(f"cannot write {path}: {error.strerror or error}") from None
     stream = new_stream(runs, compare=compare)
     stream.save(path)
     fill(stream, runs, blueprint(runs, compare=compare))
@@ -98,8 +97,9 @@ def _run_viewer(
             with log.open("w") as output:
                 process = subprocess.Popen([str(binary), *arguments, str(file)], stdout=output, stderr=output)
         except OSError as error:
-            msg = f"the viewer {binary} does not start: {error.strerror or error}; {_ELSEWHERE}"
-            raise PlaybackError(msg) from None
+            raise PlaybackError(
+                f"the viewer {binary} does not start: {error.strerror or error}; {_ELSEWHERE}"
+            ) from None
         try:
             while ready is not None and port is not None and process.poll() is None:
                 if _answers(port):
@@ -112,8 +112,7 @@ def _run_viewer(
                 process.wait()
         if status != 0:
             reason = f"signal {-status}" if status < 0 else _reason(log.read_text(errors="replace"))
-            msg = f"the viewer ended with an error: {reason}; {_ELSEWHERE}"
-            raise PlaybackError(msg)
+            raise PlaybackError(f"the viewer ended with an error: {reason}; {_ELSEWHERE}")
 
 
 def viewer_binary() -> Path:
@@ -127,8 +126,9 @@ def viewer_binary() -> Path:
         binary = Path(spec.origin).with_name("rerun.exe" if os.name == "nt" else "rerun")
         if binary.is_file():
             return binary
-    msg = f"the rerun viewer is missing, which the package rerun-sdk brings: reinstall it, or use --save; {_ELSEWHERE}"
-    raise PlaybackError(msg)
+    raise PlaybackError(
+        f"the rerun viewer is missing, which the package rerun-sdk brings: reinstall it, or use --save; {_ELSEWHERE}"
+    )
 
 
 def _reason(log: str) -> str:

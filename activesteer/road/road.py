@@ -42,11 +42,11 @@ class RoadPatch:
             ManeuverError: the patch ends before it begins, or its side has an unknown name.
         """
         if not self.end_m > self.start_m:
-            msg = f"the patch ends at {self.end_m:g} m, which is not behind its start_m of {self.start_m:g} m"
-            raise ManeuverError(msg)
+            raise ManeuverError(
+                f"the patch ends at {self.end_m:g} m, which is not behind its start_m of {self.start_m:g} m"
+            )
         if self.side not in _SIDES:
-            msg = f"side: is {self.side!r}; {nearest_names(self.side, _SIDES)}"
-            raise ManeuverError(msg)
+            raise ManeuverError(f"side: is {self.side!r}; {nearest_names(self.side, _SIDES)}")
 
 
 class Area(NamedTuple):

@@ -58,11 +58,9 @@ class ReferenceData:
         folder = home / name
         if not (folder / "reference.toml").is_file():
             names = [path.parent.name for path in home.glob("*/reference.toml")]
-            msg = f"there is no reference named {name!r}; {nearest_names(name, names)}"
-            raise ParameterError(msg)
+            raise ParameterError(f"there is no reference named {name!r}; {nearest_names(name, names)}")
         if more is not None and not more.is_dir():
-            msg = f"the folder of reference runs {more} does not exist"
-            raise ParameterError(msg)
+            raise ParameterError(f"the folder of reference runs {more} does not exist")
         table: dict[str, Any] = tomllib.loads((folder / "reference.toml").read_text(encoding="utf-8"))
         x, y, z = table["point_from_cg_m"]
         folders = (folder / "runs",) if more is None else (more, folder / "runs")
@@ -108,9 +106,7 @@ def read_table(path: Path) -> Table:
             header = file.readline().strip().split(",")
             values = np.loadtxt(file, delimiter=",", ndmin=2)
     except (OSError, ValueError) as reason:
-        msg = f"cannot read the reference {path}: {reason}"
-        raise ParameterError(msg) from reason
+        raise ParameterError(f"cannot read the reference {path}: {reason}") from reason
     if values.shape[1] != len(header):
-        msg = f"cannot read the reference {path}: {len(header)} names and {values.shape[1]} columns"
-        raise ParameterError(msg)
+        raise ParameterError(f"cannot read the reference {path}: {len(header)} names and {values.shape[1]} columns")
     return {name: values[:, column] for column, name in enumerate(header)}

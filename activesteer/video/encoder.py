@@ -37,7 +37,7 @@ class Encoder(Protocol):
         ...
 
     def __enter__(self) -> Self:
-        """Begins."""
+        """Opens the file."""
         ...
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
@@ -69,18 +69,16 @@ def check(path: Path, size: tuple[int, int]) -> None:
         PlaybackError: there is no ffmpeg, or the folder does not exist.
     """
     if path.suffix.lower() not in FORMATS:
-        msg = f"{path}: a video's name must end in {' or '.join(FORMATS)}"
-        raise ParameterError(msg)
+        raise ParameterError(f"{path}: a video's name must end in {' or '.join(FORMATS)}")
     if min(size) < 16 or max(size) > _SIDE_LIMIT:
-        msg = f"a picture of {size[0]} x {size[1]} pixels cannot be made; each side must be 16 to {_SIDE_LIMIT}"
-        raise ParameterError(msg)
+        raise ParameterError(
+            f"a picture of {size[0]} x {size[1]} pixels cannot be made; each side must be 16 to {_SIDE_LIMIT}"
+        )
     if not path.parent.is_dir():
-        msg = f"cannot write {path}: there is no folder {path.parent}"
-        raise PlaybackError(msg)
+        raise PlaybackError(f"cannot write {path}: there is no folder {path.parent}")
     if path.suffix.lower() == ".mp4":
         if size[0] % 2 or size[1] % 2:
-            msg = f"{size[0]} x {size[1]} pixels: an MP4 needs an even width and height"
-            raise ParameterError(msg)
+            raise ParameterError(f"{size[0]} x {size[1]} pixels: an MP4 needs an even width and height")
         ffmpeg()
 
 
@@ -108,8 +106,9 @@ def ffmpeg() -> str:
         return importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
     if found := shutil.which("ffmpeg"):
         return found
-    msg = "an MP4 needs ffmpeg: pip install 'activesteer[video]', or apt-get install ffmpeg; a .gif needs neither"
-    raise PlaybackError(msg)
+    raise PlaybackError(
+        "an MP4 needs ffmpeg: pip install 'activesteer[video]', or apt-get install ffmpeg; a .gif needs neither"
+    )
 
 
 class _Mp4:
@@ -128,8 +127,7 @@ class _Mp4:
             self._process: Any = subprocess.Popen(self._command, stdin=subprocess.PIPE, stderr=self._log)
         except OSError as reason:
             self._log.close()
-            msg = f"{self._command[0]} does not start: {reason.strerror or reason}"
-            raise PlaybackError(msg) from None
+            raise PlaybackError(f"{self._command[0]} does not start: {reason.strerror or reason}") from None
         return self
 
     def write(self, pixels: Pixels) -> None:
@@ -151,8 +149,7 @@ class _Mp4:
             if kind is None:
                 self._part.replace(self._path)
         except OSError as reason:
-            msg = f"cannot write {self._path}: {reason.strerror or reason}"
-            raise PlaybackError(msg) from None
+            raise PlaybackError(f"cannot write {self._path}: {reason.strerror or reason}") from None
         finally:
             self._log.close()
             self._part.unlink(missing_ok=True)
@@ -196,7 +193,6 @@ class _Gif:
                 )
                 self._part.replace(self._path)
         except OSError as reason:
-            msg = f"cannot write {self._path}: {reason.strerror or reason}"
-            raise PlaybackError(msg) from None
+            raise PlaybackError(f"cannot write {self._path}: {reason.strerror or reason}") from None
         finally:
             self._part.unlink(missing_ok=True)

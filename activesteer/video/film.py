@@ -56,8 +56,7 @@ class Settings:
             ("speed", self.speed, 0.01, 100.0),
         ):
             if not low <= value <= high:
-                msg = f"{name}: is {value:g}, must be {low:g} to {high:g}"
-                raise ParameterError(msg)
+                raise ParameterError(f"{name}: is {value:g}, must be {low:g} to {high:g}")
 
 
 class Film:
@@ -110,7 +109,7 @@ class Film:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Closes it."""
+        """Closes the canvas."""
         if self._canvas is not None:
             self._canvas.close()
             self._canvas = None
@@ -134,8 +133,7 @@ class Film:
             time_s: The instant [s]; a car whose recording has ended stands where it was last.
         """
         if self._canvas is None:
-            msg = "a film is drawn in a `with` block"
-            raise RuntimeError(msg)
+            raise RuntimeError("a film is drawn in a `with` block")
         for number, track in enumerate(self._tracks):
             self._scene.place(number, *track.poses(time_s))
         self._scene.update()

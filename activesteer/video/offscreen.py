@@ -120,13 +120,13 @@ class Offscreen:
                 self._context.make_current()
                 self._drawer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
             except (ImportError, RuntimeError, mujoco.FatalError) as reason:
-                msg = f"no pictures of {size[0]} x {size[1]} can be drawn here with {self._name}: {reason}"
-                raise PlaybackError(msg) from reason
+                raise PlaybackError(
+                    f"no pictures of {size[0]} x {size[1]} can be drawn here with {self._name}: {reason}"
+                ) from reason
         if self._drawer.offWidth < size[0] or self._drawer.offHeight < size[1]:
             most = f"{self._drawer.offWidth} x {self._drawer.offHeight}"
             self.close()
-            msg = f"pictures of {size[0]} x {size[1]} are larger than what can be drawn here: {most}"
-            raise PlaybackError(msg)
+            raise PlaybackError(f"pictures of {size[0]} x {size[1]} are larger than what can be drawn here: {most}")
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
 
     def draw(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> NDArray[np.uint8]:
@@ -153,7 +153,7 @@ class Offscreen:
         self._context.free()
 
     def __enter__(self) -> Self:
-        """Begins."""
+        """The canvas, ready to be drawn on."""
         return self
 
     def __exit__(

@@ -113,8 +113,7 @@ class RenderScene:
                 _add_car(spec, car, f"{number}/")
             self.model = spec.compile()
         except (ValueError, KeyError, TypeError) as reason:
-            msg = f"car, course or road of the recording cannot be drawn: {reason!r}"
-            raise PlaybackError(msg) from reason
+            raise PlaybackError(f"car, course or road of the recording cannot be drawn: {reason!r}") from reason
         self.data = mujoco.MjData(self.model)
         self._mocap = [
             np.array([self._mocap_id(f"{number}/{body}") for body in car.bodies]) for number, car in enumerate(cars)

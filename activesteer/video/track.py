@@ -43,8 +43,7 @@ class Track:
         self.bodies = poses.names
         whole = np.isfinite(poses.positions_m).all(axis=(1, 2)) & np.isfinite(poses.quaternions).all(axis=(1, 2))
         if CHASSIS not in poses.names or not whole.any():
-            msg = f"{name} has no poses of a car, so there is nothing to draw"
-            raise PlaybackError(msg)
+            raise PlaybackError(f"{name} has no poses of a car, so there is nothing to draw")
         self._time_s = poses.time_s[whole]
         self._positions_m = poses.positions_m[whole]
         self._quaternions = poses.quaternions[whole]
@@ -93,8 +92,7 @@ class Track:
         """
         body = f"{corner}_wheel"
         if body not in self.bodies:
-            msg = f"the recording has no body {body!r}; it has {', '.join(self.bodies)}"
-            raise PlaybackError(msg)
+            raise PlaybackError(f"the recording has no body {body!r}; it has {', '.join(self.bodies)}")
         positions, _ = self.poses(self.start_s)
         x, y, z = positions[self.bodies.index(body)] - positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0)
         cos, sin = np.cos(self.heading(self.start_s)), np.sin(self.heading(self.start_s))

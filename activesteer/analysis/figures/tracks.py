@@ -71,7 +71,7 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
 
 
 def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
-    """Course and tracks."""
+    """Draws the course, and the track of the front axle centre of every run."""
     drawn = style.curves(recordings)
     for curve in drawn:
         x, y = (style.thinned(values) for values in track.front_axle(curve.recording))
