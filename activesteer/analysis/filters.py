@@ -35,7 +35,7 @@ def low_pass(values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float)
     """
     from scipy.signal import butter, sosfiltfilt  # noqa: PLC0415 - takes half a second to import
 
-    if cut_off_Hz * timestep_s >= 0.5:
+    if cut_off_Hz * timestep_s > 0.499:
         raise RecordingError(
             f"a filter of {cut_off_Hz:g} Hz needs samples less than {0.5 / cut_off_Hz:.3g} s apart; "
             f"the recording has one every {timestep_s:.3g} s"

@@ -77,7 +77,7 @@ def frequency_response(
     if places.min() <= HALF_BAND_LINES or places.max() + HALF_BAND_LINES >= len(lines_Hz):
         raise RecordingError(
             f"a run of {len(time_s) * step_s:.3g} s holds no response from {asked.min():.3g} to {asked.max():.3g} Hz; "
-            f"it reaches from {lines_Hz[HALF_BAND_LINES + 1]:.3g} to {lines_Hz[-HALF_BAND_LINES - 2]:.3g} Hz"
+            f"its spectrum ends at {lines_Hz[-1]:.3g} Hz, and {HALF_BAND_LINES + 1} lines at each end fall away"
         )
     band = places[:, None] + np.arange(-HALF_BAND_LINES, HALF_BAND_LINES + 1)
     power_u = (np.abs(u[band]) ** 2).sum(axis=1)

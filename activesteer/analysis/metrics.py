@@ -14,7 +14,7 @@ from activesteer.analysis import (
     sine_with_dwell,
     step_response,
 )
-from activesteer.analysis.source import RecordingLike, maneuver_kind
+from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
 
 BY_KIND: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "step_steer": step_response.metrics,
@@ -40,6 +40,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         Metric name, ending in its unit, to value; nan where the run does not define one.
 
     Raises:
-        RecordingError: the metadata name no kind, a channel is missing, or the run is not what its kind promises.
+        RecordingError: the metadata name no kind, a channel is missing or not finite, there are less than two rows, or
+            the run is not what its kind promises.
     """
-    return BY_KIND.get(maneuver_kind(recording), general.metrics)(recording)
+    return BY_KIND.get(maneuver_kind(recording), general.metrics)(Evaluable(recording))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,40 @@ class RecordingLike(Protocol):
     def __getitem__(self, name: str, /) -> NDArray[Any]:
         """One channel over `time_s`, shape (n,)."""
         ...
+
+
+class Evaluable:
+    """A recorded run whose channels are fit for formulas: each that is asked for is finite, in two rows or more."""
+
+    def __init__(self, recording: RecordingLike) -> None:
+        """Takes a run.
+
+        Raises:
+            RecordingError: it has less than two rows.
+        """
+        if len(recording.time_s) < 2:
+            raise RecordingError(f"a run of {len(recording.time_s)} rows cannot be evaluated, at least 2 are needed")
+        self._recording = recording
+        self.time_s, self.metadata = recording.time_s, recording.metadata
+
+    def __getitem__(self, name: str, /) -> NDArray[Any]:
+        """Return a channel over time, shape (n,).
+
+        Raises:
+            RecordingError: there is none of that name, or it is not finite.
+        """
+        values = self._recording[name]
+        usable = np.abs(values) <= _MAX_VALUE
+        if not usable.all():
+            row = int(np.argmin(usable))
+            raise RecordingError(
+                f"channel {name} is {values[row]:g} at {self.time_s[row]:.3f} s, and cannot be evaluated"
+            )
+        return values
+
+
+_MAX_VALUE: Final = 1e30
+"""What no channel of a car that drives comes near to, and whose square is still finite."""
 
 
 def maneuver_kind(recording: RecordingLike) -> str:

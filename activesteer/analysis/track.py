@@ -36,18 +36,19 @@ def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> A
         path_y_m: World y of the path [m], shape (m,).
 
     Returns:
-        Distance [m], shape (n,), positive where the point is to the left of the path.
+        Distance [m], shape (n,), positive where the point is to the left of the path; nan where there is no distance.
     """
     from scipy.spatial import KDTree  # noqa: PLC0415 - takes a while to import
 
     points = np.column_stack([x_m, y_m])
     corners = np.column_stack([path_x_m, path_y_m])
-    _, nearest = KDTree(corners).query(points)
+    # Of a point that is not finite, or whose distance is not, the tree finds a corner that does not exist.
+    nearest = np.minimum(KDTree(corners).query(np.nan_to_num(points))[1], len(corners) - 1)
     pieces = np.diff(corners, axis=0)
     lengths = np.linalg.norm(pieces, axis=1)
     last = len(pieces) - 1
     best = np.full(len(points), math.inf)
-    signed = np.empty(len(points))
+    signed = np.full(len(points), math.nan)
     for piece in (np.maximum(nearest - 1, 0), np.minimum(nearest, last)):
         along, start = pieces[piece] / lengths[piece, None], points - corners[piece]
         along_m = np.einsum("ij,ij->i", start, along)

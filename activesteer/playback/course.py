@@ -16,6 +16,7 @@ from activesteer.playback.runs import CHASSIS, Run
 from activesteer.playback.timeline import times
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, course_of
 from activesteer.road.footprint import Footprint, footprint_of
+from activesteer.road.recorded import LIMIT_M
 from activesteer.road.road import road_of
 
 Array = NDArray[np.float64]
@@ -165,12 +166,13 @@ def _outline(run: Run) -> Array:
 
 def _track(run: Run) -> Array:
     """Where the centre of gravity went; the origin of the chassis where it was not recorded."""
-    if run.has("x_m", "y_m"):
-        track = np.stack([run.channel("x_m"), run.channel("y_m")], axis=1)
-    else:
-        poses = run.recording.poses
-        track = poses.positions_m[run.poses, poses.names.index(CHASSIS), :2]
-    return track[np.isfinite(track).all(axis=1)]
+    poses = run.recording.poses
+    at = poses.positions_m[run.poses, poses.names.index(CHASSIS), :2]
+    if not run.has("x_m", "y_m"):
+        return at
+    track = np.stack([run.channel("x_m"), run.channel("y_m")], axis=1)
+    track = track[(np.abs(track) <= LIMIT_M).all(axis=1)]
+    return track if len(track) else at
 
 
 def _course(runs: Sequence[Run]) -> Course | None:

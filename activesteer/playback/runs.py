@@ -33,7 +33,7 @@ class Run(NamedTuple):
         label: What it is called in legends and titles.
         colour: Its colour, `#rrggbb`.
         rows: Rows of the recording that are shown, about `PLOT_RATE_HZ` of them in a second.
-        poses: Sets of poses that are finite; a run that diverged ends with some that are not.
+        poses: Sets of poses that can be shown; a run that diverged ends with some that cannot.
     """
 
     recording: Recording
@@ -76,10 +76,7 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
     runs = []
     for number, name in enumerate(ordered, start=1):
         recording = recordings[name]
-        poses = np.flatnonzero(
-            np.isfinite(recording.poses.positions_m).all(axis=(1, 2))
-            & np.isfinite(recording.poses.quaternions).all(axis=(1, 2))
-        )
+        poses = np.flatnonzero(recording.poses.usable())
         if len(recording) == 0 or CHASSIS not in recording.poses.names or len(poses) == 0:
             raise RecordingError(f"{name}: {recording!r} has nothing to play back: rows and poses of a car are needed")
         path = re.sub(r"\W", "_", name, flags=re.ASCII)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from activesteer.errors import RecordingError
 from activesteer.recording.contents import MAX_CHUNK_BYTES, MAX_EXPANSION
 from activesteer.recording.decoder import Block, BlockDecoder
+from activesteer.road.recorded import LIMIT_M
 from activesteer.signals import Channel
 
 MAX_CACHED_BYTES: Final = 2**29
@@ -54,6 +55,16 @@ class Poses(NamedTuple):
     names: tuple[str, ...]
     positions_m: NDArray[np.float64]
     quaternions: NDArray[np.float64]
+
+    def usable(self) -> NDArray[np.bool_]:
+        """Which sets can be drawn, shape (k,): all bodies within reach, and turned by some angle."""
+        near = (np.abs(self.positions_m) <= LIMIT_M).all(axis=(1, 2))
+        size = np.linalg.norm(self.quaternions, axis=2)
+        return near & ((size > _SMALLEST) & (size < 1.0 / _SMALLEST)).all(axis=1)
+
+
+_SMALLEST: Final = 1e-6
+"""Length of a quaternion that still tells a direction."""
 
 
 class Place(NamedTuple):

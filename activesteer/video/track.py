@@ -30,7 +30,7 @@ class Track:
     """
 
     def __init__(self, recording: Recording, name: str) -> None:
-        """Takes the poses that are finite; a run that diverged ends with some that are not.
+        """Takes the poses that can be drawn; a run that diverged ends with some that cannot.
 
         Args:
             recording: The run.
@@ -41,7 +41,7 @@ class Track:
         """
         poses = recording.poses
         self.bodies = poses.names
-        whole = np.isfinite(poses.positions_m).all(axis=(1, 2)) & np.isfinite(poses.quaternions).all(axis=(1, 2))
+        whole = poses.usable()
         if CHASSIS not in poses.names or not whole.any():
             raise PlaybackError(f"{name} has no poses of a car, so there is nothing to draw")
         self._time_s = poses.time_s[whole]

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from activesteer.analysis.source import RecordingLike
-from activesteer.errors import ParameterError
+from activesteer.analysis.source import Evaluable, RecordingLike
+from activesteer.errors import ParameterError, RecordingError
 
 SYSTEMS: Final = ("none", "ars", "afs")
 """The runs that are compared: no control, active rear steering, active front superposition."""
@@ -59,7 +59,14 @@ def all_metrics(
         raise ParameterError(
             f"the claims about the {what} need the runs {', '.join(SYSTEMS)}; missing: {', '.join(missing)}"
         )
-    return {system: metrics(recordings[system]) for system in SYSTEMS}
+    return {system: _Metrics(metrics(Evaluable(recordings[system]))) for system in SYSTEMS}
+
+
+class _Metrics(dict[str, float]):
+    """Metrics of a run that may be of another kind than the name of its manoeuvre says."""
+
+    def __missing__(self, name: str) -> float:
+        raise RecordingError(f"the run has no metric {name}: is it what its name says?")
 
 
 def pick(runs: Runs, *metrics: str) -> dict[str, float]:

@@ -1,0 +1,240 @@
+"""Recordings that hold nonsense: they are refused when they are opened, or every command can handle them."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.records import Channel as Topic
+from mcap.records import McapRecord, Metadata
+
+from activesteer import simulate
+from activesteer.analysis.claims import SCENARIOS, SYSTEMS, claims_for
+from activesteer.analysis.metrics import BY_KIND, metrics
+from activesteer.analysis.report import report_page
+from activesteer.cli import main
+from activesteer.errors import ActiveSteerError, RecordingError
+from activesteer.playback import runs_of, save
+from activesteer.recording import Poses, Recording
+from activesteer.recording.format import RUN_RECORD
+from activesteer.video.track import Track
+from tests.unit.recording.records import records_of, write_records
+
+NONSENSE: tuple[Any, ...] = (
+    None, True, 0, -1, 1e308, -(10**30), 10**400, float("nan"), float("inf"), "", "x", "\ud800",
+    "\x1b[2J\n<!--<script>", "A" * 200_000, [], [1], [None], ["x", {}], {}, {"": 1}, {"x": {"y": [1, "z"]}},
+    [[[[1]]]], [1e300] * 3,
+)  # fmt: skip
+"""What stands in place of a value."""
+
+
+def thinned(recording: Recording, every: int = 50) -> Recording:
+    """Every so many rows of a run, which makes it small."""
+    poses = recording.poses
+    few = slice(None, None, every)
+    kept = Poses(poses.time_s[few], poses.names, poses.positions_m[few], poses.quaternions[few])
+    return Recording(
+        recording.channels, recording.time_s[few], recording.values[few], poses=kept, metadata=recording.metadata,
+        metrics=recording.metrics, attachments={"a.toml": b"x = 1"}, scene=recording.scene,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def driven() -> Recording:
+    return thinned(simulate("double_lane_change", "ars"))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def use(path: Path) -> bool:
+    """Opens a file and does everything with it that can be done; whether it could be opened."""
+    try:
+        recording = Recording.open(path, recover=True)
+    except RecordingError:
+        return False
+    assert main(["info", str(path)]) == 0
+    runs = {"ars": recording}
+    everything: Sequence[Callable[[], object]] = (
+        lambda: metrics(recording),
+        lambda: (claims_for(recording) or (lambda _: []))(dict.fromkeys(SYSTEMS, recording)),
+        lambda: report_page({str(path): recording, "again.mcap": recording}),
+        lambda: save(runs_of(runs), path.with_suffix(".rrd")),
+        lambda: Track(recording, "ars"),
+        lambda: recording.to_csv(path.with_suffix(".csv")),
+        lambda: recording.to_parquet(path.with_suffix(".parquet")),
+        lambda: recording.to_mat(path.with_suffix(".mat")),
+        lambda: recording.save(path.with_suffix(".again.mcap")),
+    )
+    for action in everything:
+        with suppress(ActiveSteerError):
+            action()
+    return True
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Where something could stand instead, in tables within tables; of a list the list, its first value, and all."""
+    if path:
+        yield path
+    if isinstance(value, Mapping):
+        for key, entry in value.items():
+            yield from places(entry, (*path, key))
+    elif isinstance(value, list) and value:
+        yield from places(value[0], (*path, 0))
+
+
+def put(tree: Any, path: Sequence[Any], value: Any) -> Any:
+    """A copy of a tree with another value at a place; without that place where the value is `...`."""
+    tree = copy.deepcopy(tree)
+    inner = tree
+    for key in path[:-1]:
+        inner = inner[key]
+    if value is ...:
+        del inner[path[-1]]
+    else:
+        inner[path[-1]] = value
+    return tree
+
+
+def with_texts(records: Sequence[McapRecord], change: Callable[[dict[str, Any]], dict[str, Any]]) -> list[McapRecord]:
+    """Records with other metadata of the run."""
+    return [
+        replace(record, metadata={key: json.dumps(value) for key, value in change(loaded(record)).items()})
+        if isinstance(record, Metadata) and record.name == RUN_RECORD
+        else record
+        for record in records
+    ]
+
+
+def loaded(record: Metadata) -> dict[str, Any]:
+    return {key: json.loads(text) for key, text in record.metadata.items()}
+
+
+def check_metadata(driven: Recording, folder: Path, count: int, rng: np.random.Generator) -> None:
+    driven.save(folder / "sound.mcap")
+    records = records_of(folder / "sound.mcap")
+    run = next(loaded(record) for record in records if isinstance(record, Metadata) and record.name == RUN_RECORD)
+    everywhere = [(place, value) for place in places(run) for value in (..., *NONSENSE)]
+    chosen = rng.permutation(len(everywhere))[:count]
+    opened = 0
+    for place, value in (everywhere[index] for index in chosen):
+        changed = with_texts(records, lambda table, place=place, value=value: put(table, place, value))
+        try:
+            opened += use(write_records(folder / "changed.mcap", changed))
+        except Exception as error:
+            error.add_note(f"with {value!r:.80} at {place}")
+            raise
+    assert 0 < opened < count
+
+
+def check_topics(driven: Recording, folder: Path, count: int, rng: np.random.Generator) -> None:
+    """Channels described wrongly, bodies that are none."""
+    driven.save(folder / "sound.mcap")
+    records = records_of(folder / "sound.mcap")
+    topics = [index for index, record in enumerate(records) if isinstance(record, Topic) and record.metadata]
+    for _ in range(count):
+        index = topics[rng.integers(len(topics))]
+        topic = records[index]
+        assert isinstance(topic, Topic)
+        key = list(topic.metadata)[rng.integers(len(topic.metadata))]
+        notes = json.loads(topic.metadata[key])
+        value = NONSENSE[rng.integers(len(NONSENSE))]
+        where = list(places(notes))
+        told = put(notes, where[rng.integers(len(where))], value) if rng.random() < 0.7 else value
+        changed = [*records]
+        changed[index] = replace(topic, metadata={**topic.metadata, key: json.dumps(told)})
+        try:
+            use(write_records(folder / "changed.mcap", changed))
+        except Exception as error:
+            error.add_note(f"with {told!r:.200} for {key} of {topic.topic}")
+            raise
+
+
+def odd_runs(driven: Recording, count: int, rng: np.random.Generator) -> Iterator[tuple[str, Recording]]:
+    """Runs with few rows, few channels, strange values, strange poses, of any kind of manoeuvre."""
+    kinds = [*BY_KIND, "open_loop", "standstill"]
+    names = [*SCENARIOS, "mine"]
+    for _ in range(count):
+        rows = [0, 1, 2, 3, len(driven)][rng.integers(5)]
+        kept = np.flatnonzero(rng.random(len(driven.channels)) < [0.02, 0.5, 0.95, 1.0, 1.0][rng.integers(5)])
+        channels = list(driven.channels)
+        values = driven.values[:rows].copy()
+        amount, kind_of_value = rng.random() < 0.5, rng.integers(7)
+        chosen = slice(None) if amount else rng.integers(values.shape[1], size=5)
+        if kind_of_value < 6:
+            values[:, chosen] = (np.nan, np.inf, 0.0, 1e300, -1e30, 1.0)[kind_of_value]
+        poses = driven.poses
+        sets = min(rows, len(poses.time_s))
+        positions, turns = poses.positions_m[:sets].copy(), poses.quaternions[:sets].copy()
+        strange = rng.integers(5)
+        if strange < 4:
+            (positions if strange % 2 else turns)[..., rng.integers(3)] = (0.0, np.nan, 0.0, 1e300)[strange]
+        metadata = copy.deepcopy(driven.metadata)
+        metadata["maneuver"] |= {"kind": kinds[rng.integers(len(kinds))], "name": names[rng.integers(len(names))]}
+        for key in ("course", "car", "vehicle", "controller", "maneuver"):
+            if rng.random() < 0.1:
+                del metadata[key]
+        words = f"{rows} rows, {len(kept)} channels, values {kind_of_value} in {chosen}, poses {strange}, "
+        words += str({key: metadata.get("maneuver", {}).get(key) for key in ("name", "kind")})
+        yield words, Recording(
+            [channels[column] for column in kept], driven.time_s[:rows], values[:, kept],
+            poses=None if rng.random() < 0.1 else Poses(poses.time_s[:sets], poses.names, positions, turns),
+            metadata=metadata, scene=driven.scene,
+        )  # fmt: skip
+
+
+def check_odd_runs(driven: Recording, folder: Path, count: int, rng: np.random.Generator) -> None:
+    for words, recording in odd_runs(driven, count, rng):
+        try:
+            recording.save(folder / "odd.mcap")
+            assert use(folder / "odd.mcap")
+        except Exception as error:
+            error.add_note(words)
+            raise
+
+
+def check_bytes(driven: Recording, folder: Path, count: int, rng: np.random.Generator) -> None:
+    """Bytes changed without a checksum over the file, and files cut anywhere."""
+    driven.save(folder / "sound.mcap")
+    data = write_records(folder / "sound.mcap", records_of(folder / "sound.mcap")).read_bytes()
+    for _ in range(count):
+        changed = bytearray(data)
+        start = int(rng.integers(8, len(data)))
+        if rng.random() < 0.3:
+            del changed[start:]
+        else:
+            # Half of the changes before the rows, which are most of the file.
+            start = start if rng.random() < 0.5 else int(rng.integers(8, 40_000))
+            changed[start : start + 4] = rng.bytes(4)
+        (folder / "changed.mcap").write_bytes(changed)
+        try:
+            use(folder / "changed.mcap")
+        except Exception as error:
+            error.add_note(f"changed at {start}")
+            raise
+
+
+CHECKS = [check_metadata, check_topics, check_odd_runs, check_bytes]
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # overflow: what is shown of nonsense may be nonsense
+@pytest.mark.parametrize("check", CHECKS)
+def test_recording_is_refused_or_every_command_can_handle_it(check, driven, folder, capsys, rng):
+    check(driven, folder, 12, rng)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("check", CHECKS)
+def test_hundreds_of_recordings_are_refused_or_every_command_can_handle_them(check, driven, folder, capsys, rng):
+    check(driven, folder, 500, rng)
