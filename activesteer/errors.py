@@ -72,6 +72,10 @@ class ControllerError(ActiveSteerError):
     """A controller cannot be loaded, or returned something that is no steering command."""
 
 
+class DriverError(ActiveSteerError):
+    """A driver cannot be loaded, or returned something that is no command."""
+
+
 class SimulationDiverged(ActiveSteerError):  # noqa: N818 - an event of the physics, named as one
     """The state became non-finite, or the engine raised a warning; what was recorded is kept."""
 

@@ -1,7 +1,7 @@
 """Active steering controllers: DriverCommand, Measurement -> SteerCommand."""
 
 from activesteer.controllers.front_superposition import FrontSuperposition
-from activesteer.controllers.loading import BUILT_IN, Controller, load_controller
+from activesteer.controllers.loading import BUILT_IN, CONTROLLER, Controller, find_controller, load_controller
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
@@ -9,6 +9,7 @@ from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
 __all__ = [
     "BUILT_IN",
+    "CONTROLLER",
     "Controller",
     "ControllerParameters",
     "ControllerSetup",
@@ -17,5 +18,6 @@ __all__ = [
     "RearSteer",
     "SingleTrack",
     "SingleTrackParameters",
+    "find_controller",
     "load_controller",
 ]

@@ -2,6 +2,7 @@
 
 from activesteer.driver.base import Driver, DriverSetup
 from activesteer.driver.constant_radius import ConstantRadiusDriver
+from activesteer.driver.loading import BUILT_IN, DRIVER, find_driver
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
 from activesteer.driver.path_preview import PathPreviewDriver
@@ -9,6 +10,8 @@ from activesteer.driver.speed_hold import SpeedHold
 from activesteer.driver.standard import StandardDriver
 
 __all__ = [
+    "BUILT_IN",
+    "DRIVER",
     "ConstantRadiusDriver",
     "Driver",
     "DriverParameters",
@@ -17,4 +20,5 @@ __all__ = [
     "PathPreviewDriver",
     "SpeedHold",
     "StandardDriver",
+    "find_driver",
 ]

@@ -1,0 +1,83 @@
+"""Drivers by name, or a user's own."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+from activesteer.config import Range
+from activesteer.driver.base import DriverSetup
+from activesteer.driver.standard import StandardDriver
+from activesteer.errors import DriverError, shown
+from activesteer.plugins import Kind, Plugin, find
+from activesteer.signals import DriverCommand, WheelTorques
+
+BUILT_IN: Final = {"standard": StandardDriver}
+"""Name -> class."""
+
+_MAX_ANGLE_RAD: Final = 50.0
+"""No steering wheel turns so far; more is taken for a mistake, such as degrees [rad]."""
+_MAX_TORQUE_NM: Final = 1e6
+"""No car has so much drive torque [N m]."""
+
+
+@dataclass(frozen=True)
+class _DriverKind(Kind):
+    """Drivers; their command is completed by the angle at the road wheel."""
+
+    def checked(self, command: Any, name: str, setup: DriverSetup) -> DriverCommand:
+        """A command as it may be carried out; see the base class."""
+        super().checked(command, name, setup)
+        torques, front = command.wheel_torques, command.front_steer_demand_rad
+        if torques is not None and not _are_torques(torques):
+            problem = f"step returned wheel_torques = {shown(torques)}; an activesteer.signals.WheelTorques of finite numbers is needed"
+            raise self.fail(name, problem, torques)
+        ours = command.steering_wheel_demand_rad / setup.steering_ratio
+        if front == ours:
+            return command
+        if math.isnan(front):
+            return command._replace(front_steer_demand_rad=ours)
+        problem = (
+            f"step returned front_steer_demand_rad = {front:g}, but the steering wheel angle over the steering ratio is "
+            f"{ours:g}; leave it out"
+        )
+        raise self.fail(name, problem, front)
+
+
+DRIVER: Final = _DriverKind(
+    word="driver",
+    example="my_file.py:MyDriver",
+    inputs="reference, measurement, motion",
+    built_in=BUILT_IN,
+    result=DriverCommand,
+    ranges={
+        "steering_wheel_demand_rad": Range(-_MAX_ANGLE_RAD, _MAX_ANGLE_RAD),
+        "drive_torque_demand_Nm": Range(-_MAX_TORQUE_NM, _MAX_TORQUE_NM),
+        "brake_pedal": Range(0.0, 1.0),
+    },
+    error=DriverError,
+    unchecked=("wheel_torques",),
+)
+"""What drivers have in common."""
+
+
+def find_driver(given: Any) -> Plugin:
+    """Finds a driver; see `activesteer.plugins.find`.
+
+    Args:
+        given: `standard`, or a user's own: `path/to/file.py:ClassName`, a class, an object, a factory.
+
+    Raises:
+        DriverError: there is no such driver.
+    """
+    return find(given, DRIVER)
+
+
+def _are_torques(torques: Any) -> bool:
+    try:
+        return isinstance(torques, WheelTorques) and all(
+            len(values) == 4 and all(abs(value) <= _MAX_TORQUE_NM for value in values) for values in torques
+        )
+    except TypeError:
+        return False

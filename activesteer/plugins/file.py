@@ -1,0 +1,88 @@
+"""A class or function in a Python file of the user's, named as `my_file.py:MyController?gain=2`."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from activesteer.config import parse_value
+from activesteer.errors import nearest_names, shown
+from activesteer.plugins.kind import Kind, in_one_line
+
+_FORM: Final = re.compile(r"(?P<path>.+?):(?P<name>[^:?]+)(?:\?(?P<parameters>.*))?", re.DOTALL)
+_PARAMETER: Final = re.compile(r"([A-Za-z_]\w*)=(.*)", re.DOTALL)
+
+
+class FromFile(NamedTuple):
+    """What a text of this form names.
+
+    Attributes:
+        path: The file.
+        content: What stands in it.
+        found: The class or function.
+        parameters: Name -> value, typed as in TOML.
+    """
+
+    path: Path
+    content: bytes
+    found: Any
+    parameters: dict[str, Any]
+
+
+def from_file(text: str, kind: Kind) -> FromFile:
+    """Reads the file and looks up what is named.
+
+    Args:
+        text: `path/to/file.py:Name`, with `?parameter=value&other=value` behind it if need be.
+        kind: What is wanted.
+
+    Raises:
+        ActiveSteerError: of the kind's type: the text has another form, the file is not there, does not run, or has no
+            such class or function.
+    """
+
+    def fail(problem: str) -> Exception:
+        return kind.fail(text, problem, text)
+
+    form = _FORM.fullmatch(text)
+    if form is None:
+        hint = nearest_names(text, kind.built_in)
+        problem = f"there is no {kind.word} {shown(text)}; {hint} Your own is given as {kind.example}"
+        raise kind.error(problem, value=text, allowed=tuple(kind.built_in))
+    if not form["name"].isidentifier():
+        raise fail(f"{form['name']} cannot be the name of a class; your own is given as {kind.example}")
+    path = Path(form["path"]).expanduser()
+    if not path.is_file():
+        raise fail(f"there is no file {path}")
+    name = f"activesteer_user_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise fail(f"{path} is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        content = path.read_bytes()
+        spec.loader.exec_module(module)
+    except Exception as reason:
+        raise fail(f"{path} cannot be run: {in_one_line(reason)}") from reason
+    found = getattr(module, form["name"], None)
+    if found is None or not (callable(found) or hasattr(found, "step")):
+        own = [key for key, value in vars(module).items() if getattr(value, "__module__", "") == name]
+        raise fail(f"{path} has no class {form['name']!r}; {nearest_names(form['name'], own)}")
+    return FromFile(path, content, found, _parameters(form["parameters"] or "", fail))
+
+
+def _parameters(text: str, fail: Any) -> dict[str, Any]:
+    """`gain=2&side="left"`: split where a name follows, so that a value may hold the sign itself."""
+    parameters: dict[str, Any] = {}
+    for part in re.split(r"&(?=[A-Za-z_]\w*=)", text) if text else ():
+        pair = _PARAMETER.fullmatch(part)
+        if pair is None:
+            raise fail(f"{part!r} is no parameter; name=value is needed, as in ?gain=2&limit_rad=0.05")
+        if pair[1] in parameters:
+            raise fail(f"the parameter {pair[1]} is given twice")
+        parameters[pair[1]] = parse_value(pair[2])
+    return parameters
