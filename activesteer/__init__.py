@@ -9,17 +9,29 @@ if TYPE_CHECKING:
     from typing import Any
 
     from activesteer.recording import Recording
-    from activesteer.signals import DriverCommand, Measurement, SteerCommand
+    from activesteer.signals import DriverCommand, Measurement, Motion, Reference, SteerCommand
     from activesteer.simulation.runner import simulate
     from activesteer.studies.study import study
 
-__all__ = ["DriverCommand", "Measurement", "Recording", "SteerCommand", "__version__", "simulate", "study"]
+__all__ = [
+    "DriverCommand",
+    "Measurement",
+    "Motion",
+    "Recording",
+    "Reference",
+    "SteerCommand",
+    "__version__",
+    "simulate",
+    "study",
+]
 
 # Imported at first use: engine and compiler take a second, which help and lists of names need not wait for.
 _HOMES = {
     "Recording": "activesteer.recording",
     "DriverCommand": "activesteer.signals",
     "Measurement": "activesteer.signals",
+    "Motion": "activesteer.signals",
+    "Reference": "activesteer.signals",
     "SteerCommand": "activesteer.signals",
     "simulate": "activesteer.simulation.runner",
     "study": "activesteer.studies.study",

@@ -85,12 +85,19 @@ def add_scenario(parser: argparse.ArgumentParser) -> None:
 
 def add_controller(parser: argparse.ArgumentParser, *, several: bool) -> None:
     """Adds `-c`; where there may be several, `options.controller` is a list, or None."""
-    words = "none, ars, afs, or my_file.py:MyController"
+    words = "none, ars, afs, or my_file.py:MyController?gain=2"
     parser.add_argument(
         "-c", "--controller", metavar="CONTROLLER",
         action="append" if several else "store", default=None if several else "none",
         help=f"{words}{'; one run for each' if several else ''} (default: none)",
     )  # fmt: skip
+
+
+def add_driver(parser: argparse.ArgumentParser) -> None:
+    """Adds `--driver`."""
+    parser.add_argument(
+        "--driver", default="standard", metavar="DRIVER", help="standard, or my_file.py:MyDriver (default: standard)"
+    )
 
 
 def add_recording(parser: argparse.ArgumentParser, *, several: bool = False) -> None:

@@ -8,7 +8,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from activesteer.commands.arguments import add_controller, add_json, add_output, add_scenario, scenario_of
+from activesteer.commands.arguments import (
+    add_controller,
+    add_driver,
+    add_json,
+    add_output,
+    add_scenario,
+    scenario_of,
+)
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError
@@ -16,6 +23,7 @@ from activesteer.files import make_folder
 
 if TYPE_CHECKING:
     from activesteer.analysis.claims import Scorecard
+    from activesteer.plugins import Plugin
 
 
 def add_to(commands: Any) -> None:
@@ -23,6 +31,7 @@ def add_to(commands: Any) -> None:
     run = commands.add_parser("run", help="drive a manoeuvre and record it")
     add_scenario(run)
     add_controller(run, several=True)
+    add_driver(run)
     add_output(run, "FILE_OR_DIR", "a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap", "runs")
     run.add_argument("--plot", action="store_true", help="also draw the runs")
     add_json(run)
@@ -31,22 +40,24 @@ def add_to(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from activesteer.analysis.tables import comparison
-    from activesteer.controllers import load_controller
+    from activesteer.controllers import find_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
+    from activesteer.driver import find_driver
     from activesteer.simulation.runner import prepared, run_scenario
 
-    controllers = options.controller or ["none"]
+    controllers = [find_controller(name) for name in options.controller or ["none"]]
+    driver = find_driver(options.driver)
     scenario = scenario_of(options)
     # What is wrong with the last controller or the plot is said before the first run, not after it.
     for controller in controllers:
-        load_controller(controller, scenario.controller_setup(DEFAULT_TIMESTEP_S))
+        controller.make(scenario.controller_setup(DEFAULT_TIMESTEP_S))
     paths = _output_paths(options.output, scenario.maneuver.name, controllers)
     scenario = prepared(scenario)
     recordings = {}
     for controller, path in zip(controllers, paths, strict=True):
-        label = _label(controller)
+        label = controller.label
         with ProgressBar(f"{scenario.maneuver.name} {label}", quiet=options.json) as progress:
-            recordings[label] = run_scenario(scenario, controller, path=path, progress=progress)
+            recordings[label] = run_scenario(scenario, controller, driver=driver, path=path, progress=progress)
         if not options.json:
             print(f"{scenario.maneuver.name} {label}: {path}", file=sys.stderr)
         if problem := recordings[label].metadata.get("metrics_error"):
@@ -54,7 +65,7 @@ def _run(options: argparse.Namespace) -> int:
     claims = _claims(recordings, scenario.car.name)
     if options.json:
         runs = [
-            {"controller": controller, "file": str(path), "metrics": recording.metrics}
+            {"controller": controller.name, "file": str(path), "metrics": recording.metrics}
             for controller, path, recording in zip(controllers, paths, recordings.values(), strict=True)
         ]
         table = {"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs}
@@ -71,17 +82,12 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _label(controller: str) -> str:
-    """How a controller is called in files and tables: the class of a user's own."""
-    return controller.rpartition(":")[2]
-
-
-def _output_paths(output: Path, maneuver: str, controllers: Sequence[str]) -> list[Path]:
+def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) -> list[Path]:
     from activesteer.recording import check_target
 
-    labels = [_label(controller) for controller in controllers]
+    labels, names = zip(*((controller.label, controller.name) for controller in controllers), strict=True)
     if len(set(labels)) != len(labels):
-        msg = f"-c {' -c '.join(controllers)}: two of them have the same name, which tells runs and files apart"
+        msg = f"-c {' -c '.join(names)}: two of them have the same name, which tells runs and files apart"
         raise ParameterError(msg)
     if output.suffix == ".mcap":
         if len(controllers) > 1:

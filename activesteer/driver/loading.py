@@ -31,18 +31,15 @@ class _DriverKind(Kind):
         super().checked(command, name, setup)
         torques, front = command.wheel_torques, command.front_steer_demand_rad
         if torques is not None and not _are_torques(torques):
-            problem = f"step returned wheel_torques = {shown(torques)}; an activesteer.signals.WheelTorques of finite numbers is needed"
-            raise self.fail(name, problem, torques)
+            needed = "an activesteer.signals.WheelTorques of finite numbers is needed"
+            raise self.fail(name, f"step returned wheel_torques = {shown(torques)}; {needed}", torques)
         ours = command.steering_wheel_demand_rad / setup.steering_ratio
-        if front == ours:
-            return command
         if math.isnan(front):
             return command._replace(front_steer_demand_rad=ours)
-        problem = (
-            f"step returned front_steer_demand_rad = {front:g}, but the steering wheel angle over the steering ratio is "
-            f"{ours:g}; leave it out"
-        )
-        raise self.fail(name, problem, front)
+        if not math.isclose(front, ours, rel_tol=1e-9, abs_tol=1e-12):
+            what = f"the steering wheel angle over the steering ratio is {ours:g}; leave it out"
+            raise self.fail(name, f"step returned front_steer_demand_rad = {front:g}, but {what}", front)
+        return command
 
 
 DRIVER: Final = _DriverKind(

@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.metrics import metrics
-from activesteer.controllers.loading import user_file
+from activesteer.controllers import find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.driver import find_driver
 from activesteer.errors import ActiveSteerError, RecordingError
+from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Recording, ScenePart
 from activesteer.scenario import FileOrTable, Scenario, describe, resolve
 from activesteer.signals import Channel
@@ -31,19 +33,22 @@ the file where they are needed, so that its memory does not grow with its length
 
 def simulate(
     maneuver: FileOrTable,
-    controller: str = "none",
+    controller: Any = "none",
     vehicle: FileOrTable = "compact",
     overrides: Mapping[str, Any] | None = None,
     *,
+    driver: Any = "standard",
     timestep_s: float = DEFAULT_TIMESTEP_S,
 ) -> Recording:
     """Drives a manoeuvre and returns what happened.
 
     Args:
         maneuver: Name, path, or table of a manoeuvre.
-        controller: `none`, `ars`, `afs`, or a user's own as `my_file.py:MyController`.
+        controller: `none`, `ars`, `afs`, or a user's own: `my_file.py:MyController?gain=2`, a class, an object (the run
+            works on a copy of it), or a function that makes one; see `activesteer.plugins.find`.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value, as `{"speed_kmh": 100, "road.mu": 0.4, "controllers.ars.limit_deg": 2}`.
+        driver: `standard`, or a user's own in the same forms as a controller.
         timestep_s: Step of engine, driver and controller [s].
 
     Returns:
@@ -52,7 +57,9 @@ def simulate(
     Raises:
         ActiveSteerError: an input is wrong, or the run failed; a failed run's recording is the error's `recording`.
     """
-    return run_scenario(prepared(resolve(maneuver, vehicle, overrides), timestep_s), controller, timestep_s=timestep_s)
+    controller, driver = find_controller(controller), find_driver(driver)
+    scenario = prepared(resolve(maneuver, vehicle, overrides), timestep_s)
+    return run_scenario(scenario, controller, driver=driver, timestep_s=timestep_s)
 
 
 def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scenario:
@@ -76,8 +83,9 @@ def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scen
 
 def run_scenario(
     scenario: Scenario,
-    controller: str = "none",
+    controller: Any = "none",
     *,
+    driver: Any = "standard",
     path: Path | None = None,
     timestep_s: float = DEFAULT_TIMESTEP_S,
     progress: Callable[[float], None] | None = None,
@@ -86,7 +94,8 @@ def run_scenario(
 
     Args:
         scenario: What to run; see `prepared`.
-        controller: Name or file of the controller.
+        controller: The controller, as in `simulate`.
+        driver: The driver, likewise.
         path: MCAP file to write.
         timestep_s: Step of the simulation [s].
         progress: Called about every simulated second with the share that is done, 0 to 1.
@@ -99,8 +108,9 @@ def run_scenario(
     Raises:
         ActiveSteerError: the run failed. What was recorded until then is in the file, and in the error's `recording`.
     """
-    simulation = Simulation(scenario, controller, timestep_s)
-    context = RunContext.of(scenario, controller, simulation)
+    controller, driver = find_controller(controller), find_driver(driver)
+    simulation = Simulation(scenario, controller, timestep_s, driver=driver)
+    context = RunContext.of(scenario, simulation, controller, driver)
     outcome: dict[str, Any] = {"complete": True}
     failure: ActiveSteerError | None = None
     # Whatever else goes wrong, the writer ends its file, marked as incomplete.
@@ -126,7 +136,7 @@ def run_scenario(
     if failure is not None:
         failure.recording = recording
         saved = f"; what was recorded until then is in {path}" if path is not None else ""
-        failure.add_note(f"controller {controller}: {len(recording)} steps were made{saved}")
+        failure.add_note(f"controller {controller.name}: {len(recording)} steps were made{saved}")
         raise failure
     return recording
 
@@ -149,7 +159,7 @@ class RunContext(NamedTuple):
         channels: The table of channels.
         body_names: Bodies whose poses are recorded.
         metadata: Resolved parameters, versions.
-        files: Manoeuvre, vehicle, model and tyre files, and a user's own controller.
+        files: Manoeuvre, vehicle, model and tyre files, and a user's own controller and driver.
         scene: What the car looks like.
     """
 
@@ -160,11 +170,12 @@ class RunContext(NamedTuple):
     scene: tuple[ScenePart, ...]
 
     @classmethod
-    def of(cls, scenario: Scenario, controller: str, simulation: Simulation) -> RunContext:
+    def of(cls, scenario: Scenario, simulation: Simulation, *plugins: Plugin) -> RunContext:
         """Collects it."""
         vehicle = simulation.vehicle
         metadata = {
-            "controller": controller,
+            **{plugin.kind.word: plugin.name for plugin in plugins},
+            **{f"{plugin.kind.word}_parameters": dict(plugin.parameters) for plugin in plugins if plugin.parameters},
             **describe(scenario),
             "car": vehicle.dimensions(),
             "timestep_s": vehicle.timestep_s,
@@ -172,7 +183,7 @@ class RunContext(NamedTuple):
         }
         if (course := scenario.maneuver.course) is not None:
             metadata["course"] = course.to_table()
-        files = scenario.files | user_file(controller)
+        files = scenario.files | {name: text for plugin in plugins for name, text in plugin.files.items()}
         return cls(channels_of(vehicle), vehicle.body_names, metadata, files, scene_of(vehicle.model))
 
     def recording(self, recorder: Recorder) -> Recording:

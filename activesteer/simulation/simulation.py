@@ -9,12 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.controllers import Controller, load_controller
-from activesteer.controllers.loading import check_command, is_sane
+from activesteer.controllers import Controller, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.driver import Driver, StandardDriver
+from activesteer.driver import Driver, find_driver
 from activesteer.scenario import Scenario
-from activesteer.signals import Measurement, Motion, Reference, SteerCommand
+from activesteer.signals import Measurement, Motion, Reference
 from activesteer.simulation.recorder import Recorder
 from activesteer.vehicle import engine_warnings_held
 
@@ -40,28 +39,37 @@ class Simulation:
         vehicle: The car.
     """
 
-    def __init__(self, scenario: Scenario, controller: str = "none", timestep_s: float = DEFAULT_TIMESTEP_S) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        controller: Any = "none",
+        timestep_s: float = DEFAULT_TIMESTEP_S,
+        *,
+        driver: Any = "standard",
+    ) -> None:
         """Builds the blocks and lets the car settle at the speed of the manoeuvre, at the origin of the road.
 
         Args:
             scenario: Manoeuvre and car.
-            controller: Name or file of the controller.
+            controller: The controller; see `activesteer.plugins.find`.
             timestep_s: Step of engine, driver and controller [s].
+            driver: The driver, likewise.
 
         Raises:
             ModelError: the car cannot be built.
             ControllerError: the controller cannot be made, or returns nonsense while the car settles.
+            DriverError: the driver, likewise.
             SimulationDiverged: the car does not settle.
         """
         self.maneuver = maneuver = scenario.maneuver
         self.vehicle = vehicle = scenario.car.on(maneuver.road, timestep_s)
         setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
-        self.driver: Driver = StandardDriver.from_vehicle(setup)
-        self.controller: Controller = load_controller(controller, scenario.controller_setup(timestep_s))
-        self._controller_name = controller
-        self._measurement, self._motion, self._step = vehicle.start(maneuver.speed_mps), vehicle.motion(), 0
-        settling = maneuver.settling_reference()
-        self._advance(lambda _: settling, round(maneuver.settle_s / timestep_s), None)
+        self.driver: Driver = find_driver(driver).make(setup)
+        self.controller: Controller = find_controller(controller).make(scenario.controller_setup(timestep_s))
+        settling, steps = maneuver.settling_reference(), round(maneuver.settle_s / timestep_s)
+        self._measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
+        self._motion, self._step = vehicle.motion(), 0
+        self._advance(lambda _: settling, steps, None)
         vehicle.rebase()
         self._measurement = self._measurement._replace(time_s=0.0)
         self._motion, self._step = vehicle.motion(), 0
@@ -79,6 +87,7 @@ class Simulation:
 
         Raises:
             ControllerError: the controller returned nonsense.
+            DriverError: the driver did.
             SimulationDiverged: the state became non-finite, or the engine raised a warning.
         """
         self.advance(self.steps - self._step, recorder)
@@ -95,8 +104,6 @@ class Simulation:
                 reference = reference_at(step * timestep_s)
                 command = driver.step(reference, measurement, motion)
                 steer = controller.step(command, measurement)
-                if steer.__class__ is not SteerCommand or not is_sane(steer):
-                    check_command(steer, self._controller_name)
                 measurement, motion = vehicle.step(command, steer, recorder.row_address if recorder else 0)
                 if recorder is not None:
                     recorder.record(command, steer)

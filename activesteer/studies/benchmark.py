@@ -11,6 +11,7 @@ from typing import Any, Final
 import mujoco
 
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS
+from activesteer.controllers import find_controller
 from activesteer.scenario import Scenario, resolve
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.runner import RunContext, prepared, run_scenario
@@ -144,7 +145,7 @@ def _closed_loop(scenario: Scenario) -> float:
 def _with_file(scenario: Scenario, path: Path) -> float:
     """The run as the command line makes it, less what a run of no length costs: building, settling, opening."""
     simulation = Simulation(scenario, _CONTROLLER)
-    with RunContext.of(scenario, _CONTROLLER, simulation).writer(path) as writer:
+    with RunContext.of(scenario, simulation, find_controller(_CONTROLLER)).writer(path) as writer:
         recorder = Recorder(simulation.vehicle, simulation.steps, writer)
         start = time.perf_counter()
         simulation.run(recorder)

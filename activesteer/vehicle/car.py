@@ -143,11 +143,12 @@ class Vehicle:
         held = [self._root_dof, self._root_dof + 1, self._root_dof + 5, *self._spins]
         static_ride(self.model, self.data, np.asarray(held))
 
-    def start(self, speed_mps: float) -> Measurement:
+    def start(self, speed_mps: float, time_s: float = 0.0) -> Measurement:
         """Sets the car rolling straight ahead at a speed, from static ride.
 
         Args:
             speed_mps: Speed along world x [m/s].
+            time_s: Time from which it counts; below 0 before a recording [s].
 
         Returns:
             The first measurement.
@@ -158,7 +159,7 @@ class Vehicle:
         data.qvel[self._root_dof] = speed_mps
         for index, dof in enumerate(self._spins):
             data.qvel[dof] = speed_mps / self._rolling_radius(index)
-        data.time = 0.0
+        data.time = time_s
         mujoco.mj_forward(self.model, data)
         return self.measure()
 

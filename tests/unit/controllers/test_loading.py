@@ -8,8 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from activesteer.controllers import BUILT_IN, FrontSuperposition, NoControl, RearSteer, load_controller
-from activesteer.controllers.loading import check_command, is_sane, user_file
+from activesteer.controllers import (
+    BUILT_IN,
+    CONTROLLER,
+    FrontSuperposition,
+    NoControl,
+    RearSteer,
+    find_controller,
+    load_controller,
+)
 from activesteer.errors import ControllerError
 from activesteer.signals import DriverCommand, Measurement, SteerCommand
 from tests.unit.controllers.cars import measured, setup, steering
@@ -93,9 +100,9 @@ def test_users_controller_can_be_copied_with_its_state(write):
 
 
 def test_users_file_is_kept_with_the_recording(write):
-    path = write("class Mine: ...")
-    assert user_file(f"{path}:Mine") == {"mine.py": path.read_bytes()}
-    assert user_file("ars") == {}
+    path = write("class Mine:\n    def step(self, command, measurement): ...\n")
+    assert find_controller(f"{path}:Mine").files == {"mine.py": path.read_bytes()}
+    assert find_controller("ars").files == {}
 
 
 @pytest.mark.parametrize(
@@ -190,8 +197,7 @@ def test_numbers_of_all_kinds_are_taken(returning, expression):
 
 def test_good_command_passes_the_check():
     steer = SteerCommand(0.05, -0.02, 0.3, 0.01, 0.04, True)
-    assert is_sane(steer)
-    check_command(steer, "mine.py:Mine")
+    assert CONTROLLER.checked(steer, "mine.py:Mine", setup()) is steer
 
 
 def test_controllers_are_told_what_sensors_measure_and_nothing_else():

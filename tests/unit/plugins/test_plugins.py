@@ -1,0 +1,257 @@
+"""Controllers and drivers of the user's own: as files with parameters, classes, objects and factories."""
+
+from __future__ import annotations
+
+import functools
+import math
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from activesteer import DriverCommand, SteerCommand, simulate
+from activesteer.controllers import find_controller
+from activesteer.driver import find_driver
+from activesteer.errors import ControllerError, DriverError
+from activesteer.scenario import resolve
+from activesteer.signals import WheelTorques
+from tests.unit.controllers.cars import measured, setup, steering
+
+SHORT = {"settle_s": 0.05, "duration_s": 0.3, "steer.start_s": 0.05, "steer.steering_wheel_deg": 30}
+
+
+class Counting:
+    """Its angle grows from step to step, so that a state carried over would show."""
+
+    def __init__(self, gain: float = 1.0, offset_rad: float = 0.0) -> None:
+        self.gain, self.offset_rad, self.count = gain, offset_rad, 0
+
+    def step(self, command: Any, measurement: Any) -> SteerCommand:
+        self.count += 1
+        return SteerCommand(self.offset_rad + 1e-5 * self.gain * self.count)
+
+
+class FromSetup(Counting):
+    @classmethod
+    def from_vehicle(cls, setup: Any, gain: float = 1.0) -> FromSetup:
+        return cls(gain, setup.timestep_s)
+
+
+def factory(setup: Any, gain: float = 3.0) -> Counting:
+    return Counting(gain, setup.timestep_s)
+
+
+def first_angle(given: Any) -> float:
+    return find_controller(given).make(setup()).step(steering(0.0), measured(0.0)).rear_steer_demand_rad
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(body: str, name: str = "mine.py") -> str:
+        path = tmp_path / name
+        path.write_text("from activesteer import DriverCommand, SteerCommand\n\n" + textwrap.dedent(body))
+        return str(path)
+
+    return write
+
+
+@pytest.fixture
+def gains(write):
+    return write(
+        """
+        class Mine:
+            def __init__(self, gain=1.0, side="left", *, limits=(1.0,)):
+                self.gain, self.side, self.limits = gain, side, limits
+
+            def step(self, command, measurement):
+                return SteerCommand(0.001 * self.gain)
+        """
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "angle_rad"),
+    [
+        (Counting, 1e-5),
+        (Counting(gain=2.0), 2e-5),
+        (functools.partial(Counting, gain=4.0), 4e-5),
+        (lambda: Counting(5.0), 5e-5),
+        (FromSetup, 0.001 + 1e-5),
+        (FromSetup(2.0), 2e-5),
+        (factory, 0.001 + 3e-5),
+        (functools.partial(factory, gain=1.0), 0.001 + 1e-5),
+        (f"{__file__}:Counting?gain=2", 2e-5),
+        (f"{__file__}:FromSetup?gain=2", 0.001 + 2e-5),
+        (f"{__file__}:factory?gain=2", 0.001 + 2e-5),
+        (Path(f"{__file__}:Counting"), 1e-5),
+    ],
+)
+def test_class_object_factory_and_file_all_make_a_controller(given, angle_rad):
+    assert first_angle(given) == pytest.approx(angle_rad, rel=1e-12)
+    # Again from the beginning, whatever was done before.
+    assert first_angle(given) == pytest.approx(angle_rad, rel=1e-12)
+
+
+def test_object_used_twice_carries_nothing_over():
+    mine = Counting()
+    one, other = (simulate("step_steer", mine, overrides=SHORT) for _ in range(2))
+    assert mine.count == 0
+    assert np.array_equal(one["rear_steer_demand_rad"], other["rear_steer_demand_rad"])
+
+
+@pytest.mark.parametrize(
+    ("query", "parameters"),
+    [
+        ("", {}),
+        ("?", {}),
+        ("?gain=2", {"gain": 2}),
+        ("?gain=-0.5&side=right", {"gain": -0.5, "side": "right"}),
+        ('?side="a&b"', {"side": "a&b"}),
+        ("?side=a:b&gain=1e-3", {"side": "a:b", "gain": 1e-3}),
+        ("?limits=[1, 2]&gain=true", {"limits": [1, 2], "gain": True}),
+    ],
+)
+def test_parameters_of_a_file_are_typed_as_in_toml(gains, query, parameters):
+    found = find_controller(f"{gains}:Mine{query}")
+    assert found.parameters == parameters
+    inner = found.make(setup()).inner
+    assert {key: getattr(inner, key) for key in parameters} == parameters
+
+
+@pytest.mark.parametrize(
+    ("query", "said"),
+    [
+        ("?gian=2", r"there is no parameter 'gian'; did you mean 'gain'\?"),
+        ("?zzzz=2", r"there is no parameter 'zzzz'; known are: gain, limits, side"),
+        ("?gain", r"'gain' is no parameter; name=value is needed"),
+        ("?gain=1&gain=2", r"the parameter gain is given twice"),
+    ],
+)
+def test_wrong_parameter_is_answered(gains, query, said):
+    with pytest.raises(ControllerError, match=said):
+        find_controller(f"{gains}:Mine{query}")
+
+
+def test_parameters_of_two_runs_tell_their_labels_apart(gains):
+    labels = [find_controller(f"{gains}:Mine{query}").label for query in ("", "?gain=1", "?gain=2", "?side=a/b")]
+    assert labels == ["Mine", "Mine-gain=1", "Mine-gain=2", "Mine-side=a_b"]
+
+
+@pytest.mark.parametrize("given", [5, None, ["ars"], {"ars": 1}, np.zeros(3), object()])
+def test_wrong_object_is_answered(given):
+    with pytest.raises(ControllerError, match=r"controller: is .*; a name \(none, ars, afs\), a file"):
+        simulate("step_steer", given)
+    with pytest.raises(DriverError, match=r"driver: is .*step\(reference, measurement, motion\)"):
+        simulate("step_steer", driver=given)
+
+
+@pytest.mark.parametrize("given", [int, dict, Path])
+def test_class_that_is_no_controller_is_answered(given):
+    with pytest.raises(ControllerError, match=rf"{given.__name__} has no method step\(command, measurement\)"):
+        find_controller(given)
+
+
+def test_factory_that_makes_something_else_is_answered():
+    with pytest.raises(ControllerError, match=r"int has no method step"):
+        find_controller(lambda: 5).make(setup())
+
+
+def test_object_that_cannot_be_copied_is_answered(tmp_path):
+    class Logging(Counting):
+        def __init__(self, path: Path) -> None:
+            super().__init__()
+            self.file = path.open("w")
+
+    mine = Logging(tmp_path / "log")
+    with mine.file, pytest.raises(ControllerError, match=r"Logging cannot be made: TypeError: cannot pickle"):
+        find_controller(mine).make(setup())
+
+
+def test_source_and_parameters_are_recorded():
+    run = simulate("step_steer", Counting(gain=2.0), overrides=SHORT)
+    assert run.metadata["controller"] == "test_plugins.py:Counting"
+    assert run.metadata["controller_parameters"] == {"gain": 2.0, "offset_rad": 0.0, "count": 0}
+    assert run.attachments["test_plugins.py"] == Path(__file__).read_bytes()
+    assert run.metadata["driver"] == "standard"
+    assert "driver_parameters" not in run.metadata
+
+
+# Drivers
+
+
+class Robot:
+    """Steers by time, as the sensors tell it, and brakes."""
+
+    def __init__(self, angle_rad: float = 0.5) -> None:
+        self.angle_rad = angle_rad
+
+    def step(self, reference: Any, measurement: Any, motion: Any) -> DriverCommand:
+        assert math.hypot(motion.x_m, motion.y_m) < 10.0
+        return DriverCommand(self.angle_rad if measurement.time_s > 0.1 else 0.0, brake_pedal=0.1)
+
+
+@pytest.mark.parametrize("given", [Robot, Robot(), lambda: Robot(0.5), f"{__file__}:Robot?angle_rad=0.5"])
+def test_users_driver_drives(given):
+    run = simulate("step_steer", driver=given, overrides=SHORT)
+    time_s = run.time_s
+    # It counts from the beginning of the recording: nothing happens while the car settles.
+    demand = run["front_steer_demand_rad"] * resolve("step_steer").car.config.steering.ratio
+    assert demand[time_s > 0.1011] == pytest.approx(0.5)
+    assert not demand[time_s < 0.0999].any()
+    assert run["brake_pedal"] == pytest.approx(0.1)
+    assert run["yaw_rate_radps"][-1] > 0.01
+    assert run.metadata["driver"].endswith(("Robot", "lambda", "Robot?angle_rad=0.5"))
+
+
+def test_driver_on_a_path_is_given_the_path():
+    class Follower:
+        def __init__(self) -> None:
+            self.paths: set[int] = set()
+
+        def step(self, reference: Any, measurement: Any, motion: Any) -> DriverCommand:
+            assert (reference.path is None) == (measurement.time_s < -1e-9)
+            return DriverCommand()
+
+    simulate("double_lane_change", driver=Follower, overrides={"settle_s": 0.05})
+
+
+@pytest.mark.parametrize(
+    ("expression", "said"),
+    [
+        ("None", r"step returned None; an activesteer\.DriverCommand is needed"),
+        ("SteerCommand()", r"an activesteer\.DriverCommand is needed"),
+        ("DriverCommand(float('nan'))", r"steering_wheel_demand_rad = nan; a finite angle"),
+        ("DriverCommand(90.0)", r"steering_wheel_demand_rad = 90\.0; .*radians, not degrees"),
+        ("DriverCommand(brake_pedal=1.5)", r"brake_pedal = 1\.5; a number from 0 to 1 is needed"),
+        ("DriverCommand(drive_torque_demand_Nm=float('inf'))", r"drive_torque_demand_Nm = inf; a number from"),
+        ("DriverCommand(saturated=None)", r"saturated = None; a number is needed"),
+        ("DriverCommand(wheel_torques=(1, 2, 3, 4))", r"wheel_torques = \(1, 2, 3, 4\); .*WheelTorques"),
+        ("DriverCommand(0.5, front_steer_demand_rad=0.5)", r"front_steer_demand_rad = 0\.5, .*leave it out"),
+        ("1 / 0", r"step raised ZeroDivisionError: .*\(mine\.py, line 5\)"),
+    ],
+)
+def test_nonsense_of_a_driver_is_answered(write, expression, said):
+    path = write(f"class Mine:\n    def step(self, reference, measurement, motion):\n        return {expression}\n")
+    with pytest.raises(DriverError, match=rf"driver .*mine\.py:Mine: .*{said}"):
+        simulate("step_steer", driver=f"{path}:Mine", overrides=SHORT)
+
+
+def test_torques_of_the_wheels_are_checked():
+    class Torquey:
+        def __init__(self, *torques: Any) -> None:
+            self.torques = WheelTorques(*torques)
+
+        def step(self, *_: Any) -> DriverCommand:
+            return DriverCommand(wheel_torques=self.torques)
+
+    simulate("step_steer", driver=Torquey((10.0,) * 4, (0.0,) * 4), overrides=SHORT)
+    for wrong in (((math.nan,) * 4, (0.0,) * 4), ((1.0,) * 3, (0.0,) * 4), (5.0, 5.0)):
+        with pytest.raises(DriverError, match="wheel_torques"):
+            simulate("step_steer", driver=Torquey(*wrong), overrides=SHORT)
+
+
+def test_unknown_driver_is_answered():
+    with pytest.raises(DriverError, match=r"no driver 'standart'; did you mean 'standard'\?.*my_file\.py:MyDriver"):
+        find_driver("standart")
