@@ -219,5 +219,6 @@ def test_controllers_are_told_what_sensors_measure_and_nothing_else():
         "drive_torque_demand_Nm",
         "brake_pedal",
         "saturated",
+        "gear",
         "wheel_torques",
     }
