@@ -75,6 +75,13 @@ def from_file(text: str, kind: Kind) -> FromFile:
     return FromFile(path, content, found, _parameters(form["parameters"] or "", fail))
 
 
+def source_of(text: str) -> dict[str, bytes]:
+    """The file that a text names, by its name, without running it; empty for anything else, as a built-in one."""
+    form = _FORM.fullmatch(text)
+    path = None if form is None else Path(form["path"]).expanduser()
+    return {path.name: path.read_bytes()} if path is not None and path.is_file() else {}
+
+
 def _parameters(text: str, fail: Any) -> dict[str, Any]:
     """`gain=2&side="left"`: split where a name follows, so that a value may hold the sign itself."""
     parameters: dict[str, Any] = {}

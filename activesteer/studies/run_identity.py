@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import activesteer
-from activesteer.controllers.loading import user_file
+from activesteer.plugins.file import source_of
 from activesteer.scenario import Scenario, describe
 from activesteer.version import __version__
 
@@ -68,8 +68,8 @@ def files_digest(scenario: Scenario) -> str:
 
 def controller_digest(controller: str) -> str:
     """Hash of a controller: its name and parameters, and the source where it is a user's own."""
-    path, _, name = controller.rpartition(":")
-    return digest({"name": f"{Path(path).name}:{name}", "source": user_file(controller)})
+    path, _, name = controller.partition(":")
+    return digest({"name": f"{Path(path).name}:{name}", "source": source_of(controller)})
 
 
 def run_id(scenario: Scenario, controller: str, seed: int, timestep_s: float) -> str:
