@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 import tempfile
+import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,7 +28,8 @@ _ROUNDS: Final = 5
 """Every figure is the best of this many rounds: what disturbs a machine only ever makes it slower."""
 _CALLS: Final = 5000
 _CONTROLLER: Final = "ars"
-"""The dearest of the built-in controllers."""
+"""The most costly of the built-in controllers."""
+_RUNS_PER_PROCESS: Final = 4
 
 
 def bench(rounds: int = _ROUNDS) -> dict[str, float]:
@@ -34,13 +39,17 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
         rounds: How often everything is measured; the best counts.
 
     Returns:
-        Microseconds per step: `bare_step_us` (the engine with the same model, without tyres), `plant_step_us` (with
-        tyres, dampers, actuators), `closed_loop_step_us` (and manoeuvre, driver, controller, every channel recorded in
-        memory), `path_following_step_us` (the same in a slalom, with a driver who looks at a path), `with_file_step_us`
-        (the step steer written as MCAP); the ratios of the last three to the first; real-time factors; and `*_us` for
-        each block of the loop.
+        Microseconds per step: `bare_step_us` (the engine with the same model, without tyres and without motion, so that
+        its solver has little to do: the least that a step can cost), `plant_step_us` (with tyres, dampers, actuators),
+        `closed_loop_step_us` (and manoeuvre, driver, controller, every channel recorded in memory),
+        `path_following_step_us` (the same in a slalom, with a driver who looks at a path), `with_file_step_us`
+        (the step steer written as MCAP), `sedan_step_us` (the second car, in memory); the ratios of the closed loops to
+        the first; real-time factors; `threads_2_speedup` (how much faster two simulations come to their ends in two
+        threads of one process than one after the other); `step_steers_per_min` (whole runs, building the car included,
+        by as many processes as there are processors); and `*_us` for each block of the loop.
     """
     scenario, along_path = prepared(resolve("step_steer")), resolve("slalom")
+    sedan = prepared(resolve("step_steer", "sedan"))
     with tempfile.TemporaryDirectory() as folder:
         stages: dict[str, Callable[[], float]] = {
             "bare_step_us": lambda: _bare(scenario),
@@ -48,6 +57,8 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
             "closed_loop_step_us": lambda: _closed_loop(scenario),
             "path_following_step_us": lambda: _closed_loop(along_path),
             "with_file_step_us": lambda: _with_file(scenario, Path(folder) / "bench.mcap"),
+            "sedan_step_us": lambda: _closed_loop(sedan),
+            "two_threads_step_us": lambda: _in_threads(scenario, 2),
         }
         best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
     step_us = 1e6 * Simulation(scenario).vehicle.timestep_s
@@ -56,6 +67,9 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
     best["with_file_to_bare_ratio"] = best["with_file_step_us"] / best["bare_step_us"]
     best["real_time_factor"] = step_us / best["closed_loop_step_us"]
     best["real_time_factor_with_file"] = step_us / best["with_file_step_us"]
+    best["sedan_real_time_factor"] = step_us / best["sedan_step_us"]
+    best["threads_2_speedup"] = best["closed_loop_step_us"] / best.pop("two_threads_step_us")
+    best["step_steers_per_min"] = _runs_per_min()
     return best | _blocks(scenario)
 
 
@@ -142,6 +156,41 @@ def _closed_loop(scenario: Scenario) -> float:
     return _per_step_us(run, simulation.steps)
 
 
+def _in_threads(scenario: Scenario, count: int) -> float:
+    """Microseconds per step of all simulations together, each in a thread of its own."""
+    simulations = [Simulation(scenario, _CONTROLLER) for _ in range(count)]
+    recorders = [Recorder(simulation.vehicle, simulation.steps) for simulation in simulations]
+    pairs = zip(simulations, recorders, strict=True)
+    threads = [threading.Thread(target=simulation.run, args=(recorder,)) for simulation, recorder in pairs]
+
+    def run() -> None:
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for recorder in recorders:
+            recorder.flush()
+
+    return _per_step_us(run, sum(simulation.steps for simulation in simulations))
+
+
+def _runs_per_min() -> float:
+    processes = os.cpu_count() or 1
+    # Spawned: a process with threads, as ours by now is, is not to be forked.
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        # The first runs load the compiled code and search the amplitude.
+        list(pool.map(_step_steers, [1] * processes))
+        start = time.perf_counter()
+        list(pool.map(_step_steers, [_RUNS_PER_PROCESS] * processes))
+        return 60.0 * processes * _RUNS_PER_PROCESS / (time.perf_counter() - start)
+
+
+def _step_steers(count: int) -> None:
+    scenario = prepared(resolve("step_steer"))
+    for _ in range(count):
+        run_scenario(scenario, _CONTROLLER)
+
+
 def _with_file(scenario: Scenario, path: Path) -> float:
     """The run as the command line makes it, less what a run of no length costs: building, settling, opening."""
     simulation = Simulation(scenario, _CONTROLLER)
@@ -188,11 +237,15 @@ def _blocks(scenario: Scenario) -> dict[str, float]:
         simulation.controller,
         simulation.vehicle,
     )
-    recorder = Recorder(vehicle, _CALLS)
+    recorder = Recorder(vehicle, 2 * _CALLS)
     measurement, motion = vehicle.measure(), vehicle.motion()
     reference = maneuver.reference(0.6)
     command = driver.step(reference, measurement, motion)
     steer = controller.step(command, measurement)
+    for _ in range(_CALLS):
+        # So that the rows of the recorder's block hold something when it is measured alone.
+        vehicle.step(command, steer, recorder.row_address)
+        recorder.record(command, steer)
     blocks: dict[str, Callable[[], object]] = {
         "maneuver_us": lambda: maneuver.reference(0.6),
         "driver_us": lambda: driver.step(reference, measurement, motion),
