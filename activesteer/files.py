@@ -140,6 +140,14 @@ def is_file(path: str | os.PathLike[str]) -> bool:
         return False
 
 
+def is_folder(path: str | os.PathLike[str]) -> bool:
+    """Whether there is a folder; a name that no folder can have is none."""
+    try:
+        return stat.S_ISDIR(os.stat(path).st_mode)
+    except (OSError, ValueError):
+        return False
+
+
 def why_no_file(path: str | os.PathLike[str]) -> str:
     """What is at a path where a file was expected, for an error message."""
     try:

@@ -17,7 +17,7 @@ from activesteer.errors import (
     nearest_names,
     shown,
 )
-from activesteer.files import is_file, user_path, why_no_file
+from activesteer.files import is_file, is_folder, user_path, why_no_file
 
 _PACKAGE = Path(__file__).resolve().parent
 
@@ -105,7 +105,7 @@ def find_vehicle(name_or_path: str | os.PathLike[str]) -> Path:
     Raises:
         ParameterError: there is no such vehicle or file; the message names the nearest ones.
     """
-    if name_or_path not in list_vehicles() and (folder := Path(name_or_path).expanduser()).is_dir():
+    if name_or_path not in list_vehicles() and is_folder(folder := user_path(name_or_path, ParameterError)):
         name_or_path = _vehicle_in(folder)
     return _find(name_or_path, models_dir() / "vehicles", "vehicle", ParameterError)
 

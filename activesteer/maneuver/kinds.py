@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from activesteer.config import Source, build
-from activesteer.errors import nearest_names
+from activesteer.errors import nearest_names, shown
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.constant_radius import ConstantRadius
@@ -74,9 +74,10 @@ def maneuver_class(table: Mapping[str, Any], source: Source) -> type[Maneuver]:
         ManeuverError: `kind` is missing or unknown.
     """
     kind = table.get("kind")
-    if kind not in KINDS:
-        problem = "is missing" if kind is None else f"there is no kind {kind!r}"
-        raise source.fail(("kind",), f"{problem}; {nearest_names(str(kind), KINDS)}")
+    if not isinstance(kind, str) or kind not in KINDS:
+        problem = "is missing" if kind is None else f"there is no kind {shown(kind)}"
+        help_ = nearest_names(kind if isinstance(kind, str) else "", KINDS)
+        raise source.fail(("kind",), f"{problem}; {help_}", kind, sorted(KINDS))
     return KINDS[kind]
 
 

@@ -136,8 +136,7 @@ def read_table(
         ActiveSteerError: the file is not found or cannot be read; of class `error`.
     """
     if isinstance(given, Mapping):
-        name = str(given.get("name") or part)
-        return {"name": name, **given}, Source(f"{part} given as a table", error=error), None, {}
+        return {"name": part, **given}, Source(f"{part} given as a table", error=error), None, {}
     if not isinstance(given, (str, os.PathLike)):
         raise error(f"a {part} is a name, a path or a table, not {shown(given)}", value=given)
     path = find(given)

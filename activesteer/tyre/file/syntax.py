@@ -109,20 +109,22 @@ def parse(text: str, source: str) -> Syntax:
         if line[0] == "[":
             match = _SECTION.match(line)
             if not match:
-                raise TyreFileError(f"{source}, line {count}: {line[:60]!r} is no section, expected [NAME]")
+                what = repr(line[:60]) if entries else "this"
+                raise TyreFileError(f"{what} is no section, expected [NAME]", file=source, line=count)
             section = match.group(1).upper()
             continue
         key, equals, rest = (part.strip() for part in line.partition("="))
         if equals:
             if not _KEY.match(key):
-                raise TyreFileError(f"{source}, line {count}: {key[:60]!r} is no key, expected KEY = value")
+                what = repr(key[:60]) if entries else "this"
+                raise TyreFileError(f"{what} is no key, expected KEY = value", file=source, line=count)
             entries.append(Entry(section, key.upper(), _value(rest), count))
             continue
         row = [number(word) for word in line.replace(",", " ").split()]
         if any(value is None for value in row):
-            raise TyreFileError(
-                f"{source}, line {count}: {line[:60]!r} is neither KEY = value, [SECTION], {{heading}} "
-                "nor a row of numbers"
-            )
+            # Before the first key it may be any file, whose content is not ours to print.
+            what = repr(line[:60]) if entries else "this"
+            problem = f"{what} is neither KEY = value, [SECTION], {{heading}} nor a row of numbers"
+            raise TyreFileError(problem, file=source, line=count)
         tables.setdefault(section, []).append(tuple(value for value in row if value is not None))
     return Syntax(tuple(entries), {name: tuple(rows) for name, rows in tables.items()})
