@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from activesteer.config import Range, Source, build, checked_number, read_toml
 from activesteer.controllers import ControllerParameters, SingleTrackParameters
@@ -27,9 +27,22 @@ TIMESTEP_RANGE_S: Final = Range(1e-4, 5e-3)
 FileOrTable = str | os.PathLike[str] | Mapping[str, Any]
 
 
+_MASS_HINT: Final = (
+    "load.payload_kg loads the car, factors.mass scales it; single_track.mass_kg is only what controllers and driver "
+    "believe of it"
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class VehicleConfig(VehicleParameters):
     """A whole vehicle file: the car, what the controllers know of it, and who drives it."""
+
+    KEY_HINTS: ClassVar = {
+        "mass_kg": _MASS_HINT,
+        "load.mass_kg": _MASS_HINT,
+        "load.mass_factor": _MASS_HINT,
+        "payload_kg": _MASS_HINT,
+    }
 
     single_track: SingleTrackParameters
     """The car as the controllers see it."""
@@ -85,7 +98,7 @@ def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | No
 
     Args:
         vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value: `load.mass_factor`, `vehicle.tyres.rear`.
+        overrides: Dotted key -> value: `factors.mass`, `vehicle.tyres.rear`.
 
     Returns:
         The car.
@@ -113,9 +126,13 @@ def car_with(vehicle: FileOrTable, overrides: list[Override]) -> Car:
     files |= {f"tyres/{path.name}": read_bytes(path, TyreFileError) for path in (front, rear)}
     model = mjcf.parent.name.encode("utf-8", "backslashreplace").decode()
     files |= {f"mjcf/{model}/{name}": text for name, text in model_files(mjcf).items()}
-    front_tyre = replace(load_tir(front), conventions=config.tyres.conventions)
-    rear_tyre = front_tyre if rear == front else replace(load_tir(rear), conventions=config.tyres.conventions)
+    front_tyre = _tyre(front, config)
+    rear_tyre = front_tyre if rear == front else _tyre(rear, config)
     return Car(config, mjcf, (front_tyre, rear_tyre), files=files)
+
+
+def _tyre(path: Path, config: VehicleConfig) -> TyreParameters:
+    return config.factors.on_tyre(replace(load_tir(path), conventions=config.tyres.conventions))
 
 
 def read_table(

@@ -114,7 +114,7 @@ def identify(
 
     Args:
         vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value, for the vehicle (`load.mass_factor`) or the road (`road.mu`).
+        overrides: Dotted key -> value, for the vehicle (`factors.mass`) or the road (`road.mu`).
         progress: Called with the name of every test before it is driven.
 
     Returns:

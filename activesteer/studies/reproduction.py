@@ -16,9 +16,8 @@ from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Scorecard, sc
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.files import make_folder
 from activesteer.recording import Recording, check_target
-from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.scenario import FileOrTable, Scenario, load_car, resolve
 from activesteer.simulation.runner import prepared, run_scenario
-from activesteer.simulation.simulation import Simulation
 from activesteer.studies.workers import TaskQueue, in_parallel, workers_for
 
 Progress = Callable[[str, int, int], None]
@@ -156,41 +155,18 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
     return ""
 
 
-class _Car(NamedTuple):
-    """What a change of load is measured by."""
-
-    mass_kg: float
-    chassis_mass_kg: float
-    cg_height_m: float
-
-    @classmethod
-    def of(cls, scenario: Scenario) -> _Car:
-        vehicle = Simulation(scenario).vehicle
-        chassis = vehicle.model.body("chassis")
-        cg = vehicle.data.site("cg").xpos
-        return cls(float(vehicle.model.body_subtreemass[chassis.id]), float(chassis.mass[0]), float(cg[2]))
-
-    def mass(self, share: float) -> dict[str, Any]:
-        """The whole car's mass changed by a share of itself; it is the chassis that gets heavier."""
-        return {"vehicle.load.mass_factor": 1.0 + share * self.mass_kg / self.chassis_mass_kg}
-
-    def cg_height(self, share: float) -> dict[str, Any]:
-        """The whole car's centre of gravity higher by a share; it is the chassis' that is moved."""
-        return {"vehicle.load.cg_height_change_m": share * self.cg_height_m * self.mass_kg / self.chassis_mass_kg}
-
-
-_VARIATIONS: Final[dict[str, Callable[[_Car, Scenario], dict[str, Any]]]] = {
-    "as is": lambda car, scenario: {},
-    "mass -10 %": lambda car, scenario: car.mass(-0.1),
-    "mass +10 %": lambda car, scenario: car.mass(0.1),
-    "CG height -5 %": lambda car, scenario: car.cg_height(-0.05),
-    "CG height +5 %": lambda car, scenario: car.cg_height(0.05),
-    "mu -0.05": lambda car, scenario: {"maneuver.road.mu": scenario.maneuver.road.mu - 0.05},
-    "mu +0.05": lambda car, scenario: {"maneuver.road.mu": scenario.maneuver.road.mu + 0.05},
-    "speed -3 km/h": lambda car, scenario: {"maneuver.speed_mps": scenario.maneuver.speed_mps - 3.0 / 3.6},
-    "speed +3 km/h": lambda car, scenario: {"maneuver.speed_mps": scenario.maneuver.speed_mps + 3.0 / 3.6},
+_VARIATIONS: Final[dict[str, Callable[[float, Scenario], dict[str, Any]]]] = {
+    "as is": lambda height_m, scenario: {},
+    "mass -10 %": lambda height_m, scenario: {"vehicle.factors.mass": 0.9},
+    "mass +10 %": lambda height_m, scenario: {"vehicle.factors.mass": 1.1},
+    "CG height -5 %": lambda height_m, scenario: {"vehicle.load.cg_height_change_m": -0.05 * height_m},
+    "CG height +5 %": lambda height_m, scenario: {"vehicle.load.cg_height_change_m": 0.05 * height_m},
+    "mu -0.05": lambda height_m, scenario: {"maneuver.road.mu": scenario.maneuver.road.mu - 0.05},
+    "mu +0.05": lambda height_m, scenario: {"maneuver.road.mu": scenario.maneuver.road.mu + 0.05},
+    "speed -3 km/h": lambda height_m, scenario: {"maneuver.speed_mps": scenario.maneuver.speed_mps - 3.0 / 3.6},
+    "speed +3 km/h": lambda height_m, scenario: {"maneuver.speed_mps": scenario.maneuver.speed_mps + 3.0 / 3.6},
 }
-"""What is varied, one at a time: overrides by what the variation is called."""
+"""What is varied, one at a time: what it is called -> height of the centre of gravity [m], scenario -> overrides."""
 
 
 def robustness(
@@ -210,9 +186,9 @@ def robustness(
         ActiveSteerError: an input is wrong, or a run failed.
     """
     scenarios = {name: resolve(name, vehicle) for name in SCENARIOS}
-    car = _Car.of(next(iter(scenarios.values())))
+    height_m = float(load_car(vehicle).on().data.site("cg").xpos[2])
     tasks = [
-        (label, name, vary(car, scenario))
+        (label, name, vary(height_m, scenario))
         for label, vary in _VARIATIONS.items()
         for name, scenario in scenarios.items()
     ]

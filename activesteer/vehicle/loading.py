@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Final
 
 import mujoco
-import numpy as np
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError, nearest_names
 from activesteer.road.road import Road
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.load import apply_load
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, DamperCurve, VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 
@@ -53,7 +53,7 @@ def load_model(
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         spec.nuserdata = len(CORNERS) * (fb.USERDATA_PER_WHEEL + 1)
         _fit_actuators(spec, parameters)
-        _load_chassis(spec, parameters)
+        apply_load(spec, parameters)
         block = _force_block(spec.compile(), parameters, tyres, road).to_array()
         start = sum(len(numeric.data) for numeric in spec.numerics)
         spec.add_numeric(name=fb.BLOCK_NAME, size=block.size + fb.TRAILER_SIZE, data=fb.with_trailer(block, start))
@@ -82,18 +82,6 @@ def _friction(actuator: str, parameters: VehicleParameters) -> tuple[float, floa
         return friction.rack_N, friction.rack_stiffness_Npm
     force = friction.front_damper_N if actuator.startswith("f") else friction.rear_damper_N
     return force, friction.damper_stiffness_Npm
-
-
-def _load_chassis(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    chassis = spec.body("chassis")
-    if chassis is None:
-        msg = "there is no body 'chassis'"
-        raise ModelError(msg)
-    factor = parameters.load.mass_factor
-    chassis.mass *= factor
-    chassis.inertia = np.asarray(chassis.inertia) * factor
-    chassis.fullinertia = np.asarray(chassis.fullinertia) * factor
-    chassis.ipos = np.add(chassis.ipos, (0.0, 0.0, parameters.load.cg_height_change_m))
 
 
 def chain_to(model: mujoco.MjModel, body: int) -> list[int]:
@@ -157,7 +145,8 @@ def _force_block(
     for corner in CORNERS:
         front = corner.startswith("f")
         block.wheels.append(_wheel(model, corner, parameters, tyres[0 if front else 1], road))
-        block.dampers.append(_damper(model, corner, parameters.dampers.front if front else parameters.dampers.rear))
+        curve = parameters.dampers.front if front else parameters.dampers.rear
+        block.dampers.append(_damper(model, corner, curve, parameters.factors.damper))
     for name in ("rack_friction", *(f"{corner}_damper_friction" for corner in CORNERS)):
         if _friction(name, parameters)[0] > 0.0:
             # Friction in the vehicle file is not to be lost because the model has no place for it.
@@ -210,11 +199,11 @@ def _activation(model: mujoco.MjModel, actuator: str) -> int:
     return address
 
 
-def _damper(model: mujoco.MjModel, corner: str, curve: DamperCurve) -> fb.DamperEntry:
+def _damper(model: mujoco.MjModel, corner: str, curve: DamperCurve, factor: float) -> fb.DamperEntry:
     tendon = find(model, mujoco.mjtObj.mjOBJ_TENDON, f"{corner}_damper")
     row, length = int(model.ten_J_rowadr[tendon]), int(model.ten_J_rownnz[tendon])
     chain = [int(dof) for dof in model.ten_J_colind[row : row + length]]
-    return fb.DamperEntry(tendon, row, chain, list(curve.velocity_mps), list(curve.force_N))
+    return fb.DamperEntry(tendon, row, chain, list(curve.velocity_mps), [factor * force for force in curve.force_N])
 
 
 def _actuator(

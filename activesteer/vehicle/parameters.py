@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
 from activesteer.tyre.conventions import TyreConventions
+from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.force_block import MAX_CURVE_POINTS
 
 Positive = Annotated[float, Range(1e-12)]
 NotNegative = Annotated[float, Range(0.0)]
 Share = Annotated[float, Range(0.0, 1.0)]
+Position = Annotated[tuple[float, ...], Range(-20.0, 20.0)]
 
 
 @dataclass(frozen=True)
@@ -156,12 +158,69 @@ class Aerodynamics:
 
 @dataclass(frozen=True)
 class Load:
-    """A change of the chassis as modelled: more or less mass, a higher or lower centre of gravity."""
+    """What the car carries beside what is in its model: masses at points of the chassis; see `load`."""
 
-    mass_factor: Annotated[float, Range(0.5, 2.0)] = 1.0
-    """Mass and inertia of the chassis body times this [-]."""
+    KEY_HINTS: ClassVar = {"mass_factor": "factors.mass scales the whole car, load.payload_kg loads it"}
+
+    payload_kg: Annotated[float, Range(0.0, 2000.0)] = 0.0
+    """Persons and luggage beside the driver [kg]."""
+    payload_position_m: Position | None = None
+    """Their centre of gravity, vehicle axes [m]; above the middle of the rear axle, 0.6 m high, where not given."""
+    roof_kg: Annotated[float, Range(0.0, 500.0)] = 0.0
+    """Load on the roof [kg], over the middle of the wheelbase."""
+    roof_height_m: Annotated[float, Range(0.5, 4.0)] = 1.6
+    """Height of its centre of gravity above the road [m]."""
+    fuel_kg: Annotated[float, Range(-100.0, 200.0)] = 0.0
+    """Fuel beside that in the model [kg]; negative is less."""
+    fuel_position_m: Position | None = None
+    """The tank, vehicle axes [m]; 0.4 m ahead of the rear axle, 0.35 m high, where not given."""
     cg_height_change_m: Annotated[float, Range(-0.3, 0.3)] = 0.0
-    """The chassis body's centre of gravity is moved up by this [m]."""
+    """The empty car's centre of gravity is moved up by this [m]; it is the chassis' that moves."""
+
+    def __post_init__(self) -> None:
+        """Checks the positions.
+
+        Raises:
+            ParameterError: one is not three numbers.
+        """
+        for name in ("payload_position_m", "fuel_position_m"):
+            position = getattr(self, name)
+            if position is not None and len(position) != 3:
+                raise ParameterError(f"{name}: {len(position)} numbers given; 3 are needed")
+
+
+@dataclass(frozen=True)
+class Factors:
+    """Factors on the car as modelled, 1 each; see `load`."""
+
+    mass: Annotated[float, Range(0.5, 2.0)] = 1.0
+    """On the mass of the empty car: the chassis takes all of the difference, its inertia in proportion to its mass."""
+    spring_rate: Annotated[float, Range(0.2, 5.0)] = 1.0
+    """On the rates of the springs; what they carry in the design position stays, and so does the ride height."""
+    anti_roll_bar: Annotated[float, Range(0.0, 10.0)] = 1.0
+    """On the stiffnesses of the anti-roll bars."""
+    damper: Annotated[float, Range(0.0, 10.0)] = 1.0
+    """On the forces of the dampers' curves."""
+    tyre_friction: Annotated[float, Range(0.1, 2.0)] = 1.0
+    """On the tyres' LMUX and LMUY."""
+    tyre_cornering_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
+    """On the tyres' LKY."""
+    tyre_slip_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
+    """On the tyres' LKX."""
+    tyre_vertical_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
+    """On the tyres' LCZ."""
+
+    def on_tyre(self, tyre: TyreParameters) -> TyreParameters:
+        """The tyre with its own scale factors multiplied; itself where nothing is to be scaled."""
+        scales = {
+            "LMUX": self.tyre_friction,
+            "LMUY": self.tyre_friction,
+            "LKX": self.tyre_slip_stiffness,
+            "LKY": self.tyre_cornering_stiffness,
+            "LCZ": self.tyre_vertical_stiffness,
+        }
+        changes = {key: factor * tyre[key] for key, factor in scales.items() if factor != 1.0}
+        return tyre.with_values(**changes) if changes else tyre
 
 
 @dataclass(frozen=True)
@@ -182,3 +241,6 @@ class VehicleParameters:
     friction: Friction = Friction()
     """None where not given."""
     load: Load = Load()
+    """Nothing where not given."""
+    factors: Factors = Factors()
+    """All 1 where not given."""

@@ -136,11 +136,11 @@ def test_last_of_two_values_counts(call):
 def test_maneuver_and_vehicle_may_be_files(call, tmp_path):
     (tmp_path / "roll.toml").write_text('kind = "open_loop"\nspeed_kmh = 30\nduration_s = 0.2\nsettle_s = 0\n')
     shipped = find_vehicle("compact").read_text()
-    (tmp_path / "heavy.toml").write_text(shipped + "\n[load]\nmass_factor = 1.2\n")
+    (tmp_path / "heavy.toml").write_text(shipped + "\n[factors]\nmass = 1.2\n")
     assert call("run", "roll.toml", "--vehicle", "heavy.toml", "-o", "out").status == 0
     recording = Recording.open(tmp_path / "out" / "roll-none.mcap")
     assert recording.metadata["vehicle"]["name"] == "heavy"
-    assert recording.metadata["vehicle"]["load"]["mass_factor"] == 1.2
+    assert recording.metadata["vehicle"]["factors"]["mass"] == 1.2
     assert recording.attachments["vehicle.toml"] == (tmp_path / "heavy.toml").read_bytes()
 
 

@@ -47,7 +47,7 @@ def test_characteristic_speed_is_that_of_the_class():
 
 
 def test_heavier_car_is_seen_by_the_identification():
-    heavier = identify_single_track("compact", {"load.mass_factor": 1.1})
+    heavier = identify_single_track("compact", {"factors.mass": 1.1})
     assert heavier.mass_kg > single_track().mass_kg + 100.0
 
 

@@ -29,7 +29,7 @@ def kinematics_compliance(
 
     Args:
         vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key of the vehicle -> value, as `load.mass_factor`.
+        overrides: Dotted key of the vehicle -> value, as `factors.mass`.
         targets: File with target bands; the one of the vehicle's name in `models/targets` where not given.
 
     Returns:

@@ -64,7 +64,7 @@ def test_overrides_reach_manoeuvre_and_vehicle_in_any_unit():
             "maneuver.title": "slow",
             "controllers.ars.limit_deg": 2,
             "vehicle.driver.speed_gain_Nmspm": 1000.0,
-            "load.mass_factor": 1.1,
+            "factors.mass": 1.1,
         },
     )
     assert scenario.maneuver.speed_mps == pytest.approx(20.0)
@@ -72,7 +72,7 @@ def test_overrides_reach_manoeuvre_and_vehicle_in_any_unit():
     assert scenario.maneuver.title == "slow"
     assert scenario.car.config.controllers.ars.limit_rad == pytest.approx(math.radians(2.0))
     assert scenario.car.config.driver.speed_gain_Nmspm == 1000.0
-    assert scenario.car.config.load.mass_factor == 1.1
+    assert scenario.car.config.factors.mass == 1.1
     assert scenario.maneuver.road.mu == 0.4
     assert scenario.controller_setup(0.002).mu == 0.4
 

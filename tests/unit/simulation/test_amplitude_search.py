@@ -68,7 +68,7 @@ def test_ramp_to_the_right_would_give_the_same_angle():
 
 
 def test_heavier_car_has_an_angle_of_its_own():
-    assert dwell_deg(load__mass_factor=1.2) != dwell_deg()
+    assert dwell_deg(factors__mass=1.2) != dwell_deg()
 
 
 def test_found_angle_is_described_beside_its_aim():

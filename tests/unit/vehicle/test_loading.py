@@ -60,15 +60,3 @@ def test_an_unchanged_copy_loads(tmp_path: Path) -> None:
     path = changed_model(tmp_path, "compact.xml", 'model="compact"', 'model="copy"')
     vehicle = dataclasses.replace(load_car(), mjcf=path).on()
     assert vehicle.model.nv > 30
-
-
-def test_the_load_changes_mass_and_centre_of_gravity() -> None:
-    plain, loaded = (
-        load_car().on(),
-        load_car(overrides={"load.mass_factor": 1.2, "load.cg_height_change_m": 0.1}).on(),
-    )
-    chassis = plain.model.body("chassis").id
-    assert loaded.model.body_mass[chassis] == pytest.approx(1.2 * plain.model.body_mass[chassis])
-    assert loaded.model.body_inertia[chassis] == pytest.approx(1.2 * plain.model.body_inertia[chassis])
-    assert loaded.model.body_ipos[chassis, 2] == pytest.approx(plain.model.body_ipos[chassis, 2] + 0.1)
-    assert loaded.data.qpos[2] < plain.data.qpos[2] - 0.01
