@@ -73,7 +73,7 @@ def test_wheel_loads_are_those_of_a_calculation_by_hand(name: str, vehicle: str)
         *carried(empty, overrides),
     ]
     moment = moment + sum(mass * (origin + rotation @ place) for mass, place in sprung)
-    cg_m = moment / mass_kg
+    cg_m = np.asarray(moment) / mass_kg
     loads, places = [], []
     for corner in CORNERS:
         loads.append(record(loaded, corner, fb.U_FZ))
