@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.errors import ParameterError
+from activesteer.config import parse_value
+from activesteer.errors import MAX_SHOWN, ParameterError
 
 if TYPE_CHECKING:
     from activesteer.scenario import Scenario
@@ -162,16 +162,18 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
     """
     from activesteer.scenario import resolve
 
-    return resolve(options.maneuver, options.vehicle, dict(_override(text) for text in options.overrides))
+    overrides: dict[str, Any] = {}
+    for key, value in map(_override, options.overrides):
+        if key in overrides:
+            raise ParameterError("is given twice; leave one out", key=key, value=value, overridden=True)
+        overrides[key] = value
+    return resolve(options.maneuver, options.vehicle, overrides)
 
 
 def _override(text: str) -> tuple[str, Any]:
     """`key=value`, the value as in TOML; what is no TOML value is a text."""
     key, sign, value = text.partition("=")
     if not sign or not key:
-        msg = f"--set {text}: KEY=VALUE is needed, as in --set road.mu=0.4"
-        raise ParameterError(msg)
-    try:
-        return key.strip(), tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return key.strip(), value
+        shortened = text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
+        raise ParameterError(f"--set {shortened}: KEY=VALUE is needed, as in --set road.mu=0.4", value=text)
+    return key.strip(), parse_value(value)
