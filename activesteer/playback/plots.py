@@ -124,7 +124,7 @@ def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
         run: The run.
         alone: Whether it is the only run: the lines of several are distinguished by the colours of the runs.
     """
-    when = times(run.recording.time_s[run.rows])
+    when = times(run.recording.time_s)
     for plot in (*MOTION, *WHEELS, *links(run)):
         own_colours = alone or plot not in MOTION
         for path, lines in _entities(run, plot):
@@ -136,7 +136,7 @@ def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
             stream.log(path, look, static=True)
             values = np.stack([run.channel(line.channel) * _factor(line.channel) for line in lines], axis=1)
             columns = rr.Scalars.columns(scalars=values.reshape(-1))
-            stream.send_columns(path, when, columns.partition(lengths=[len(lines)] * len(run.rows)))
+            stream.send_columns(path, when, columns.partition(lengths=[len(lines)] * len(run.recording)))
 
 
 def _factor(channel: str) -> float:

@@ -27,12 +27,11 @@ class Run(NamedTuple):
     """A recording as it is shown.
 
     Attributes:
-        recording: The recording.
+        recording: The recording, with the rows that are shown: about `PLOT_RATE_HZ` of them in a second.
         name: What it is called in entity paths; of several, numbered, since the viewer sorts by it.
         short: What it was called by whoever asked for it, such as `ars`.
         label: What it is called in legends and titles.
         colour: Its colour, `#rrggbb`.
-        rows: Rows of the recording that are shown, about `PLOT_RATE_HZ` of them in a second.
         poses: Sets of poses that can be shown; a run that diverged ends with some that cannot.
     """
 
@@ -41,7 +40,6 @@ class Run(NamedTuple):
     short: str
     label: str
     colour: str
-    rows: NDArray[np.intp]
     poses: NDArray[np.intp]
 
     @property
@@ -51,7 +49,7 @@ class Run(NamedTuple):
 
     def channel(self, name: str) -> NDArray[np.float64]:
         """A channel at the rows that are shown."""
-        return self.recording[name][self.rows]
+        return self.recording[name]
 
     def has(self, *names: str) -> bool:
         """Whether the recording has all these channels."""
@@ -82,9 +80,8 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
         path = re.sub(r"\W", "_", name, flags=re.ASCII)
         path = f"{number}_{path}" if len(ordered) > 1 else path
         colour = colours.get(name) or COLOURS[next(spare) % len(COLOURS)]
-        runs.append(
-            Run(recording, path or "run", name, SYSTEM_LABELS.get(name, name), colour, _shown(recording.time_s), poses)
-        )
+        shown = recording.at(_shown(recording.time_s))
+        runs.append(Run(shown, path or "run", name, SYSTEM_LABELS.get(name, name), colour, poses))
     return runs
 
 

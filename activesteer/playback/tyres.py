@@ -38,7 +38,7 @@ def send_tyre_forces(stream: rr.RecordingStream, run: Run) -> None:
     colours = use_colours(np.stack([run.channel(f"{corner}_friction_use") for corner in CORNERS], axis=1))
     # A run that diverged ends with numbers that cannot be drawn.
     good = np.isfinite(origins).all(axis=(1, 2)) & np.isfinite(vectors).all(axis=(1, 2))
-    when, four = times(run.recording.time_s[run.rows][good]), [len(CORNERS)] * int(good.sum())
+    when, four = times(run.recording.time_s[good]), [len(CORNERS)] * int(good.sum())
     painted = colours[good].reshape(-1)
     arrows = f"{run.scene}/tyres/force"
     stream.log(arrows, rr.Arrows3D.from_fields(radii=[_ARROW_RADIUS_M], colors=[_ARROW_COLOUR]), static=True)
@@ -64,7 +64,7 @@ def force_arrows(run: Run) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     Returns:
         Origins and vectors [m], each of shape (number of shown rows, 4, 3).
     """
-    origins = np.empty((len(run.rows), len(CORNERS), 3), np.float32)
+    origins = np.empty((len(run.recording), len(CORNERS), 3), np.float32)
     vectors = np.zeros_like(origins)
     origins[:, :, 2] = _ABOVE_ROAD_M
     for wheel, corner in enumerate(CORNERS):

@@ -187,6 +187,18 @@ class Recording:
         """All channel values, shape (n, number of channels), read-only; of a long recording that is much memory."""
         return _frozen(self._values.values()) if isinstance(self._values, FileRows) else self._values
 
+    def at(self, rows: NDArray[np.intp]) -> Recording:
+        """The same run with some of its rows, in memory; all poses are kept.
+
+        Args:
+            rows: Which ones, ascending.
+        """
+        values = self._values.at(rows) if isinstance(self._values, FileRows) else self._values[rows]
+        return Recording(
+            self._channels, self._time_s[rows], values, poses=self.poses, metadata=self.metadata,
+            metrics=self.metrics, attachments=self.attachments, scene=self.scene,
+        )  # fmt: skip
+
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """Return a channel over time, shape (n,), read-only; `RecordingError` where there is none of that name."""
         column = self._channels.index(name)

@@ -219,6 +219,17 @@ class FileRows:
             found = self._load(columns)[columns.index(column)]
         return found.astype(np.float64)
 
+    def at(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+        """The values of all channels in some rows, in ascending order, shape (len(rows), number of channels)."""
+        values = np.empty((len(rows), len(self._types)), order="F")
+        done = before = 0
+        for block in self.blocks():
+            stop = int(np.searchsorted(rows, before + len(block.row_ns)))
+            for column, part in block.columns.items():
+                values[done:stop, column] = part[rows[done:stop] - before]
+            done, before = stop, before + len(block.row_ns)
+        return values
+
     def values(self) -> NDArray[np.float64]:
         """The values of all channels, shape (n, number of channels)."""
         return values_of(self.blocks(), self._rows, len(self._types))

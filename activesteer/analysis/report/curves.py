@@ -26,6 +26,8 @@ RATE_HZ: Final = 200.0
 """Most samples of a signal in a second; the car's own motion ends below 20 Hz."""
 MAX_SAMPLES: Final = 4000
 """Most samples of a signal in all: twice what the widest screen shows, until one zooms in."""
+MAX_STEP_S: Final = 0.02
+"""Most from one sample to the next as long as samples can stand for the signal [s]: 25 Hz are seen at this rate."""
 DIGITS: Final = 4
 """Digits after the first of a signal's range; more cannot be seen."""
 
@@ -137,7 +139,7 @@ def _panel(panel: Panel, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
                 # A run of an older version, or of another program, may lack it; the others are shown.
                 continue
             if values is not None:
-                sampled = _sampled(run.recording.time_s, values * panel.quantity.factor, grid)
+                sampled = _reduced(run.recording.time_s, values * panel.quantity.factor, grid)
                 series.append({"run": number, "dashed": line > 0, "values": _rounded(sampled)})
     note = panel.note if any(item["dashed"] for item in series) else ""
     shown = panel.quantity
@@ -147,6 +149,24 @@ def _panel(panel: Panel, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
 def _sampled(time_s: Array, values: Array, grid: Array) -> Array:
     """Values at the instants of the grid; nan before and after the run."""
     return np.interp(grid, time_s, values, left=math.nan, right=math.nan)
+
+
+def _reduced(time_s: Array, values: Array, grid: Array) -> Array:
+    """Values for a curve; of a run too long for all of its motion, the extremes, so that no peak is lost.
+
+    Two instants of the grid take the least and the greatest value between the first of them and the next pair.
+    """
+    if len(grid) < 2 or grid[1] - grid[0] <= MAX_STEP_S:
+        return _sampled(time_s, values, grid)
+    starts = np.searchsorted(time_s, grid[::2])
+    ends = np.append(starts[1:], len(time_s))
+    filled = starts < ends
+    first, last = starts[filled], ends[filled] - 1
+    low, high = np.fmin.reduceat(values, first), np.fmax.reduceat(values, first)
+    rising = values[last] >= values[first]
+    pairs = np.full((len(starts), 2), math.nan)
+    pairs[filled] = np.column_stack([np.where(rising, low, high), np.where(rising, high, low)])
+    return pairs.reshape(-1)[: len(grid)]
 
 
 def _rounded(values: Array, decimals: int | None = None) -> list[float | None]:

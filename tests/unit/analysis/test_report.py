@@ -223,6 +223,24 @@ def test_recording_that_lacks_channels_shows_the_others():
     assert group["track"] is None
 
 
+@pytest.mark.parametrize("peak", [5.0, -5.0])
+def test_curve_of_a_long_run_keeps_every_peak(peak: float):
+    time_s = np.arange(200_000) * 1e-3
+    values = np.sin(0.1 * time_s)
+    values[[0, 123_457, 199_999]] = peak
+    run = Recording([Channel("ay_mps2", "m/s2", "", "vehicle")], time_s, values[:, None])
+    (group,) = data_of(report_page({"long.mcap": run}))
+    (panel,) = group["panels"]
+    shown = panel["series"][0]["values"]
+    assert len(shown) == group["samples"] <= MAX_SAMPLES
+    found = np.flatnonzero(np.array(shown) == peak) * group["step_s"]
+    assert found == pytest.approx([0.0, 123.457, 199.999], abs=2.0 * group["step_s"])
+    plain = np.abs(np.array(shown)) < 2.0
+    assert plain.sum() == len(shown) - 3
+    times = np.arange(len(shown)) * group["step_s"]
+    assert np.array(shown)[plain] == pytest.approx(np.sin(0.1 * times[plain]), abs=0.2 * group["step_s"] + 1e-3)
+
+
 def test_text_of_a_recording_cannot_become_markup():
     evil = "</script><script>alert(1)</script>"
     run = recording_of(step_steer(), evil, {"title": evil, "name": evil, "note": evil}, overrides={evil: evil})

@@ -88,12 +88,12 @@ def test_force_arrows_stand_at_the_contact_points_and_turn_with_the_wheels() -> 
     recording = circle()
     (run,) = runs_of({"ars": recording})
     origins, vectors = force_arrows(run)
-    assert np.allclose(origins[:, 1, 0], recording["fr_contact_x_m"][run.rows], atol=1e-5)
+    assert np.allclose(origins[:, 1, 0], run.recording["fr_contact_x_m"], atol=1e-5)
     assert np.allclose(np.linalg.norm(vectors, axis=-1), synthetic.FY_N / FORCE_SCALE_NPM, rtol=1e-5)
     # A side force points a quarter turn to the left of where the wheel points.
     for wheel, steer in ((0, synthetic.STEER_RAD), (3, 0.0)):
         angle = np.unwrap(np.arctan2(vectors[:, wheel, 1], vectors[:, wheel, 0]))
-        assert np.allclose(angle, recording["yaw_rad"][run.rows] + steer + 0.5 * math.pi, atol=1e-5)
+        assert np.allclose(angle, run.recording["yaw_rad"] + steer + 0.5 * math.pi, atol=1e-5)
 
 
 def test_friction_use_goes_from_green_to_red() -> None:
@@ -111,10 +111,10 @@ def test_plots_are_in_degrees_and_hold_the_recorded_values(tmp_path: Path) -> No
     rrd = saved(tmp_path, {"ars": recording})
     for channel, factor in (("yaw_rate_radps", math.degrees(1.0)), ("ay_mps2", 1.0), ("rear_steer_rad", 180 / math.pi)):
         values = rrd.numbers(f"/ars/plots/{channel}", "Scalars:scalars")[:, 0]
-        assert np.allclose(values, recording[channel][run.rows] * factor)
-        assert np.allclose(rrd.time_s(f"/ars/plots/{channel}"), recording.time_s[run.rows])
+        assert np.allclose(values, run.recording[channel] * factor)
+        assert np.allclose(rrd.time_s(f"/ars/plots/{channel}"), run.recording.time_s)
     together = rrd.numbers("/ars/plots/tyre_fy_N", "Scalars:scalars")
-    assert together.shape == (len(run.rows), 4)
+    assert together.shape == (len(run.recording), 4)
     assert together == pytest.approx(1e-3 * synthetic.FY_N)  # kN
 
 

@@ -41,7 +41,7 @@ def test_names_are_fit_for_paths_and_differ() -> None:
 def test_a_hundred_samples_a_second_are_shown_from_the_first_to_the_last() -> None:
     recording = circle(2.0)
     (run,) = runs_of({"ars": recording})
-    shown = recording.time_s[run.rows]
+    shown = run.recording.time_s
     assert shown[0] == recording.time_s[0]
     assert shown[-1] == recording.time_s[-1]
     assert np.allclose(np.diff(shown)[:-1], 0.01)
