@@ -123,6 +123,21 @@ def metric_label(name: str) -> tuple[str, str, float]:
     return words, unit.name, unit.factor
 
 
+_COUNTS: Final = frozenset({"cones_hit", "cones_missed", "all_wheels_in_lanes"})
+
+
+def metric_number(name: str, value: float) -> str:
+    """The value of a metric as tables show it, in the unit of `metric_label`; `-` where it is not defined (nan).
+
+    Args:
+        name: Name with unit suffix.
+        value: Its value, SI.
+    """
+    if math.isnan(value):
+        return "-"
+    return f"{value:.0f}" if name in _COUNTS else f"{value * metric_label(name)[2]:.3f}"
+
+
 def _row(
     channel: str, label: str, digits: int, min_span: float, short: str = "", unit: DisplayUnit | None = None
 ) -> Quantity:

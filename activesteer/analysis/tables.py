@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
-from activesteer.quantities import metric_label
+from activesteer.quantities import metric_label, metric_number
 
 
 def comparison(runs: Mapping[str, Mapping[str, float]]) -> str:
@@ -21,16 +20,11 @@ def comparison(runs: Mapping[str, Mapping[str, float]]) -> str:
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows = [["", "", *runs]]
     for name in names:
-        words, unit, factor = metric_label(name)
-        rows.append([words, unit, *(_number(metrics.get(name), factor) for metrics in runs.values())])
+        words, unit, _ = metric_label(name)
+        numbers = [metric_number(name, metrics[name]) if name in metrics else "" for metrics in runs.values()]
+        rows.append([words, unit, *numbers])
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return "\n".join(_line(row, widths) for row in rows)
-
-
-def _number(value: float | None, factor: float) -> str:
-    if value is None:
-        return ""
-    return "-" if math.isnan(value) else f"{value * factor:.3f}"
 
 
 def _line(row: list[str], widths: list[int]) -> str:

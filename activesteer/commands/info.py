@@ -6,7 +6,8 @@ import argparse
 from typing import Any
 
 from activesteer.commands.arguments import add_recording
-from activesteer.commands.output import print_plain
+from activesteer.commands.output import print_entry
+from activesteer.files import shown_path
 
 
 def add_to(commands: Any) -> None:
@@ -24,20 +25,22 @@ def _info(options: argparse.Namespace) -> int:
     metadata = recording.metadata
     time_s = recording.time_s
     span = f"{time_s[0]:.3f} to {time_s[-1]:.3f} s, {len(time_s)} steps" if len(time_s) else "no steps"
-    print_plain(f"{options.file}: {span}")
+    print(f"{shown_path(options.file)}: {span}")
     for key in ("maneuver", "vehicle"):
         table = metadata.get(key, {})
-        print_plain(f"{key}: {table.get('name', '?')} {table.get('title', '')}".rstrip())
-    print_plain(f"controller: {metadata.get('controller', '?')}")
+        print_entry(f"{key}: ", f"{table.get('name', '?')} {table.get('title', '')}")
+    print_entry("controller: ", str(metadata.get("controller", "?")))
     for key in ("overrides", "versions"):
         if metadata.get(key):
-            print_plain(f"{key}: " + ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
+            print_entry(f"{key}: ", ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
     if not metadata.get("complete", True):
-        print_plain(f"INCOMPLETE: {metadata.get('error', 'the run did not end properly')}")
+        print_entry("INCOMPLETE: ", str(metadata.get("error", "the run did not end properly")))
     if recording.metrics:
         print(comparison({"metrics": recording.metrics}))
     print("channels:")
+    width = max((len(channel.name) for channel in recording.channels), default=0)
     for channel in recording.channels:
-        print(f"  {channel.name:32} {channel.unit or '-':6} {channel.meaning}")
-    print_plain("attachments: " + ", ".join(recording.attachments))
+        head = f"  {channel.name:{width}} {channel.unit or '-':6} "
+        print_entry(head, channel.meaning, len(head))
+    print_entry("attachments: ", ", ".join(recording.attachments))
     return 0

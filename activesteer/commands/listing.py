@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import Any, Final
+
+from activesteer.commands.output import print_entry
+
+_WIDTH: Final = 25
+"""Of the column of names."""
 
 
 def add_to(commands: Any) -> None:
@@ -20,11 +25,11 @@ def _list(_options: argparse.Namespace) -> int:
     print("manoeuvres:")
     for name in list_maneuvers():
         title = read_toml(find_maneuver(name))[0].get("title", "")
-        print(f"  {name:24} {title}")
+        print_entry(f"  {name:{_WIDTH}} ", title, _WIDTH + 3)
     print("controllers:")
     for name, made_from in BUILT_IN.items():
-        print(f"  {name:24} {(made_from.__doc__ or '').splitlines()[0]}")
-    print("  my_file.py:MyController  a class of your own with step(self, command, measurement)")
+        print_entry(f"  {name:{_WIDTH}} ", (made_from.__doc__ or "").splitlines()[0], _WIDTH + 3)
+    print_entry(f"  {'my_file.py:MyController':{_WIDTH}} ", "your own: step(self, command, measurement)", _WIDTH + 3)
     print("vehicles:")
     for name in list_vehicles():
         print(f"  {name}")

@@ -5,12 +5,19 @@ from __future__ import annotations
 import json
 import logging
 import math
+import os
+import re
+import sys
+import textwrap
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final
 
-_COLOURS: Final = {"passed": "32", "holds": "32", "FAILED": "31", "known": "33"}
+_COLOURS: Final = {"passed": 32, "FAILED": 31, "not reproduced": 33}
 """Verdict -> what makes a terminal write green, red or yellow."""
+_VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
+
+_COLUMNS: Final = 80
 
 
 def print_json(value: Any) -> None:
@@ -18,9 +25,27 @@ def print_json(value: Any) -> None:
     print(json.dumps(_finite(value), indent=2))
 
 
-def print_plain(text: str) -> None:
-    """Prints a line that comes from a file; what would move the cursor or change colours is shown instead."""
-    print("".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text))
+def coloured(text: str) -> str:
+    """The text with its verdicts in colour where a terminal shows it and NO_COLOR does not forbid it (no-color.org)."""
+    if not sys.stdout.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return text
+    return _VERDICT.sub(lambda found: f"{found[1]}\x1b[{_COLOURS[found[2]]}m{found[2]}\x1b[0m", text)
+
+
+def print_entry(head: str, text: str, hanging: int = 2) -> None:
+    """Prints a line of 80 columns, or several of which the further ones hang.
+
+    Args:
+        head: What it begins with, kept as it is.
+        text: What follows. It may come from a file of anybody's: what a terminal would obey is written out.
+        hanging: How far the further lines hang.
+    """
+    plain = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+    lines = textwrap.wrap(
+        plain, _COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, break_on_hyphens=False,
+        break_long_words=False,
+    )  # fmt: skip
+    print("\n".join(lines) or head.rstrip())
 
 
 def _finite(value: Any) -> Any:

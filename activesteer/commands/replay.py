@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections import Counter
 from pathlib import Path
@@ -31,6 +32,8 @@ def add_to(commands: Any) -> None:
 
 
 def _replay(options: argparse.Namespace) -> int:
+    # rerun's own threads write to the terminal, in colours, what we say ourselves.
+    os.environ.setdefault("RUST_LOG", "warn,re_log_encoding=off,re_sdk=off")
     from activesteer.playback import runs_of, save, serve, show
     from activesteer.recording import Recording
 

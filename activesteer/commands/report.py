@@ -22,6 +22,10 @@ def add_to(commands: Any) -> None:
 
 def _report(options: argparse.Namespace) -> int:
     from activesteer.analysis.report import open_all, write_report
+    from activesteer.errors import ParameterError
+
+    if options.output.suffix.lower() not in {".html", ".htm"}:
+        raise ParameterError(f"-o {options.output}: a report is a page, whose name ends in .html; a browser prints it")
 
     print(f"report: {write_report(open_all(options.files), options.output)}")
     return 0

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import add_jobs, add_json, add_output, add_vehicle
-from activesteer.commands.output import print_json
+from activesteer.commands.output import coloured, print_json
 from activesteer.commands.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def _reproduce(options: argparse.Namespace) -> int:
         table["report"] = None if report is None else str(report)
         print_json({**table, "failures": failures, "exit_status": result.exit_status})
         return result.exit_status
-    print(result.scorecard.to_text())
+    print(coloured(result.scorecard.to_text()))
     print(f"recordings: {len(files)} MCAP files in {options.output}")
     if report is not None:
         print(f"report: {report}")

@@ -16,9 +16,9 @@ from activesteer.commands.arguments import (
     add_scenario,
     scenario_of,
 )
-from activesteer.commands.output import print_json
+from activesteer.commands.output import coloured, print_json
 from activesteer.commands.progress import ProgressBar
-from activesteer.errors import ParameterError
+from activesteer.errors import ParameterError, shown
 from activesteer.files import make_folder
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def add_to(commands: Any) -> None:
     add_controller(run, several=True)
     add_driver(run)
     add_output(run, "FILE_OR_DIR", "a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap", "runs")
+    run.add_argument("--replace", action="store_true", help="replace recordings that were made with other settings")
     run.add_argument("--plot", action="store_true", help="also draw the runs")
     add_json(run)
     run.set_defaults(action=_run)
@@ -43,6 +44,7 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.controllers import find_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
     from activesteer.driver import find_driver
+    from activesteer.scenario import describe
     from activesteer.simulation.runner import prepared, run_scenario
 
     controllers = [find_controller(name) for name in options.controller or ["none"]]
@@ -53,6 +55,9 @@ def _run(options: argparse.Namespace) -> int:
         controller.make(scenario.controller_setup(DEFAULT_TIMESTEP_S))
     paths = _output_paths(options.output, scenario.maneuver.name, controllers)
     scenario = prepared(scenario)
+    if not options.replace:
+        for controller, path in zip(controllers, paths, strict=True):
+            _check_settings(path, describe(scenario) | {"controller": controller.name})
     recordings = {}
     for controller, path in zip(controllers, paths, strict=True):
         label = controller.label
@@ -74,7 +79,7 @@ def _run(options: argparse.Namespace) -> int:
         print(comparison({label: recording.metrics for label, recording in recordings.items()}))
         for judged in claims.judged if claims else ():
             verdict = "FAILED" if judged.verdict == "failed" else judged.verdict
-            print(f"{judged.claim.id} {verdict}: {judged.claim.text}")
+            print(coloured(f"{judged.claim.id} {verdict}: {judged.claim.text}"))
     if options.plot:
         for figure in _plot(recordings, paths[0].parent, scenario):
             if not options.json:
@@ -101,6 +106,34 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) ->
     for path in paths:
         check_target(path)
     return paths
+
+
+def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:
+    """Refuses to replace a recording that was made with other settings, which could be missed."""
+    from activesteer.errors import RecordingError
+    from activesteer.recording import Recording
+
+    try:
+        before = _flat(Recording.open(path, recover=True).metadata)
+    except RecordingError:  # there is none, or none that anybody could look at
+        return
+    now = _flat({key: value for key, value in settings.items() if key != "overrides"})
+    other = sorted(key for key, value in now.items() if before.get(key, value) != value)
+    if other:
+        some = ", ".join(f"{key} {shown(before[key])}" for key in other[:3]) + (" ..." if len(other) > 3 else "")
+        msg = f"{path} was made with other settings ({some}); --replace replaces it, -o names another place"
+        raise ParameterError(msg)
+
+
+def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, Any]:
+    """Nested tables as dotted keys, with what JSON makes of the values."""
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            flat |= _flat(value, f"{start}{key}.")
+        else:
+            flat[f"{start}{key}"] = list(value) if isinstance(value, tuple) else value
+    return flat
 
 
 def _claims(recordings: Mapping[str, Any], vehicle: str) -> Scorecard | None:

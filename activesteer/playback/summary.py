@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from activesteer.playback.runs import Run
-from activesteer.quantities import metric_label
+from activesteer.quantities import metric_label, metric_number
 
 
 def summary(runs: Sequence[Run]) -> str:
@@ -33,8 +32,9 @@ def summary(runs: Sequence[Run]) -> str:
     if names:
         lines += ["", f"| metric | unit | {' | '.join(run.short for run in runs)} |", "|---" * (2 + len(runs)) + "|"]
     for name in names:
-        words, unit, factor = metric_label(name)
-        values = (_number(run.recording.metrics.get(name), factor) for run in runs)
+        words, unit, _ = metric_label(name)
+        found = [run.recording.metrics.get(name) for run in runs]
+        values = ("" if value is None else metric_number(name, value) for value in found)
         lines.append(f"| {words} | {unit} | {' | '.join(values)} |")
     return "\n".join(lines) + "\n"
 
@@ -46,9 +46,3 @@ def _scenario(metadata: Mapping[str, Any]) -> str:
 def _named(metadata: Mapping[str, Any], table: str, key: str) -> str:
     entry = metadata.get(table, {})
     return str(entry.get(key, "")) if isinstance(entry, Mapping) else ""
-
-
-def _number(value: float | None, factor: float) -> str:
-    if value is None:
-        return ""
-    return "-" if math.isnan(value) else f"{value * factor:.3f}"

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from activesteer.errors import PlaybackError
+from activesteer.files import replacing, shown_path
 from activesteer.playback.layout import blueprint
 from activesteer.playback.runs import Run
 from activesteer.playback.stream import fill, new_stream
@@ -21,6 +22,9 @@ from activesteer.playback.stream import fill, new_stream
 _ELSEWHERE: Final = "--web shows it in a browser, --save out.rrd writes a file for a viewer elsewhere"
 _HOST: Final = "127.0.0.1"
 """Where a browser's pages are served: to this machine alone."""
+_FOOTER: Final = b"RRF2FOOT"
+_FOOTER_BYTES: Final = 64
+"""What a whole file ends with: this word among its last bytes."""
 
 
 def save(runs: Sequence[Run], path: Path, *, compare: bool = False) -> None:
@@ -32,16 +36,25 @@ def save(runs: Sequence[Run], path: Path, *, compare: bool = False) -> None:
         compare: Whether to leave out the pages of the single runs.
 
     Raises:
-        PlaybackError: the file cannot be written.
+        PlaybackError: the name does not end in .rrd, or the file cannot be written.
     """
-    try:
-        path.open("wb").close()
-    except OSError as error:
-        raise PlaybackError(f"cannot write {path}: {error.strerror or error}") from None
-    stream = new_stream(runs, compare=compare)
-    stream.save(path)
-    fill(stream, runs, blueprint(runs, compare=compare))
-    stream.disconnect()
+    if path.suffix.lower() != ".rrd":
+        raise PlaybackError(f"{shown_path(path)}: the name of a file for the viewer must end in .rrd")
+    with replacing(path, PlaybackError) as part:
+        part.touch()
+        stream = new_stream(runs, compare=compare)
+        # It writes in a thread of its own, which only logs what goes wrong.
+        stream.save(part)
+        try:
+            fill(stream, runs, blueprint(runs, compare=compare))
+            stream.disconnect()
+            with part.open("rb") as file:
+                file.seek(-min(_FOOTER_BYTES, part.stat().st_size), os.SEEK_END)
+                whole = _FOOTER in file.read()
+        except RuntimeError:
+            whole = False
+        if not whole:
+            raise PlaybackError(f"cannot write {shown_path(path)}: not all of it could be written; is the disk full?")
 
 
 def show(runs: Sequence[Run], *, compare: bool = False) -> None:

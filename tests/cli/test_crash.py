@@ -118,3 +118,13 @@ def test_disk_that_fills_up_ends_the_run_with_what_was_saved(tmp_path):
     assert recording.metadata["complete"] is False
     assert f"saved up to {recording.time_s[-1]:.3f} s" in done.stderr
     assert len(recording) >= 500
+
+
+def test_disk_that_fills_up_leaves_no_half_file_for_the_viewer(call, tmp_path):
+    call("run", "straight_line", "--set", "duration_s=3", "-o", "run.mcap")
+    done = activesteer(
+        tmp_path, "replay", "run.mcap", "--save", "run.rrd", program=LIMITED.replace("1_000_000", "200_000")
+    )
+    assert done.returncode == 1
+    assert done.stderr == "activesteer: cannot write run.rrd: not all of it could be written; is the disk full?\n"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap"]

@@ -47,6 +47,8 @@ def test_list_names_everything_that_can_be_run(call):
 def test_info_tells_what_a_recording_holds(call, file):
     told = call("info", file)
     assert told.status == 0
+    assert max(map(len, told.out.splitlines()[1:])) <= 80
+    printed = " ".join(told.out.split())
     for text in (
         f"{file}: 0.000 to 2.499 s, 2500 steps",
         "maneuver: straight_line Straight line, 80 km/h",
@@ -57,10 +59,10 @@ def test_info_tells_what_a_recording_holds(call, file):
         "lateral acceleration peak abs",
         "mjcf/compact/compact.xml",
     ):
-        assert text in told.out
+        assert text in printed
     for channel in activesteer.Recording.open(file).channels:
         assert channel.name in told.out
-        assert channel.meaning in told.out
+        assert channel.meaning in printed
     assert "INCOMPLETE" not in told.out
 
 

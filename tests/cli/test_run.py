@@ -13,17 +13,19 @@ import pytest
 
 import activesteer
 from activesteer import Recording
+from activesteer.commands.output import coloured
 from activesteer.resources import find_vehicle
 from activesteer.version import __version__
 
 SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.3")
 STEP = ("--set", "settle_s=0.1", "--set", "steer.steering_wheel_deg=30", "--set", "steer.start_s=0.1")
 EVALUATED = (*STEP, "--set", "duration_s=2.4")
+PAPER = ("--set", "duration_s=3")
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_each_controller_makes_a_file_and_a_column(call, tmp_path):
-    told = call("run", "step_steer", "-c", "none", "-c", "ars", "--controller", "afs", *EVALUATED, "-o", "out")
+    told = call("run", "step_steer", "-c", "none", "-c", "ars", "--controller", "afs", *PAPER, "-o", "out")
     assert told.status == 0
     files = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert files == ["step_steer-afs.mcap", "step_steer-ars.mcap", "step_steer-none.mcap"]
@@ -86,7 +88,7 @@ def test_json_says_null_where_a_metric_is_not_defined(call):
 
 
 def test_claims_of_the_paper_are_in_the_json_of_the_three_systems(call):
-    told = call("run", "step_steer", "-c", "none", "-c", "ars", "-c", "afs", *EVALUATED, "--json")
+    told = call("run", "step_steer", "-c", "none", "-c", "ars", "-c", "afs", *PAPER, "--json")
     assert [claim["id"] for claim in told.json["claims"]] == ["S1", "S2", "S3", "S4", "S5"]
     assert all(isinstance(claim["passed"], bool) and claim["values"] for claim in told.json["claims"])
 
@@ -101,11 +103,23 @@ def test_output_goes_to_runs_where_nothing_is_said(call, tmp_path):
     assert (tmp_path / "runs" / "straight_line-none.mcap").is_file()
 
 
-def test_recording_that_exists_is_replaced(call, tmp_path):
-    for duration_s in (0.2, 0.3):
-        told = call("run", "straight_line", *SHORT, "--set", f"duration_s={duration_s}", "-o", "run.mcap")
-        assert told.status == 0
+def test_recording_that_exists_is_replaced_but_one_of_other_settings_only_where_that_is_said(call, tmp_path):
+    words = ("run", "straight_line", *SHORT, "-o", "run.mcap", "--set")
+    for _ in range(2):
+        assert call(*words, "duration_s=0.2").status == 0
+    told = call(*words, "duration_s=0.3")
+    assert told.status == 1
+    assert "run.mcap was made with other settings (maneuver.duration_s 0.2); --replace replaces it" in told.err
+    assert "controller 'none'" in call(*words, "duration_s=0.2", "-c", "ars").err
+    assert len(Recording.open(tmp_path / "run.mcap")) == 200
+    assert call(*words, "duration_s=0.3", "--replace").status == 0
     assert len(Recording.open(tmp_path / "run.mcap")) == 300
+
+
+def test_paper_is_not_judged_by_what_it_did_not_drive(call):
+    systems = ("-c", "none", "-c", "ars", "-c", "afs")
+    told = call("run", "step_steer", *systems, *EVALUATED, "--set", "speed_kmh=90", "--json")
+    assert told.json["claims"] == []
 
 
 @pytest.mark.parametrize(
@@ -197,3 +211,17 @@ def test_plot_is_drawn_beside_the_files(call, tmp_path):
     assert (tmp_path / "out" / "step_steer.png").stat().st_size > 10_000
     assert "figure: out/step_steer.png" in told.out
     assert (tmp_path / "out" / "step_steer-models.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(("environment", "green"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)])
+def test_verdicts_are_coloured_on_a_terminal_alone(monkeypatch, environment, green):
+    for name in ("NO_COLOR", "TERM"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    text = "S1 passed: faster\nS2 FAILED: passed by\nS1  not reproduced  slower"
+    assert coloured(text) == text
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    shown = text.replace("passed:", "\x1b[32mpassed\x1b[0m:").replace("FAILED", "\x1b[31mFAILED\x1b[0m")
+    shown = shown.replace("not reproduced", "\x1b[33mnot reproduced\x1b[0m")
+    assert coloured(text) == (shown if green else text)

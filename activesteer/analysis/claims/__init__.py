@@ -26,6 +26,9 @@ SCENARIOS: Final[dict[str, Claims]] = {
 }
 """Name of the manoeuvre -> its claims, in the order of the paper's sections."""
 
+_NO_SETTING: Final = frozenset({"vehicle", "duration_s", "settle_s", "title"})
+"""Keys of a manoeuvre's file that may be another than the paper's, and the whole of the car."""
+
 step_steer_claims = step_steer.claims
 
 
@@ -34,7 +37,7 @@ def claims_for(recording: RecordingLike) -> Claims | None:
 
     Args:
         recording: The run. The name of its manoeuvre counts, and, for the two open-loop ones, its kind: a step steer of
-            one's own is a step steer.
+            one's own is a step steer. One driven with other settings of the manoeuvre is none that the paper speaks of.
 
     Returns:
         What checks them; None where the paper says nothing about the manoeuvre.
@@ -42,10 +45,20 @@ def claims_for(recording: RecordingLike) -> Claims | None:
     maneuver = recording.metadata.get("maneuver")
     if not isinstance(maneuver, Mapping):
         return None
+    if any(
+        _is_of_maneuver(key, recording.metadata.get("vehicle")) for key in recording.metadata.get("overrides") or ()
+    ):
+        return None
     name, kind = maneuver.get("name"), maneuver.get("kind")
     if name in SCENARIOS:
         return SCENARIOS[name]
     return SCENARIOS[kind] if kind in {"step_steer", "sine_with_dwell"} else None
+
+
+def _is_of_maneuver(key: str, vehicle: object) -> bool:
+    """Whether an override changes what is driven; a car of one's own is judged like any other, and any length."""
+    part = key.removeprefix("maneuver.").partition(".")[0]
+    return part not in _NO_SETTING and not (isinstance(vehicle, Mapping) and part in vehicle)
 
 
 __all__ = [

@@ -190,6 +190,14 @@ def test_claims_are_found_by_the_name_of_the_manoeuvre():
     run = along_path()
     run.metadata["maneuver"] = {"kind": "lane_change", "name": "double_lane_change_low_mu"}
     assert claims_for(run) is SCENARIOS["double_lane_change_low_mu"]
+    run.metadata["vehicle"] = {"name": "compact", "controllers": {}}
+    for key in ("road.mu", "maneuver.speed_kmh"):
+        run.metadata["overrides"] = {key: 1.0}
+        assert claims_for(run) is None
+    for key in ("controllers.ars.limit_deg", "vehicle.load.payload_kg", "duration_s"):
+        run.metadata["overrides"] = {key: 1.0}
+        assert claims_for(run) is not None
+    run.metadata["overrides"] = {}
     run.metadata["maneuver"] = {"kind": "lane_change", "name": "my_own"}
     assert claims_for(run) is None
     assert claims_for(step_steer()) is SCENARIOS["step_steer"]

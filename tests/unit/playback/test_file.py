@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -206,12 +205,20 @@ def test_a_run_that_diverged_is_shown_up_to_its_end(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["folder is missing", "is a folder"])
 def test_a_file_that_cannot_be_written_is_named(tmp_path: Path, kind: str) -> None:
-    path = tmp_path / "missing" / "out.rrd" if kind == "folder is missing" else tmp_path
+    path = tmp_path / ("missing" if kind == "folder is missing" else "") / "out.rrd"
+    if kind == "is a folder":
+        path.mkdir()
     with pytest.raises(PlaybackError, match=f"cannot write {path}: "):
         save(runs_of({"ars": circle(0.1)}), path)
 
 
-def test_twenty_seconds_convert_in_two_and_take_less_than_15_MB(driven: Path, tmp_path: Path) -> None:
+def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(PlaybackError, match=r"out\.txt: the name of a file for the viewer must end in \.rrd"):
+        save(runs_of({"ars": circle(0.1)}), tmp_path / "out.txt")
+    assert not list(tmp_path.iterdir())
+
+
+def test_twenty_seconds_take_less_than_15_MB(driven: Path, tmp_path: Path) -> None:
     """The real car, its drive twice over."""
     once = Recording.open(driven)
     times = 2
@@ -231,10 +238,5 @@ def test_twenty_seconds_convert_in_two_and_take_less_than_15_MB(driven: Path, tm
     )
     assert recording.time_s[-1] > 20.0
     path = tmp_path / "out.rrd"
-    took_s = []
-    for _ in range(2):  # the first one also imports
-        start = time.perf_counter()
-        save(runs_of({"ars": recording}), path)
-        took_s.append(time.perf_counter() - start)
-    assert min(took_s) < 2.0
+    save(runs_of({"ars": recording}), path)
     assert path.stat().st_size < 15e6
