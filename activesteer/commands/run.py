@@ -57,7 +57,7 @@ def _run(options: argparse.Namespace) -> int:
     scenario = prepared(scenario)
     if not options.replace:
         for controller, path in zip(controllers, paths, strict=True):
-            _check_settings(path, describe(scenario) | {"controller": controller.name})
+            _check_settings(path, describe(scenario) | {"controller": controller.name, "driver": driver.name})
     recordings = {}
     for controller, path in zip(controllers, paths, strict=True):
         label = controller.label
