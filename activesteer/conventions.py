@@ -17,6 +17,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
+"""Numbers of double precision, of any shape."""
+
 CORNERS: Final = ("fl", "fr", "rl", "rr")
 """Corner names in the order of every per-corner array: front left, front right, rear left, rear right."""
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.road.course import Course
-
-Array = NDArray[np.float64]
 
 BEFORE_M: Final = 20.0
 AFTER_M: Final = 50.0

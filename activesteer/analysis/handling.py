@@ -20,14 +20,12 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from activesteer.analysis.series import timestep
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.theory.single_track import characteristic_speed
-
-Array = NDArray[np.float64]
 
 FIT_MPS2: Final = (0.5, 2.0)
 """Range of lateral acceleration over which gradients are fitted [m/s2]."""

@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.road.course import CONE_RADIUS_M, Course
 from activesteer.road.footprint import Footprint
-
-Array = NDArray[np.float64]
 
 
 def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> float:

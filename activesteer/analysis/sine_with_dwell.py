@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 from activesteer.analysis.filters import low_pass
 from activesteer.analysis.series import crossing_time, timestep
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import Array
 from activesteer.errors import RecordingError
-
-Array = NDArray[np.float64]
 
 STEERING_CUT_OFF_Hz: Final = 10.0
 """Filter of the steering wheel angle [Hz]."""

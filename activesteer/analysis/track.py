@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
-
-Array = NDArray[np.float64]
+from activesteer.conventions import Array
 
 
 def front_axle(recording: RecordingLike) -> tuple[Array, Array]:

@@ -17,17 +17,16 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from activesteer.compilation import compiled
+from activesteer.conventions import Array
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
 from activesteer.road.path import Path
 from activesteer.road.path_search import PathSearch
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 
-Array = NDArray[np.float64]
 LateralModel = Callable[[float], tuple[Array, Array]]
 """Speed [m/s] -> system matrix (2, 2) and input matrix (2, k) of a model with the states yaw rate [rad/s] and sideslip
 angle [rad], whose first input is the front steer angle [rad]."""

@@ -15,14 +15,12 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
+from activesteer.conventions import Array
 from activesteer.errors import ManeuverError
-
-Array = NDArray[np.float64]
 
 _DEGREE: Final = 5
 """Where no bound acts, the least jerk is a quintic polynomial."""

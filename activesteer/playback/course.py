@@ -7,9 +7,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
-from activesteer.conventions import yaw_of
+from activesteer.conventions import Array, yaw_of
 from activesteer.playback.car import rgb
 from activesteer.playback.geometry import rotated
 from activesteer.playback.runs import CHASSIS, Run
@@ -18,8 +17,6 @@ from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, course
 from activesteer.road.footprint import Footprint, footprint_of
 from activesteer.road.recorded import LIMIT_M
 from activesteer.road.road import road_of
-
-Array = NDArray[np.float64]
 
 ROAD, COURSE, MAP = "road", "course", "map"
 """Entities below which road and course stand in the world, and below which all of the map lies."""

@@ -9,11 +9,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.road.lane import Lane
 from activesteer.road.path import MIN_CHORD_M, Path
 from activesteer.road.recorded import fail, number, numbers, sequence, table_of, text
-
-Array = NDArray[np.float64]
 
 CONE_RADIUS_M: Final = 0.145
 """Half of the square base of a traffic cone of `CONE_HEIGHT_M` [m]."""

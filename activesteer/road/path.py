@@ -10,9 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from activesteer.conventions import Array
 from activesteer.errors import ManeuverError
-
-Array = NDArray[np.float64]
 
 SPACING_M: Final = 0.5
 """Distance of two points of a path: a car at 100 km/h passes one in 18 ms."""

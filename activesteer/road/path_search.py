@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from activesteer.compilation import compiled
+from activesteer.conventions import Array
 from activesteer.road.path import SPACING_M, Path
-
-Array = NDArray[np.float64]
 
 
 class PathSearch:

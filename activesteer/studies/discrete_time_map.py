@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.errors import ModelError
 from activesteer.signals import DriverCommand, SteerCommand
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.local_state import LocalState
-
-Array = NDArray[np.float64]
 
 INPUTS: Final = ("steering_wheel_rad", "rear_steer_rad", "superposition_rad")
 """What is demanded of steering wheel [rad], rear steering [rad], and superposition at the road wheel [rad]."""

@@ -28,9 +28,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.simulation.simulation import Simulation
@@ -40,7 +40,6 @@ from activesteer.vehicle.modes import Mode, find_modes
 if TYPE_CHECKING:
     import control
 
-Array = NDArray[np.float64]
 
 CUT_OFF_HZ: Final = 30.0
 """Natural frequency above which a mode is replaced by its static part [Hz]."""

@@ -7,15 +7,13 @@ from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from activesteer.conventions import Array
 from activesteer.rigs.kc.held_car import Case, HeldCar
 from activesteer.validation.comparison import Comparison, absolute, relative
 from activesteer.validation.reference import ReferenceData, Table
 from activesteer.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 _MAX_TRAVEL_MM: Final = 65.0
 _STEP_MM: Final = 5.0

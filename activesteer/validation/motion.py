@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.recording import Recording
-
-Array = NDArray[np.float64]
 
 _ACCELERATION_INTERVAL_S: Final = 0.005
 """Over which the reference takes its mean accelerations [s]."""

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.resources import models_dir
 
-Array = NDArray[np.float64]
 Table = dict[str, Array]
 
 _ENDING: Final = "_reference.csv"

@@ -10,12 +10,10 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.validation.comparison import Comparison, absolute, relative
 from activesteer.validation.reference import Table
-
-Array = NDArray[np.float64]
 
 STEADY_TOLERANCE: Final = 0.02
 PEAK_TOLERANCE: Final = 0.05

@@ -7,12 +7,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import Side, TyreParameters
 from activesteer.validation.comparison import Comparison
 from activesteer.validation.reference import ReferenceData, Table
-
-Array = NDArray[np.float64]
 
 _TOLERANCE: Final = 0.005
 """Share of the peak."""

@@ -7,16 +7,13 @@ from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError, nearest_names
 from activesteer.signals import Channel
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.loading import find
 from activesteer.vehicle.parameters import VehicleParameters
-
-Array = NDArray[np.float64]
 
 _STANDSTILL_MPS: Final = 0.2
 """Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""

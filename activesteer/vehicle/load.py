@@ -6,14 +6,11 @@ from typing import Final
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.vehicle.mass_properties import mass_properties, point_mass_inertia
 from activesteer.vehicle.parameters import Factors, Load, VehicleParameters
-
-Array = NDArray[np.float64]
 
 _AXLES: Final = (CORNERS[:2], CORNERS[2:])
 _BOOT_M: Final = (0.0, 0.0, 0.6)

@@ -12,13 +12,10 @@ from typing import Final
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.loading import find
-
-Array = NDArray[np.float64]
 
 _AXES: Final = ("x", "y", "z", "roll", "pitch", "yaw")
 _JOINT_DOFS: Final = {0: _AXES, 1: ("_x", "_y", "_z"), 2: ("",), 3: ("",)}

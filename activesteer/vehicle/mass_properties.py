@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from activesteer.conventions import Array
 
 
 class MassProperties(NamedTuple):

@@ -6,8 +6,8 @@ import math
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.parameters import Aerodynamics, Brakes, Powertrain
@@ -15,8 +15,6 @@ from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind
 from activesteer.vehicle_builder.design import Axle, Car, Link, Log, Solid
 from activesteer.vehicle_builder.levers import mount
 from activesteer.vehicle_builder.table import UNITS, AxleTable, CarTable, LinkTable
-
-Array = NDArray[np.float64]
 
 DEFAULT_TYRE: Final = "compact_205_55R16.tir"
 BUSHINGS_NPM: Final = {"ball_joint": 1e8, "hard": 1e7, "medium": 1e6, "soft": 3e5}

@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
+from activesteer.conventions import Array
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.parameters import Aerodynamics, Brakes, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind
 from activesteer.vehicle_builder.levers import Mount
 from activesteer.vehicle_builder.table import AxleTable, CarTable
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.vehicle_builder.axle_kinds import AxleKind
-
-Array = NDArray[np.float64]
 
 _LEAST, _MOST = 0.05, 1.5
 """Levers beyond these are no springs of a car."""

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.vehicle.mass_properties import mass_properties, point_mass_inertia
 from activesteer.vehicle_builder.design import Car, Log, Solid
-
-Array = NDArray[np.float64]
 
 
 def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:

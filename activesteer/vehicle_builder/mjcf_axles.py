@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.vehicle_builder.design import Axle, Car, Solid
 from activesteer.vehicle_builder.levers import Mount
 from activesteer.vehicle_builder.numbers import num, sig, vec
 from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
 
-Array = NDArray[np.float64]
 _ON_RACK = "tie_rod"
 
 

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.errors import ModelError
-
-Array = NDArray[np.float64]
 
 _ROTATION_M = 0.3
 """Length that makes a rotation comparable with a displacement: the size of a knuckle."""

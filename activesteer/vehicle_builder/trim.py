@@ -15,9 +15,8 @@ from typing import Final
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar
 from activesteer.scenario import load_car
@@ -32,7 +31,6 @@ from activesteer.vehicle_builder.masses import chassis_of
 from activesteer.vehicle_builder.motion import corner_motion
 from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
 
-Array = NDArray[np.float64]
 Write = Callable[[Trimmed], Path]
 """Writes the car's files and returns the vehicle file."""
 

@@ -11,16 +11,13 @@ from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import yaw_of
+from activesteer.conventions import Array, yaw_of
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.course import Course
 from activesteer.road.road import Road
 from activesteer.video.road import add_areas, add_course, add_road
-
-Array = NDArray[np.float64]
 
 CHASSIS: Final = "chassis"
 """Body that cameras follow."""

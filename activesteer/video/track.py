@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import yaw_of
+from activesteer.conventions import Array, yaw_of
 from activesteer.errors import PlaybackError
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint, footprint_of
 from activesteer.video.render_scene import CHASSIS
-
-Array = NDArray[np.float64]
 
 _STEADY_S: Final = 0.35
 """Standard deviation of the window over which the direction of the camera is averaged [s]: it follows the car through

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from activesteer.conventions import Array
 
 FRONT_LINKS = ("lca_front", "lca_rear", "tie_rod")
 REAR_LINKS = ("spring_link", "toe_link", "camber_link", "trailing_lower", "trailing_upper")

@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.rigs.kc.held_car import HeldCar
 from tests.physics.rigid_links import FRONT_LINKS, REAR_LINKS
-
-Array = NDArray[np.float64]
 
 PINION_M = 0.0074
 """Radius of the pinion of the compact."""

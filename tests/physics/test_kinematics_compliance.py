@@ -12,10 +12,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.rigs.kc.held_car import Case, HeldCar
@@ -23,8 +22,6 @@ from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from tests.physics.rigid_links import FRONT_LINKS, REAR_LINKS, Pose, RigidCorner
 from tests.physics.static_corner import PINION_M, StaticCorner
-
-Array = NDArray[np.float64]
 
 TRAVEL_M = np.linspace(-0.08, 0.08, 17)
 STIFFER = 100.0

@@ -7,20 +7,17 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.course_view import view_of
 from activesteer.analysis.report.runs import Group, Run
 from activesteer.analysis.source import read_course
 from activesteer.analysis.track import front_axle, path_distance
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.errors import RecordingError
 from activesteer.quantities import Quantity, quantity_of
 from activesteer.recording import Recording
 from activesteer.road.course import Course
-
-Array = NDArray[np.float64]
 
 RATE_HZ: Final = 200.0
 """Most samples of a signal in a second; the car's own motion ends below 20 Hz."""

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.rigs.kc.programme import Measured, TyreStiffness
 from activesteer.rigs.kc.steering_axis import SteeringAxis
 from activesteer.rigs.kc.sweep import Sweep
 
-Array = NDArray[np.float64]
 AxleName = Literal["front", "rear", "car"]
 
 FRONT_AND_REAR: Final = ("front", "rear")

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from activesteer.conventions import Array
 from activesteer.plotting import new_figure, save_all
 from activesteer.rigs.kc.definitions import Axle
 from activesteer.rigs.kc.metrics_kinematics import roll_angle_rad
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _LEFT, _RIGHT, _THIRD, _GREY = "#0072b2", "#d55e00", "#009e73", "#777777"
 """Colours that colour-blind readers can tell apart (Okabe and Ito, 2008)."""

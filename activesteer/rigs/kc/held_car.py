@@ -18,13 +18,11 @@ from typing import Final, Literal, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 Springs = Literal["in", "out", "locked"]
 Hold = Literal["centre", "contact", "nothing"]
 

@@ -13,16 +13,14 @@ from typing import TYPE_CHECKING, Final
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from activesteer.rigs.kc.programme import TyreStiffness
 
-Array = NDArray[np.float64]
 
 _LIFT_M: Final = 1.0
 _DIFFERENCE: Final = 1e-6

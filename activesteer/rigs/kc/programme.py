@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
 from activesteer.rigs.kc.modes import Modes, modes
 from activesteer.rigs.kc.steering_axis import SteeringAxis, steering_axis
@@ -20,8 +19,6 @@ from activesteer.tyre.kernels.vertical import deflection_under_load, vertical_fo
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle, VehicleParameters
 from activesteer.vehicle import force_block as fb
-
-Array = NDArray[np.float64]
 
 _TRAVEL_M: Final = np.linspace(-0.08, 0.08, 33)
 _SIDE_FORCE_N: Final = np.linspace(-4000.0, 4000.0, 17)

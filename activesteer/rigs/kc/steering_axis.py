@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.rigs.kc.held_car import WheelPose
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

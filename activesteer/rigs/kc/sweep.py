@@ -7,12 +7,9 @@ from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.rigs.kc.held_car import Case, HeldCar
-
-Array = NDArray[np.float64]
 
 INWARDS: Final = np.array([-1.0, 1.0, -1.0, 1.0])
 """Sign of y towards the middle of the car, by corner."""

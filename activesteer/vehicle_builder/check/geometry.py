@@ -8,14 +8,11 @@ from typing import Final
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.vehicle_builder.check.findings import Finding, Level, Usual, judged
 from activesteer.vehicle_builder.motion import corner_motion
-
-Array = NDArray[np.float64]
 
 _MIRROR_M: Final = 1e-6
 _TOUCH_M: Final = 0.005
