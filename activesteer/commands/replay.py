@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.commands.arguments import add_recording
-from activesteer.errors import ParameterError
+from activesteer.errors import ParameterError, PlaybackError
 
 
 def add_to(commands: Any) -> None:
@@ -34,7 +34,10 @@ def add_to(commands: Any) -> None:
 def _replay(options: argparse.Namespace) -> int:
     # rerun's own threads write to the terminal, in colours, what we say ourselves.
     os.environ.setdefault("RUST_LOG", "warn,re_log_encoding=off,re_sdk=off")
-    from activesteer.playback import runs_of, save, serve, show
+    try:
+        from activesteer.playback import runs_of, save, serve, show
+    except ImportError as error:
+        raise PlaybackError("replay needs the viewer rerun: pip install rerun-sdk") from error
     from activesteer.recording import Recording
 
     if options.compare and len(options.files) < 2:
