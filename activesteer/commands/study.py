@@ -21,6 +21,7 @@ def add_to(commands: Any) -> None:
     add_scheduler(parser)
     parser.add_argument("--limit", type=int, metavar="N", help="make at most N runs now and leave the rest")
     parser.add_argument("--status", action="store_true", help="only say how far the study in DIR is")
+    parser.add_argument("--report", action="store_true", help="only write DIR/report.html, of the runs that are done")
     add_json(parser)
     parser.set_defaults(action=_study)
 
@@ -34,6 +35,8 @@ def _study(options: argparse.Namespace) -> int:
         raise StudyError(f"-o DIR is needed: where the results of {options.study} go")
     if options.status:
         return _status(folder, as_json=options.json)
+    if options.report:
+        return _report(folder, as_json=options.json)
     from activesteer.studies.store import RESULTS, read_environment
     from activesteer.studies.study import study
 
@@ -73,4 +76,15 @@ def _status(folder: Path, *, as_json: bool) -> int:
     print(f"{progress['done']} of {progress['total']} runs are done: {counts}{at_work}")
     for error, number in progress["errors"].items():
         print(f"{number:6}  {error}")
+    return 0
+
+
+def _report(folder: Path, *, as_json: bool) -> int:
+    from activesteer.studies.report import write_report
+
+    path = write_report(folder)
+    if as_json:
+        print_json({"report": str(path)})
+    else:
+        print(f"report: {path}")
     return 0

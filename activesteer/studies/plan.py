@@ -88,14 +88,15 @@ class Plan:
 
 def _labelled(study: StudyFile, key: str, items: Sequence[Any]) -> tuple[tuple[str, Any], ...]:
     """Every item with the name that it has in the result: without folders, so that it is the same on every machine."""
-    labels = [_label(item) for item in items]
+    labels = [label_of(item) for item in items]
     for label in labels:
         if labels.count(label) > 1:
             raise study.source.fail((key,), f"two of them have the name {label!r}, which tells runs apart")
     return tuple(zip(labels, items, strict=True))
 
 
-def _label(item: FileOrTable) -> str:
+def label_of(item: FileOrTable) -> str:
+    """The name that a manoeuvre, vehicle or controller has in the result."""
     if isinstance(item, Mapping):
         return str(item.get("name") or "table")
     path, colon, class_name = str(item).rpartition(":")
@@ -135,7 +136,7 @@ def _resolved(
     try:
         return resolve(maneuver, vehicle, overrides)
     except ActiveSteerError as error:
-        error.add_note(f"in {_label(maneuver)} with {_label(vehicle)}" + (f", factor {key}" if key else ""))
+        error.add_note(f"in {label_of(maneuver)} with {label_of(vehicle)}" + (f", factor {key}" if key else ""))
         raise
 
 

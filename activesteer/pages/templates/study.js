@@ -1,0 +1,223 @@
+"use strict";
+// Draws a study from the JSON in #data. Every picture is an SVG with axes and units; nothing is fetched.
+const data = JSON.parse(document.getElementById("data").textContent);
+const at = (id) => document.getElementById(id);
+const NS = "http://www.w3.org/2000/svg";
+
+function element(parent, name, attributes, text) {
+  const made = document.createElementNS(NS, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text !== undefined) made.textContent = text;
+  parent.appendChild(made);
+  return made;
+}
+
+function html(parent, name, text) {
+  const made = document.createElement(name);
+  if (text !== undefined) made.textContent = text;
+  parent.appendChild(made);
+  return made;
+}
+
+function ticks(low, high, count) {
+  const raw = (high - low) / count, power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= raw);
+  const found = [];
+  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) found.push(i * step);
+  return found;
+}
+
+const short = (value) => String(Number(value.toPrecision(4)));
+const withUnit = (label, unit) => (unit && unit !== "-" ? `${label} [${unit}]` : label);
+
+function range(values) {
+  let low = Infinity, high = -Infinity;
+  for (const v of values) if (v !== null && v !== undefined) { if (v < low) low = v; if (v > high) high = v; }
+  if (!(low <= high)) return [0, 1];
+  const margin = (high - low) * 0.04 || Math.abs(low) * 0.1 || 1;
+  return [low - margin, high + margin];
+}
+
+// A frame with axes; returns the svg and the scales. An axis is {label, range} or {label, levels}.
+function frame(parent, width, height, x, y) {
+  const left = 62, right = 12, top = 10, bottom = 42;
+  const svg = element(parent, "svg", { width, height, role: "img", "aria-label": `${y.label} over ${x.label}` });
+  const span = (axis) => (axis.levels ? [-0.5, axis.levels.length - 0.5] : axis.range);
+  const [x0, x1] = span(x), [y0, y1] = span(y);
+  const sx = (v) => left + ((v - x0) / (x1 - x0)) * (width - left - right);
+  const sy = (v) => height - bottom - ((v - y0) / (y1 - y0)) * (height - top - bottom);
+  element(svg, "rect", { x: left, y: top, width: width - left - right, height: height - top - bottom, fill: "none", stroke: "#888" });
+  const marks = (axis, count) => axis.levels ? axis.levels.map((level, i) => [i, String(level)]) : ticks(...axis.range, count).map((v) => [v, short(v)]);
+  for (const [v, text] of marks(x, 5)) {
+    element(svg, "line", { x1: sx(v), x2: sx(v), y1: height - bottom, y2: height - bottom + 4, stroke: "#888" });
+    element(svg, "text", { x: sx(v), y: height - bottom + 16, "text-anchor": "middle" }, text);
+  }
+  for (const [v, text] of marks(y, 5)) {
+    element(svg, "line", { x1: left - 4, x2: left, y1: sy(v), y2: sy(v), stroke: "#888" });
+    element(svg, "text", { x: left - 7, y: sy(v) + 4, "text-anchor": "end" }, text);
+  }
+  element(svg, "text", { x: (left + width - right) / 2, y: height - 8, "text-anchor": "middle" }, x.label);
+  element(svg, "text", { transform: `translate(13 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, y.label);
+  return { svg, sx, sy };
+}
+
+const metricAxis = (metric) => withUnit(metric.label, metric.unit);
+
+function histogram(parent, metric, found, width, height) {
+  const { edges, counts } = found.histogram;
+  const shares = counts.map((part) => { const n = part.reduce((a, b) => a + b, 0) || 1; return part.map((c) => (100 * c) / n); });
+  const top = Math.max(...shares.flat());
+  const f = frame(parent, width, height, { label: metricAxis(metric), range: [edges[0], edges[edges.length - 1]] },
+    { label: "share of the runs [%]", range: [0, top * 1.05 || 1] });
+  shares.forEach((part, c) => {
+    let path = `M${f.sx(edges[0])} ${f.sy(0)}`;
+    part.forEach((share, i) => { path += `V${f.sy(share)}H${f.sx(edges[i + 1])}`; });
+    element(f.svg, "path", { d: `${path}V${f.sy(0)}`, fill: data.colours[c], "fill-opacity": 0.15, stroke: data.colours[c], "stroke-width": 1.5 });
+  });
+}
+
+function factorAxis(factor) {
+  const label = withUnit(factor.key, factor.unit);
+  if (!factor.numeric) return { axis: { label, levels: factor.levels }, value: (v) => factor.levels.indexOf(String(v)) };
+  return { axis: { label, range: range(data.rows.factors[factor.key]) }, value: (v) => v };
+}
+
+function rowsOf(group) {
+  const found = [];
+  data.rows.group.forEach((g, i) => { if (g === group) found.push(i); });
+  return found;
+}
+
+function scatter(parent, factor, points, label) {
+  const { axis, value } = factorAxis(factor);
+  const f = frame(parent, 380, 260, axis, { label, range: range(points.map((p) => p.y)) });
+  for (const p of points) {
+    if (p.y === null || p.x === null || p.x === undefined) continue;
+    const dot = element(f.svg, "circle", { cx: f.sx(value(p.x)), cy: f.sy(p.y), r: 2.2, fill: data.colours[p.c], "fill-opacity": 0.6 });
+    element(dot, "title", {}, `run ${p.run}: ${short(p.y)}`);
+  }
+}
+
+function heat(parent, metric, found, keyed) {
+  const all = found.heat.maps.flat(2).filter((v) => v !== null), low = Math.min(...all), high = Math.max(...all);
+  found.heat.maps.forEach((map, c) => {
+    const axes = found.heat.keys.map((key, i) => ({ label: withUnit(key, keyed[key].unit), levels: found.heat.levels[i] }));
+    const box = html(parent, "div");
+    html(box, "div", `${data.controllers[c]}: ${metricAxis(metric)}, mean`);
+    const f = frame(box, 400, 300, axes[0], axes[1]);
+    map.forEach((line, i) => line.forEach((v, j) => {
+      if (v === null) return;
+      const share = high > low ? (v - low) / (high - low) : 0.5;
+      element(f.svg, "rect", { x: f.sx(i - 0.5), y: f.sy(j + 0.5), width: f.sx(0.5) - f.sx(-0.5), height: f.sy(-0.5) - f.sy(0.5), fill: `hsl(${240 - 200 * share} 70% ${80 - 25 * share}%)` });
+      element(f.svg, "text", { x: f.sx(i), y: f.sy(j) + 4, "text-anchor": "middle" }, short(v));
+    }));
+  });
+}
+
+function bars(parent, controller, found, metric) {
+  const names = [...new Set(found.map((index) => index[1]))], factors = [...new Set(found.map((index) => index[0]))];
+  const box = html(parent, "div");
+  html(box, "div", data.controllers[controller]);
+  const top = Math.max(...found.map((index) => index[2] + (index[3] || 0)), 0), bottom = Math.min(...found.map((index) => index[2] - (index[3] || 0)), 0);
+  const label = names[0] === "mu*" ? withUnit("mu*", metric.unit) : `${names.join(" (light), ")}${names.length > 1 ? " (dark)" : ""} [-]`;
+  const f = frame(box, Math.max(300, 90 + 130 * factors.length), 240, { label: "factor", levels: factors }, { label, range: [bottom * 1.05, top * 1.05 || 1] });
+  for (const [factor, name, value, confidence, spread] of found) {
+    const n = names.indexOf(name), width = 0.6 / names.length, x = factors.indexOf(factor) - 0.3 + n * width;
+    const bar = element(f.svg, "rect", { x: f.sx(x), width: f.sx(width) - f.sx(0), y: f.sy(Math.max(value, 0)), height: Math.abs(f.sy(value) - f.sy(0)), fill: data.colours[controller], "fill-opacity": n === 0 && names.length > 1 ? 0.45 : 0.85 });
+    element(bar, "title", {}, `${name} ${short(value)} ± ${short(confidence)}${spread === null ? "" : `, spread ${short(spread)}`}`);
+    const middle = f.sx(x + width / 2);
+    element(f.svg, "line", { x1: middle, x2: middle, y1: f.sy(value - confidence), y2: f.sy(value + confidence), stroke: "#000", "stroke-width": 1.5 });
+  }
+}
+
+function parallel(parent, metric, rows) {
+  const axes = data.factors.map((factor) => { const { axis, value } = factorAxis(factor); return { ...axis, of: (i) => value(data.rows.factors[factor.key][i]) }; });
+  const values = data.rows.metrics[metric.name];
+  axes.push({ label: metricAxis(metric), range: range(rows.map((i) => values[i])), of: (i) => values[i] });
+  const width = Math.max(420, 190 * (axes.length - 1) + 160), height = 320, top = 30, bottom = 20;
+  const svg = element(parent, "svg", { width, height, role: "img", "aria-label": "parallel coordinates" });
+  const x = (n) => 80 + (n * (width - 160)) / Math.max(axes.length - 1, 1);
+  const y = (axis, v) => { const [low, high] = axis.levels ? [-0.5, axis.levels.length - 0.5] : axis.range; return height - bottom - ((v - low) / (high - low)) * (height - top - bottom); };
+  for (const i of rows.slice(0, 600)) {
+    const points = axes.map((axis, n) => [x(n), axis.of(i)]);
+    if (points.some(([, v]) => v === null || v === undefined)) continue;
+    element(svg, "polyline", { points: points.map(([px, v], n) => `${px},${y(axes[n], v)}`).join(" "), fill: "none", stroke: data.colours[data.rows.controller[i]], "stroke-opacity": 0.35 });
+  }
+  axes.forEach((axis, n) => {
+    element(svg, "line", { x1: x(n), x2: x(n), y1: top, y2: height - bottom, stroke: "#444" });
+    element(svg, "text", { x: x(n), y: 16, "text-anchor": "middle" }, axis.label);
+    const marks = axis.levels ? axis.levels.map((level, i) => [i, String(level)]) : ticks(...axis.range, 5).map((v) => [v, short(v)]);
+    for (const [v, text] of marks) element(svg, "text", { x: x(n) - 5, y: y(axis, v) + 4, "text-anchor": "end" }, text);
+  });
+}
+
+function tableOf(parent, header, lines) {
+  const table = html(parent, "table"), first = html(table, "tr");
+  header.forEach((text) => html(first, "th", text));
+  for (const line of lines) {
+    const row = html(table, "tr");
+    line.forEach((cell) => (cell instanceof Node ? html(row, "td").appendChild(cell) : html(row, "td", cell)));
+  }
+}
+
+function replayLine(command) {
+  if (!command) return document.createTextNode("the manoeuvre or vehicle has no file of its own");
+  const box = document.createElement("span"), button = html(box, "button", "copy");
+  const line = html(box, "code", ` ${command}`);
+  line.className = "line";
+  button.addEventListener("click", () => {
+    const chosen = document.createRange();
+    chosen.selectNodeContents(line);
+    getSelection().removeAllRanges();
+    getSelection().addRange(chosen);
+    if (navigator.clipboard) navigator.clipboard.writeText(command).catch(() => document.execCommand("copy"));
+    else document.execCommand("copy");
+  });
+  return box;
+}
+
+function draw() {
+  for (const id of ["distribution", "quantiles", "scatter", "paired", "paired-table", "heat", "indices", "parallel", "extremes", "all"]) at(id).replaceChildren();
+  const group = Number(at("group").value), metric = data.metrics.find((m) => m.name === at("metric").value);
+  const found = data.by_group[group][metric.name], keyed = Object.fromEntries(data.factors.map((factor) => [factor.key, factor]));
+  for (const id of ["paired-part", "heat-part", "indices-part"]) at(id).hidden = true;
+  if (!found) { html(at("distribution"), "p", "No run of this manoeuvre has this metric."); return; }
+  const rows = rowsOf(group), values = data.rows.metrics[metric.name];
+  const number = (v) => (v === null || v === undefined ? "-" : short(v));
+  histogram(at("distribution"), metric, found, 640, 320);
+  tableOf(at("quantiles"), ["controller", ...["5 %", "median", "95 %"].map((text) => withUnit(text, metric.unit))],
+    data.controllers.map((name, c) => [name, ...(found.quantiles[c] || [null, null, null]).map(number)]));
+  at("shown").textContent = data.all > data.rows.run.length ? `Points are ${data.rows.run.length} of ${data.all} runs; all else is of all runs.` : "";
+  for (const factor of data.factors) scatter(at("scatter"), factor, rows.map((i) => ({ x: data.rows.factors[factor.key][i], y: values[i], c: data.rows.controller[i], run: data.rows.run[i] })), metricAxis(metric));
+  if (found.paired.some((pair) => pair)) {
+    at("paired-part").hidden = false;
+    const first = new Map();
+    for (const i of rows) if (data.rows.controller[i] === 0) first.set(data.rows.sample[i], values[i]);
+    const pairs = rows.filter((i) => data.rows.controller[i] > 0 && values[i] !== null && first.get(data.rows.sample[i]) != null);
+    for (const factor of data.factors) scatter(at("paired"), factor, pairs.map((i) => ({ x: data.rows.factors[factor.key][i], y: values[i] - first.get(data.rows.sample[i]), c: data.rows.controller[i], run: data.rows.run[i] })), `less ${data.controllers[0]}: ${metricAxis(metric)}`);
+    tableOf(at("paired-table"), [`less ${data.controllers[0]}`, ...["5 %", "median", "95 %"].map((text) => withUnit(text, metric.unit)), "smaller in magnitude [%]"],
+      found.paired.map((pair, n) => [data.controllers[n + 1], ...(pair ? [...pair.quantiles.map(number), short(100 * pair.smaller)] : ["-", "-", "-", "-"])]));
+  }
+  if (found.heat) { at("heat-part").hidden = false; heat(at("heat"), metric, found, keyed); }
+  if (found.indices.length) { at("indices-part").hidden = false; found.indices.forEach((part, c) => { if (part.length) bars(at("indices"), c, part, metric); }); }
+  parallel(at("parallel"), metric, rows);
+  tableOf(at("extremes"), ["controller", "run", metricAxis(metric), "to drive and replay it"],
+    found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [data.controllers[c], String(run), short(value), replayLine(command)])));
+  for (const other of data.metrics) if (data.by_group[group][other.name]) histogram(at("all"), other, data.by_group[group][other.name], 300, 190);
+}
+
+data.groups.forEach((text, place) => { html(at("group"), "option", text).value = place; });
+for (const metric of data.metrics) html(at("metric"), "option", metric.label).value = metric.name;
+data.controllers.forEach((name, c) => {
+  const colour = html(at("legend"), "span");
+  colour.className = "colour";
+  colour.style.background = data.colours[c];
+  at("legend").append(name);
+});
+const preferred = data.metrics.find((metric) => metric.name === "sideslip_peak_abs_rad" || metric.name === "yaw_rate_peak_radps");
+if (preferred) at("metric").value = preferred.name;
+if (data.metrics.length) {
+  at("group").addEventListener("change", draw);
+  at("metric").addEventListener("change", draw);
+  draw();
+}

@@ -1,0 +1,241 @@
+"""One page that shows a study: distributions, scatter and paired differences, sensitivities, worst and best runs."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from activesteer.conventions import RUN_COLOURS
+from activesteer.errors import StudyError
+from activesteer.files import write_text
+from activesteer.pages import render
+from activesteer.quantities import metric_label
+from activesteer.studies.column_units import unit_of
+from activesteer.studies.plan import label_of
+from activesteer.studies.sensitivity import indices
+from activesteer.studies.store import IDENTITY, OUTCOME, Store
+from activesteer.studies.study_file import StudyFile, read_study
+
+_SHOWN_ROWS: Final = 3000
+"""Runs whose points the page holds; whatever is counted or averaged is so over all of them."""
+_BINS: Final = 40
+_EXTREMES: Final = 5
+_MAX_INDICES: Final = 400
+"""Sets of indices that are computed: each takes some hundredths of a second."""
+
+Array = NDArray[np.float64]
+Group = tuple[str, str]
+"""Manoeuvre and vehicle."""
+
+
+def write_report(folder: str | os.PathLike[str]) -> Path:
+    """Writes report.html into a study's folder, from the rows that there are.
+
+    Args:
+        folder: Of the study.
+
+    Returns:
+        The page.
+
+    Raises:
+        StudyError: there is no study, it has no rows yet, or the page cannot be written.
+    """
+    home = Path(folder)
+    store = Store(home, ())
+    progress = store.progress()
+    study = read_study(home / "study.toml")
+    table = store.read()
+    if not table.num_rows:
+        raise StudyError(f"{home}: no run is done yet")
+    content = {
+        "title": study.title or home.resolve().name,
+        "progress": progress.to_json(),
+        "data": _data(study, table),
+        "study": study.to_toml(),
+    }
+    return write_text(home / "report.html", render("study.html", **content), StudyError)
+
+
+def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
+    """Everything that the page draws, as JSON values in the units that are shown."""
+    metrics = [name for name in table.column_names if name not in (*IDENTITY, *OUTCOME, *study.keys)]
+    values = {name: table[name].to_numpy(zero_copy_only=False).astype(np.float64) for name in metrics}
+    values = {name: column * metric_label(name)[2] for name, column in values.items() if np.isfinite(column).any()}
+    who = {name: _codes(table[name]) for name in ("maneuver", "vehicle", "controller")}
+    groups = sorted(set(zip(who["maneuver"][1].tolist(), who["vehicle"][1].tolist(), strict=True)))
+    shown = _shown_rows(table)
+    return {
+        "controllers": who["controller"][0],
+        "colours": [RUN_COLOURS[place % len(RUN_COLOURS)] for place in range(len(who["controller"][0]))],
+        "groups": [f"{who['maneuver'][0][m]}, {who['vehicle'][0][v]}" for m, v in groups],
+        "metrics": [{"name": name, "label": metric_label(name)[0], "unit": metric_label(name)[1]} for name in values],
+        "factors": [_factor(key, table[key]) for key in study.keys],
+        "rows": {
+            "group": [groups.index(pair) for pair in zip(
+                who["maneuver"][1][shown].tolist(), who["vehicle"][1][shown].tolist(), strict=True)],
+            "controller": who["controller"][1][shown].tolist(),
+            "sample": table["sample"].to_numpy()[shown].tolist(),
+            "run": table["run"].to_numpy()[shown].tolist(),
+            "factors": {key: table[key].take(pa.array(shown)).to_pylist() for key in study.keys},
+            "metrics": {name: _json(column[shown]) for name, column in values.items()},
+        },
+        "all": table.num_rows,
+        "by_group": [_of_group(study, table, values, who, pair) for pair in groups],
+    }  # fmt: skip
+
+
+def _codes(column: pa.ChunkedArray) -> tuple[list[str], NDArray[np.int64]]:
+    """The different texts of a column in the order in which they occur, and the place of each row's in them."""
+    encoded = column.combine_chunks().dictionary_encode()
+    return encoded.dictionary.to_pylist(), encoded.indices.to_numpy()
+
+
+def _shown_rows(table: pa.Table) -> NDArray[np.int64]:
+    """Rows of evenly spread samples, whole, so that paired runs stay together."""
+    samples = table["sample"].to_numpy()
+    every = -(-table.num_rows // _SHOWN_ROWS)
+    return np.flatnonzero(samples % every == 0)
+
+
+def _factor(key: str, column: pa.ChunkedArray) -> dict[str, Any]:
+    numeric = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
+    levels = pc.unique(column.drop_null()).to_pylist()
+    few = len(levels) <= _BINS
+    ordered = (sorted(levels) if numeric else [str(level) for level in levels]) if few or not numeric else []
+    return {"key": key, "unit": unit_of(key), "numeric": numeric, "levels": ordered}
+
+
+def _of_group(
+    study: StudyFile, table: pa.Table, values: Mapping[str, Array], who: Mapping[str, Any], group: tuple[int, int]
+) -> dict[str, Any]:
+    """What is computed from all rows of a manoeuvre with a vehicle, by metric."""
+    inside = (who["maneuver"][1] == group[0]) & (who["vehicle"][1] == group[1])
+    controllers = who["controller"][0]
+    rows = [np.flatnonzero(inside & (who["controller"][1] == place)) for place in range(len(controllers))]
+    samples = table["sample"].to_numpy()
+    indexed = len(values) * len(controllers) <= _MAX_INDICES
+    found = {}
+    for name, column in values.items():
+        parts = [column[each] for each in rows]
+        finite = [part[np.isfinite(part)] for part in parts]
+        if not any(len(part) for part in finite):
+            continue
+        found[name] = {
+            "histogram": _histogram(finite),
+            "quantiles": [_json(np.quantile(part, [0.05, 0.5, 0.95])) if len(part) else None for part in finite],
+            "paired": _paired(study, samples, rows, parts),
+            "heat": _heat(study, table, rows, parts),
+            "indices": _indices(study, table, rows, parts) if indexed else [],
+            "extremes": [_extremes(study, table, each, part) for each, part in zip(rows, parts, strict=True)],
+        }
+    return found
+
+
+def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
+    together = np.concatenate(parts)
+    low, high = float(together.min()), float(together.max())
+    if high - low <= 1e-12 * max(abs(low), abs(high), 1e-300):
+        low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
+    edges = np.linspace(low, high, min(_BINS, max(5, int(np.sqrt(max(map(len, parts)))) + 1)) + 1)
+    return {"edges": _json(edges), "counts": [np.histogram(part, edges)[0].tolist() for part in parts]}
+
+
+def _paired(study: StudyFile, samples: Array, rows: Sequence[NDArray[np.int64]], parts: Sequence[Array]) -> list[Any]:
+    """Of each controller but the first: 5, 50 and 95 % of its difference to the first in the same sample.
+
+    `smaller` is the share of the samples in which it is smaller in magnitude.
+    """
+    if len(rows) < 2 or not study.design.paired:
+        return []
+    found: list[Any] = []
+    for each, part in zip(rows[1:], parts[1:], strict=True):
+        _, first, second = np.intersect1d(samples[rows[0]], samples[each], return_indices=True)
+        a, b = parts[0][first], part[second]
+        both = np.isfinite(a) & np.isfinite(b)
+        if not both.any():
+            found.append(None)
+            continue
+        difference = (b - a)[both]
+        smaller = float(np.mean(np.abs(b[both]) < np.abs(a[both])))
+        found.append({"quantiles": _json(np.quantile(difference, [0.05, 0.5, 0.95])), "smaller": round(smaller, 4)})
+    return found
+
+
+def _heat(
+    study: StudyFile, table: pa.Table, rows: Sequence[NDArray[np.int64]], parts: Sequence[Array]
+) -> dict[str, Any] | None:
+    """Means over the first two grids, controller by controller."""
+    grids = [factor for factor in study.factors if factor.kind == "grid"]
+    if len(grids) != 2:
+        return None
+    places = []
+    for factor in grids:
+        levels = {value: place for place, value in enumerate(factor.values)}
+        places.append(np.array([levels[value] for value in table[factor.key].to_pylist()]))
+    maps = []
+    for each, part in zip(rows, parts, strict=True):
+        total, count = np.zeros([len(factor.values) for factor in grids]), np.zeros([len(f.values) for f in grids])
+        good = np.isfinite(part)
+        where = (places[0][each][good], places[1][each][good])
+        np.add.at(total, where, part[good])
+        np.add.at(count, where, 1)
+        with np.errstate(invalid="ignore"):
+            maps.append([_json(row) for row in total / count])
+    return {"keys": [factor.key for factor in grids], "levels": [list(f.values) for f in grids], "maps": maps}
+
+
+def _indices(
+    study: StudyFile, table: pa.Table, rows: Sequence[NDArray[np.int64]], parts: Sequence[Array]
+) -> list[list[Any]]:
+    """Of each controller, its indices as [factor, name, value, confidence, spread]."""
+    complete = len({len(each) for each in rows}) == 1
+    if study.case_list is not None or not complete:
+        return []
+    found = []
+    for each, part in zip(rows, parts, strict=True):
+        columns = {key: table[key].take(pa.array(each)).to_pylist() for key in study.keys}
+        found.append([
+            [index.factor, index.name, *_json(np.array([index.value, index.confidence, index.spread]))]
+            for index in indices(study.design.kind, study.factors, columns, part)
+        ])  # fmt: skip
+    return found if any(found) else []
+
+
+def _extremes(study: StudyFile, table: pa.Table, rows: NDArray[np.int64], part: Array) -> list[list[Any]]:
+    """The runs with the largest and the smallest magnitudes: run, value, and the line that drives it again."""
+    good = np.flatnonzero(np.isfinite(part))
+    order = good[np.argsort(-np.abs(part[good]), kind="stable")]
+    chosen = order if len(order) <= 2 * _EXTREMES else np.concatenate([order[:_EXTREMES], order[-_EXTREMES:]])
+    return [
+        [row["run"], float(f"{part[place]:.5g}"), _command(study, row)]
+        for place, row in zip(chosen, table.take(pa.array(rows[chosen])).to_pylist(), strict=True)
+    ]
+
+
+def _command(study: StudyFile, row: Mapping[str, Any]) -> str:
+    """The command line that drives a run again and replays it; empty where its manoeuvre or vehicle has no file."""
+    given = {}
+    for part, items in (("maneuver", study.maneuvers), ("vehicle", study.vehicles), ("controller", study.controllers)):
+        given[part] = next((item for item in items if label_of(item) == row[part]), None)
+    if not all(isinstance(item, str) for item in given.values()):
+        return ""
+    values = {**study.overrides, **{key: row[key] for key in study.keys if row[key] is not None}}
+    words = ["activesteer", "run", given["maneuver"], "-c", given["controller"], "--vehicle", given["vehicle"]]
+    for key, value in values.items():
+        words += ["--set", f"{key}={value if isinstance(value, str) else json.dumps(value)}"]
+    file = f"run-{row['run']}.mcap"
+    return f"{shlex.join([*words, '-o', file])} && activesteer replay {file}"
+
+
+def _json(column: Array) -> list[float | None]:
+    """Numbers as the page holds them: five digits, and null where there is none."""
+    return [float(f"{value:.5g}") if np.isfinite(value) else None for value in column.tolist()]
