@@ -11,7 +11,6 @@ from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from activesteer.conventions import RUN_COLOURS
@@ -21,7 +20,7 @@ from activesteer.pages import render
 from activesteer.quantities import metric_label
 from activesteer.studies.column_units import unit_of
 from activesteer.studies.plan import label_of
-from activesteer.studies.sensitivity import indices
+from activesteer.studies.sensitivity import MAX_SAMPLES, indices
 from activesteer.studies.store import IDENTITY, OUTCOME, Store
 from activesteer.studies.study_file import StudyFile, read_study
 
@@ -108,7 +107,7 @@ def _shown_rows(table: pa.Table) -> NDArray[np.int64]:
 
 def _factor(key: str, column: pa.ChunkedArray) -> dict[str, Any]:
     numeric = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
-    levels = pc.unique(column.drop_null()).to_pylist()
+    levels = column.drop_null().unique().to_pylist()
     few = len(levels) <= _BINS
     ordered = (sorted(levels) if numeric else [str(level) for level in levels]) if few or not numeric else []
     return {"key": key, "unit": unit_of(key), "numeric": numeric, "levels": ordered}
@@ -122,7 +121,16 @@ def _of_group(
     controllers = who["controller"][0]
     rows = [np.flatnonzero(inside & (who["controller"][1] == place)) for place in range(len(controllers))]
     samples = table["sample"].to_numpy()
-    indexed = len(values) * len(controllers) <= _MAX_INDICES
+    indexed = len(values) * len(controllers) <= _MAX_INDICES and len({len(each) for each in rows}) == 1
+    indexed = indexed and study.case_list is None
+    points = [
+        {key: table[key].take(pa.array(each[:MAX_SAMPLES])).to_pylist() for key in study.keys} if indexed else {}
+        for each in rows
+    ]
+    pairs = [
+        np.intersect1d(samples[rows[0]], samples[each], assume_unique=True, return_indices=True)[1:]
+        for each in (rows[1:] if study.design.paired else ())
+    ]
     found = {}
     for name, column in values.items():
         parts = [column[each] for each in rows]
@@ -132,9 +140,9 @@ def _of_group(
         found[name] = {
             "histogram": _histogram(finite),
             "quantiles": [_json(np.quantile(part, [0.05, 0.5, 0.95])) if len(part) else None for part in finite],
-            "paired": _paired(study, samples, rows, parts),
+            "paired": _paired(pairs, parts),
             "heat": _heat(study, table, rows, parts),
-            "indices": _indices(study, table, rows, parts) if indexed else [],
+            "indices": _indices(study, points, parts) if indexed else [],
             "extremes": [_extremes(study, table, each, part) for each, part in zip(rows, parts, strict=True)],
         }
     return found
@@ -149,16 +157,13 @@ def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
     return {"edges": _json(edges), "counts": [np.histogram(part, edges)[0].tolist() for part in parts]}
 
 
-def _paired(study: StudyFile, samples: Array, rows: Sequence[NDArray[np.int64]], parts: Sequence[Array]) -> list[Any]:
+def _paired(pairs: Sequence[tuple[Array, Array]], parts: Sequence[Array]) -> list[Any]:
     """Of each controller but the first: 5, 50 and 95 % of its difference to the first in the same sample.
 
     `smaller` is the share of the samples in which it is smaller in magnitude.
     """
-    if len(rows) < 2 or not study.design.paired:
-        return []
     found: list[Any] = []
-    for each, part in zip(rows[1:], parts[1:], strict=True):
-        _, first, second = np.intersect1d(samples[rows[0]], samples[each], return_indices=True)
+    for (first, second), part in zip(pairs, parts[1:], strict=False):
         a, b = parts[0][first], part[second]
         both = np.isfinite(a) & np.isfinite(b)
         if not both.any():
@@ -193,28 +198,25 @@ def _heat(
     return {"keys": [factor.key for factor in grids], "levels": [list(f.values) for f in grids], "maps": maps}
 
 
-def _indices(
-    study: StudyFile, table: pa.Table, rows: Sequence[NDArray[np.int64]], parts: Sequence[Array]
-) -> list[list[Any]]:
+def _indices(study: StudyFile, points: Sequence[Mapping[str, Any]], parts: Sequence[Array]) -> list[list[Any]]:
     """Of each controller, its indices as [factor, name, value, confidence, spread]."""
-    complete = len({len(each) for each in rows}) == 1
-    if study.case_list is not None or not complete:
-        return []
-    found = []
-    for each, part in zip(rows, parts, strict=True):
-        columns = {key: table[key].take(pa.array(each)).to_pylist() for key in study.keys}
-        found.append([
+    found = [
+        [
             [index.factor, index.name, *_json(np.array([index.value, index.confidence, index.spread]))]
-            for index in indices(study.design.kind, study.factors, columns, part)
-        ])  # fmt: skip
+            for index in indices(study.design.kind, study.factors, columns, part[:MAX_SAMPLES])
+        ]
+        for columns, part in zip(points, parts, strict=True)
+    ]
     return found if any(found) else []
 
 
 def _extremes(study: StudyFile, table: pa.Table, rows: NDArray[np.int64], part: Array) -> list[list[Any]]:
     """The runs with the largest and the smallest magnitudes: run, value, and the line that drives it again."""
     good = np.flatnonzero(np.isfinite(part))
-    order = good[np.argsort(-np.abs(part[good]), kind="stable")]
-    chosen = order if len(order) <= 2 * _EXTREMES else np.concatenate([order[:_EXTREMES], order[-_EXTREMES:]])
+    if len(good) > 2 * _EXTREMES:
+        good = good[np.argpartition(np.abs(part[good]), (_EXTREMES - 1, len(good) - _EXTREMES))]
+        good = np.concatenate([good[:_EXTREMES], good[-_EXTREMES:]])
+    chosen = good[np.argsort(-np.abs(part[good]), kind="stable")]
     return [
         [row["run"], float(f"{part[place]:.5g}"), _command(study, row)]
         for place, row in zip(chosen, table.take(pa.array(rows[chosen])).to_pylist(), strict=True)

@@ -18,8 +18,8 @@ from activesteer.studies.design import FOR_INDICES, MORRIS_LEVELS
 from activesteer.studies.factors import Factor
 
 CONFIDENCE: Final = 0.95
-_MAX_SAMPLES: Final = 16384
-"""More rows move the indices less than their confidence intervals are wide."""
+MAX_SAMPLES: Final = 16384
+"""Rows that are enough: more move the indices less than their confidence intervals are wide."""
 _MIN_SAMPLES: Final = 40
 """With fewer, RBD-FAST has no meaning."""
 
@@ -85,7 +85,7 @@ def _computed(
     keys = problem["names"]
     if kind == "saltelli":
         block = len(keys) + 2
-        used = values[: block * min(len(values) // block, _MAX_SAMPLES)]
+        used = values[: block * (1 << ((len(values) // block).bit_length() - 1))]
         # The estimators are made for a metric around zero.
         found = sobol.analyze(problem, (used - used.mean()) / used.std(), calc_second_order=False, seed=0)
         return [
@@ -94,13 +94,15 @@ def _computed(
             for place, key in enumerate(keys)
         ]
     if kind == "morris":
+        whole = len(values) // (len(keys) + 1) * (len(keys) + 1)
+        unit, values = unit[:whole], values[:whole]
         found = morris.analyze(problem, unit, values, num_levels=MORRIS_LEVELS, seed=0)
         return [
             Index(key, "mu*", *(float(found[name][place]) for name in ("mu_star", "mu_star_conf", "sigma")))
             for place, key in enumerate(keys)
         ]
     finite = np.isfinite(values)
-    rows = np.flatnonzero(finite)[:_MAX_SAMPLES]
+    rows = np.flatnonzero(finite)[:MAX_SAMPLES]
     if len(rows) < _MIN_SAMPLES:
         return []
     found = rbd_fast.analyze(problem, unit[rows], values[rows], seed=0)
