@@ -32,6 +32,7 @@ _MAX_INDICES: Final = 400
 """Sets of indices that are computed: each takes some hundredths of a second."""
 
 Array = NDArray[np.float64]
+Places = NDArray[np.int64]
 Group = tuple[str, str]
 """Manoeuvre and vehicle."""
 
@@ -92,13 +93,13 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _codes(column: pa.ChunkedArray) -> tuple[list[str], NDArray[np.int64]]:
+def _codes(column: pa.ChunkedArray) -> tuple[list[str], Places]:
     """The different texts of a column in the order in which they occur, and the place of each row's in them."""
     encoded = column.combine_chunks().dictionary_encode()
     return encoded.dictionary.to_pylist(), encoded.indices.to_numpy()
 
 
-def _shown_rows(table: pa.Table) -> NDArray[np.int64]:
+def _shown_rows(table: pa.Table) -> Places:
     """Rows of evenly spread samples, whole, so that paired runs stay together."""
     samples = table["sample"].to_numpy()
     every = -(-table.num_rows // _SHOWN_ROWS)
@@ -127,7 +128,8 @@ def _of_group(
         {key: table[key].take(pa.array(each[:MAX_SAMPLES])).to_pylist() for key in study.keys} if indexed else {}
         for each in rows
     ]
-    pairs = [
+    driven = table.select([*IDENTITY, *study.keys]).combine_chunks()
+    pairs: list[Any] = [
         np.intersect1d(samples[rows[0]], samples[each], assume_unique=True, return_indices=True)[1:]
         for each in (rows[1:] if study.design.paired else ())
     ]
@@ -143,7 +145,7 @@ def _of_group(
             "paired": _paired(pairs, parts),
             "heat": _heat(study, table, rows, parts),
             "indices": _indices(study, points, parts) if indexed else [],
-            "extremes": [_extremes(study, table, each, part) for each, part in zip(rows, parts, strict=True)],
+            "extremes": [_extremes(study, driven, each, part) for each, part in zip(rows, parts, strict=True)],
         }
     return found
 
@@ -157,7 +159,7 @@ def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
     return {"edges": _json(edges), "counts": [np.histogram(part, edges)[0].tolist() for part in parts]}
 
 
-def _paired(pairs: Sequence[tuple[Array, Array]], parts: Sequence[Array]) -> list[Any]:
+def _paired(pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array]) -> list[Any]:
     """Of each controller but the first: 5, 50 and 95 % of its difference to the first in the same sample.
 
     `smaller` is the share of the samples in which it is smaller in magnitude.
@@ -176,7 +178,7 @@ def _paired(pairs: Sequence[tuple[Array, Array]], parts: Sequence[Array]) -> lis
 
 
 def _heat(
-    study: StudyFile, table: pa.Table, rows: Sequence[NDArray[np.int64]], parts: Sequence[Array]
+    study: StudyFile, table: pa.Table, rows: Sequence[Places], parts: Sequence[Array]
 ) -> dict[str, Any] | None:
     """Means over the first two grids, controller by controller."""
     grids = [factor for factor in study.factors if factor.kind == "grid"]
@@ -210,7 +212,7 @@ def _indices(study: StudyFile, points: Sequence[Mapping[str, Any]], parts: Seque
     return found if any(found) else []
 
 
-def _extremes(study: StudyFile, table: pa.Table, rows: NDArray[np.int64], part: Array) -> list[list[Any]]:
+def _extremes(study: StudyFile, table: pa.Table, rows: Places, part: Array) -> list[list[Any]]:
     """The runs with the largest and the smallest magnitudes: run, value, and the line that drives it again."""
     good = np.flatnonzero(np.isfinite(part))
     if len(good) > 2 * _EXTREMES:

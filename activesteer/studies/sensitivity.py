@@ -20,6 +20,8 @@ from activesteer.studies.factors import Factor
 CONFIDENCE: Final = 0.95
 MAX_SAMPLES: Final = 16384
 """Rows that are enough: more move the indices less than their confidence intervals are wide."""
+_MAX_RBD_SAMPLES: Final = 4096
+_RBD_RESAMPLES: Final = 30
 _MIN_SAMPLES: Final = 40
 """With fewer, RBD-FAST has no meaning."""
 
@@ -102,10 +104,10 @@ def _computed(
             for place, key in enumerate(keys)
         ]
     finite = np.isfinite(values)
-    rows = np.flatnonzero(finite)[:MAX_SAMPLES]
+    rows = np.flatnonzero(finite)[:_MAX_RBD_SAMPLES]
     if len(rows) < _MIN_SAMPLES:
         return []
-    found = rbd_fast.analyze(problem, unit[rows], values[rows], seed=0)
+    found = rbd_fast.analyze(problem, unit[rows], values[rows], num_resamples=_RBD_RESAMPLES, seed=0)
     return [
         Index(key, "S1", float(found["S1"][place]), float(found["S1_conf"][place])) for place, key in enumerate(keys)
     ]
