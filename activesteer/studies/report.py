@@ -177,9 +177,7 @@ def _paired(pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array]) -> l
     return found
 
 
-def _heat(
-    study: StudyFile, table: pa.Table, rows: Sequence[Places], parts: Sequence[Array]
-) -> dict[str, Any] | None:
+def _heat(study: StudyFile, table: pa.Table, rows: Sequence[Places], parts: Sequence[Array]) -> dict[str, Any] | None:
     """Means over the first two grids, controller by controller."""
     grids = [factor for factor in study.factors if factor.kind == "grid"]
     if len(grids) != 2:
