@@ -1,0 +1,134 @@
+"""No run diverges or holds a value that is not finite: all grips, grades and speeds, both cars, every shipped manoeuvre.
+
+What a car cannot do it does not do: it slides down a slope of ice, spins its wheels as far as the driver's foot lets it,
+leaves the road of a lane change. A run may be refused because its course cannot be driven in the time, by an error that
+says so; it may not end as `SimulationDiverged`.
+"""
+
+from __future__ import annotations
+
+import random
+import tomllib
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import pytest
+
+import activesteer
+from activesteer.conventions import CORNERS
+from activesteer.resources import find_maneuver, list_maneuvers
+from activesteer.scenario import load_car
+
+MU: Final = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.2)
+GRADE: Final = (0.0, 0.1, 0.2, 0.3, 0.5)
+SPEED_KMH: Final = (5.0, 15.0, 30.0, 60.0, 100.0, 160.0, 250.0)
+TIMESTEP_S: Final = (5e-4, 1e-3, 2e-3)
+COURSES: Final = {"lane_change": 180.0, "slalom": 320.0}
+"""Kind of manoeuvre -> length of its course, with what follows [m]."""
+LEFT_TO_SEARCHES: Final = ("amplitude_factor", "lateral_acceleration_g", "lateral_acceleration_mps2")
+KNOWN: Final = (
+    ("straight_line", 30.0, 0.2, 0.1),
+    ("straight_line", 30.0, 0.3, 0.2),
+    ("slalom", 100.0, 0.0, 0.05),
+)
+"""What once span up without end: manoeuvre, speed [km/h], grade, friction."""
+
+
+class Case(NamedTuple):
+    """One run."""
+
+    maneuver: str
+    vehicle: str
+    controller: str
+    speed_kmh: float
+    grade: float
+    mu: float
+    timestep_s: float
+
+    def table(self) -> dict[str, Any]:
+        """The manoeuvre, cut to some seconds; angles that would be searched for are given."""
+        table = tomllib.loads(find_maneuver(self.maneuver).read_text(encoding="utf-8"))
+        for steering in ("steer", "turn"):
+            for key in LEFT_TO_SEARCHES:
+                if table.get(steering, {}).pop(key, None) is not None:
+                    table[steering]["steering_wheel_deg"] = 90.0
+        speed_mps = max(self.speed_kmh, 15.0) / 3.6
+        if "speed" not in table:
+            table["speed_kmh"] = 3.6 * speed_mps if table["kind"] in COURSES else self.speed_kmh
+        if table["kind"] in COURSES:
+            table["duration_s"] = min(60.0, COURSES[table["kind"]] / speed_mps + 4.0)
+        elif table["kind"] in ("open_loop", "slowly_increasing_steer", "constant_radius"):
+            table["duration_s"] = 6.0
+            if "circle" in table:
+                table["circle"]["end_speed_kmh"] = 20.0 + max(95.0, self.speed_kmh)
+        elif table["kind"] == "sine_sweep":
+            table["sweep"] |= {"length_s": 8.0}
+            table["duration_s"] = 9.0
+        table["road"] = {"mu": self.mu, "grade": self.grade}
+        if self.maneuver == "split_mu_braking":
+            table["road"] = {"mu_left": self.mu, "mu_right": max(0.05, 0.3 * self.mu), "grade": self.grade}
+        return table
+
+    def drive(self) -> None:
+        """Runs it, and looks at every number that is recorded."""
+        recording = activesteer.simulate(
+            self.table(), vehicle=self.vehicle, controller=self.controller, timestep_s=self.timestep_s
+        )
+        assert recording.metadata["complete"]
+        for name in recording.channels.names:
+            assert np.isfinite(recording[name]).all(), f"{self}: {name}"
+        # An open differential turns one wheel at most twice as fast as the engine; faster than that only the road can.
+        limit_radps = 2.0 * load_car(self.vehicle).config.powertrain.max_wheel_speed_radps
+        fastest = max(np.abs(recording[f"{corner}_wheel_speed_radps"]).max() for corner in CORNERS)
+        assert fastest < limit_radps, f"{self}: a wheel turns at {fastest:.0f} rad/s"
+        assert np.abs(recording["roll_rad"]).max() < 0.5, f"{self}: the car tips over"
+
+
+def drawn(seed: int, count: int) -> list[Case]:
+    """A sample of all there is."""
+    draw = random.Random(seed)
+    return [
+        Case(
+            draw.choice(list_maneuvers()),
+            draw.choice(("compact", "sedan")),
+            draw.choice(("none", "ars", "afs")),
+            draw.choice(SPEED_KMH),
+            draw.choice(GRADE),
+            draw.choice(MU),
+            draw.choice(TIMESTEP_S),
+        )
+        for _ in range(count)
+    ]
+
+
+@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+@pytest.mark.parametrize(("maneuver", "speed_kmh", "grade", "mu"), KNOWN)
+def test_wheels_do_not_spin_up_without_end(
+    maneuver: str, speed_kmh: float, grade: float, mu: float, vehicle: str
+) -> None:
+    Case(maneuver, vehicle, "none", speed_kmh, grade, mu, 2e-3).drive()
+
+
+@pytest.mark.parametrize("case", drawn(seed=20121121, count=8), ids=lambda case: "-".join(map(str, case)))
+def test_no_run_of_a_sample_diverges(case: Case) -> None:
+    case.drive()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_no_run_of_a_larger_sample_diverges(seed: int) -> None:
+    for case in drawn(seed, 50):
+        case.drive()
+
+
+@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+def test_on_a_slope_of_ice_the_car_slides_back_as_a_block_would(vehicle: str) -> None:
+    """g (sin - mu cos) of the slope, when all wheels slide; wheels that still roll carry less, so it may be quicker."""
+    case = Case("straight_line", vehicle, "none", 30.0, 0.5, 0.05, 1e-3)
+    recording = activesteer.simulate(case.table(), vehicle=vehicle)
+    speed = recording["vx_mps"]
+    slope = np.arctan(0.5)
+    least = 9.81 * (np.sin(slope) - 0.05 * np.cos(slope))
+    assert speed[0] > speed[1000] > speed[2000]
+    assert (speed[1000] - speed[2000]) / 1.0 == pytest.approx(least, rel=0.15)
+    assert speed[2500] < -5.0
