@@ -1,8 +1,7 @@
-"""No run diverges or holds a value that is not finite: all grips, grades and speeds, both cars, every shipped manoeuvre.
+"""No run diverges or holds a value that is not finite: all grips, grades, speeds, both cars, every shipped manoeuvre.
 
-What a car cannot do it does not do: it slides down a slope of ice, spins its wheels as far as the driver's foot lets it,
-leaves the road of a lane change. A run may be refused because its course cannot be driven in the time, by an error that
-says so; it may not end as `SimulationDiverged`.
+What a car cannot do it does not do: it slides down a slope of ice, spins its wheels as far as the driver's foot lets
+it, leaves the lanes. What cannot end as `SimulationDiverged` is any of it.
 """
 
 from __future__ import annotations
