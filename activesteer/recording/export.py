@@ -11,20 +11,19 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
+from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.files import replacing
-from activesteer.recording.channels import TIME
+from activesteer.recording.channels import TIME, ChannelTable
 from activesteer.recording.format import metadata_texts
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
-
-    from activesteer.recording.recording import Recording
 
 MATLAB_NAME_LENGTH: Final = 63
 """Longest name of a variable or field in MATLAB (`namelengthmax`)."""
@@ -33,7 +32,33 @@ MATLAB_TABLES: Final = ("units", "meanings", "metrics", "metadata")
 """Variables beside the channels."""
 
 
-def to_dataframe(recording: Recording) -> pd.DataFrame:
+class Exportable(Protocol):
+    """What of a recording is exported; `Recording` is one."""
+
+    metadata: dict[str, Any]
+    metrics: dict[str, float]
+
+    @property
+    def channels(self) -> ChannelTable:
+        """The channels in column order."""
+        ...
+
+    @property
+    def time_s(self) -> Array:
+        """Time of each row [s], shape (n,)."""
+        ...
+
+    @property
+    def values(self) -> Array:
+        """All channel values, shape (n, number of channels)."""
+        ...
+
+    def __getitem__(self, name: str, /) -> Array:
+        """A channel over time, shape (n,)."""
+        ...
+
+
+def to_dataframe(recording: Exportable) -> pd.DataFrame:
     """A column for each channel, the time as the index.
 
     Returns:
@@ -54,7 +79,7 @@ def to_dataframe(recording: Recording) -> pd.DataFrame:
     return frame
 
 
-def to_csv(recording: Recording, path: str | os.PathLike[str]) -> Path:
+def to_csv(recording: Exportable, path: str | os.PathLike[str]) -> Path:
     """Writes a line of names and a line for each row: `time_s`, then the channels; a file that exists is replaced.
 
     Numbers have as many digits as are needed to read the same ones back; channels with `single` have 32 bit.
@@ -73,7 +98,7 @@ def to_csv(recording: Recording, path: str | os.PathLike[str]) -> Path:
     return _written(path, write)
 
 
-def to_parquet(recording: Recording, path: str | os.PathLike[str]) -> Path:
+def to_parquet(recording: Exportable, path: str | os.PathLike[str]) -> Path:
     """Writes `time_s` and the channels as columns; a file that exists is replaced.
 
     Channels with `single` have 32 bit. Each field carries `unit` and `meaning`, the schema `metadata` and `metrics` as
@@ -87,7 +112,7 @@ def to_parquet(recording: Recording, path: str | os.PathLike[str]) -> Path:
     return _written(path, lambda target: parquet.write_table(_table(recording), target, compression="zstd"))
 
 
-def to_mat(recording: Recording, path: str | os.PathLike[str]) -> Path:
+def to_mat(recording: Exportable, path: str | os.PathLike[str]) -> Path:
     """Writes a MATLAB file (version 5, as `load` of every MATLAB and Octave reads it); one that exists is replaced.
 
     `time_s` and every channel is a column of doubles: single ones would turn all that is computed with them single.
@@ -120,7 +145,7 @@ def to_mat(recording: Recording, path: str | os.PathLike[str]) -> Path:
     return _written(path, write)
 
 
-def _table(recording: Recording) -> pa.Table:
+def _table(recording: Exportable) -> pa.Table:
     import pyarrow as pa  # noqa: PLC0415 - slow to import
 
     columns = [pa.array(recording.time_s)]
@@ -135,7 +160,7 @@ def _table(recording: Recording) -> pa.Table:
     return pa.table(columns, schema=pa.schema(fields, metadata=about))
 
 
-def _metadata(recording: Recording) -> str:
+def _metadata(recording: Exportable) -> str:
     texts, _ = metadata_texts(recording.metadata)
     return json.dumps({key: json.loads(text) for key, text in texts.items()}, ensure_ascii=False)
 

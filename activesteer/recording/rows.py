@@ -26,9 +26,9 @@ from activesteer.recording.decoder import Block, BlockDecoder
 from activesteer.road.recorded import LIMIT_M
 from activesteer.signals import Channel
 
-MAX_CACHED_BYTES: Final = 2**29
+MAX_CACHED_BYTES: Final = 3 * 2**27
 """Channels of all open files together that stay in memory, as they are in the files."""
-_READ_BYTES: Final = 2**28
+_READ_BYTES: Final = 2**27
 """How much is read at once: neighbours of the channel that was asked for come with it, since the whole file has to be
 decompressed for a single one."""
 _SMALL_BYTES: Final = 2**16
