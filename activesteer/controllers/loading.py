@@ -18,13 +18,17 @@ class Controller(Protocol):
     """What a controller must have: one method, called once every step of the simulation.
 
     Example:
+        >>> import activesteer
         >>> class CounterSteer:
         ...     def __init__(self, gain=0.1):
         ...         self.gain = gain
         ...
         ...     def step(self, command, measurement):
-        ...         return SteerCommand(rear_steer_demand_rad=-self.gain * command.front_steer_demand_rad)
+        ...         angle_rad = -self.gain * command.front_steer_demand_rad
+        ...         return activesteer.SteerCommand(rear_steer_demand_rad=angle_rad)
         >>> recording = activesteer.simulate("step_steer", controller=CounterSteer(gain=0.05))
+        >>> recording.metrics["rear_steer_steady_state_rad"] < 0.0 < recording.metrics["front_steer_steady_state_rad"]
+        True
     """
 
     def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:

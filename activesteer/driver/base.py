@@ -14,6 +14,16 @@ class Driver(Protocol):
     """What a driver must have: one method, called once every step of the simulation.
 
     A driver who acts less often counts the steps (`DriverSetup.timestep_s`) and repeats the last command in between.
+
+    Example:
+        >>> import math
+        >>> import activesteer
+        >>> class Holds:
+        ...     def step(self, reference, measurement, motion):
+        ...         return activesteer.DriverCommand(steering_wheel_demand_rad=math.radians(30.0), gear=0)
+        >>> recording = activesteer.simulate("straight_line", driver=Holds())
+        >>> bool(recording["yaw_rate_radps"][-1] > 0.1)
+        True
     """
 
     def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:

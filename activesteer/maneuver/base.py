@@ -17,7 +17,18 @@ Speed = Annotated[float, Range(-20.0, 100.0)]
 
 @dataclass(frozen=True, kw_only=True)
 class Maneuver(ABC):
-    """Base of all kinds. The fields are the keys of the TOML file."""
+    """Base of all kinds. The fields are the keys of the TOML file.
+
+    Example:
+        >>> from activesteer.scenario import resolve
+        >>> table = {"kind": "open_loop", "speed_kmh": 72.0, "duration_s": 4.0,
+        ...          "steering": {"time_s": [1.0, 2.0], "steering_wheel_deg": [0.0, 45.0]}}
+        >>> maneuver = resolve(table).maneuver
+        >>> maneuver.speed_mps
+        20.0
+        >>> round(maneuver.reference(1.5).steering_wheel_demand_rad, 4)
+        0.3927
+    """
 
     kind: str
     """Which kind of manoeuvre this is."""

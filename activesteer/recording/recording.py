@@ -34,6 +34,18 @@ class Recording:
         metrics: Metrics by name, in the unit that ends their names.
         attachments: Files kept with the run, by name.
         scene: What the car looks like: solids in body frames, and links between bodies.
+
+    Example:
+        >>> import activesteer
+        >>> recording = activesteer.simulate("straight_line", overrides={"duration_s": 2.0})
+        >>> recording.save("straight.mcap")
+        >>> again = activesteer.Recording.open("straight.mcap")
+        >>> len(again), again["speed_mps"].shape, again.metadata["controller"]
+        (2000, (2000,), 'none')
+        >>> [channel.name for channel in again.channels if channel.unit == "rad/s"][:1]
+        ['yaw_rate_radps']
+        >>> float(again.metrics["speed_end_mps"]) == float(recording.metrics["speed_end_mps"])
+        True
     """
 
     def __init__(

@@ -44,6 +44,19 @@ class TyreRig:
         mu: Friction of the road relative to that of the tyre file.
         pressure_Pa: Inflation pressure [Pa].
         timestep_s: Step of the engine [s].
+
+    Example:
+        >>> import math
+        >>> from activesteer.resources import models_dir
+        >>> from activesteer.rigs.tyre_rig import TyreRig
+        >>> from activesteer.tyre.file.tir import load_tir
+        >>> rig = TyreRig(load_tir(models_dir() / "tyres" / "compact_205_55R16.tir"), mu=0.5)
+        >>> forces = rig.steady(
+        ...     slip_angle_rad=math.radians(4.0), slip_ratio=0.0, inclination_rad=0.0, load_N=4000.0, speed_mps=20.0
+        ... )
+        >>> fx_N, fy_N, fz_N = forces.force_N
+        >>> bool(-0.5 * 4000.0 < 0.9 * fy_N < 0.0)  # a positive slip angle, a force to the right
+        True
     """
 
     def __init__(

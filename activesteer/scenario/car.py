@@ -107,6 +107,13 @@ def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | No
         ParameterError: the vehicle is not found or wrong, or an override names a key that does not exist.
         ModelError: the model file is not found.
         TyreFileError: a tyre file is not found or wrong.
+
+    Example:
+        >>> from activesteer.road.road import Road
+        >>> from activesteer.scenario import load_car
+        >>> car = load_car("compact", {"load.payload_kg": 200.0}).on(Road(mu=0.5))
+        >>> round(float(car.model.body_mass.sum()))
+        1630
     """
     changes = plain(overrides)
     listed = [Override(key, tuple(key.removeprefix("vehicle.").split(".")), value) for key, value in changes.items()]

@@ -71,6 +71,14 @@ def resolve(
         ParameterError: the vehicle is not found or wrong, or an override names a key that does not exist.
         ModelError: the model file is not found.
         TyreFileError: a tyre file is not found or wrong.
+
+    Example:
+        >>> from activesteer.scenario import resolve
+        >>> scenario = resolve("double_lane_change", overrides={"speed_kmh": 72, "factors.mass": 1.1})
+        >>> scenario.maneuver.speed_mps, scenario.car.config.factors.mass
+        (20.0, 1.1)
+        >>> scenario.maneuver.course.path.length_m > 100.0
+        True
     """
     table, source, folder, files = read_table(maneuver, "maneuver", find_maneuver, ManeuverError)
     kind = maneuver_class(table, source)

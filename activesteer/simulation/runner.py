@@ -56,6 +56,17 @@ def simulate(
 
     Raises:
         ActiveSteerError: an input is wrong, or the run failed; a failed run's recording is the error's `recording`.
+
+    Example:
+        >>> import activesteer
+        >>> none, ars = (
+        ...     activesteer.simulate("step_steer", controller, overrides={"speed_kmh": 100, "road.mu": 0.9})
+        ...     for controller in ("none", "ars")
+        ... )
+        >>> ars.metrics["yaw_rate_overshoot"] < 0.5 * none.metrics["yaw_rate_overshoot"]
+        True
+        >>> none["yaw_rate_radps"].shape == none.time_s.shape
+        True
     """
     controller, driver = find_controller(controller), find_driver(driver)
     scenario = prepared(resolve(maneuver, vehicle, overrides), timestep_s)

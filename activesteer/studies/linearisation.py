@@ -172,6 +172,14 @@ def linearise(
     Raises:
         ParameterError: the speed is too low, or the vehicle is not found or wrong.
         ModelError: the car cannot be built, or does not roll straight ahead at this speed.
+
+    Example:
+        >>> from activesteer.studies.linearisation import linearise
+        >>> system = linearise("compact", speed_mps=25.0)
+        >>> system.ninputs, system.noutputs
+        (3, 4)
+        >>> bool(system.poles().real.max() < 0.0)
+        True
     """
     return linear_car(vehicle, speed_mps, overrides).state_space(cut_off_Hz)
 

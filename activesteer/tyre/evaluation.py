@@ -156,6 +156,16 @@ class MagicFormula:
 
     Attributes:
         parameters: Its coefficients.
+
+    Example:
+        >>> import numpy as np
+        >>> from activesteer.resources import models_dir
+        >>> from activesteer.tyre.evaluation import MagicFormula
+        >>> from activesteer.tyre.file.tir import load_tir
+        >>> tyre = MagicFormula(load_tir(models_dir() / "tyres" / "compact_205_55R16.tir"))
+        >>> alpha_rad = np.radians([0.0, 2.0, 4.0])
+        >>> tyre.evaluate(fz_N=4000.0, kappa=0.0, alpha_rad=alpha_rad).fy_N.round(-2)
+        array([  100., -2400., -3600.])
     """
 
     def __init__(self, parameters: TyreParameters) -> None:

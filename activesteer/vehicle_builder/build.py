@@ -71,6 +71,15 @@ def new_vehicle(
         ParameterError: the table is wrong, or the folder has files already.
         TyreFileError: a tyre file is not found or wrong.
         ModelError: the car cannot stand.
+
+    Example:
+        >>> from activesteer.resources import models_dir
+        >>> from activesteer.vehicle_builder import check_vehicle, new_vehicle
+        >>> made = new_vehicle("mine", models_dir() / "tables" / "wishbone.csv")
+        >>> made.vehicle_file.as_posix()
+        'vehicles/mine/mine.toml'
+        >>> check_vehicle(made.vehicle_file).count("error")
+        0
     """
     if not re.fullmatch(r"[A-Za-z][\w-]*", name):
         msg = f"{name!r} cannot be the name of a car: a letter first, then letters, digits, _ and -"

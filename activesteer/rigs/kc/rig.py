@@ -39,6 +39,12 @@ def kinematics_compliance(
         ParameterError: the vehicle or the targets are not found or wrong.
         ModelError: the model is not found, lacks a part, or has no equilibrium.
         TyreFileError: a tyre file is not found or wrong.
+
+    Example:
+        >>> from activesteer.rigs.kc.rig import kinematics_compliance
+        >>> result = kinematics_compliance("compact")
+        >>> result["front", "bump_steer"] < 0.0
+        True
     """
     car = load_car(vehicle, overrides)
     bands = load_targets(car.name, targets)

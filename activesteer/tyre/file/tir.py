@@ -51,6 +51,13 @@ def load_tir(path: str | Path, mounted: Side | None = None, *, slip_tangent: boo
 
     Raises:
         TyreFileError: the file cannot be read, a line cannot be understood, or a value is missing or not allowed.
+
+    Example:
+        >>> from activesteer.resources import models_dir
+        >>> from activesteer.tyre.file.tir import load_tir
+        >>> tyre = load_tir(models_dir() / "tyres" / "compact_205_55R16.tir")
+        >>> tyre["FNOMIN"], tyre["UNLOADED_RADIUS"]
+        (4000.0, 0.316)
     """
     path = Path(path)
     return tir_from_text(read_text(path), path, mounted, slip_tangent=slip_tangent)

@@ -1,0 +1,111 @@
+"""The examples run as their first lines say, and show what they are there to show."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import shlex
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import activesteer
+from activesteer.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples"
+SCRIPTS = sorted(EXAMPLES.glob("*.py"))
+
+
+def example(name: str) -> dict[str, Any]:
+    """What a script defines."""
+    return runpy.run_path(str(EXAMPLES / f"{name}.py"))
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
+def test_script_runs_and_prints(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    # A study's processes would load the engine once more each.
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    monkeypatch.setattr("os.sched_getaffinity", lambda _pid: {0}, raising=False)
+    runpy.run_path(str(path), run_name="__main__")
+    assert len(capsys.readouterr().out.splitlines()) >= 2
+    assert not list(tmp_path.iterdir()), "an example leaves no files where it is run"
+
+
+COMMANDS = [
+    (path.name, line.strip())
+    for path in sorted(EXAMPLES.iterdir())
+    if path.suffix in {".py", ".toml"}
+    for line in re.findall(r"^(?:#| )\s+(activesteer .*)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+]
+
+
+@pytest.mark.parametrize(("name", "command"), COMMANDS, ids=[name for name, _ in COMMANDS])
+def test_command_in_an_example_runs(
+    name: str, command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(EXAMPLES)
+    assert name in command
+    assert main(shlex.split(command)[1:]) == 0, capsys.readouterr().err
+    assert list(tmp_path.glob("runs/*.mcap"))
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_every_example_is_listed(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    files = {path.name for path in EXAMPLES.iterdir() if path.is_file()}
+    assert not {name for name in files if f"examples/{name}" not in text}
+
+
+def test_own_controller_keeps_the_car_from_spinning() -> None:
+    runs = example("own_controller")["compare"]()
+    sideslip_rad = {name: run.metrics["sideslip_peak_abs_rad"] for name, run in runs.items()}
+    assert sideslip_rad["yaw damper"] < 0.3 * sideslip_rad["none"]
+    assert runs["yaw damper"]["rear_steer_demand_rad"].any()
+
+
+def test_own_driver_keeps_the_lane_change_but_cuts_it() -> None:
+    runs = example("own_driver")["compare"]()
+    standard, own = (runs[name].metrics for name in ("standard", "pure pursuit"))
+    assert own["speed_end_mps"] > 15.0
+    # A single point ahead: the corners of the path are cut, more than by the standard driver and by less than a lane.
+    assert standard["track_deviation_max_m"] < own["track_deviation_max_m"] < 2.0
+
+
+def test_own_manoeuvre_tightens() -> None:
+    slow, fast = (example("own_manoeuvre")["drive"](speed_kmh) for speed_kmh in (40.0, 60.0))
+    # v^2 / R; the end of the bend, of some 45 m radius, is at the recording's end.
+    ratio = fast.metrics["ay_peak_abs_mps2"] / slow.metrics["ay_peak_abs_mps2"]
+    assert ratio == pytest.approx((60.0 / 40.0) ** 2, rel=0.1)
+    assert fast["yaw_rate_radps"][-1] > 2.0 * fast["yaw_rate_radps"][len(fast) // 2]
+
+
+def test_own_manoeuvre_file_brakes_in_its_turn() -> None:
+    table = tomllib.loads((EXAMPLES / "own_manoeuvre.toml").read_text(encoding="utf-8"))
+    run = activesteer.simulate(EXAMPLES / "own_manoeuvre.toml")
+    braking = (run.time_s > 3.1) & (run.time_s < 3.4)
+    assert run["ax_mps2"][braking].mean() < -1.5
+    assert run["ay_mps2"][braking].mean() > 2.0
+    assert run["fl_mu"].min() == pytest.approx(table["road"]["patches"][0]["mu"])
+
+
+def test_own_cars_roll_as_their_changes_say(tmp_path: Path) -> None:
+    runs = example("own_car")["compare"](tmp_path)
+    roll_rad = {name: run.metrics["roll_steady_state_rad"] for name, run in runs.items()}
+    assert roll_rad["300 kg in the boot"] > 1.03 * roll_rad["compact"]
+    assert roll_rad["stiffer front"] < 0.95 * roll_rad["compact"]
+    masses_kg = [runs[name].metadata["vehicle"]["load"]["payload_kg"] for name in ("compact", "300 kg in the boot")]
+    assert masses_kg == [0.0, 300.0]
+
+
+def test_own_study_shows_that_rear_steering_takes_the_overshoot_out() -> None:
+    scope = example("own_study")
+    found = scope["overshoots"](activesteer.study(scope["STUDY"], jobs=1))
+    assert set(found) == {(controller, mu) for controller in ("none", "ars") for mu in (0.7, 1.0)}
+    assert all(found["ars", mu] < 0.6 * found["none", mu] for mu in (0.7, 1.0))
