@@ -82,6 +82,7 @@ def all_commands() -> Commands:
         reproduce,
         run,
         study,
+        tune,
         tyre,
         validate,
         vehicle,
@@ -96,7 +97,7 @@ def all_commands() -> Commands:
         "drive": (listing, run, watch),
         "look": (info, report, replay, video, recover),
         "car": (vehicle, tyre, kc),
-        "study": (study, identify, linearise),
+        "study": (study, tune, identify, linearise),
         "prove": (reproduce, figures, validate, bench),
     }.items():
         commands.begin_group(title)

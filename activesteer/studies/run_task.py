@@ -232,9 +232,11 @@ def _is_kept(patterns: tuple[str, ...], name: str) -> bool:
 def _claims(maneuver: str, recordings: Mapping[str, Recording]) -> dict[str, float]:
     """Column -> 1 where a claim of the paper holds for the sample, else 0; empty where a run is missing."""
     try:
-        return {f"claim_{claim.id}": float(claim.passed) for claim in SCENARIOS[maneuver](recordings)}
+        claims = SCENARIOS[maneuver](recordings)
     except (KeyError, ActiveSteerError):
         return {}
+    failed = sum(not claim.passed for claim in claims)
+    return {f"claim_{claim.id}": float(claim.passed) for claim in claims} | {"claims_failed": float(failed)}
 
 
 def failed_row(settings: Settings, request: Request, status: Status, problem: str) -> Row:

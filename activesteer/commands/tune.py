@@ -1,0 +1,76 @@
+"""`activesteer tune`: values of a study's factors that make objectives small."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler
+from activesteer.commands.output import print_json
+from activesteer.commands.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from activesteer.studies.tuning import Tuning
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("tune", help="find values of a study's factors that make objectives small")
+    parser.add_argument("study", metavar="STUDY", help="a study file with a table [tune], or its name")
+    add_output(parser, "DIR", "folder of the search; one that is there is gone on with", "tuning")
+    parser.add_argument("--trials", type=int, metavar="N", help="sets to have tried in the end (default: the file's)")
+    add_jobs(parser)
+    add_scheduler(parser)
+    add_json(parser)
+    parser.set_defaults(action=_tune)
+
+
+def _tune(options: argparse.Namespace) -> int:
+    from activesteer.studies.tuning import tune
+
+    with ProgressBar("tune", quiet=options.json) as bar:
+        result = tune(
+            options.study,
+            options.output,
+            trials=options.trials,
+            jobs=options.jobs,
+            scheduler=options.scheduler,
+            progress=lambda done, total: bar(done / total, f"{done}/{total} sets"),
+        )
+    figures = _draw(result, options.output)
+    if options.json:
+        front = [vars(trial) for trial in result.front]
+        print_json({"done": result.done, "failed": result.failed, "front": front, "figures": list(map(str, figures))})
+        return 0
+    print(f"{result.done} sets were tried, of {result.failed} a run failed; the best:")
+    for trial in result.front:
+        print("  ".join(f"{name} {value:.4g}" for name, value in trial.objectives.items()))
+        for key, value in trial.values.items():
+            print(f"  {key} = {value!r}")
+    for path in figures:
+        print(f"figure: {path}")
+    return 0
+
+
+def _draw(result: Tuning, folder: Path) -> list[Path]:
+    """The objectives of all sets, two against each other, or one over the sets; nothing without matplotlib."""
+    if not result.trials:
+        return []
+    from activesteer.errors import ParameterError, StudyError
+    from activesteer.plotting import new_figure, save
+
+    try:
+        figure = new_figure(6.0, 4.5, "Objectives of the sets that were tried")
+    except ParameterError:
+        return []
+    names = list(result.trials[0].objectives)
+    x, y = names[:2] if len(names) > 1 else ("set", names[0])
+    axes = figure.subplots()
+    for trials, colour, label in ((result.trials, "0.6", "tried"), (result.front, "C3", "best")):
+        places = [trial.objectives.get(x, trial.number) for trial in trials]
+        axes.plot(places, [trial.objectives[y] for trial in trials], "o", color=colour, markersize=4, label=label)
+    axes.set_xlabel(f"{x} [-]")
+    axes.set_ylabel(f"{y} [-]")
+    axes.legend()
+    return [save(figure, folder / f"front.{kind}", StudyError) for kind in ("png", "svg")]
