@@ -18,6 +18,7 @@ from activesteer.resources import find_vehicle, models_dir
 from activesteer.road.road import Road
 from activesteer.scenario.model_files import model_files
 from activesteer.scenario.overrides import Override, applied, plain
+from activesteer.theory.single_track import IDENTIFY
 from activesteer.tyre.file.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle, VehicleParameters
@@ -123,7 +124,11 @@ def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | No
 def car_with(vehicle: FileOrTable, overrides: list[Override]) -> Car:
     """The car with overrides that are known to be meant for it; see `load_car`."""
     table, source, folder, files = read_table(vehicle, "vehicle", find_vehicle, ParameterError)
+    known = table.get("single_track")
     table, source = applied(VehicleConfig, table, source, overrides)
+    if table.get("single_track") == IDENTIFY and isinstance(known, Mapping):
+        # Short for the key `source` of the table.
+        table["single_track"] = {**known, "source": IDENTIFY}
     config = build(VehicleConfig, table, source)
     mjcf = _find_file(config.mjcf, folder, models_dir() / "mjcf", source, ("mjcf",), ModelError)
     front, rear = (

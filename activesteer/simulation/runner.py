@@ -24,6 +24,8 @@ from activesteer.simulation.amplitude_search import amplitude
 from activesteer.simulation.appearance import scene_of
 from activesteer.simulation.recorder import Recorder, channels_of
 from activesteer.simulation.simulation import Simulation
+from activesteer.simulation.single_track_search import with_identified_single_track
+from activesteer.theory.single_track import IDENTIFY
 from activesteer.version import __version__
 
 MAX_KEPT_VALUES: Final = 2**25
@@ -74,7 +76,7 @@ def simulate(
 
 
 def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scenario:
-    """The scenario with everything known that must be found by driving first: how far the steering wheel is turned.
+    """The scenario with everything known that must be found by driving first: steering angle, single-track model.
 
     Args:
         scenario: A scenario.
@@ -86,6 +88,8 @@ def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scen
     Raises:
         ManeuverError: no amplitude gives what is asked for.
     """
+    if scenario.car.config.single_track.source == IDENTIFY:
+        scenario = with_identified_single_track(scenario, run_scenario)
     search = scenario.maneuver.search
     if search is None:
         return scenario

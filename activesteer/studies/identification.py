@@ -13,31 +13,32 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.handling import Car, Handling, evaluate
+from activesteer.analysis.handling import Handling
 from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.tables import comparison
 from activesteer.controllers import SingleTrackParameters
-from activesteer.errors import ModelError, RecordingError
+from activesteer.errors import RecordingError
 from activesteer.quantities import metric_label
-from activesteer.scenario import Car as CarFiles
-from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.scenario import FileOrTable, resolve
 from activesteer.scenario.vehicle_file import write_values
 from activesteer.simulation.runner import run_scenario
-from activesteer.theory.single_track import SingleTrack, characteristic_speed
-from activesteer.vehicle.mass_properties import mass_properties
+from activesteer.simulation.single_track_search import (
+    CONSTANT_SPEED_TESTS,
+    body_of,
+    fitted,
+    handling_in,
+    linear_tests,
+    single_track_of,
+)
+from activesteer.theory.single_track import SingleTrack
 
-CONSTANT_SPEED_TESTS: Final = {"80 km/h": 80.0, "100 km/h": 100.0}
-"""Tests at constant speed: name and speed [km/h]; the single-track model comes from these."""
 RADIUS_TEST: Final = "100 m"
 """The test on a circle."""
-
-_LINEAR: Final = {"duration_s": 12.0, "steer.end_deg": 50.0}
-"""What a test at constant speed is cut to where only the linear range is wanted."""
 
 CLASS_BANDS: Final = {
     "understeer_gradient_radpmps2": (2.2, 3.2, "computed for axle stiffnesses of 80-110 and 120-155 kN/rad"),
@@ -45,22 +46,6 @@ CLASS_BANDS: Final = {
     "roll_gradient_radpmps2": (3.9, 6.4, "computed for a roll stiffness of 95 to 60 kNm/rad"),
 }
 """What is expected of a car of the compact class: metric -> low, high (in the unit shown), source."""
-
-
-class Body(NamedTuple):
-    """Mass properties of the whole car at static ride.
-
-    Attributes:
-        mass_kg: Mass [kg].
-        yaw_inertia_kgm2: Inertia about the vertical axis through the centre of gravity [kg m2].
-        cg_to_front_m: l_V [m].
-        cg_to_rear_m: l_H [m].
-    """
-
-    mass_kg: float
-    yaw_inertia_kgm2: float
-    cg_to_front_m: float
-    cg_to_rear_m: float
 
 
 @dataclass(frozen=True)
@@ -129,13 +114,13 @@ def identify(
         for name, speed in CONSTANT_SPEED_TESTS.items()
     }
     scenarios[RADIUS_TEST] = resolve("constant_radius", vehicle, overrides)
-    body = _body(scenarios[RADIUS_TEST].car)
+    body = body_of(scenarios[RADIUS_TEST].car)
     tests = {}
     for name, scenario in scenarios.items():
         if progress is not None:
             progress(name)
-        tests[name] = _drive(scenario, body)
-    found = _single_track(body, [tests[name] for name in CONSTANT_SPEED_TESTS])
+        tests[name] = handling_in(scenario, body, run_scenario)
+    found = fitted(body, [tests[name] for name in CONSTANT_SPEED_TESTS])
     return Identification(scenarios[RADIUS_TEST].car.name, tests, found)
 
 
@@ -151,51 +136,7 @@ def identify_single_track(
     Raises:
         ActiveSteerError: as for `identify`.
     """
-    scenarios = [
-        resolve("slowly_increasing_steer", vehicle, {**(overrides or {}), **_LINEAR, "speed_kmh": speed})
-        for speed in CONSTANT_SPEED_TESTS.values()
-    ]
-    body = _body(scenarios[0].car)
-    return _single_track(body, [_drive(scenario, body) for scenario in scenarios])
-
-
-def _body(car: CarFiles) -> Body:
-    """Mass properties of the whole car, from the model at static ride."""
-    vehicle = car.on()
-    body = mass_properties(vehicle.model, vehicle.data)
-    front, rear = (vehicle.data.xpos[vehicle.model.body(f"{axle}l_wheel").id, 0] for axle in "fr")
-    x_m = body.cg_m[0]
-    return Body(body.mass_kg, float(body.inertia_kgm2[2, 2]), float(front - x_m), float(x_m - rear))
-
-
-def _drive(scenario: Scenario, body: Body) -> Handling:
-    recording = run_scenario(scenario)
-    return evaluate(recording, Car(body.cg_to_front_m, body.cg_to_rear_m, scenario.car.config.steering.ratio))
-
-
-def _single_track(body: Body, tests: list[Handling]) -> SingleTrackParameters:
-    """The model whose slip angles and understeer are the mean of those of the tests at constant speed."""
-    wheelbase = body.cg_to_front_m + body.cg_to_rear_m
-
-    def mean(name: str) -> float:
-        return float(np.mean([getattr(test, name) for test in tests]))
-
-    understeer, front, rear = (mean(f"{name}_gradient_radpmps2") for name in ("understeer", "front_slip", "rear_slip"))
-    if understeer <= 0.0:
-        msg = (
-            f"the car oversteers: its understeer gradient is {math.degrees(understeer) * 9.81:.3g} deg/g, and the "
-            "characteristic speed of the single-track model needs one above 0"
-        )
-        raise ModelError(msg)
-    return SingleTrackParameters(
-        mass_kg=body.mass_kg,
-        yaw_inertia_kgm2=body.yaw_inertia_kgm2,
-        cg_to_front_m=body.cg_to_front_m,
-        cg_to_rear_m=body.cg_to_rear_m,
-        front_stiffness_Nprad=body.mass_kg * body.cg_to_rear_m / wheelbase / front,
-        rear_stiffness_Nprad=body.mass_kg * body.cg_to_front_m / wheelbase / rear,
-        characteristic_speed_mps=characteristic_speed(wheelbase, understeer),
-    )
+    return single_track_of(linear_tests(vehicle, overrides), run_scenario)
 
 
 def single_track_lines(parameters: SingleTrackParameters) -> dict[str, str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,12 @@ if TYPE_CHECKING:
 
 _Speed = TypeVar("_Speed", float, NDArray[np.float64])
 _Positive = Annotated[float, Range(1e-9)]
+
+
+IDENTIFY: Final = "identify"
+IDENTIFIED: Final = "identified"
+SOURCES: Final = ("file", IDENTIFY, IDENTIFIED)
+"""Where the numbers of a single-track model come from."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +49,18 @@ class SingleTrackParameters:
     """Cornering stiffness of the rear axle with its suspension, C_H [N/rad]."""
     characteristic_speed_mps: _Positive | None = None
     """Characteristic speed v_ch from a test of the car [m/s]; eq. 4 where not given."""
+    source: str = "file"
+    """`file`: the numbers are as given, whatever the car carries; `identify`: the car is driven before the run and the
+    numbers found replace them; `identified`: they were found so."""
+
+    def __post_init__(self) -> None:
+        """Checks the source.
+
+        Raises:
+            ParameterError: it has an unknown name.
+        """
+        if self.source not in SOURCES:
+            raise ParameterError(f"source: is {self.source!r}; allowed are {', '.join(SOURCES)}")
 
 
 def characteristic_speed(wheelbase_m: float, understeer_gradient_radpmps2: float) -> float:

@@ -1,0 +1,32 @@
+"""What controllers and driver believe of a loaded car: what the file says, or what driving it tells."""
+
+from __future__ import annotations
+
+import pytest
+
+from activesteer.errors import ParameterError
+from activesteer.scenario import describe, resolve
+from activesteer.simulation.runner import prepared
+
+LOAD = {"load.payload_kg": 300.0}
+
+
+def test_belief_is_kept_unless_asked_otherwise() -> None:
+    known = prepared(resolve("straight_line", overrides=LOAD)).car.config.single_track
+    assert known == resolve("straight_line").car.config.single_track
+    assert known.source == "file"
+
+
+@pytest.mark.parametrize("key", ["single_track", "single_track.source"])
+def test_belief_is_identified_where_asked_for_and_said_so(key: str) -> None:
+    scenario = prepared(resolve("straight_line", overrides={**LOAD, key: "identify"}))
+    known, before = scenario.car.config.single_track, resolve("straight_line").car.config.single_track
+    assert known.mass_kg == pytest.approx(1730.0, abs=1.0)
+    # 300 kg above the rear axle take the centre of gravity back by 300 (l - l_V) / 1730.
+    assert known.cg_to_front_m - before.cg_to_front_m == pytest.approx(300.0 * 1.5554 / 1730.0, abs=0.02)
+    assert describe(scenario)["vehicle"]["single_track"]["source"] == "identified"
+
+
+def test_unknown_source_is_refused() -> None:
+    with pytest.raises(ParameterError, match="source: is 'guess'; allowed are file, identify, identified"):
+        resolve("straight_line", overrides={"single_track.source": "guess"})
