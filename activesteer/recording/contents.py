@@ -81,6 +81,12 @@ def _all(check: Check) -> Check:
     return entries
 
 
+def _single_track(value: Any, key: str) -> None:
+    """Numbers, and where they come from."""
+    for name, entry in table_of(value, key).items():
+        (_name if name == "source" else _number(1e-9, 1e12))(entry, f"{key}.{name}")
+
+
 SCHEMA: Final[Mapping[str, Check]] = {
     "complete": _flag,
     "error": text,
@@ -95,7 +101,7 @@ SCHEMA: Final[Mapping[str, Check]] = {
     "maneuver.title": text,
     "vehicle": table_of,
     "vehicle.name": _name,
-    "vehicle.single_track": _all(_number(1e-9, 1e12)),
+    "vehicle.single_track": _single_track,
     "vehicle.controllers": _all(table_of),
     "vehicle.controllers.ars.corrector": _all(_number(-1e12, 1e12)),
     "vehicle.controllers.afs.corrector": _all(_number(-1e12, 1e12)),
