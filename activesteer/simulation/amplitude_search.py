@@ -5,6 +5,7 @@ Every controller is then given the same input. What was found is kept for the pr
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from dataclasses import replace
@@ -33,7 +34,10 @@ _CHUNK_S: Final = 0.25
 _ROUNDED_RAD: Final = math.radians(0.1)
 """FMVSS 126 rounds A to 0.1 deg, which also makes it the same on every machine."""
 
-_found: dict[tuple[object, ...], float] = {}
+_MAX_KEPT: Final = 256
+"""How many amplitudes are kept: a study asks for a new one in every sample."""
+
+_found: dict[str, float] = {}
 
 
 def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
@@ -53,8 +57,13 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
     probed = replace(scenario, maneuver=search.probe)
     tables = [to_table(probed.maneuver), search.lateral_acceleration_mps2, to_table(probed.car.config), timestep_s]
     models = sorted(item for item in scenario.car.files.items() if item[0].startswith(("mjcf/", "tyres/")))
-    key = (json.dumps(tables, sort_keys=True), scenario.car.mjcf, *models)
+    hashed = hashlib.sha256(json.dumps([tables, str(scenario.car.mjcf)], sort_keys=True).encode())
+    for name, content in models:
+        hashed.update(f"{name} {len(content)} ".encode() + content)
+    key = hashed.hexdigest()
     if key not in _found:
+        while len(_found) >= _MAX_KEPT:
+            del _found[next(iter(_found))]
         if isinstance(search, RampAngle):
             _found[key] = _ramp_angle(probed, search, timestep_s)
         else:
