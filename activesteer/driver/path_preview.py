@@ -24,7 +24,7 @@ from activesteer.conventions import Array
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
 from activesteer.road.path import Path
-from activesteer.road.path_search import PathSearch
+from activesteer.road.path_search import PathSearch, nearest, point_at
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 
 LateralModel = Callable[[float], tuple[Array, Array]]
@@ -92,14 +92,14 @@ class PathPreviewDriver:
 
     def _update_preview(self, path: Path, motion: Motion) -> None:
         """Looks at the road ahead and decides on a steering wheel angle."""
-        speed, search = motion.speed_mps, PathSearch(path)
-        along = self._along_m = search.nearest(motion.x_m, motion.y_m, self._along_m, _WINDOW_M)
-        if speed < _LEAST_SPEED_MPS:
+        search = PathSearch(path)
+        if motion.speed_mps < _LEAST_SPEED_MPS:
+            self._along_m = search.nearest(motion.x_m, motion.y_m, self._along_m, _WINDOW_M)
             self._decide(self._decided_rad[-1])
             return
-        preview = self._preview(speed)
-        ahead = search.at(along + speed * preview.times_s)
-        self._decide(self.robot.steering_ratio * _best_steering(*motion, *ahead, *preview[1:]))
+        preview = self._preview(motion.speed_mps)
+        self._along_m, angle = _best_steering(*motion, self._along_m, *search.line, *preview)
+        self._decide(self.robot.steering_ratio * angle)
 
     def _decide(self, steering_wheel_rad: float) -> None:
         """Puts an angle into the line; what stands at its head is what the hands now begin to do."""
@@ -144,21 +144,30 @@ class PathPreviewDriver:
 
 
 @compiled
-def _best_steering(x, y, yaw, speed, lateral_speed, yaw_rate, ahead_x, ahead_y, by_yaw_rate, by_sideslip, by_steering):
-    """Road-wheel angle held from now on that comes closest to the path, in the least squares sense [rad].
+def _best_steering(
+    x, y, yaw, speed, lateral_speed, yaw_rate,
+    around, spacing, xs, ys, heading_first, heading_last,
+    times, by_yaw_rate, by_sideslip, by_steering,
+):  # fmt: skip
+    """Where the car is along the path, and the road-wheel angle that, held from now on, keeps it closest to the path.
 
-    The arguments are the members of `Motion`, the points ahead [m], shape (n,), and the members of `_Preview` without
-    the times.
+    Args are the members of `Motion`, the arc length where the car last was [m], `PathSearch.line` and the members of
+    `_Preview`.
+
+    Returns:
+        Arc length [m] and angle [rad], the latter in the least squares sense.
     """
+    along = nearest(x, y, around, _WINDOW_M, spacing, xs, ys, heading_first, heading_last)
     cos, sin = math.cos(yaw), math.sin(yaw)
     sideslip = math.atan2(lateral_speed, speed)
     product, square = 0.0, 0.0
-    for index in range(len(ahead_x)):
-        wanted = cos * (ahead_y[index] - y) - sin * (ahead_x[index] - x)
+    for index in range(len(times)):
+        ahead_x, ahead_y = point_at(along + speed * times[index], spacing, xs, ys, heading_first, heading_last)
+        wanted = cos * (ahead_y - y) - sin * (ahead_x - x)
         missing = wanted - yaw_rate * by_yaw_rate[index] - sideslip * by_sideslip[index]
         product += missing * by_steering[index]
         square += by_steering[index] * by_steering[index]
-    return product / square
+    return along, product / square
 
 
 def _look_ahead(speed_mps: float, model: LateralModel, preview_s: float) -> _Preview:

@@ -12,7 +12,12 @@ from activesteer.road.path import SPACING_M, Path
 
 
 class PathSearch:
-    """Places along a path, also before its beginning and beyond its end."""
+    """Places along a path, also before its beginning and beyond its end.
+
+    Attributes:
+        line: The path as `nearest` and `point_at` take it: distance of its points [m], their world x and y [m], heading
+            at both ends [rad].
+    """
 
     def __init__(self, path: Path) -> None:
         """Prepares what the kernels take.
@@ -21,7 +26,7 @@ class PathSearch:
             path: The path; its points have equal distances.
         """
         spacing = path.length_m / (len(path.s_m) - 1)
-        self._line = spacing, path.x_m, path.y_m, float(path.heading_rad[0]), float(path.heading_rad[-1])
+        self.line = spacing, path.x_m, path.y_m, float(path.heading_rad[0]), float(path.heading_rad[-1])
 
     def at(self, s_m: Array) -> tuple[Array, Array]:
         """Points at arc lengths, also before the beginning and beyond the end.
@@ -32,7 +37,7 @@ class PathSearch:
         Returns:
             World x and y [m], shape (k,) each.
         """
-        return _points_at(s_m, *self._line)
+        return _points_at(s_m, *self.line)
 
     def nearest(self, x_m: float, y_m: float, around_m: float, window_m: float) -> float:
         """Arc length of the point of the path nearest to a point, looked for around a place where it was before.
@@ -46,11 +51,11 @@ class PathSearch:
         Returns:
             Arc length [m]; below 0 or above the length where the path goes on straight.
         """
-        return _nearest(x_m, y_m, around_m, window_m, *self._line)
+        return nearest(x_m, y_m, around_m, window_m, *self.line)
 
 
 @compiled
-def _point_at(s, spacing, xs, ys, heading_first, heading_last):
+def point_at(s, spacing, xs, ys, heading_first, heading_last):
     """One point: linear between points, straight beyond the ends."""
     last = len(xs) - 1
     place = s / spacing
@@ -69,18 +74,18 @@ def _points_at(s, spacing, xs, ys, heading_first, heading_last):
     """`PathSearch.at` as native code."""
     x, y = np.empty(len(s)), np.empty(len(s))
     for index in range(len(s)):
-        x[index], y[index] = _point_at(s[index], spacing, xs, ys, heading_first, heading_last)
+        x[index], y[index] = point_at(s[index], spacing, xs, ys, heading_first, heading_last)
     return x, y
 
 
 @compiled
-def _nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
+def nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
     """`PathSearch.nearest` as native code."""
     count = math.ceil(2.0 * window / SPACING_M) + 1
     best, least, before, after = 0, math.inf, math.inf, math.inf
     previous = math.inf
     for index in range(count):
-        px, py = _point_at(around - window + index * SPACING_M, spacing, xs, ys, heading_first, heading_last)
+        px, py = point_at(around - window + index * SPACING_M, spacing, xs, ys, heading_first, heading_last)
         distance = (px - x) ** 2 + (py - y) ** 2
         if index == best + 1:
             after = distance

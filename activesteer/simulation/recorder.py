@@ -86,6 +86,7 @@ class Recorder:
         self._values = np.empty((capacity, len(self.channels)), order="F")
         self._raw = vehicle.raw_rows(self._block_rows)
         self._control = np.empty((len(self._raw.sensordata), len(CONTROL_CHANNELS)))
+        self._control_memory = self._control.data
         self.row_address = self._block_address = self._raw.sensordata.ctypes.data
         self._row_bytes = self._raw.sensordata.strides[0]
         self._pose_every = max(1, round(POSE_INTERVAL_S / vehicle.timestep_s))
@@ -110,7 +111,7 @@ class Recorder:
         count = self._rows
         row = count - self._flushed
         _CONTROL_ROW.pack_into(
-            self._control.data, row * _CONTROL_ROW.size, *_driver_row(command), *_controller_row(steer)
+            self._control_memory, row * _CONTROL_ROW.size, *_driver_row(command), *_controller_row(steer)
         )
         if count % self._pose_every == 0:
             pose = count // self._pose_every - self._poses_before(self._first)

@@ -233,16 +233,16 @@ class Vehicle:
                 ctrl[index] = command.brake_pedal * torque
         if command.wheel_torques is not None:
             self._apply_torques(command.wheel_torques)
-        numbers = native_step.step(
+        sane, measurement, motion = native_step.step(
             self._plan_address,
             row_address,
             command.steering_wheel_demand_rad,
             steer.superposition_demand_rad,
             steer.rear_steer_demand_rad,
         )
-        if not numbers[0]:
+        if not sane:
             self.check()
-        return sensed(numbers)
+        return sensed(measurement, motion)
 
     def _engage(self, gear: int) -> None:
         """Couples the engine to the driven wheels, each of which then carries its share of the inertia, or frees it."""
@@ -291,10 +291,10 @@ class Vehicle:
         return self._sense()[1]
 
     def _sense(self) -> tuple[Measurement, Motion]:
-        numbers = native_step.sense(self._plan_address)
-        if not numbers[0]:
+        sane, measurement, motion = native_step.sense(self._plan_address)
+        if not sane:
             self.check()
-        return sensed(numbers)
+        return sensed(measurement, motion)
 
     def check(self) -> None:
         """Looks for warnings of the engine and for what is not finite.

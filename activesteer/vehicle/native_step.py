@@ -138,7 +138,7 @@ def _all_finite(address, size):
 
 @inlined
 def _sense(plan):
-    """What `Sensed` holds, as numbers."""
+    """Whether all is well, and the members of `Measurement` and of `Motion`."""
     s = carray(f64_pointer(plan.sensordata), (plan.sizes[0],))
     yaw_rate = carray(f64_pointer(plan.qvel), (plan.n_dofs,))[plan.yaw_dof]
     speed = s[plan.velocimeter]
@@ -153,24 +153,27 @@ def _sense(plan):
     cos, sin = math.cos(yaw), math.sin(yaw)
     east, north = s[plan.velocity], s[plan.velocity + 1]
     return (
-        1.0 if sane else 0.0,
-        carray(f64_pointer(plan.time), (1,))[0],
-        speed,
-        yaw_rate,
-        s[plan.accelerometer + 1],
-        s[plan.accelerometer],
-        s[plan.steering_wheel_angle],
-        0.5 * (s[plan.rear_left_angle] + s[plan.rear_right_angle]),
-        s[plan.superposition_angle] / plan.ratio,
-        s[plan.wheel_speed], s[plan.wheel_speed + 1], s[plan.wheel_speed + 2], s[plan.wheel_speed + 3],
-        s[plan.position], s[plan.position + 1], yaw, cos * east + sin * north, cos * north - sin * east, yaw_rate,
-    )  # fmt: skip
+        sane,
+        (
+            carray(f64_pointer(plan.time), (1,))[0],
+            speed,
+            yaw_rate,
+            s[plan.accelerometer + 1],
+            s[plan.accelerometer],
+            s[plan.steering_wheel_angle],
+            0.5 * (s[plan.rear_left_angle] + s[plan.rear_right_angle]),
+            s[plan.superposition_angle] / plan.ratio,
+            (s[plan.wheel_speed], s[plan.wheel_speed + 1], s[plan.wheel_speed + 2], s[plan.wheel_speed + 3]),
+        ),
+        (s[plan.position], s[plan.position + 1], yaw, cos * east + sin * north, cos * north - sin * east, yaw_rate),
+    )
 
 
-_NUMBERS: Final = types.UniTuple(types.float64, 19)
+_MEASUREMENT: Final = types.Tuple([types.float64] * 8 + [types.UniTuple(types.float64, 4)])
+_SENSED: Final = types.Tuple([types.boolean, _MEASUREMENT, types.UniTuple(types.float64, 6)])
 
 
-@compiled_call(_NUMBERS, types.intp)
+@compiled_call(_SENSED, types.intp)
 def sense(plan_address):
     """What the sensors say now.
 
@@ -178,12 +181,12 @@ def sense(plan_address):
         plan_address: Address of a `STEP_PLAN`.
 
     Returns:
-        What `sensed` reads.
+        Whether all is well, and what `sensed` takes.
     """
     return _sense(carray(_plan_pointer(plan_address), (1,))[0])
 
 
-@compiled_call(_NUMBERS, types.intp, types.intp, types.float64, types.float64, types.float64)
+@compiled_call(_SENSED, types.intp, types.intp, types.float64, types.float64, types.float64)
 def step(plan_address, row_address, steering_wheel_rad, superposition_rad, rear_steer_rad):
     """Writes the steering's inputs, makes one step of the engine and reads everything.
 
@@ -195,7 +198,7 @@ def step(plan_address, row_address, steering_wheel_rad, superposition_rad, rear_
         rear_steer_rad: Rear wheel angle demanded [rad].
 
     Returns:
-        What `sensed` reads.
+        Whether all is well, and what `sensed` takes.
     """
     plan = carray(_plan_pointer(plan_address), (1,))[0]
     ctrl = f64_pointer(plan.ctrl)
@@ -215,10 +218,7 @@ def step(plan_address, row_address, steering_wheel_rad, superposition_rad, rear_
     return _sense(plan)
 
 
-def sensed(numbers: tuple[float, ...]) -> tuple[Measurement, Motion]:
-    """Measurement and motion from what `sense` and `step` return behind the first number."""
+def sensed(measurement: tuple[Any, ...], motion: tuple[float, ...]) -> tuple[Measurement, Motion]:
+    """Measurement and motion from what `sense` and `step` return behind the first member."""
     # Made without the class's own `__new__`, which costs as much as the engine's sensors: this happens every step.
-    return (
-        tuple.__new__(Measurement, (*numbers[1:9], numbers[9:13])),
-        tuple.__new__(Motion, numbers[13:]),
-    )
+    return tuple.__new__(Measurement, measurement), tuple.__new__(Motion, motion)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 
 import mujoco
@@ -96,3 +97,27 @@ def test_cars_step_in_threads_as_they_do_alone() -> None:
         thread.join()
     drive(cars[0])
     assert {car.data.qpos.tobytes() for car in cars} == {cars[0].data.qpos.tobytes()}
+
+
+def test_a_step_lets_other_threads_run() -> None:
+    """Python does not make a thread hand on its lock here: the other one gets in only where a step lets it."""
+    cars, start, order = [_rolling(), _rolling()], threading.Barrier(2), []
+
+    def drive(index: int) -> None:
+        start.wait()
+        for _ in range(2000):
+            cars[index].step(COMMAND, STEER)
+            order.append(index)
+
+    threads = [threading.Thread(target=drive, args=(index,)) for index in (0, 1)]
+    interval_s = sys.getswitchinterval()
+    sys.setswitchinterval(1000.0)
+    try:
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    finally:
+        sys.setswitchinterval(interval_s)
+    # One after the other there is a single change.
+    assert np.count_nonzero(np.diff(order)) > 1
