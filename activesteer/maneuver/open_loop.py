@@ -30,12 +30,16 @@ class OpenLoop(Maneuver):
     """File with the columns time_s and fl_drive_Nm ... rr_brake_Nm, as many as are needed."""
     drive: str = "hold_speed"
     """`hold_speed` or `coast`; with torques of the wheels, what happens before the recording starts."""
+    hold_last: bool = False
+    """Whether steering or torques of the wheels that end before `duration_s` stay at their last value; a single value
+    always does."""
 
     def __post_init__(self) -> None:
         """Checks the tables.
 
         Raises:
-            ManeuverError: a table's columns differ in length, its times do not increase, or two contradict each other.
+            ManeuverError: a table's columns differ in length, its times do not increase, it ends before the manoeuvre, or two
+                contradict each other.
         """
         check_choice("drive", self.drive, DRIVES)
         torques = self.wheel_torques
@@ -56,6 +60,18 @@ class OpenLoop(Maneuver):
             except ManeuverError as reason:
                 msg = f"{key}.{reason}" if str(reason).startswith("time_s") else f"{key}: {reason}"
                 raise ManeuverError(msg) from reason
+        self._check_end("steering", self.steering.time_s)
+        if torques is not None:
+            self._check_end("wheel_torques", torques.time_s)
+
+    def _check_end(self, key: str, times_s: tuple[float, ...]) -> None:
+        """A table that is shorter than the manoeuvre, as a measurement may be, is not prolonged without a word."""
+        if len(times_s) > 1 and times_s[-1] < self.duration_s and not self.hold_last:
+            problem = (
+                f"ends at {times_s[-1]:g} s, before duration_s = {self.duration_s:g}; add points, shorten duration_s, "
+                "or keep the last value with hold_last = true"
+            )
+            raise ManeuverError(problem, key=f"{key}.time_s", value=times_s[-1])
 
     def reference(self, time_s: float) -> Reference:
         """Values of the tables; see the base class."""

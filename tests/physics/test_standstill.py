@@ -107,6 +107,7 @@ def test_turning_the_steering_wheel_at_rest_leaves_the_car_where_it_is() -> None
         "standstill",
         steering__time_s=(0.5, 1.5, 3.0),
         steering__steering_wheel_deg=(0.0, 180.0, 180.0),
+        hold_last=True,
         duration_s=5.0,
     )
     assert distance_m(recording) < 0.05

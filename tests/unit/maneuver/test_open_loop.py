@@ -27,10 +27,26 @@ def test_nothing_is_asked_but_the_speed_where_no_table_is_given():
 
 
 def test_tables_are_linear_between_their_times_and_constant_outside():
-    maneuver = open_loop(steering={"time_s": [1.0, 2.0, 4.0], "steering_wheel_deg": [0.0, 90.0, -90.0]})
+    maneuver = open_loop(hold_last=True, steering={"time_s": [1.0, 2.0, 4.0], "steering_wheel_deg": [0.0, 90.0, -90.0]})
     asked = {0.0: 0.0, 1.0: 0.0, 1.5: 45.0, 2.0: 90.0, 3.0: 0.0, 4.0: -90.0, 9.0: -90.0}
     for time_s, angle_deg in asked.items():
         assert math.degrees(maneuver.reference(time_s).steering_wheel_demand_rad) == pytest.approx(angle_deg, abs=1e-12)
+
+
+SHORT = {"time_s": [0.0, 4.9], "steering_wheel_deg": [0.0, 90.0]}
+
+
+@pytest.mark.parametrize(
+    ("key", "table"), [("steering", SHORT), ("wheel_torques", {"time_s": [0.0, 4.9], "fl_drive_Nm": [0.0, 90.0]})]
+)
+def test_table_that_ends_before_the_manoeuvre_is_not_prolonged_without_a_word(key, table):
+    with pytest.raises(ManeuverError) as told:
+        open_loop(**{key: table})
+    assert told.value.key == f"{key}.time_s"
+    for words in ("4.9 s", "duration_s = 5", "hold_last = true"):
+        assert words in str(told.value)
+    assert open_loop(**{key: table}, hold_last=True).duration_s == 5.0
+    assert open_loop(**{key: table, "duration_s": 4.9}).duration_s == 4.9
 
 
 def test_table_of_one_time_is_constant():

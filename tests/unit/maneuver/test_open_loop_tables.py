@@ -11,7 +11,7 @@ from activesteer.errors import ManeuverError
 from activesteer.maneuver import OpenLoop
 from activesteer.scenario import describe, resolve
 
-HEAD = 'kind = "open_loop"\nspeed_kmh = 72\nduration_s = 1.0\nsettle_s = 0.5\ndrive = "coast"\n'
+HEAD = 'kind = "open_loop"\nspeed_kmh = 72\nduration_s = 1.0\nsettle_s = 0.5\ndrive = "coast"\nhold_last = true\n'
 
 
 def write(folder: Path, toml: str, **csvs: str) -> Path:
@@ -39,6 +39,19 @@ def test_a_steering_csv_is_found_beside_the_file_and_kept_with_the_run(tmp_path:
     assert again == scenario.maneuver
 
 
+@pytest.mark.parametrize(
+    ("key", "csv"), [("steering", "time_s,rack_m\n0,0\n0.8,0.1\n"), ("drive", "time_s,fl_drive_Nm\n0,0\n0.8,9\n")]
+)
+def test_a_csv_that_ends_before_the_manoeuvre_is_not_prolonged_without_a_word(
+    tmp_path: Path, key: str, csv: str
+) -> None:
+    path = write(tmp_path, f'{key}_csv = "short.csv"\n', short=csv)
+    assert maneuver(path).duration_s == 1.0
+    path.write_text(path.read_text().replace("hold_last = true\n", ""))
+    with pytest.raises(ManeuverError, match=r"ends at 0\.8 s, before duration_s = 1; .*hold_last = true"):
+        maneuver(path)
+
+
 def test_a_rack_column_asks_for_the_rack_not_the_wheel(tmp_path: Path) -> None:
     path = write(tmp_path, 'steering_csv = "rack.csv"\n', rack="time_s,rack_m\n0,0\n0.2,0.002\n")
     reference = maneuver(path).reference(0.1)
@@ -49,7 +62,7 @@ def test_a_rack_column_asks_for_the_rack_not_the_wheel(tmp_path: Path) -> None:
 
 
 def test_every_car_with_a_rack_takes_rack_positions() -> None:
-    table = {"kind": "open_loop", "speed_mps": 20.0, "duration_s": 1.0, "settle_s": 0.5,
+    table = {"kind": "open_loop", "speed_mps": 20.0, "duration_s": 1.0, "settle_s": 0.5, "hold_last": True,
              "steering": {"time_s": [0.0, 0.2], "rack_m": [0.0, 0.003]}}  # fmt: skip
     run = simulate(table, vehicle="compact")
     # The compact's column has a torsion bar, which the rack's load winds up.
