@@ -347,8 +347,10 @@ def leaf_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
 
 
 def key_hint(cls: type, key: str) -> str | None:
-    """What a class says to those who look for a key that it does not have."""
-    return getattr(cls, "KEY_HINTS", {}).get(key)
+    """What a class, or that of a table in it, says to those who look for a dotted key that it does not have."""
+    first, _, rest = key.partition(".")
+    inner = _dataclass_in(typing.get_type_hints(cls).get(first)) if rest else None
+    return getattr(cls, "KEY_HINTS", {}).get(key) if inner is None else key_hint(inner, rest)
 
 
 def to_table(value: Any) -> Any:

@@ -38,8 +38,8 @@ class OpenLoop(Maneuver):
         """Checks the tables.
 
         Raises:
-            ManeuverError: a table's columns differ in length, its times do not increase, it ends too early, or two contradict
-                each other.
+            ManeuverError: a table's columns differ in length, its times do not increase, it ends too early, or two
+                contradict each other.
         """
         check_choice("drive", self.drive, DRIVES)
         torques = self.wheel_torques

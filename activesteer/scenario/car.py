@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from activesteer.config import Range, Source, build, checked_number, read_toml
 from activesteer.controllers import ControllerParameters, SingleTrackParameters
@@ -28,22 +28,9 @@ TIMESTEP_RANGE_S: Final = Range(1e-4, 5e-3)
 FileOrTable = str | os.PathLike[str] | Mapping[str, Any]
 
 
-_MASS_HINT: Final = (
-    "load.payload_kg loads the car, factors.mass scales it; single_track.mass_kg is only what controllers and driver "
-    "believe of it"
-)
-
-
 @dataclass(frozen=True, kw_only=True)
 class VehicleConfig(VehicleParameters):
     """A whole vehicle file: the car, what the controllers know of it, and who drives it."""
-
-    KEY_HINTS: ClassVar = {
-        "mass_kg": _MASS_HINT,
-        "load.mass_kg": _MASS_HINT,
-        "load.mass_factor": _MASS_HINT,
-        "payload_kg": _MASS_HINT,
-    }
 
     single_track: SingleTrackParameters
     """The car as the controllers see it."""

@@ -15,6 +15,19 @@ from activesteer.vehicle.force_block import MAX_CURVE_POINTS
 Positive = Annotated[float, Range(1e-12)]
 NotNegative = Annotated[float, Range(0.0)]
 Share = Annotated[float, Range(0.0, 1.0)]
+_MASS_HINT: Final = (
+    "load.payload_kg loads the car, factors.mass scales it; single_track.mass_kg is only what controllers and driver "
+    "believe of it"
+)
+_GRAVITY_HINT: Final = (
+    "load.cg_height_change_m moves the empty car's centre of gravity up, load.payload_position_m places the payload"
+)
+_MASS_HINTS: Final = {
+    **dict.fromkeys(("mass", "mass_kg", "mass_factor", "curb_mass_kg", "weight", "weight_kg", "weight_N"), _MASS_HINT),
+    **dict.fromkeys(("load_kg", "payload", "passengers", "luggage_kg"), _MASS_HINT),
+    **dict.fromkeys(("cg_m", "cg_height", "cg_height_m"), _GRAVITY_HINT),
+}
+"""What people look for in vain -> which keys do it."""
 Position = Annotated[tuple[float, ...], Range(-20.0, 20.0)]
 
 
@@ -160,7 +173,7 @@ class Aerodynamics:
 class Load:
     """What the car carries beside what is in its model: masses at points of the chassis; see `load`."""
 
-    KEY_HINTS: ClassVar = {"mass_factor": "factors.mass scales the whole car, load.payload_kg loads it"}
+    KEY_HINTS: ClassVar = _MASS_HINTS
 
     payload_kg: Annotated[float, Range(0.0, 2000.0)] = 0.0
     """Persons and luggage beside the driver [kg]."""
@@ -192,6 +205,8 @@ class Load:
 @dataclass(frozen=True)
 class Factors:
     """Factors on the car as modelled, 1 each; see `load`."""
+
+    KEY_HINTS: ClassVar = dict.fromkeys(("mass_kg", "payload_kg"), _MASS_HINT)
 
     mass: Annotated[float, Range(0.5, 2.0)] = 1.0
     """On the mass of the empty car: the chassis takes all of the difference, its inertia in proportion to its mass."""
@@ -226,6 +241,16 @@ class Factors:
 @dataclass(frozen=True)
 class VehicleParameters:
     """A vehicle file without what belongs to controllers and driver."""
+
+    KEY_HINTS: ClassVar = {
+        **_MASS_HINTS,
+        "payload_kg": _MASS_HINT,
+        "cg_height_change_m": _GRAVITY_HINT,
+        **dict.fromkeys(("roof_kg", "roof_load_kg"), "load.roof_kg loads the roof, at load.roof_height_m"),
+        **dict.fromkeys(("fuel", "fuel_kg"), "load.fuel_kg is fuel beside that in the model"),
+        **dict.fromkeys(("springs", "spring_rate", "spring_stiffness"), "factors.spring_rate scales the springs"),
+        **dict.fromkeys(("mu", "grip"), "road.mu is the road's, factors.tyre_friction scales the tyres"),
+    }
 
     name: str
     mjcf: str

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
+from collections.abc import Iterator
+from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
 
 import activesteer
+from activesteer.config import key_paths
 from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError, TyreFileError
-from activesteer.maneuver import StepSteer
+from activesteer.maneuver import KINDS, StepSteer
 from activesteer.resources import find_vehicle, list_maneuvers, list_vehicles, models_dir
-from activesteer.scenario import describe, resolve
+from activesteer.scenario import VehicleConfig, describe, load_car, resolve
 from activesteer.simulation.runner import prepared
 
 SHORT = {"duration_s": 0.2, "settle_s": 0.0, "steer.start_s": 0.05, "steer.steering_wheel_deg": 20}
@@ -245,6 +249,39 @@ def test_run_made_again_from_its_recording_is_bit_identical(controller, tmp_path
     assert len(again) == 200
     assert np.array_equal(again.values, first.values)
     assert np.array_equal(again.poses.positions_m, first.poses.positions_m)
+
+
+def tables_with_hints(cls: type, above: str = "") -> Iterator[tuple[str, str]]:
+    yield from ((above + key, hint) for key, hint in getattr(cls, "KEY_HINTS", {}).items())
+    for field, hint in get_type_hints(cls).items():
+        if is_dataclass(hint):
+            yield from tables_with_hints(hint, f"{above}{field}.")  # type: ignore[reportArgumentType] - a class
+
+
+HINTS = dict(tables_with_hints(VehicleConfig))
+
+
+def test_hints_name_keys_that_exist():
+    known = {*key_paths(VehicleConfig), *key_paths(KINDS["open_loop"])}
+    for key, hint in HINTS.items():
+        named = re.findall(r"[a-z_]+\.\w+", hint)
+        assert named
+        assert set(named) <= known
+        assert key not in known
+
+
+@pytest.mark.parametrize("key", sorted(HINTS))
+@pytest.mark.parametrize("part", ["", "vehicle."])
+def test_mass_of_the_car_and_the_like_lead_to_the_keys_that_change_it(key, part):
+    for call in (resolve, lambda _, overrides: load_car(overrides=overrides)):
+        with pytest.raises(ParameterError) as told:
+            call("standstill", overrides={part + key: 1800})
+        assert HINTS[key] in str(told.value)
+
+
+def test_mass_in_a_vehicle_file_leads_to_the_keys_that_change_it(vehicle):
+    with pytest.raises(ParameterError, match=r"load\.payload_kg loads the car, factors\.mass scales it"):
+        resolve("standstill", vehicle(("[tyres]", "mass_kg = 1800\n[tyres]")))
 
 
 def search(**overrides: Any) -> float:
