@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from activesteer.recording import Recording
     from activesteer.signals import DriverCommand, Measurement, Motion, Reference, SteerCommand
     from activesteer.simulation.runner import simulate
+    from activesteer.simulation.simulation import Simulation
     from activesteer.studies.study import study
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Motion",
     "Recording",
     "Reference",
+    "Simulation",
     "SteerCommand",
     "__version__",
     "simulate",
@@ -32,6 +34,7 @@ _HOMES = {
     "Measurement": "activesteer.signals",
     "Motion": "activesteer.signals",
     "Reference": "activesteer.signals",
+    "Simulation": "activesteer.simulation.simulation",
     "SteerCommand": "activesteer.signals",
     "simulate": "activesteer.simulation.runner",
     "study": "activesteer.studies.study",

@@ -26,7 +26,8 @@ from activesteer.plotting import new_figure
 from activesteer.quantities import DisplayUnit, Quantity, quantity_of
 from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
-from activesteer.simulation.runner import prepared, run_scenario
+from activesteer.simulation.preparation import prepared
+from activesteer.simulation.runner import run_scenario
 from activesteer.tyre import MagicFormula, load_tir
 
 if TYPE_CHECKING:

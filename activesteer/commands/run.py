@@ -45,7 +45,8 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.conventions import DEFAULT_TIMESTEP_S
     from activesteer.driver import find_driver
     from activesteer.scenario import describe
-    from activesteer.simulation.runner import prepared, run_scenario
+    from activesteer.simulation.preparation import prepared
+    from activesteer.simulation.runner import run_scenario
 
     controllers = [find_controller(name) for name in options.controller or ["none"]]
     driver = find_driver(options.driver)

@@ -34,7 +34,7 @@ def add_to(commands: Any) -> None:
 
 
 def _watch(options: argparse.Namespace) -> int:
-    from activesteer.simulation.runner import prepared
+    from activesteer.simulation.preparation import prepared
 
     if not 0.01 <= options.speed <= 100.0:
         msg = f"--speed: is {options.speed:g}, must be 0.01 to 100"
@@ -49,10 +49,10 @@ def _watch(options: argparse.Namespace) -> int:
 def _show(scenario: Any, controller: str, driver: str, speed: float) -> None:
     import mujoco.viewer
 
+    from activesteer.simulation.closed_loop import ClosedLoop
     from activesteer.simulation.live_view import Pacer, drive, scene_for
-    from activesteer.simulation.simulation import Simulation
 
-    simulation = Simulation(scenario, controller, driver=driver)
+    simulation = ClosedLoop(scenario, controller, driver=driver)
     scene = scene_for(simulation, scenario.maneuver)
     with (
         _threads_joined(),

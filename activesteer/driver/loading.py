@@ -26,19 +26,19 @@ _MAX_TORQUE_NM: Final = 1e6
 class _DriverKind(Kind):
     """Drivers; their command is completed by the angle at the road wheel."""
 
-    def checked(self, command: Any, name: str, setup: DriverSetup) -> DriverCommand:
+    def checked(self, command: Any, name: str, setup: DriverSetup, said: str = "step returned") -> DriverCommand:
         """A command as it may be carried out; see the base class."""
-        super().checked(command, name, setup)
+        super().checked(command, name, setup, said)
         torques, front = command.wheel_torques, command.front_steer_demand_rad
         if torques is not None and not _are_torques(torques):
             needed = "an activesteer.signals.WheelTorques of finite numbers is needed"
-            raise self.fail(name, f"step returned wheel_torques = {shown(torques)}; {needed}", torques)
+            raise self.fail(name, f"{said} wheel_torques = {shown(torques)}; {needed}", torques)
         ours = command.steering_wheel_demand_rad / setup.steering_ratio
         if math.isnan(front):
             return command._replace(front_steer_demand_rad=ours)
         if not math.isclose(front, ours, rel_tol=1e-9, abs_tol=1e-12):
             what = f"the steering wheel angle over the steering ratio is {ours:g}; leave it out"
-            raise self.fail(name, f"step returned front_steer_demand_rad = {front:g}, but {what}", front)
+            raise self.fail(name, f"{said} front_steer_demand_rad = {front:g}, but {what}", front)
         return command
 
 

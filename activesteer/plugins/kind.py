@@ -58,13 +58,14 @@ class Kind:
         """
         return self.error(problem, key=f"{self.word} {name}".rstrip(), value=value, allowed=allowed)
 
-    def checked(self, command: Any, name: str, _setup: Any) -> Any:
+    def checked(self, command: Any, name: str, _setup: Any, said: str = "step returned") -> Any:
         """A command as it may be carried out.
 
         Args:
             command: What `step` returned, or what was given in its place.
             name: Who returned it, for the message.
             _setup: What the block was made from.
+            said: What comes before the command in the message.
 
         Returns:
             The command.
@@ -73,7 +74,7 @@ class Kind:
             ActiveSteerError: of the type `error`: it is no command, a value is no number, or out of its range.
         """
         if not self._is_usual(command):
-            self._check(command, name)
+            self._check(command, name, said)
         return command
 
     def _is_usual(self, command: Any) -> bool:
@@ -84,10 +85,10 @@ class Kind:
                 return False
         return all(low <= command[index] <= high for index, low, high in self._places)
 
-    def _check(self, command: Any, name: str) -> None:
+    def _check(self, command: Any, name: str, said: str) -> None:
         if not isinstance(command, self.result):
             needed = f"an activesteer.{self.result.__name__} is needed"
-            raise self.fail(name, f"step returned {shown(command)}; {needed}", command, self.result)
+            raise self.fail(name, f"{said} {shown(command)}; {needed}", command, self.result)
         for key, value in zip(self.result._fields, command, strict=True):
             limits = self.ranges.get(key)
             if key in self.unchecked:
@@ -102,7 +103,7 @@ class Kind:
                 )
             else:
                 needed = f"a number from {limits.low:g} to {limits.high:g} is needed"
-            raise self.fail(name, f"step returned {key} = {shown(value)}; {needed}", value, limits)
+            raise self.fail(name, f"{said} {key} = {shown(value)}; {needed}", value, limits)
 
 
 def in_one_line(error: Exception) -> str:

@@ -19,8 +19,8 @@ from activesteer.errors import ManeuverError
 from activesteer.maneuver.search import RampAngle, Search, SteadyTurn
 from activesteer.maneuver.step_steer import StepSteer
 from activesteer.scenario import Scenario
+from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
-from activesteer.simulation.simulation import Simulation
 
 _TOLERANCE: Final = 5e-4
 """Relative error of the lateral acceleration at which the search for a steady turn ends."""
@@ -77,7 +77,7 @@ def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> f
     if wanted == 0.0:
         return 0.0
     probe = search.probe
-    simulation = Simulation(scenario, "none", timestep_s)
+    simulation = ClosedLoop(scenario, "none", timestep_s)
     start = simulation.save_state()
     car, speed = scenario.car.config.single_track, max(probe.speed_mps, 1.0)
     wheelbase = car.cg_to_front_m + car.cg_to_rear_m
@@ -105,7 +105,7 @@ def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> f
     raise ManeuverError(msg)
 
 
-def _steady_acceleration(simulation: Simulation, maneuver: StepSteer, start: Any) -> float:
+def _steady_acceleration(simulation: ClosedLoop, maneuver: StepSteer, start: Any) -> float:
     simulation.restore_state(start)
     simulation.maneuver = maneuver
     recorder = Recorder(simulation.vehicle, simulation.steps)
@@ -121,7 +121,7 @@ def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> flo
     """
     wanted, probe = search.lateral_acceleration_mps2, search.probe
     low, high = (share * wanted for share in _FIT)
-    simulation = Simulation(scenario, "none", timestep_s)
+    simulation = ClosedLoop(scenario, "none", timestep_s)
     recorder = Recorder(simulation.vehicle, simulation.steps)
     chunk, left = round(_CHUNK_S / timestep_s), simulation.steps
     # A little further than the line goes, so that all of it is settled.

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple, Protocol
 from activesteer.maneuver import Maneuver
 from activesteer.quantities import quantity_of
 from activesteer.simulation.appearance import scene_of
-from activesteer.simulation.simulation import Simulation
+from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.video import Car, RenderScene
 from activesteer.video.gauges import MIN_SPEED_MPS
 
@@ -105,7 +105,7 @@ class DriveResult(NamedTuple):
     finished: bool
 
 
-def scene_for(simulation: Simulation, maneuver: Maneuver) -> RenderScene:
+def scene_for(simulation: ClosedLoop, maneuver: Maneuver) -> RenderScene:
     """The scene for a simulation's car.
 
     Args:
@@ -119,7 +119,7 @@ def scene_for(simulation: Simulation, maneuver: Maneuver) -> RenderScene:
     return RenderScene([Car(scene_of(vehicle.model), vehicle.body_names)], maneuver.course, maneuver.road)
 
 
-def drive(simulation: Simulation, scene: RenderScene, viewer: Viewer, pacer: Pacer) -> DriveResult:
+def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pacer) -> DriveResult:
     """Drives a manoeuvre from its beginning to its end, or until the window is closed, and shows it.
 
     The engine that simulates and the model that is drawn are two: whatever is done in the window, such as pulling at
@@ -159,7 +159,7 @@ def drive(simulation: Simulation, scene: RenderScene, viewer: Viewer, pacer: Pac
 class _Follow:
     """Moves the camera along with the car; from which side and how far away stays in the hands of who watches."""
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: ClosedLoop) -> None:
         self._simulation = simulation
         self._heading_rad: float | None = None
         self._time_s = 0.0
@@ -178,7 +178,7 @@ class _Follow:
         camera.lookat[:] = motion.x_m, motion.y_m, 0.5
 
 
-def _texts(simulation: Simulation, time_s: float) -> tuple[str, str]:
+def _texts(simulation: ClosedLoop, time_s: float) -> tuple[str, str]:
     """Names and values, a line for each."""
     vehicle = simulation.vehicle
     measured, motion = vehicle.measure(), vehicle.motion()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from operator import attrgetter
-from typing import Final
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.errors import SimulationDiverged
+from activesteer.errors import RecordingError, SimulationDiverged
 from activesteer.recording import McapWriter, Poses
 from activesteer.signals import Channel, DriverCommand, SteerCommand
 from activesteer.vehicle import Vehicle
@@ -57,12 +58,44 @@ _CONTROL_ROW: Final = struct.Struct(f"{len(CONTROL_CHANNELS)}d")
 _driver_row, _controller_row = attrgetter(*_DRIVER_CHANNELS), attrgetter(*_CONTROLLER_CHANNELS)
 
 
+@dataclass
+class _Kept:
+    """Rows and poses in memory; those that somebody refers to are never written again."""
+
+    values: NDArray[np.float64]
+    positions_m: NDArray[np.float64]
+    quaternions: NDArray[np.float64]
+    referred_rows: int = 0
+
+    @classmethod
+    def empty(cls, rows: int, poses: int, channels: int, bodies: int) -> Self:
+        # By column, because that is how it is filled and read.
+        return cls(np.empty((rows, channels), order="F"), np.empty((poses, bodies, 3)), np.empty((poses, bodies, 4)))
+
+    def copied(self, rows: int, poses: int) -> Self:
+        """The first rows and poses again, with as much room behind them."""
+        new = self.empty(len(self.values), len(self.positions_m), self.values.shape[1], self.positions_m.shape[1])
+        new.values[:rows] = self.values[:rows]
+        new.positions_m[:poses], new.quaternions[:poses] = self.positions_m[:poses], self.quaternions[:poses]
+        return new
+
+
+class RecordedRows(NamedTuple):
+    """What a recorder had taken when its state was saved."""
+
+    kept: _Kept
+    rows: int
+    yaw_rad: float
+
+
 class Recorder:
     """Rows of one run, in memory and, where a writer is given, in a file as the run goes on.
 
     Attributes:
         channels: The table of channels.
         row_address: Where the vehicle leaves the row of the next step.
+        rows: How many were taken.
+        keeps_all: Whether all rows stay in memory.
     """
 
     def __init__(self, vehicle: Vehicle, steps: int, writer: McapWriter | None = None, *, keep: bool = True) -> None:
@@ -75,15 +108,14 @@ class Recorder:
             keep: Whether all rows stay in memory; else only the block that is being filled does.
         """
         self.channels = channels_of(vehicle)
-        vehicle.channels.restart()
         self._vehicle = vehicle
         self._writer = writer
         self._timestep_s = vehicle.timestep_s
-        self._keep = keep
+        self.keeps_all = keep
         self._block_rows = max(1, round(BLOCK_INTERVAL_S / vehicle.timestep_s))
         capacity = steps if keep else min(self._block_rows, steps)
-        # By column, because that is how it is filled and read.
-        self._values = np.empty((capacity, len(self.channels)), order="F")
+        self._yaw_column = [channel.name for channel in self.channels].index("yaw_rad")
+        self._yaw_rad = 0.0
         self._raw = vehicle.raw_rows(self._block_rows)
         self._control = np.empty((len(self._raw.sensordata), len(CONTROL_CHANNELS)))
         self._control_memory = self._control.data
@@ -91,13 +123,11 @@ class Recorder:
         self._row_bytes = self._raw.sensordata.strides[0]
         self._pose_every = max(1, round(POSE_INTERVAL_S / vehicle.timestep_s))
         data, bodies = vehicle.data, len(vehicle.body_names)
-        poses = -(-capacity // self._pose_every) + 1
-        self._positions = np.empty((poses, bodies, 3))
-        self._quaternions = np.empty((poses, bodies, 4))
+        self._kept = _Kept.empty(capacity, self._poses_before(capacity) + 1, len(self.channels), bodies)
         # Without the world, which is the engine's body 0.
         self._xpos, self._xquat = data.xpos[1:], data.xquat[1:]
         # Rows so far, those of them that are channels already, and the first one in memory.
-        self._rows = self._flushed = self._first = 0
+        self.rows = self._flushed = self._first = 0
 
     def record(self, command: DriverCommand, steer: SteerCommand) -> None:
         """Takes the row of the step that was just made, which the vehicle has left at `row_address`.
@@ -108,16 +138,16 @@ class Recorder:
             command: What the driver did.
             steer: What the controller asked for.
         """
-        count = self._rows
+        count = self.rows
         row = count - self._flushed
         _CONTROL_ROW.pack_into(
             self._control_memory, row * _CONTROL_ROW.size, *_driver_row(command), *_controller_row(steer)
         )
         if count % self._pose_every == 0:
             pose = count // self._pose_every - self._poses_before(self._first)
-            self._positions[pose] = self._xpos
-            self._quaternions[pose] = self._xquat
-        self._rows = count + 1
+            self._kept.positions_m[pose] = self._xpos
+            self._kept.quaternions[pose] = self._xquat
+        self.rows = count + 1
         self.row_address += self._row_bytes
         if row + 1 == self._block_rows:
             self.flush()
@@ -131,20 +161,19 @@ class Recorder:
         Raises:
             SimulationDiverged: a channel or a pose is not finite, or larger than a file can hold.
         """
-        first, last = self._flushed, self._rows
+        first, last = self._flushed, self.rows
         count = last - first
         if count == 0:
             return
-        values = self._values[first - self._first : last - self._first]
-        split = len(self.channels) - len(CONTROL_CHANNELS)
-        self._vehicle.channels.evaluate(type(self._raw)(*(rows[:count] for rows in self._raw)), values[:, :split])
-        values[:, split:] = self._control[:count]
+        values = self._kept.values[first - self._first : last - self._first]
+        self._evaluate(count, values)
+        self._yaw_rad = float(values[-1, self._yaw_column])
         poses = self._poses_between(first, last)
         self._flushed = last
         self.row_address = self._block_address
         if self._writer is not None:
             self._writer.write(self._times(first, last), values, poses.time_s, poses.positions_m, poses.quaternions)
-        if not self._keep:
+        if not self.keeps_all:
             self._first = last
         if checked:
             self._check(first, values, poses)
@@ -152,8 +181,53 @@ class Recorder:
     def result(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Poses]:
         """Times, values and poses of all rows that are kept; see `flush`."""
         self.flush()
-        first, last = self._first, self._rows
-        return self._times(first, last), self._values[: last - first], self._poses_between(first, last)
+        first, last = self._first, self.rows
+        self._kept.referred_rows = max(self._kept.referred_rows, last)
+        return self._times(first, last), self._kept.values[: last - first], self._poses_between(first, last)
+
+    def present(self, command: DriverCommand, steer: SteerCommand) -> dict[str, float]:
+        """What would be recorded of the present instant, by channel name; nothing is recorded.
+
+        Args:
+            command: What the driver last did.
+            steer: What the controller last asked for.
+        """
+        # Into the place of the next row, which is free.
+        row = self.rows - self._flushed
+        for raw, now in zip(self._raw, self._vehicle.present_row(), strict=True):
+            raw[row] = now[0]
+        self._control[row] = (*_driver_row(command), *_controller_row(steer))
+        values = np.empty((row + 1, len(self.channels)))
+        self._evaluate(row + 1, values)
+        return {channel.name: float(value) for channel, value in zip(self.channels, values[-1], strict=True)}
+
+    def save_state(self) -> RecordedRows:
+        """What was recorded so far, which stays as it is whatever is recorded afterwards."""
+        self.flush()
+        self._kept.referred_rows = max(self._kept.referred_rows, self.rows)
+        return RecordedRows(self._kept, self.rows, self._yaw_rad)
+
+    def restore_state(self, state: RecordedRows) -> None:
+        """Goes back to the rows of a saved state.
+
+        Raises:
+            RecordingError: they are in a file already.
+        """
+        if self._writer is not None:
+            raise RecordingError("a run that is written to a file while it is made cannot go back to a saved state")
+        if state.kept is not self._kept or state.kept.referred_rows > state.rows:
+            self._kept = state.kept.copied(state.rows, self._poses_before(state.rows))
+            self._kept.referred_rows = state.rows
+        self.rows = self._flushed = state.rows
+        self._yaw_rad = state.yaw_rad
+        self.row_address = self._block_address
+
+    def _evaluate(self, count: int, values: NDArray[np.float64]) -> None:
+        """Channels of the first raw rows."""
+        split = len(self.channels) - len(CONTROL_CHANNELS)
+        rows = type(self._raw)(*(raw[:count] for raw in self._raw))
+        self._vehicle.channels.evaluate(rows, values[:, :split], self._yaw_rad)
+        values[:, split:] = self._control[:count]
 
     def _check(self, first: int, values: NDArray[np.float64], poses: Poses) -> None:
         # NaN compares as false, and is what `max` and `min` return where there is one.
@@ -181,7 +255,7 @@ class Recorder:
         begin, end = self._poses_before(first), self._poses_before(last)
         times = np.asarray(np.arange(begin, end) * (every * self._timestep_s), dtype=np.float64)
         rows = slice(begin - kept, end - kept)
-        return Poses(times, self._vehicle.body_names, self._positions[rows], self._quaternions[rows])
+        return Poses(times, self._vehicle.body_names, self._kept.positions_m[rows], self._kept.quaternions[rows])
 
 
 def channels_of(vehicle: Vehicle) -> tuple[Channel, ...]:

@@ -1,128 +1,292 @@
-"""The simulation: maneuver -> driver -> controller -> vehicle -> recorder, once every millisecond."""
+"""A run that is driven step by step, by the blocks of the loop or by commands from outside, and recorded."""
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property
+from numbers import Integral
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from activesteer.controllers import Controller, find_controller
+from activesteer.analysis.metrics import metrics
+from activesteer.controllers import CONTROLLER, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.driver import Driver, find_driver
-from activesteer.scenario import Scenario
-from activesteer.signals import Measurement, Motion, Reference
-from activesteer.simulation.recorder import Recorder
-from activesteer.vehicle import engine_warnings_held
+from activesteer.driver import DRIVER, find_driver
+from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
+from activesteer.recording import McapWriter, Recording
+from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.signals import DriverCommand, Measurement, Motion, Reference, SteerCommand
+from activesteer.simulation.closed_loop import ClosedLoop, LoopState
+from activesteer.simulation.preparation import prepared
+from activesteer.simulation.recorder import RecordedRows, Recorder
+from activesteer.simulation.run_context import RunContext
+
+MAX_KEPT_VALUES: Final = 2**25
+"""Values of a run that stay in memory beside its file, 256 MiB: some three minutes. Those of a longer run are read from
+the file where they are needed, so that its memory does not grow with its length."""
+_SAID: Final = "Simulation.step was given"
 
 
 class SavedState(NamedTuple):
-    """Everything that a simulation continues from."""
+    """Everything that a simulation continues from, and what it had recorded."""
 
-    engine: NDArray[np.float64]
-    driver: Any
-    controller: Any
-    measurement: Measurement
-    motion: Motion
-    step: int
+    loop: LoopState
+    rows: RecordedRows
+    given: dict[str, int]
+    metadata: dict[str, Any]
+
+
+class _Given(NamedTuple):
+    """A driver or controller that repeats one command."""
+
+    command: Any
+
+    def step(self, *_: Any, **__: Any) -> Any:
+        return self.command
 
 
 class Simulation:
-    """A manoeuvre, a driver, a controller and a car.
+    """A manoeuvre that is driven as far as one asks: `simulate`, step by step.
 
     Attributes:
-        maneuver: What is asked of the driver.
-        driver: Who drives.
-        controller: The active steering.
-        vehicle: The car.
+        scenario: Manoeuvre and car.
+        loop: The blocks: `loop.driver`, `loop.controller`, `loop.vehicle`, and what they may know of the car.
+        context: What its recording holds beside the rows.
+
+    Example:
+        >>> import activesteer
+        >>> simulation = activesteer.Simulation("straight_line", overrides={"duration_s": 1.0})
+        >>> while not simulation.done:
+        ...     measurement = simulation.step()
+        >>> len(simulation.recording())
+        1000
     """
 
     def __init__(
         self,
-        scenario: Scenario,
+        maneuver: FileOrTable | Scenario,
         controller: Any = "none",
-        timestep_s: float = DEFAULT_TIMESTEP_S,
+        vehicle: FileOrTable = "compact",
+        overrides: Mapping[str, Any] | None = None,
         *,
         driver: Any = "standard",
+        timestep_s: float = DEFAULT_TIMESTEP_S,
     ) -> None:
-        """Builds the blocks and lets the car settle at the speed of the manoeuvre, at the origin of the road.
+        """Builds the car and lets it settle, as `simulate` does; the arguments are the same.
 
         Args:
-            scenario: Manoeuvre and car.
-            controller: The controller; see `activesteer.plugins.find`.
+            maneuver: Name, path, or table of a manoeuvre; or a prepared `Scenario`, which holds vehicle and
+                overrides already; see `activesteer.simulation.preparation.prepared`.
+            controller: Name of a controller, or a user's own.
+            vehicle: Name, path, or table of a vehicle.
+            overrides: Dotted key -> value.
+            driver: `standard`, or a user's own.
             timestep_s: Step of engine, driver and controller [s].
-            driver: The driver, likewise.
 
         Raises:
-            ModelError: the car cannot be built.
-            ControllerError: the controller cannot be made, or returns nonsense while the car settles.
-            DriverError: the driver, likewise.
-            SimulationDiverged: the car does not settle.
+            ActiveSteerError: an input is wrong, or the car does not settle.
         """
-        self.maneuver = maneuver = scenario.maneuver
-        self.vehicle = vehicle = scenario.car.on(maneuver.road, timestep_s)
-        setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
-        self.driver: Driver = find_driver(driver).make(setup)
-        self.controller: Controller = find_controller(controller).make(scenario.controller_setup(timestep_s))
-        settling, steps = maneuver.settling_reference(), round(maneuver.settle_s / timestep_s)
-        self._measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
-        self._motion, self._step = vehicle.motion(), 0
-        self._advance(lambda _: settling, steps, None)
-        vehicle.rebase()
-        self._measurement = self._measurement._replace(time_s=0.0)
-        self._motion, self._step = vehicle.motion(), 0
+        controller, driver = find_controller(controller), find_driver(driver)
+        if not isinstance(maneuver, Scenario):
+            maneuver = prepared(resolve(maneuver, vehicle, overrides), timestep_s)
+        elif overrides or vehicle != "compact":
+            raise ParameterError("a Scenario has its vehicle and overrides already", key="vehicle, overrides")
+        self.scenario = maneuver
+        self.loop = ClosedLoop(self.scenario, controller, timestep_s, driver=driver)
+        self.context = RunContext.of(self.scenario, self.loop.vehicle, controller, driver)
+        self._given: dict[str, int] = {}
+        self._failure: BaseException | None = None
+        self._writer: McapWriter | None = None
+
+    @cached_property
+    def _recorder(self) -> Recorder:
+        return Recorder(self.loop.vehicle, self.steps)
 
     @property
     def steps(self) -> int:
         """Number of steps of the manoeuvre."""
-        return round(self.maneuver.duration_s / self.vehicle.timestep_s)
+        return self.loop.steps
 
-    def run(self, recorder: Recorder | None = None) -> None:
-        """Drives the manoeuvre to its end.
+    @property
+    def time_s(self) -> float:
+        """The present instant, from the start of the recording [s]."""
+        return self.loop.step_count * self.loop.vehicle.timestep_s
+
+    @property
+    def done(self) -> bool:
+        """Whether the manoeuvre was driven to its end."""
+        return self.loop.step_count >= self.steps
+
+    @property
+    def reference(self) -> Reference:
+        """What the manoeuvre now asks of the driver."""
+        return self.scenario.maneuver.reference(self.time_s)
+
+    @property
+    def measurement(self) -> Measurement:
+        """What the sensors say: all that a controller gets to see."""
+        return self.loop.measurement
+
+    @property
+    def motion(self) -> Motion:
+        """Where the car is and how it moves, as a driver sees it."""
+        return self.loop.motion
+
+    @property
+    def truth(self) -> dict[str, float]:
+        """Every recorded channel at the present instant, by name.
+
+        It is what the next row of the recording will hold, but for what depends on the commands of the next step; these
+        are the last ones. It is worked out whenever it is asked for, which takes as long as some ten steps.
+        """
+        return self._recorder.present(*self.loop.commands)
+
+    def step(
+        self, driver_command: DriverCommand | None = None, steer_command: SteerCommand | None = None
+    ) -> Measurement:
+        """Drives one step; see `advance`."""
+        return self.advance(1, driver_command, steer_command)
+
+    def advance(
+        self, steps: int, driver_command: DriverCommand | None = None, steer_command: SteerCommand | None = None
+    ) -> Measurement:
+        """Drives on for some steps.
 
         Args:
-            recorder: Where every step is recorded.
+            steps: How many, at most to the end of the manoeuvre.
+            driver_command: What the driver does in all of them. The driver is then not asked, and his state stands
+                still until he is.
+            steer_command: What the controller asks for, likewise.
+
+        Returns:
+            What the sensors say afterwards.
 
         Raises:
-            ControllerError: the controller returned nonsense.
-            DriverError: the driver did.
+            ManeuverError: the manoeuvre ends before; nothing was driven.
+            DriverError: the driver command is none, or the driver returned nonsense.
+            ControllerError: the same of the steer command and the controller.
             SimulationDiverged: the state became non-finite, or the engine raised a warning.
         """
-        self.advance(self.steps - self._step, recorder)
+        loop, left = self.loop, self.steps - self.loop.step_count
+        if self._failure is not None:
+            problem = f"the run failed ({type(self._failure).__name__}); it goes on from a saved state only"
+            raise ManeuverError(f"{problem}: {self._failure}")
+        if isinstance(steps, bool) or not isinstance(steps, Integral) or steps < 0:
+            raise ParameterError(f"is {shown(steps)}; a whole number of steps, 0 or more, is needed", key="steps")
+        if steps > left:
+            end = f"{self.scenario.maneuver.name} ends at {self.scenario.maneuver.duration_s:g} s (duration_s)"
+            raise ManeuverError(f"{end}; {steps} more steps are asked for, {left} are left", value=steps, allowed=left)
+        driver = controller = None
+        if driver_command is not None:
+            driver = _Given(DRIVER.checked(driver_command, "", loop.driver_setup, _SAID))
+        if steer_command is not None:
+            controller = _Given(CONTROLLER.checked(steer_command, "", loop.controller_setup, _SAID))
+        rows = self._recorder.rows
+        with self._watched():
+            try:
+                loop.advance(int(steps), self._recorder, driver=driver, controller=controller)
+            finally:
+                for word, given in (("driver", driver), ("controller", controller)):
+                    if given is not None:
+                        self._given[word] = self._given.get(word, 0) + self._recorder.rows - rows
+            if self.done:
+                self._recorder.flush()
+        return loop.measurement
 
-    def advance(self, steps: int, recorder: Recorder | None = None) -> None:
-        """Drives on for some steps; see `run`."""
-        self._advance(self.maneuver.reference, steps, recorder)
-
-    def _advance(self, reference_at: Callable[[float], Reference], steps: int, recorder: Recorder | None) -> None:
-        driver, controller, vehicle = self.driver, self.controller, self.vehicle
-        timestep_s, measurement, motion = vehicle.timestep_s, self._measurement, self._motion
-        with engine_warnings_held():
-            for step in range(self._step, self._step + steps):
-                reference = reference_at(step * timestep_s)
-                command = driver.step(reference, measurement, motion)
-                steer = controller.step(command, measurement)
-                measurement, motion = vehicle.step(command, steer, recorder.row_address if recorder else 0)
-                if recorder is not None:
-                    recorder.record(command, steer)
-        self._step, self._measurement, self._motion = self._step + steps, measurement, motion
-        vehicle.check()
+    def run(self) -> None:
+        """Drives the manoeuvre to its end; see `advance`."""
+        self.advance(self.steps - self.loop.step_count)
 
     def save_state(self) -> SavedState:
-        """Everything that the simulation continues from."""
-        return SavedState(
-            self.vehicle.save_state(),
-            copy.deepcopy(self.driver),
-            copy.deepcopy(self.controller),
-            self._measurement,
-            self._motion,
-            self._step,
-        )
+        """Everything that the simulation continues from, and what was recorded so far.
+
+        Raises:
+            SimulationDiverged: something recorded is not finite.
+        """
+        with self._watched():
+            rows = self._recorder.save_state()
+        return SavedState(self.loop.save_state(), rows, dict(self._given), self.context.metadata)
 
     def restore_state(self, state: SavedState) -> None:
-        """Goes back to a saved state; what follows is bit-identical to what followed then."""
-        self.vehicle.restore_state(state.engine)
-        self.driver, self.controller = copy.deepcopy(state.driver), copy.deepcopy(state.controller)
-        self._measurement, self._motion, self._step = state.measurement, state.motion, state.step
+        """Goes back to a saved state; what follows is bit-identical to what followed then.
+
+        The recording goes back too: it then holds what led to this state. Recordings taken before stay as they are.
+
+        Args:
+            state: A state of this simulation, or of another one that was made with the same inputs.
+
+        Raises:
+            ParameterError: it is the state of a simulation of something else.
+        """
+        if state.metadata is not self.context.metadata and state.metadata != self.context.metadata:
+            raise ParameterError("was saved by a simulation with other inputs", key="state")
+        self.loop.restore_state(state.loop)
+        self._recorder.restore_state(state.rows)
+        self._given, self._failure = dict(state.given), None
+
+    def recording(self) -> Recording:
+        """What was driven so far.
+
+        Returns:
+            The recording; at the end of the manoeuvre that of `simulate`. Before, and after a failure, it has no
+            metrics, `complete` is false, and `error` says why. Where commands came from outside, `commands_given` has
+            the number of these steps by `driver` and `controller`.
+
+        Raises:
+            SimulationDiverged: something recorded is not finite; calling it again returns the recording.
+        """
+        recorder, failure = self._recorder, self._failure
+        if failure is None:
+            with self._watched():
+                recorder.flush()
+        if recorder.keeps_all or self._writer is None:
+            recording = self.context.recording(recorder)
+        else:
+            recording = Recording.open(self._writer.flush())
+        recording.metadata["complete"] = failure is None and self.done
+        if self._given:
+            recording.metadata["commands_given"] = dict(self._given)
+        if failure is not None:
+            recording.metadata["error"] = f"{type(failure).__name__}: {failure}"
+        elif not self.done:
+            recording.metadata["error"] = f"driven to {self.time_s:g} of {self.scenario.maneuver.duration_s:g} s"
+        else:
+            try:
+                recording.metrics.update(metrics(recording))
+            except RecordingError as error:
+                recording.metadata["metrics_error"] = str(error)
+        return recording
+
+    @contextmanager
+    def recorded_to(self, path: Path) -> Iterator[None]:
+        """While this lasts, a file is written as the run goes on; it has to begin before the first step.
+
+        Args:
+            path: MCAP file to write. It is ended in every case, marked as incomplete after an exception.
+
+        Raises:
+            RecordingError: the file cannot be written.
+        """
+        assert self.loop.step_count == 0
+        with self.context.writer(path) as self._writer:
+            keep = self.steps * len(self.context.channels) <= MAX_KEPT_VALUES
+            self._recorder = Recorder(self.loop.vehicle, self.steps, self._writer, keep=keep)
+            yield
+
+    def end_file(self, recording: Recording) -> None:
+        """Writes how the run ended and its metrics behind the rows of its file, if there is one."""
+        if self._writer is not None:
+            known = self.context.metadata
+            outcome = {key: value for key, value in recording.metadata.items() if key not in known}
+            self._writer.close(outcome | {"metrics": recording.metrics})
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Notes a failure, after which the blocks do not agree on where they are; what was recorded is kept."""
+        try:
+            yield
+        except BaseException as failure:
+            self._failure = failure
+            self._recorder.flush(checked=False)
+            raise

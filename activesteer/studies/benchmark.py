@@ -15,10 +15,11 @@ from typing import Any, Final
 import mujoco
 
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS
-from activesteer.controllers import find_controller
 from activesteer.scenario import Scenario, resolve
+from activesteer.simulation.closed_loop import ClosedLoop
+from activesteer.simulation.preparation import prepared
 from activesteer.simulation.recorder import Recorder
-from activesteer.simulation.runner import RunContext, prepared, run_scenario
+from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation
 from activesteer.tyre.benchmark import bench as tyre_bench
 from activesteer.vehicle import force_block as fb
@@ -61,7 +62,7 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
             "two_threads_step_us": lambda: _in_threads(scenario, 2),
         }
         best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
-    step_us = 1e6 * Simulation(scenario).vehicle.timestep_s
+    step_us = 1e6 * ClosedLoop(scenario).vehicle.timestep_s
     best["closed_loop_to_bare_ratio"] = best["closed_loop_step_us"] / best["bare_step_us"]
     best["path_following_to_bare_ratio"] = best["path_following_step_us"] / best["bare_step_us"]
     best["with_file_to_bare_ratio"] = best["with_file_step_us"] / best["bare_step_us"]
@@ -121,7 +122,7 @@ def _bare(scenario: Scenario) -> float:
     What the callbacks would apply at the start is applied as a constant force, so that the car stays near where it is:
     falling, with its springs at their stops, it would be another problem for the engine's solver.
     """
-    simulation = Simulation(scenario, _CONTROLLER)
+    simulation = ClosedLoop(scenario, _CONTROLLER)
     model, data, steps = simulation.vehicle.model, simulation.vehicle.data, simulation.steps
     mujoco.mj_forward(model, data)
     carried = data.qfrc_passive.copy()
@@ -135,7 +136,7 @@ def _bare(scenario: Scenario) -> float:
 
 
 def _plant(scenario: Scenario) -> float:
-    simulation = Simulation(scenario, _CONTROLLER)
+    simulation = ClosedLoop(scenario, _CONTROLLER)
     model, data, steps = simulation.vehicle.model, simulation.vehicle.data, simulation.steps
     return _per_step_us(lambda: _repeat(mujoco.mj_step, model, data, steps), steps)
 
@@ -146,7 +147,7 @@ def _repeat(step: Callable[..., object], model: mujoco.MjModel, data: mujoco.MjD
 
 
 def _closed_loop(scenario: Scenario) -> float:
-    simulation = Simulation(scenario, _CONTROLLER)
+    simulation = ClosedLoop(scenario, _CONTROLLER)
     recorder = Recorder(simulation.vehicle, simulation.steps)
 
     def run() -> None:
@@ -158,7 +159,7 @@ def _closed_loop(scenario: Scenario) -> float:
 
 def _in_threads(scenario: Scenario, count: int) -> float:
     """Microseconds per step of all simulations together, each in a thread of its own."""
-    simulations = [Simulation(scenario, _CONTROLLER) for _ in range(count)]
+    simulations = [ClosedLoop(scenario, _CONTROLLER) for _ in range(count)]
     recorders = [Recorder(simulation.vehicle, simulation.steps) for simulation in simulations]
     pairs = zip(simulations, recorders, strict=True)
     threads = [threading.Thread(target=simulation.run, args=(recorder,)) for simulation, recorder in pairs]
@@ -194,13 +195,10 @@ def _step_steers(count: int) -> None:
 def _with_file(scenario: Scenario, path: Path) -> float:
     """The run as the command line makes it, less what a run of no length costs: building, settling, opening."""
     simulation = Simulation(scenario, _CONTROLLER)
-    with RunContext.of(scenario, simulation, find_controller(_CONTROLLER)).writer(path) as writer:
-        recorder = Recorder(simulation.vehicle, simulation.steps, writer)
+    with simulation.recorded_to(path):
         start = time.perf_counter()
-        simulation.run(recorder)
-        recorder.flush()
-        writer.close()
-        return (time.perf_counter() - start) / simulation.steps * 1e6
+        simulation.run()
+    return (time.perf_counter() - start) / simulation.steps * 1e6
 
 
 def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
@@ -214,7 +212,7 @@ def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
         relaxation and the application of their forces add to the engine's passive forces, in the same state.
     """
     scenario = resolve("straight_line")
-    simulation = Simulation(scenario)
+    simulation = ClosedLoop(scenario)
     model, data = simulation.vehicle.model, simulation.vehicle.data
     numbers = model.numeric_data
     count = int(numbers[-fb.TRAILER_SIZE]) + fb.N_WHEELS
@@ -230,7 +228,7 @@ def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
 
 def _blocks(scenario: Scenario) -> dict[str, float]:
     """Each block of the loop on its own, in the order of the data."""
-    simulation = Simulation(scenario, _CONTROLLER)
+    simulation = ClosedLoop(scenario, _CONTROLLER)
     maneuver, driver, controller, vehicle = (
         simulation.maneuver,
         simulation.driver,

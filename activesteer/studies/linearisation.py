@@ -33,7 +33,7 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.scenario import FileOrTable, resolve
-from activesteer.simulation.simulation import Simulation
+from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.studies.discrete_time_map import INPUTS, OUTPUTS, StepMap
 from activesteer.vehicle.modes import Mode, find_modes
 
@@ -206,7 +206,7 @@ def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, 
         "kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0, "settle_s": _SETTLE_S,
     }  # fmt: skip
     sliding = {**(overrides or {}), "vehicle.friction.rack_N": 0.0}
-    step = StepMap(Simulation(resolve(straight, vehicle, sliding)).vehicle)
+    step = StepMap(ClosedLoop(resolve(straight, vehicle, sliding)).vehicle)
     step.trim(speed_mps)
     a, c = step.derivatives("x")
     b, d = step.derivatives("u")

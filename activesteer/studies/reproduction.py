@@ -17,7 +17,8 @@ from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.files import make_folder
 from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, Scenario, load_car, resolve
-from activesteer.simulation.runner import prepared, run_scenario
+from activesteer.simulation.preparation import prepared
+from activesteer.simulation.runner import run_scenario
 from activesteer.studies.workers import TaskQueue, in_parallel, workers_for
 
 Progress = Callable[[str, int, int], None]

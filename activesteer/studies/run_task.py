@@ -17,7 +17,8 @@ from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import make_folder, writing
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, Scenario, resolve
-from activesteer.simulation.runner import prepared, run_scenario
+from activesteer.simulation.preparation import prepared
+from activesteer.simulation.runner import run_scenario
 from activesteer.studies.run_identity import controller_digest, deciding_versions, digest, files_digest, run_id
 from activesteer.vehicle.native_forces import install_native_forces
 

@@ -330,9 +330,19 @@ class Vehicle:
         block = np.empty((count, ends[-1]))
         return RawRows(*(block[:, end - array.size : end] for array, end in zip(live, ends, strict=True)))
 
+    def present_row(self) -> RawRows:
+        """One row as `step` fills it, of the present instant with the inputs that are in force; nothing is changed."""
+        now = mujoco.MjData(self.model)
+        mujoco.mj_copyData(now, self.model, self.data)
+        mujoco.mj_forward(self.model, now)
+        return RawRows(*(array[np.newaxis] for array in self._arrays_of(now)))
+
     def live_arrays(self) -> tuple[NDArray[np.float64], ...]:
         """The engine's arrays in the order of `RawRows`."""
-        data = self.data
+        return self._arrays_of(self.data)
+
+    @staticmethod
+    def _arrays_of(data: mujoco.MjData) -> tuple[NDArray[np.float64], ...]:
         return (
             data.sensordata, data.userdata, data.ten_length, data.ten_velocity, data.act, data.actuator_force,
             data.ctrl,

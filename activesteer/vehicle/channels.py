@@ -64,7 +64,6 @@ class ChannelMap:
         """
         self._model = model
         self._parameters = parameters
-        self.restart()
         self._sensors = {model.sensor(index).name: index for index in range(model.nsensor)}
         for name in _MOTION_SENSORS:
             # They are read block by block; a missing one is to show now.
@@ -73,21 +72,17 @@ class ChannelMap:
         self.channels = tuple(signal.channel for signal in signals)
         self._values = tuple(signal.values for signal in signals)
 
-    def restart(self) -> None:
-        """Begins a new recording: its yaw angle starts within half a turn, whatever was recorded before."""
-        self._last_yaw_rad = 0.0
-
-    def evaluate(self, rows: RawRows, out: Array) -> None:
-        """Values of all channels. Blocks must come in the order of time, so that the yaw angle stays unwrapped.
+    def evaluate(self, rows: RawRows, out: Array, last_yaw_rad: float = 0.0) -> None:
+        """Values of all channels.
 
         Args:
             rows: Raw rows of n steps, n > 0.
             out: Where the values go, shape (n, len(channels)).
+            last_yaw_rad: Yaw angle of the row before the first one, which the angle is unwrapped from [rad].
         """
         # The last rows of a run that diverged are not finite; they are to be recorded, not complained about.
         with np.errstate(invalid="ignore", over="ignore"):
-            self._frame = _Frame(rows, self._sensor, self._model.opt.gravity, self._last_yaw_rad)
-            self._last_yaw_rad = float(self._frame.yaw_rad[-1])
+            self._frame = _Frame(rows, self._sensor, self._model.opt.gravity, last_yaw_rad)
             for column, values in enumerate(self._values):
                 out[:, column] = values(rows)
 

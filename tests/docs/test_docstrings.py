@@ -21,6 +21,7 @@ PUBLIC = (
     "activesteer.scenario.car.load_car",
     "activesteer.scenario.scenario.resolve",
     "activesteer.simulation.runner.simulate",
+    "activesteer.simulation.simulation.Simulation",
     "activesteer.studies.linearisation.linearise",
     "activesteer.studies.study.study",
     "activesteer.tyre.evaluation.MagicFormula",

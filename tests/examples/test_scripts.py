@@ -78,6 +78,17 @@ def test_own_driver_keeps_the_lane_change_but_cuts_it() -> None:
     assert standard["track_deviation_max_m"] < own["track_deviation_max_m"] < 2.0
 
 
+def test_own_loop_drives_the_car_into_its_turn() -> None:
+    recording = example("own_loop")["drive"]().recording()
+    assert recording.metadata["commands_given"] == {"driver": 8000, "controller": 8000}
+    assert recording["speed_mps"][[0, -1]] == pytest.approx([10.0, 15.0], rel=0.02)
+    assert recording["speed_mps"][-1] / recording["yaw_rate_radps"][-1] == pytest.approx(50.0, rel=0.02)
+    # One command each 10 ms, held in between, is what the car got.
+    held = recording["rear_steer_demand_rad"].reshape(-1, 10)
+    assert (held == held[:, :1]).all()
+    assert len(set(held[:, 0])) > 300
+
+
 def test_own_manoeuvre_tightens() -> None:
     slow, fast = (example("own_manoeuvre")["drive"](speed_kmh) for speed_kmh in (40.0, 60.0))
     # v^2 / R; the end of the bend, of some 45 m radius, is at the recording's end.

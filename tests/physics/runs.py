@@ -12,8 +12,8 @@ import activesteer
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.recording import Recording
 from activesteer.scenario import Scenario, resolve
+from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
-from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle import Vehicle
 
 STEP_DEG = 36.5
@@ -46,14 +46,14 @@ def step_steer_scenario() -> Scenario:
     return resolve("step_steer", overrides={"steer.steering_wheel_deg": STEP_DEG})
 
 
-def in_the_corner(controller: str = "none", steps: int = 900) -> Simulation:
+def in_the_corner(controller: str = "none", steps: int = 900) -> ClosedLoop:
     """A step steer in its transient: 0.4 s after the steering wheel began to turn."""
-    simulation = Simulation(step_steer_scenario(), controller)
+    simulation = ClosedLoop(step_steer_scenario(), controller)
     simulation.advance(steps)
     return simulation
 
 
-def go_on(simulation: Simulation, steps: int) -> NDArray[np.float64]:
+def go_on(simulation: ClosedLoop, steps: int) -> NDArray[np.float64]:
     """Every channel of the next steps, shape (steps, number of channels)."""
     recorder = Recorder(simulation.vehicle, steps)
     simulation.advance(steps, recorder)

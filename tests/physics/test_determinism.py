@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.simulation.simulation import Simulation
+from activesteer.simulation.closed_loop import ClosedLoop
 from tests.physics.runs import STEP_DEG, go_on, in_the_corner, step_steer, step_steer_scenario
 
 SYSTEMS = ("none", "ars", "afs")
@@ -55,7 +55,7 @@ def test_a_state_restored_into_another_simulation_continues_bit_identically(cont
     simulation = in_the_corner(controller)
     state = simulation.save_state()
     uninterrupted = go_on(simulation, 1500)
-    other = Simulation(step_steer_scenario(), controller)
+    other = ClosedLoop(step_steer_scenario(), controller)
     other.restore_state(state)
     np.testing.assert_array_equal(go_on(other, 1500), uninterrupted)
 

@@ -13,7 +13,7 @@ from activesteer.analysis.frequency_response import frequency_response
 from activesteer.errors import ParameterError
 from activesteer.scenario import load_car, resolve
 from activesteer.signals import SteerCommand
-from activesteer.simulation.simulation import Simulation
+from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.studies.linearisation import (
     INPUTS,
     OUTPUTS,
@@ -54,7 +54,7 @@ def test_frequency_response_is_that_of_a_sine_sweep_of_the_full_car(row):
 def test_step_of_an_active_steering_gives_the_response_of_the_full_car(name, amplitude_rad):
     straight = {"kind": "open_loop", "speed_mps": SPEED_MPS, "duration_s": 1.0}
     # So small a superposition winds the column up by little more than the friction of the rack holds.
-    vehicle_run = Simulation(resolve(straight, overrides={"vehicle.friction.rack_N": 0.0}))
+    vehicle_run = ClosedLoop(resolve(straight, overrides={"vehicle.friction.rack_N": 0.0}))
     command = SteerCommand(**{name: amplitude_rad})
     vehicle_run.controller = type("Constant", (), {"step": lambda *_: command})()  # type: ignore[assignment]
     values = go_on(vehicle_run, 1000)

@@ -20,7 +20,7 @@ from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, Para
 from activesteer.maneuver import KINDS, StepSteer
 from activesteer.resources import find_vehicle, list_maneuvers, list_vehicles, models_dir
 from activesteer.scenario import VehicleConfig, describe, load_car, resolve
-from activesteer.simulation.runner import prepared
+from activesteer.simulation.preparation import prepared
 
 SHORT = {"duration_s": 0.2, "settle_s": 0.0, "steer.start_s": 0.05, "steer.steering_wheel_deg": 20}
 

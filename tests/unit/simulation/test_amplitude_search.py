@@ -12,7 +12,7 @@ import activesteer
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import BrakeInTurn, SineWithDwell
 from activesteer.scenario import describe, resolve
-from activesteer.simulation.runner import prepared
+from activesteer.simulation.preparation import prepared
 from activesteer.studies.identification import identify_single_track
 
 

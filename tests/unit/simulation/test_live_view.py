@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from activesteer.scenario import resolve
+from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.live_view import FRAME_S, Pacer, drive, scene_for
-from activesteer.simulation.simulation import Simulation
 
 
 class Clock:
@@ -65,7 +65,7 @@ def watched(duration_s: float = 0.5, speed: float = 1.0, **look: Any):
     scenario = dataclasses.replace(
         scenario, maneuver=scenario.maneuver.search.accept(0.8)
     )  # instead of searching for it
-    simulation, clock = Simulation(scenario), Clock()
+    simulation, clock = ClosedLoop(scenario), Clock()
     stage = scene_for(simulation, scenario.maneuver)
     viewer, pacer = Viewer(stage, clock, **look), Pacer(speed, clock, clock.sleep)
     return drive(simulation, stage, viewer, pacer), viewer, clock, pacer, simulation

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,9 @@ from activesteer.errors import SimulationDiverged
 from activesteer.recording import McapWriter, Recording
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S, CONTROL_CHANNELS, POSE_INTERVAL_S, Recorder, channels_of
 from activesteer.simulation.runner import run_scenario
-from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle.channels import ChannelMap
 
 BLOCK_ROWS = round(BLOCK_INTERVAL_S / 0.001)
@@ -31,8 +32,8 @@ COMMAND = DriverCommand(0.3, 150.0, 0.25, saturated=True, front_steer_demand_rad
 STEER = SteerCommand(-0.01, 0.003, 0.2, 0.004, -0.014, True)
 
 
-def simulation(controller: str = "ars", timestep_s: float = 0.001) -> Simulation:
-    return Simulation(resolve("step_steer", overrides=KEYS), controller, timestep_s)
+def simulation(controller: str = "ars", timestep_s: float = 0.001) -> ClosedLoop:
+    return ClosedLoop(resolve("step_steer", overrides=KEYS), controller, timestep_s)
 
 
 def column(recorder: Recorder, name: str) -> np.ndarray:
@@ -147,8 +148,11 @@ def test_whole_blocks_are_in_the_file_while_the_run_goes_on(tmp_path):
 def test_yaw_angle_of_a_recording_does_not_depend_on_the_one_before():
     simulated = simulation()
     before = simulated.save_state()
+    turned = Recorder(simulated.vehicle, 3)
     # As at the end of a run that has turned round more than once.
-    simulated.vehicle.channels._last_yaw_rad = 7.0
+    turned._yaw_rad = 7.0
+    simulated.advance(3, turned)
+    assert np.abs(column(turned, "yaw_rad") - math.tau).max() < 0.1
     recorder = Recorder(simulated.vehicle, 3)
     simulated.restore_state(before)
     simulated.advance(3, recorder)
@@ -162,7 +166,7 @@ def test_file_of_a_run_is_the_same_where_only_a_block_stays_in_memory(tmp_path):
         with McapWriter(tmp_path / f"{keep}.mcap", channels_of(driven.vehicle), driven.vehicle.body_names) as writer:
             recorder = Recorder(driven.vehicle, 5000, writer, keep=keep)
             driven.advance(count, recorder)
-            assert len(recorder._values) == (5000 if keep else BLOCK_ROWS)
+            assert len(recorder._kept.values) == (5000 if keep else BLOCK_ROWS)
             recorder.flush()
     assert (tmp_path / "True.mcap").read_bytes() == (tmp_path / "False.mcap").read_bytes()
 
@@ -170,7 +174,7 @@ def test_file_of_a_run_is_the_same_where_only_a_block_stays_in_memory(tmp_path):
 def test_run_too_long_for_memory_gives_what_its_file_holds(tmp_path, monkeypatch):
     scenario = resolve("step_steer", overrides=KEYS | {"duration_s": 0.7})
     short = run_scenario(scenario, "ars", path=tmp_path / "short.mcap")
-    monkeypatch.setattr("activesteer.simulation.runner.MAX_KEPT_VALUES", 0)
+    monkeypatch.setattr("activesteer.simulation.simulation.MAX_KEPT_VALUES", 0)
     long = run_scenario(scenario, "ars", path=tmp_path / "long.mcap")
     assert np.allclose(long.values, short.values, rtol=1e-7, atol=1e-30)
     assert np.array_equal(long.poses.positions_m, short.poses.positions_m)
@@ -184,11 +188,11 @@ def test_run_too_long_for_memory_gives_what_its_file_holds(tmp_path, monkeypatch
 def test_recorded_value_that_is_not_finite_ends_the_run_with_its_name(tmp_path, monkeypatch, keep_values):
     """The state alone may stay finite for a whole run while a tyre records nonsense."""
     scenario = resolve("step_steer", overrides=KEYS)
-    monkeypatch.setattr("activesteer.simulation.runner.MAX_KEPT_VALUES", keep_values)
+    monkeypatch.setattr("activesteer.simulation.simulation.MAX_KEPT_VALUES", keep_values)
     evaluate = ChannelMap.evaluate
 
-    def damaged(self: ChannelMap, rows: Any, out: np.ndarray) -> None:
-        evaluate(self, rows, out)
+    def damaged(self: ChannelMap, rows: Any, out: np.ndarray, last_yaw_rad: float) -> None:
+        evaluate(self, rows, out, last_yaw_rad)
         column = [channel.name for channel in self.channels].index("rl_tyre_mz_Nm")
         if out[0, 0] > 20.0:
             out[100, column] = np.nan

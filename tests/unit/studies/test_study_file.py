@@ -95,7 +95,7 @@ def test_a_wrong_factor_is_told_with_its_line(tmp_path):
     ],
 )
 def test_keys_are_checked_before_anything_runs(change, monkeypatch):
-    monkeypatch.setattr("activesteer.simulation.simulation.Simulation.__init__", lambda *_: pytest.fail("it runs"))
+    monkeypatch.setattr("activesteer.simulation.closed_loop.ClosedLoop.__init__", lambda *_: pytest.fail("it runs"))
     with pytest.raises(ActiveSteerError):
         Plan(read_study({**STEP, **change}))
 

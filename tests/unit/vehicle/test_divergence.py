@@ -14,8 +14,8 @@ from activesteer.errors import SimulationDiverged
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
 from activesteer.signals import Measurement, Motion
+from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.runner import run_scenario
-from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle import Vehicle
 
 SPOILED_S = 1.2345
@@ -121,7 +121,7 @@ def test_no_row_after_the_failure_looks_like_a_car_that_drives_on(
 
 
 def test_a_warning_of_the_engine_ends_the_run() -> None:
-    simulation = Simulation(resolve("straight_line"))
+    simulation = ClosedLoop(resolve("straight_line"))
     simulation.advance(10)
     simulation.vehicle.data.warning[mujoco.mjtWarning.mjWARN_INERTIA].number += 1
     with pytest.raises(SimulationDiverged, match=r"MuJoCo warns at 0\.\d+ s: .*[Ii]nertia"):
@@ -129,6 +129,6 @@ def test_a_warning_of_the_engine_ends_the_run() -> None:
 
 
 def test_without_a_fault_nothing_is_reported() -> None:
-    simulation = Simulation(resolve("straight_line"))
+    simulation = ClosedLoop(resolve("straight_line"))
     simulation.advance(300)
     simulation.vehicle.check()

@@ -10,7 +10,7 @@ import pytest
 
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, SteerCommand
-from activesteer.simulation.simulation import Simulation
+from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.vehicle.local_state import LocalState
 
 ROLLING = {"kind": "open_loop", "speed_kmh": 80, "duration_s": 1.0, "settle_s": 0.5}
@@ -18,7 +18,7 @@ ROLLING = {"kind": "open_loop", "speed_kmh": 80, "duration_s": 1.0, "settle_s": 
 
 @pytest.fixture
 def local() -> LocalState:
-    return LocalState(Simulation(resolve(ROLLING)).vehicle)
+    return LocalState(ClosedLoop(resolve(ROLLING)).vehicle)
 
 
 def step(local: LocalState) -> None:

@@ -1,0 +1,156 @@
+"""The closed loop: maneuver -> driver -> controller -> vehicle -> recorder, once every millisecond."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.controllers import Controller, find_controller
+from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.driver import Driver, find_driver
+from activesteer.scenario import Scenario
+from activesteer.signals import DriverCommand, Measurement, Motion, Reference, SteerCommand
+from activesteer.simulation.recorder import Recorder
+from activesteer.vehicle import engine_warnings_held
+
+
+class LoopState(NamedTuple):
+    """Everything that a loop continues from."""
+
+    engine: NDArray[np.float64]
+    driver: Any
+    controller: Any
+    measurement: Measurement
+    motion: Motion
+    commands: tuple[DriverCommand, SteerCommand]
+    step: int
+
+
+class ClosedLoop:
+    """A manoeuvre, a driver, a controller and a car.
+
+    Attributes:
+        maneuver: What is asked of the driver.
+        driver: Who drives.
+        controller: The active steering.
+        vehicle: The car.
+        driver_setup: What a driver may know of the car.
+        controller_setup: What a controller may know of it.
+        measurement: What the sensors say.
+        motion: Where the car is and how it moves.
+        commands: What driver and controller last asked for.
+        step_count: How many steps of the manoeuvre were made.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        controller: Any = "none",
+        timestep_s: float = DEFAULT_TIMESTEP_S,
+        *,
+        driver: Any = "standard",
+    ) -> None:
+        """Builds the blocks and lets the car settle at the speed of the manoeuvre, at the origin of the road.
+
+        Args:
+            scenario: Manoeuvre and car.
+            controller: The controller; see `activesteer.plugins.find`.
+            timestep_s: Step of engine, driver and controller [s].
+            driver: The driver, likewise.
+
+        Raises:
+            ModelError: the car cannot be built.
+            ControllerError: the controller cannot be made, or returns nonsense while the car settles.
+            DriverError: the driver, likewise.
+            SimulationDiverged: the car does not settle.
+        """
+        self.maneuver = maneuver = scenario.maneuver
+        self.vehicle = vehicle = scenario.car.on(maneuver.road, timestep_s)
+        self.driver_setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
+        self.controller_setup = scenario.controller_setup(timestep_s)
+        self.driver: Driver = find_driver(driver).make(self.driver_setup)
+        self.controller: Controller = find_controller(controller).make(self.controller_setup)
+        settling, steps = maneuver.settling_reference(), round(maneuver.settle_s / timestep_s)
+        self.measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
+        self.motion, self.step_count = vehicle.motion(), 0
+        self.commands = DriverCommand(front_steer_demand_rad=0.0), SteerCommand()
+        self._advance(lambda _: settling, self.driver, self.controller, steps, None)
+        vehicle.rebase()
+        self.measurement = self.measurement._replace(time_s=0.0)
+        self.motion, self.step_count = vehicle.motion(), 0
+
+    @property
+    def steps(self) -> int:
+        """Number of steps of the manoeuvre."""
+        return round(self.maneuver.duration_s / self.vehicle.timestep_s)
+
+    def run(self, recorder: Recorder | None = None) -> None:
+        """Drives the manoeuvre to its end; see `advance`."""
+        self.advance(self.steps - self.step_count, recorder)
+
+    def advance(
+        self,
+        steps: int,
+        recorder: Recorder | None = None,
+        *,
+        driver: Driver | None = None,
+        controller: Controller | None = None,
+    ) -> None:
+        """Drives on for some steps.
+
+        Args:
+            steps: How many.
+            recorder: Where every step is recorded.
+            driver: Who drives in these steps; the loop's own where not given.
+            controller: What steers in them, likewise.
+
+        Raises:
+            ControllerError: the controller returned nonsense.
+            DriverError: the driver did.
+            SimulationDiverged: the state became non-finite, or the engine raised a warning.
+        """
+        self._advance(self.maneuver.reference, driver or self.driver, controller or self.controller, steps, recorder)
+
+    def _advance(
+        self,
+        reference_at: Callable[[float], Reference],
+        driver: Driver,
+        controller: Controller,
+        steps: int,
+        recorder: Recorder | None,
+    ) -> None:
+        vehicle, (command, steer) = self.vehicle, self.commands
+        timestep_s, measurement, motion = vehicle.timestep_s, self.measurement, self.motion
+        with engine_warnings_held():
+            for step in range(self.step_count, self.step_count + steps):
+                reference = reference_at(step * timestep_s)
+                command = driver.step(reference, measurement, motion)
+                steer = controller.step(command, measurement)
+                measurement, motion = vehicle.step(command, steer, recorder.row_address if recorder else 0)
+                if recorder is not None:
+                    recorder.record(command, steer)
+        self.step_count, self.commands = self.step_count + steps, (command, steer)
+        self.measurement, self.motion = measurement, motion
+
+    def save_state(self) -> LoopState:
+        """Everything that the loop continues from."""
+        return LoopState(
+            self.vehicle.save_state(),
+            copy.deepcopy(self.driver),
+            copy.deepcopy(self.controller),
+            self.measurement,
+            self.motion,
+            self.commands,
+            self.step_count,
+        )
+
+    def restore_state(self, state: LoopState) -> None:
+        """Goes back to a saved state; what follows is bit-identical to what followed then."""
+        self.vehicle.restore_state(state.engine)
+        self.driver, self.controller = copy.deepcopy(state.driver), copy.deepcopy(state.controller)
+        self.measurement, self.motion = state.measurement, state.motion
+        self.commands, self.step_count = state.commands, state.step

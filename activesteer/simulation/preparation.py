@@ -1,0 +1,43 @@
+"""What must be found by driving before a scenario can be run: single-track model, amplitude of the steering wheel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.recording import Recording
+from activesteer.scenario import Scenario
+from activesteer.simulation.amplitude_search import amplitude
+from activesteer.simulation.closed_loop import ClosedLoop
+from activesteer.simulation.recorder import Recorder
+from activesteer.simulation.run_context import RunContext
+from activesteer.simulation.single_track_search import with_identified_single_track
+from activesteer.theory.single_track import IDENTIFY
+
+
+def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scenario:
+    """The scenario with everything known that must be found by driving first: steering angle, single-track model.
+
+    Args:
+        scenario: A scenario.
+        timestep_s: Step of the simulation [s].
+
+    Returns:
+        A scenario that can be run with any controller, always with the same input.
+
+    Raises:
+        ManeuverError: no amplitude gives what is asked for.
+    """
+    if scenario.car.config.single_track.source == IDENTIFY:
+        scenario = with_identified_single_track(scenario, _test_drive)
+    search = scenario.maneuver.search
+    if search is None:
+        return scenario
+    return replace(scenario, maneuver=search.accept(amplitude(scenario, search, timestep_s)))
+
+
+def _test_drive(scenario: Scenario) -> Recording:
+    loop = ClosedLoop(scenario)
+    recorder = Recorder(loop.vehicle, loop.steps)
+    loop.run(recorder)
+    return RunContext.of(scenario, loop.vehicle).recording(recorder)

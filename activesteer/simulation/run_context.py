@@ -1,0 +1,78 @@
+"""What a recording holds beside its rows: all that is needed to make the run again."""
+
+from __future__ import annotations
+
+import functools
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from activesteer.plugins import Plugin
+from activesteer.recording import McapWriter, Recording, ScenePart
+from activesteer.scenario import Scenario, describe
+from activesteer.signals import Channel
+from activesteer.simulation.appearance import scene_of
+from activesteer.simulation.recorder import Recorder, channels_of
+from activesteer.vehicle import Vehicle
+from activesteer.version import __version__
+
+
+class RunContext(NamedTuple):
+    """What goes into a recording beside its rows.
+
+    Attributes:
+        channels: The table of channels.
+        body_names: Bodies whose poses are recorded.
+        metadata: Resolved parameters, versions.
+        files: Manoeuvre, vehicle, model and tyre files, and a user's own controller and driver.
+        scene: What the car looks like.
+    """
+
+    channels: tuple[Channel, ...]
+    body_names: tuple[str, ...]
+    metadata: dict[str, Any]
+    files: dict[str, bytes]
+    scene: tuple[ScenePart, ...]
+
+    @classmethod
+    def of(cls, scenario: Scenario, vehicle: Vehicle, *plugins: Plugin) -> RunContext:
+        """Collects it."""
+        metadata = {
+            **{plugin.kind.word: plugin.name for plugin in plugins},
+            **{f"{plugin.kind.word}_parameters": dict(plugin.parameters) for plugin in plugins if plugin.parameters},
+            **describe(scenario),
+            "car": vehicle.dimensions(),
+            "timestep_s": vehicle.timestep_s,
+            "versions": _versions(),
+        }
+        if (course := scenario.maneuver.course) is not None:
+            metadata["course"] = course.to_table()
+        files = scenario.files | {name: text for plugin in plugins for name, text in plugin.files.items()}
+        return cls(channels_of(vehicle), vehicle.body_names, metadata, files, scene_of(vehicle.model))
+
+    def recording(self, recorder: Recorder) -> Recording:
+        """What a recorder that keeps all rows has taken."""
+        time_s, values, poses = recorder.result()
+        return Recording(
+            self.channels, time_s, values, poses=poses, metadata=self.metadata, attachments=self.files, scene=self.scene
+        )
+
+    def writer(self, path: Path) -> McapWriter:
+        """A file that rows can be written to.
+
+        Raises:
+            RecordingError: the file cannot be written.
+        """
+        return McapWriter(path, self.channels, self.body_names, self.metadata, self.files, self.scene)
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    found = {"activesteer": __version__, "python": platform.python_version(), "platform": platform.platform()}
+    for package in ("mujoco", "numpy", "numba"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found
