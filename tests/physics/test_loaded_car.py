@@ -6,7 +6,7 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.scenario import describe, resolve
-from activesteer.simulation.runner import prepared
+from activesteer.simulation.preparation import prepared
 
 LOAD = {"load.payload_kg": 300.0}
 
