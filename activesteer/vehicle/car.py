@@ -23,7 +23,7 @@ from activesteer.vehicle.channels import ChannelMap, RawRows
 from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.loading import find, load_model
 from activesteer.vehicle.native_forces import install_native_forces
-from activesteer.vehicle.native_step import FASTEST_MPS, Places, sensed, step_plan
+from activesteer.vehicle.native_step import FASTEST_MPS, Places, Wheels, sensed, step_plan
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 
@@ -113,7 +113,16 @@ class Vehicle:
             ),
             yaw_dof=int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")]) + 5,
         )  # fmt: skip
-        self._plan = step_plan(model, data, self.live_arrays(), self._places, self.parameters.steering.ratio)
+        powertrain, brakes = self.parameters.powertrain, self.parameters.brakes
+        front_Nm, rear_Nm = brakes.front_torque_Nm, brakes.rear_torque_Nm
+        self._wheels = Wheels(
+            [actuator(f"{corner}_drive") for corner in CORNERS],
+            [actuator(f"{corner}_brake") for corner in CORNERS],
+            powertrain.wheel_shares,
+            (front_Nm, front_Nm, rear_Nm, rear_Nm),
+        )
+        ratio = self.parameters.steering.ratio
+        self._plan = step_plan(model, data, self.live_arrays(), self._places, self._wheels, ratio)
         self._plan_address = self._plan.ctypes.data
         block = int(model.numeric_data[-fb.TRAILER_SIZE])
         self._areas_felt = model.numeric_data[block + fb.AREAS_FELT : block + fb.AREAS_FELT + 1]
@@ -128,14 +137,6 @@ class Vehicle:
         if self._root or self._root_dof:
             msg = "the free joint 'root' of the chassis must be the first joint of the model"
             raise ModelError(msg)
-        powertrain, brakes = self.parameters.powertrain, self.parameters.brakes
-        shares = zip(CORNERS, powertrain.wheel_shares, strict=True)
-        self._drives = tuple((actuator(f"{corner}_drive"), share) for corner, share in shares if share > 0.0)
-        self._each_drive = tuple(actuator(f"{corner}_drive") for corner in CORNERS)
-        torques = (brakes.front_torque_Nm, brakes.front_torque_Nm, brakes.rear_torque_Nm, brakes.rear_torque_Nm)
-        self._brakes = tuple((actuator(f"{corner}_brake"), most) for corner, most in zip(CORNERS, torques, strict=True))
-        self._drive_torque_Nm = 0.0
-        self._brake = 0.0
 
     def _place(self) -> None:
         """Static equilibrium at the origin of the world, heading along x."""
@@ -218,27 +219,21 @@ class Vehicle:
         Raises:
             SimulationDiverged: the engine warns, or something recorded is not finite or beyond all reason.
         """
-        ctrl = self._ctrl
-        gear = command.gear if command.wheel_torques is None else CLUTCH_OPEN
+        torques = command.wheel_torques
+        gear = command.gear if torques is None else CLUTCH_OPEN
         if gear != self._gear:
             self._engage(gear)
-        torque = command.drive_torque_demand_Nm if gear != CLUTCH_OPEN else 0.0
-        if torque != self._drive_torque_Nm:
-            self._drive_torque_Nm = torque
-            for index, share in self._drives:
-                ctrl[index] = share * torque
-        if command.brake_pedal != self._brake:
-            self._brake = command.brake_pedal
-            for index, torque in self._brakes:
-                ctrl[index] = command.brake_pedal * torque
-        if command.wheel_torques is not None:
-            self._apply_torques(command.wheel_torques)
+        if torques is not None:
+            self._apply_torques(torques)
         sane, measurement, motion = native_step.step(
             self._plan_address,
             row_address,
             command.steering_wheel_demand_rad,
             steer.superposition_demand_rad,
             steer.rear_steer_demand_rad,
+            command.drive_torque_demand_Nm if gear != CLUTCH_OPEN else 0.0,
+            command.brake_pedal,
+            torques is not None,
         )
         if not sane:
             self.check()
@@ -254,13 +249,8 @@ class Vehicle:
 
     def _apply_torques(self, torques: WheelTorques) -> None:
         """Torques of the wheels, one by one: past the engine, so at once and whatever that can give."""
-        ctrl = self._ctrl
-        for index, torque in zip(self._each_drive, torques.drive_Nm, strict=True):
-            ctrl[index] = torque
-        for (index, _), torque in zip(self._brakes, torques.brake_Nm, strict=True):
-            ctrl[index] = torque
-        # Whatever is commanded next in the usual way is to be written again.
-        self._drive_torque_Nm = self._brake = math.nan
+        self._ctrl[self._wheels.drives] = torques.drive_Nm
+        self._ctrl[self._wheels.brakes] = torques.brake_Nm
 
     @property
     def rack_per_steering_wheel_m(self) -> float | None:
@@ -357,8 +347,8 @@ class Vehicle:
     def restore_state(self, state: NDArray[np.float64]) -> None:
         """Puts a saved state back."""
         mujoco.mj_setState(self.model, self.data, state, _STATE)
-        # The step writes drive, brake and gear only where they change; these values never occur, so it writes them now.
-        self._drive_torque_Nm = self._brake = self._gear = math.nan
+        # The step engages a gear only where it changes; this one never occurs, so it does so now.
+        self._gear = math.nan
 
     def dimensions(self) -> dict[str, float | list[float]]:
         """What an evaluation needs of the car's outline [m]: width, wheelbase, tracks and tyre widths, as designed."""

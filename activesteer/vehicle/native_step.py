@@ -20,6 +20,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from activesteer.compilation import compiled_call, inlined
+from activesteer.conventions import CORNERS
 from activesteer.signals import Measurement, Motion
 from activesteer.vehicle.engine_layout import engine_layout
 from activesteer.vehicle.native_memory import f64_pointer, pointer_to
@@ -27,10 +28,24 @@ from activesteer.vehicle.native_memory import f64_pointer, pointer_to
 FASTEST_MPS: Final = 200.0
 """No car of ours goes faster; a speed beyond it, or none at all, is a run that has diverged [m/s]."""
 
+_N_WHEELS: Final = len(CORNERS)
 _SOURCES: Final = 7
 _WARNINGS: Final = len(mujoco.mjtWarning.__members__) - 1
 _EXPONENT: Final = 0x7FF0000000000000
 """Bits of a float64 that are all set where it is not finite, and only there."""
+
+
+class Wheels(NamedTuple):
+    """How torques come to the four wheels, order of `CORNERS`."""
+
+    drives: Sequence[int]
+    """Controls of the drive."""
+    brakes: Sequence[int]
+    """Controls of the brakes."""
+    drive_shares: Sequence[float]
+    """What each gets of the drive torque."""
+    brake_torques_Nm: Sequence[float]
+    """Brake torques at a pedal pressed to the end [Nm]."""
 
 
 class Places(NamedTuple):
@@ -63,6 +78,8 @@ STEP_PLAN: Final = np.dtype(
         [
             *((name, np.intp) for name in (*_ADDRESSES, *Places._fields)),
             ("ratio", np.float64),
+            *((name, np.intp, (_N_WHEELS,)) for name in ("drives", "brakes")),
+            *((name, np.float64, (_N_WHEELS,)) for name in ("drive_shares", "brake_torques_Nm")),
             ("sources", np.intp, (_SOURCES,)),
             ("sizes", np.intp, (_SOURCES,)),
         ],
@@ -78,6 +95,7 @@ def step_plan(
     data: mujoco.MjData,
     recorded: Sequence[NDArray[np.float64]],
     places: Places,
+    wheels: Wheels,
     ratio: float,
 ) -> NDArray[Any]:
     """Looks up all addresses.
@@ -87,6 +105,7 @@ def step_plan(
         data: Its state; both must outlive the plan.
         recorded: The engine's arrays that a row is copied from, in its order.
         places: Where the step finds what it needs.
+        wheels: How torques come to the wheels.
         ratio: Overall steering ratio.
 
     Returns:
@@ -105,6 +124,8 @@ def step_plan(
         "sensordata": data.sensordata.ctypes.data,
         **places._asdict(),
     }
+    for name, value in wheels._asdict().items():
+        plan[name] = value
     for name, value in values.items():
         plan[name] = value
     plan["ratio"] = ratio
@@ -186,9 +207,12 @@ def sense(plan_address):
     return _sense(carray(_plan_pointer(plan_address), (1,))[0])
 
 
-@compiled_call(_SENSED, types.intp, types.intp, types.float64, types.float64, types.float64)
-def step(plan_address, row_address, steering_wheel_rad, superposition_rad, rear_steer_rad):
-    """Writes the steering's inputs, makes one step of the engine and reads everything.
+@compiled_call(_SENSED, types.intp, types.intp, *[types.float64] * 5, types.boolean)
+def step(
+    plan_address, row_address, steering_wheel_rad, superposition_rad, rear_steer_rad, drive_torque_Nm, brake_pedal,
+    torques_stand,
+):  # fmt: skip
+    """Writes the inputs, makes one step of the engine and reads everything.
 
     Args:
         plan_address: Address of a `STEP_PLAN`.
@@ -196,6 +220,9 @@ def step(plan_address, row_address, steering_wheel_rad, superposition_rad, rear_
         steering_wheel_rad: Steering wheel angle demanded [rad].
         superposition_rad: Angle demanded of the front superposition, at the road wheel [rad].
         rear_steer_rad: Rear wheel angle demanded [rad].
+        drive_torque_Nm: Torque at the driven wheels together [Nm].
+        brake_pedal: Brake pedal position, 0 to 1.
+        torques_stand: Whether drive and brakes have their inputs already, and the last two do not count.
 
     Returns:
         Whether all is well, and what `sensed` takes.
@@ -206,6 +233,11 @@ def step(plan_address, row_address, steering_wheel_rad, superposition_rad, rear_
     ctrl[plan.superposition] = superposition_rad * plan.ratio
     ctrl[plan.rear_left] = rear_steer_rad
     ctrl[plan.rear_right] = rear_steer_rad
+    if not torques_stand:
+        for wheel in range(_N_WHEELS):
+            # + 0.0: a wheel that is not driven would get -0.0 while the engine brakes.
+            ctrl[plan.drives[wheel]] = plan.drive_shares[wheel] * drive_torque_Nm + 0.0
+            ctrl[plan.brakes[wheel]] = brake_pedal * plan.brake_torques_Nm[wheel]
     _call(plan.mj_step, plan.model, plan.data)  # pyright: ignore[reportCallIssue] - numba adds the context
     if row_address != 0:
         row = f64_pointer(row_address)

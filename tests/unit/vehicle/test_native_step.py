@@ -11,7 +11,7 @@ import pytest
 
 from activesteer.conventions import CORNERS
 from activesteer.errors import SimulationDiverged
-from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.signals import DriverCommand, SteerCommand, WheelTorques
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.channels import RawRows
 from tests.unit.vehicle.cars import standing
@@ -121,3 +121,15 @@ def test_a_step_lets_other_threads_run() -> None:
         sys.setswitchinterval(interval_s)
     # One after the other there is a single change.
     assert np.count_nonzero(np.diff(order)) > 1
+
+
+def test_after_torques_given_wheel_by_wheel_the_usual_ones_count_again() -> None:
+    vehicle, usual = _rolling(), _rolling()
+    torques = WheelTorques((100.0, 200.0, 300.0, 400.0), (10.0, 20.0, 30.0, 40.0))
+    vehicle.step(DriverCommand(wheel_torques=torques), STEER)
+    inputs = {name: vehicle.data.actuator(name).ctrl[0] for name in ("fl_drive", "rr_drive", "fl_brake", "rr_brake")}
+    assert inputs == {"fl_drive": 100.0, "rr_drive": 400.0, "fl_brake": 10.0, "rr_brake": 40.0}
+    for each in (vehicle, usual):
+        each.step(COMMAND, STEER)
+    np.testing.assert_array_equal(vehicle.data.ctrl, usual.data.ctrl)
+    assert vehicle.data.actuator("rr_drive").ctrl == 0.0
