@@ -33,7 +33,9 @@ def full() -> Identification:
     return identify("compact")
 
 
-@pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(SingleTrackParameters)])
+@pytest.mark.parametrize(
+    "name", [field.name for field in dataclasses.fields(SingleTrackParameters) if field.name != "source"]
+)
 def test_stored_single_track_parameter_matches_the_car(name):
     """Where this fails the car has changed: run `activesteer identify`."""
     stored = load_car("compact").config.single_track
