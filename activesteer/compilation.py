@@ -18,19 +18,37 @@ import inspect
 import logging
 import re
 from collections.abc import Callable, Iterator
-from importlib import metadata
+from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any, Final
 
+from llvmlite.binding import get_host_cpu_name
 from numba import njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.ccallback import CFunc
+from numba.np import linalg
 
 _VERSIONS: Final = ("numba", "llvmlite", "numpy", "mujoco")
 _KEPT: Final = 4
 """Compiled states of a function that are kept: some branches and versions that are worked on in turn."""
 _IMPORT: Final = re.compile(r"^\s*(?:from\s+([\w.]+)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+([\w.]+))", re.MULTILINE)
 _LOGGER: Final = logging.getLogger("activesteer")
+
+
+def _import_array_functions() -> None:
+    """Lets numba import these without scipy.linalg, which takes longer than all of them.
+
+    numba only looks whether it is there, and looks again when it compiles something that needs it.
+    """
+    look = getattr(linalg, "ensure_blas", None)
+    linalg.ensure_blas = lambda: None
+    try:
+        import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = look
+
+
+_import_array_functions()
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -159,6 +177,11 @@ def content_key(source: Path) -> str:
         digest.update(f"\n{file.relative_to(package)}\n".encode())
         digest.update(_content(file))
     return digest.hexdigest()
+
+
+def processor() -> str:
+    """The processor of this machine as the compiler calls it; with another, last digits may differ."""
+    return get_host_cpu_name()
 
 
 @functools.cache

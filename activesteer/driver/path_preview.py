@@ -17,7 +17,6 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from activesteer.compilation import compiled
 from activesteer.conventions import Array
@@ -172,6 +171,8 @@ def _best_steering(
 
 def _look_ahead(speed_mps: float, model: LateralModel, preview_s: float) -> _Preview:
     """Solves the model over the preview time, exactly for a steering angle that is held."""
+    from scipy.linalg import expm  # noqa: PLC0415 - slow to import, and only a driver on a path needs it
+
     a, b = model(speed_mps)
     # States: yaw rate, sideslip angle, heading, lateral position; then the steering angle, which stays as it is.
     system = np.zeros((5, 5))

@@ -12,15 +12,16 @@ jerk for smooth motion: T. Flash, N. Hogan, The coordination of arm movements, J
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.linalg import solve_triangular
-from scipy.optimize import nnls
 
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 _DEGREE: Final = 5
 """Where no bound acts, the least jerk is a quintic polynomial."""
@@ -84,10 +85,13 @@ class _Spline:
     """
 
     def __init__(self, start: float, end: float) -> None:
+        from scipy.interpolate import BSpline  # noqa: PLC0415 - slow to import, and few manoeuvres need it
+
         count = max(_DEGREE + 2, round((end - start) / _KNOT_SPACING_M))
         knots = np.linspace(start, end, count + 1)
         self._knots = np.concatenate([[start] * _DEGREE, knots, [end] * _DEGREE])
-        self.basis = BSpline(self._knots, np.eye(count + _DEGREE), _DEGREE)
+        self._on_knots = partial(BSpline, self._knots, k=_DEGREE)
+        self.basis = self._on_knots(np.eye(count + _DEGREE))
         # y''' is a parabola between knots: three points of Gauss integrate its square exactly.
         points, weights = np.polynomial.legendre.leggauss(3)
         half = 0.5 * np.diff(knots)[:, None]
@@ -97,11 +101,14 @@ class _Spline:
     def of(self, free: Array, fixed: Array) -> BSpline:
         coefficients = fixed.copy()
         coefficients[3:-3] = free
-        return BSpline(self._knots, coefficients, _DEGREE)
+        return self._on_knots(coefficients)
 
 
 def _bounded(a: Array, b: Array, g: Array, low: Array, high: Array) -> Array:
     """The z that minimises |A z - b| within low <= G z <= high; A of full column rank (Lawson and Hanson, LSI, LDP)."""
+    from scipy.linalg import solve_triangular  # noqa: PLC0415 - likewise
+    from scipy.optimize import nnls  # noqa: PLC0415 - likewise
+
     q, r = np.linalg.qr(a)
     target = q.T @ b
     if not len(g):  # nnls does not take an empty matrix

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Annotated, Final
 
 import numpy as np
-from scipy.interpolate import BPoly
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
@@ -80,6 +79,8 @@ class Slalom(AlongCourse):
 
 def _slalom_path(places: np.ndarray, spacing: float, offset: float) -> tuple[np.ndarray, np.ndarray]:
     """Path that passes the first cone on the left."""
+    from scipy.interpolate import BPoly  # noqa: PLC0415 - slow to import, and only a slalom needs it
+
     first, last = float(places[0]), float(places[-1])
     wave_number = math.pi / spacing
     crest = np.array([offset, 0.0, -offset * wave_number**2])

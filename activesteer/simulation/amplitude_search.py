@@ -1,6 +1,7 @@
 """How far the steering wheel must be turned: found by driving the control-free car, before a manoeuvre is run.
 
-Every controller is then given the same input. What was found is kept for the process, by everything that it depends on.
+Every controller is then given the same input. What was found is kept by everything that it depends on; see
+`amplitude_store`.
 """
 
 from __future__ import annotations
@@ -8,19 +9,25 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import platform
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final
 
+import mujoco
 import numpy as np
 
+from activesteer.compilation import content_key, processor
 from activesteer.config import to_table
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.search import RampAngle, Search, SteadyTurn
 from activesteer.maneuver.step_steer import StepSteer
 from activesteer.scenario import Scenario
+from activesteer.simulation import amplitude_store
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
+from activesteer.version import __version__
 
 _TOLERANCE: Final = 5e-4
 """Relative error of the lateral acceleration at which the search for a steady turn ends."""
@@ -33,11 +40,6 @@ _CHUNK_S: Final = 0.25
 """How often it is looked whether a ramp has come far enough [s]."""
 _ROUNDED_RAD: Final = math.radians(0.1)
 """FMVSS 126 rounds A to 0.1 deg, which also makes it the same on every machine."""
-
-_MAX_KEPT: Final = 256
-"""How many amplitudes are kept: a study asks for a new one in every sample."""
-
-_found: dict[str, float] = {}
 
 
 def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
@@ -55,20 +57,31 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
         ManeuverError: no angle gives what is asked for.
     """
     probed = replace(scenario, maneuver=search.probe)
-    tables = [to_table(probed.maneuver), search.lateral_acceleration_mps2, to_table(probed.car.config), timestep_s]
-    models = sorted(item for item in scenario.car.files.items() if item[0].startswith(("mjcf/", "tyres/")))
-    hashed = hashlib.sha256(json.dumps([tables, str(scenario.car.mjcf)], sort_keys=True).encode())
-    for name, content in models:
-        hashed.update(f"{name} {len(content)} ".encode() + content)
-    key = hashed.hexdigest()
-    if key not in _found:
-        while len(_found) >= _MAX_KEPT:
-            del _found[next(iter(_found))]
-        if isinstance(search, RampAngle):
-            _found[key] = _ramp_angle(probed, search, timestep_s)
-        else:
-            _found[key] = _steady_turn(probed, search, timestep_s)
-    return _found[key]
+    key = _key(probed, search, timestep_s)
+    angle = amplitude_store.recall(key)
+    if angle is None:
+        find = _ramp_angle if isinstance(search, RampAngle) else _steady_turn
+        angle = find(probed, search, timestep_s)
+        amplitude_store.keep(key, angle)
+    return angle
+
+
+def _key(scenario: Scenario, search: Search, timestep_s: float) -> str:
+    """Digest of everything that decides what is found.
+
+    The model as the engine has compiled it holds the content of all model and tyre files, the road and the step.
+    Controllers decide nothing: it is the control-free car that is driven.
+    """
+    model = scenario.car.on(scenario.maneuver.road, timestep_s).model
+    compiled_model = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, compiled_model)
+    parts = {
+        "model": hashlib.sha256(compiled_model.tobytes()).hexdigest(),
+        "car": to_table(scenario.car.config) | {"controllers": None},
+        "search": [type(search).__name__, to_table(search.probe), search.lateral_acceleration_mps2, timestep_s],
+        "code": [__version__, content_key(Path(__file__)), platform.platform(), processor()],
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
 def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> float:
