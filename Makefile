@@ -8,7 +8,7 @@ READY := $(VENV)/.ready-demo
 READY_DEV := $(VENV)/.ready-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all pytest pictures lint format docs wheel clean clean-kernels
+.PHONY: help demo test test-all pytest pictures lint format docs wheel clean clean-kernels clean-amplitudes
 
 help:  ## what there is
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 24
@@ -51,7 +51,10 @@ wheel: $(READY_DEV)  ## build dist/*.whl
 clean-kernels:  ## delete the compiled kernels that numba keeps beside the sources
 	find activesteer tests \( -name '*.nbi' -o -name '*.nbc' \) -delete
 
-clean: clean-kernels  ## delete the environment and everything generated
+clean-amplitudes:  ## delete the steering amplitudes that were found by driving and are kept for the next run
+	rm -rf "$${XDG_CACHE_HOME:-$$HOME/.cache}/activesteer/amplitudes"
+
+clean: clean-kernels clean-amplitudes  ## delete the environment and everything generated
 	rm -rf $(VENV) build dist demo .pytest_cache .ruff_cache .import_linter_cache
 
 $(BIN)/python:

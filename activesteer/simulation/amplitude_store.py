@@ -1,7 +1,7 @@
 """Amplitudes that were found by driving, kept for the process and, in the user's cache folder, for the next one.
 
-The folder is `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/activesteer/amplitudes`; it may be deleted at
-any time. A file is named by the key of its number and holds the number with a hash of both, so that one that is
+The folder is `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/activesteer/amplitudes`; it may be deleted
+at any time. A file is named by the key of its number and holds the number with a hash of both, so that one that is
 damaged, or belongs elsewhere, is not taken; where nothing can be read or written, nothing is kept there.
 """
 
@@ -78,13 +78,14 @@ def keep(key: str, value: float) -> None:
             part.unlink(missing_ok=True)
         kept = sorted(place.glob(f"*{_SUFFIX}"), key=lambda file: file.lstat().st_mtime)
         for file in kept[:-MAX_KEPT]:
-            file.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                file.unlink()
 
 
 def _remember(key: str, value: float) -> None:
     _in_process[key] = value
-    while len(_in_process) > MAX_KEPT:
-        del _in_process[next(iter(_in_process))]
+    for oldest in list(_in_process)[:-MAX_KEPT]:
+        _in_process.pop(oldest, None)
 
 
 def _line(key: str, value: float) -> str:

@@ -131,6 +131,21 @@ def test_only_some_states_of_a_function_are_kept(package: Path, tmp_path: Path) 
     assert len(list(tmp_path.rglob("outer.outer-*.nbc"))) == compilation._KEPT
 
 
+def test_compiling_needs_no_linear_algebra_and_leaves_it_to_those_who_do() -> None:
+    code = (
+        "import sys\n"
+        "import activesteer.simulation.runner\n"
+        "assert not {'scipy.linalg', 'scipy.optimize', 'scipy.interpolate'} & set(sys.modules)\n"
+        "import numba, numpy\n"
+        "a = numpy.arange(9.0).reshape(3, 3)\n"
+        "product = numba.njit(lambda x: numpy.dot(x, x))(a)\n"
+        "assert (product == a @ a).all()\n"
+        "assert 'scipy.linalg.cython_blas' in sys.modules\n"
+        "print(abs(numba.njit(lambda x: numpy.linalg.solve(x, x))(a + numpy.eye(3)) - numpy.eye(3)).max() < 1e-12)"
+    )
+    assert _run(code, _PACKAGE.parent) == ("True", "")
+
+
 def test_all_native_code_of_the_package_is_made_in_one_place() -> None:
     words = re.compile(r"\b(njit|jit|cfunc|guvectorize|vectorize)\b")
     found = [file for file in _PACKAGE.rglob("*.py") if words.search(file.read_text())]
