@@ -19,7 +19,7 @@ from activesteer.errors import ManeuverError
 from activesteer.resources import models_dir
 from activesteer.scenario import resolve
 from activesteer.simulation import amplitude_search, amplitude_store
-from activesteer.simulation.runner import prepared
+from activesteer.simulation.preparation import prepared
 
 SHORT = {"settle_s": 0.2, "duration_s": 1.5, "steer.start_s": 0.2}
 KEY = "0123456789abcdef" * 4
@@ -69,7 +69,7 @@ def test_three_controllers_search_once_and_another_process_not_at_all(searches, 
     code = (
         "from activesteer.scenario import resolve\n"
         "from activesteer.simulation import amplitude_search\n"
-        "from activesteer.simulation.runner import prepared\n"
+        "from activesteer.simulation.preparation import prepared\n"
         "amplitude_search._steady_turn = None\n"
         f"print(prepared(resolve('step_steer', overrides={SHORT})).maneuver.steer.steering_wheel_rad.hex())"
     )
@@ -206,7 +206,7 @@ def test_key_covers_the_sources_of_every_block_that_is_driven():
     names = {file.relative_to(package).as_posix() for file in followed}
     for name in (
         "driver/speed_hold.py", "maneuver/step_steer.py", "maneuver/slowly_increasing_steer.py", "tyre/kernels/rows.py",
-        "simulation/simulation.py", "simulation/recorder.py", "vehicle/load.py", "vehicle/equilibrium.py",
+        "simulation/closed_loop.py", "simulation/recorder.py", "vehicle/load.py", "vehicle/equilibrium.py",
         "vehicle/native_step.py", "vehicle/native_forces.py", "road/road.py", "tyre/file/tir.py",
     ):  # fmt: skip
         assert name in names
