@@ -60,8 +60,10 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
     key = _key(probed, search, timestep_s)
     angle = amplitude_store.recall(key)
     if angle is None:
-        find = _ramp_angle if isinstance(search, RampAngle) else _steady_turn
-        angle = find(probed, search, timestep_s)
+        if isinstance(search, RampAngle):
+            angle = _ramp_angle(probed, search, timestep_s)
+        else:
+            angle = _steady_turn(probed, search, timestep_s)
         amplitude_store.keep(key, angle)
     return angle
 
