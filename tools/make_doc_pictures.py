@@ -62,7 +62,7 @@ PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
     ),
 }  # fmt: skip
 """What shows a manoeuvre better than the general picture: where the car goes straight or stands, that is rounding."""
-LEAST_SPAN: Final = 0.1
+MIN_SPAN: Final = 0.1
 """No axis of these is enlarged further than this, in its unit, so that what stays as it is looks so."""
 
 
@@ -91,9 +91,9 @@ def _manoeuvre(name: str) -> Figure:
     figure = style.time_figure(runs, PANELS[name])
     for axis in figure.get_axes():
         low, high = axis.get_ylim()
-        if high - low < LEAST_SPAN:
+        if high - low < MIN_SPAN:
             middle = 0.5 * (low + high)
-            axis.set_ylim(middle - 0.5 * LEAST_SPAN, middle + 0.5 * LEAST_SPAN)
+            axis.set_ylim(middle - 0.5 * MIN_SPAN, middle + 0.5 * MIN_SPAN)
         axis.ticklabel_format(useOffset=False)
     return figure
 

@@ -37,7 +37,7 @@ MIN_SPEED_MPS: Final = 1.0
 """Slower than this, curvature is not evaluated [m/s]."""
 
 
-class Car(NamedTuple):
+class CarGeometry(NamedTuple):
     """What the evaluation must know of the car.
 
     Attributes:
@@ -88,7 +88,7 @@ class Handling(NamedTuple):
     limit_acceleration_mps2: float
 
 
-def car_of(recording: RecordingLike) -> Car:
+def car_of(recording: RecordingLike) -> CarGeometry:
     """The car of a recording, from its metadata.
 
     Raises:
@@ -97,7 +97,9 @@ def car_of(recording: RecordingLike) -> Car:
     vehicle: Any = recording.metadata.get("vehicle")
     try:
         single_track, steering = vehicle["single_track"], vehicle["steering"]
-        return Car(float(single_track["cg_to_front_m"]), float(single_track["cg_to_rear_m"]), float(steering["ratio"]))
+        return CarGeometry(
+            float(single_track["cg_to_front_m"]), float(single_track["cg_to_rear_m"]), float(steering["ratio"])
+        )
     except (KeyError, TypeError, ValueError) as error:
         shown = sorted(vehicle) if isinstance(vehicle, Mapping) else vehicle
         raise RecordingError(
@@ -106,7 +108,7 @@ def car_of(recording: RecordingLike) -> Car:
         ) from error
 
 
-def evaluate(recording: RecordingLike, car: Car | None = None) -> Handling:
+def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> Handling:
     """Steady-state handling from a test.
 
     Args:

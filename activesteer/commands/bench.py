@@ -25,8 +25,7 @@ def _bench(options: argparse.Namespace) -> int:
     from activesteer.studies.benchmark import bench, bench_tyre
 
     if options.rounds < 1:
-        msg = f"--rounds {options.rounds}: at least 1 is needed"
-        raise ParameterError(msg)
+        raise ParameterError(f"--rounds {options.rounds}: at least 1 is needed")
     if options.maneuvers:
         return _maneuvers(as_json=options.json)
     results = bench_tyre(options.rounds) if options.tyre else bench(options.rounds)

@@ -46,8 +46,7 @@ def _figures(options: argparse.Namespace) -> int:
             )
         if result.failures:
             first = next(iter(result.failures))
-            msg = f"{' '.join(first)} failed: {result.failures[first]}"
-            raise ParameterError(msg)
+            raise ParameterError(f"{' '.join(first)} failed: {result.failures[first]}")
         recordings = result.recordings()
     for path in draw_all(recordings, options.output, options.vehicle):
         print(path)

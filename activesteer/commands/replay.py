@@ -41,11 +41,9 @@ def _replay(options: argparse.Namespace) -> int:
     from activesteer.recording import Recording
 
     if options.compare and len(options.files) < 2:
-        msg = f"--compare needs at least two files, and {options.files[0]} is one"
-        raise ParameterError(msg)
+        raise ParameterError(f"--compare needs at least two files, and {options.files[0]} is one")
     if len(set(options.files)) != len(options.files):
-        msg = f"a file is named twice: {', '.join(str(file) for file in options.files)}"
-        raise ParameterError(msg)
+        raise ParameterError(f"a file is named twice: {', '.join(str(file) for file in options.files)}")
     recordings = [Recording.open(file, recover=True) for file in options.files]
     names = _names(options.files, recordings)
     runs = runs_of(dict(zip(names, recordings, strict=True)))

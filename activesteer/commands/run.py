@@ -93,12 +93,12 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) ->
 
     labels, names = zip(*((controller.label, controller.name) for controller in controllers), strict=True)
     if len(set(labels)) != len(labels):
-        msg = f"-c {' -c '.join(names)}: two of them have the same name, which tells runs and files apart"
-        raise ParameterError(msg)
+        raise ParameterError(
+            f"-c {' -c '.join(names)}: two of them have the same name, which tells runs and files apart"
+        )
     if output.suffix == ".mcap":
         if len(controllers) > 1:
-            msg = f"-o {output}: {len(controllers)} controllers make as many files; give a folder"
-            raise ParameterError(msg)
+            raise ParameterError(f"-o {output}: {len(controllers)} controllers make as many files; give a folder")
         folder, paths = output.parent, [output]
     else:
         folder, paths = output, [output / f"{maneuver}-{label}.mcap" for label in labels]
@@ -122,8 +122,9 @@ def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:
     other = sorted(key for key, value in now.items() if before.get(key, value) != value)
     if other:
         some = ", ".join(f"{key} {shown(before[key])}" for key in other[:3]) + (" ..." if len(other) > 3 else "")
-        msg = f"{path} was made with other settings ({some}); --replace replaces it, -o names another place"
-        raise ParameterError(msg)
+        raise ParameterError(
+            f"{path} was made with other settings ({some}); --replace replaces it, -o names another place"
+        )
 
 
 def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, Any]:

@@ -41,7 +41,7 @@ def _study(options: argparse.Namespace) -> int:
     from activesteer.studies.study import study
 
     if given.is_dir():
-        read_environment(given)  # says what is wrong with a folder that is none of a study
+        read_environment(given)  # says what is wrong with a folder without a study
     with RunCounter("study", quiet=options.json) as counter:
         study(
             given / "study.toml" if given.is_dir() else options.study,

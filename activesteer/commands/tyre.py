@@ -46,5 +46,6 @@ def _find(name: str) -> Path:
         if candidate.is_file():
             return candidate
     names = [path.name for path in folder.glob("*.tir")]
-    msg = f"there is no tyre file {name}, neither as a path nor in models/tyres; {nearest_names(name, names)}"
-    raise TyreFileError(msg)
+    raise TyreFileError(
+        f"there is no tyre file {name}, neither as a path nor in models/tyres; {nearest_names(name, names)}"
+    )

@@ -75,8 +75,7 @@ def _table(options: argparse.Namespace) -> int:
         return 0
     file = files.get(options.table.removesuffix(".toml").removesuffix(".csv"))
     if file is None:
-        msg = f"no table is named {options.table!r}; {nearest_names(options.table, files)}"
-        raise ParameterError(msg)
+        raise ParameterError(f"no table is named {options.table!r}; {nearest_names(options.table, files)}")
     print(file.read_text(encoding="utf-8"), end="")
     return 0
 

@@ -53,8 +53,7 @@ def _video(options: argparse.Namespace) -> int:
 
     files = [options.file, *([options.compare] if options.compare is not None else [])]
     if len(files) == 2 and files[0].resolve() == files[1].resolve():
-        msg = f"--compare {options.compare}: it is the same file, so there is nothing to compare"
-        raise ParameterError(msg)
+        raise ParameterError(f"--compare {options.compare}: it is the same file, so there is nothing to compare")
     recordings = [Recording.open(file, recover=True) for file in files]
     output = options.output if options.output is not None else options.file.with_suffix(".mp4")
     rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0

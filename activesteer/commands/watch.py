@@ -37,8 +37,7 @@ def _watch(options: argparse.Namespace) -> int:
     from activesteer.simulation.preparation import prepared
 
     if not 0.01 <= options.speed <= 100.0:
-        msg = f"--speed: is {options.speed:g}, must be 0.01 to 100"
-        raise ParameterError(msg)
+        raise ParameterError(f"--speed: is {options.speed:g}, must be 0.01 to 100")
     # What is wrong with the manoeuvre is said wherever one is; only then is a window needed.
     scenario = scenario_of(options)
     check_display()

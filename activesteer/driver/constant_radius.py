@@ -9,7 +9,7 @@ from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 
 _TIME_CONSTANT_S: Final = 0.5
 """Time in which an error of the curvature is steered away [s]: slower than the car answers, faster than speed rises."""
-_LEAST_SPEED_MPS: Final = 1.0
+_MIN_SPEED_MPS: Final = 1.0
 """Below this speed yaw rate over speed says nothing about the path and no correction is made [m/s]."""
 
 
@@ -51,7 +51,7 @@ class ConstantRadiusDriver:
         robot = self.robot
         angle = robot.steering_ratio * self._wheelbase_m * (curvature + self._correction_1pm)
         command = robot.turn(angle, reference, measurement)
-        if command.steering_wheel_demand_rad == angle and measurement.speed_mps > _LEAST_SPEED_MPS:
+        if command.steering_wheel_demand_rad == angle and measurement.speed_mps > _MIN_SPEED_MPS:
             error = curvature - measurement.yaw_rate_radps / measurement.speed_mps
             self._correction_1pm += self._share * error
         return command

@@ -59,8 +59,9 @@ class OpenLoopDriver:
         if reference.rack_demand_m is None:
             return self.turn(reference.steering_wheel_demand_rad, reference, measurement)
         if self._rack_per_steering_wheel_m is None:
-            msg = "steering.rack_m: the car has no rack that its steering wheel drives; give steering_wheel_rad"
-            raise ManeuverError(msg)
+            raise ManeuverError(
+                "steering.rack_m: the car has no rack that its steering wheel drives; give steering_wheel_rad"
+            )
         return self.turn(reference.rack_demand_m / self._rack_per_steering_wheel_m, reference, measurement)
 
     def turn(self, angle: float, reference: Reference, measurement: Measurement) -> DriverCommand:

@@ -36,7 +36,7 @@ _POINTS: Final = 12
 """Points on the path ahead at which the distance counts."""
 _WINDOW_M: Final = 5.0
 """How far along the path the car can have come between two looks, with a margin [m]."""
-_LEAST_SPEED_MPS: Final = 3.0
+_MIN_SPEED_MPS: Final = 3.0
 """Slower than this, the driver holds the steering wheel [m/s]."""
 _SPEED_STEP_MPS: Final = 0.5
 """The driver's picture of his car is that of a speed rounded to this [m/s]."""
@@ -92,7 +92,7 @@ class PathPreviewDriver:
     def _update_preview(self, path: Path, motion: Motion) -> None:
         """Looks at the road ahead and decides on a steering wheel angle."""
         search = PathSearch(path)
-        if motion.speed_mps < _LEAST_SPEED_MPS:
+        if motion.speed_mps < _MIN_SPEED_MPS:
             self._along_m = search.nearest(motion.x_m, motion.y_m, self._along_m, _WINDOW_M)
             self._decide(self._decided_rad[-1])
             return

@@ -15,7 +15,7 @@ from activesteer.signals import Reference
 
 Width = Annotated[float, Range(0.5, 4.0)]
 
-_LEAST_SPEED_MPS: Final = 5.0 / 3.6
+_MIN_SPEED_MPS: Final = 5.0 / 3.6
 """Slower than this, a preview of a second or two does not look beyond the car's own length [m/s]."""
 _AFTER_S: Final = 3.5
 """How long after the last gate a run should go on, so that it can be seen whether the car settles [s]."""
@@ -31,20 +31,18 @@ class AlongCourse(Maneuver):
         Raises:
             ManeuverError: it does not, or the course cannot be made.
         """
-        if self.speed_mps < _LEAST_SPEED_MPS:
-            msg = (
+        if self.speed_mps < _MIN_SPEED_MPS:
+            raise ManeuverError(
                 f"speed_kmh: is {3.6 * self.speed_mps:g} km/h; a course is driven forwards, with at least "
-                f"{3.6 * _LEAST_SPEED_MPS:g} km/h"
+                f"{3.6 * _MIN_SPEED_MPS:g} km/h"
             )
-            raise ManeuverError(msg)
         last = self.course.last_gate_x_m
         if last is not None and self.duration_s * self.speed_mps < last:
             least = last / self.speed_mps
-            msg = (
+            raise ManeuverError(
                 f"duration_s: is {self.duration_s:g} s, but at {3.6 * self.speed_mps:g} km/h the last gate, {last:g} m "
                 f"from the start, is reached after {least:.1f} s; {least + _AFTER_S:.1f} s show how the car settles"
             )
-            raise ManeuverError(msg)
 
     @property
     def course(self) -> Course:
@@ -79,6 +77,7 @@ def known_width(vehicle_width_m: float | None) -> float:
         ManeuverError: it is not known.
     """
     if vehicle_width_m is None:
-        msg = "vehicle_width_m: is missing; it comes from the vehicle file (width_m) unless it is given here"
-        raise ManeuverError(msg)
+        raise ManeuverError(
+            "vehicle_width_m: is missing; it comes from the vehicle file (width_m) unless it is given here"
+        )
     return vehicle_width_m

@@ -37,11 +37,10 @@ class TurnInput:
             ManeuverError: neither of them is given.
         """
         if self.steering_wheel_rad is None and self.lateral_acceleration_mps2 is None:
-            msg = (
+            raise ManeuverError(
                 "steering_wheel_deg (the angle to hold) or lateral_acceleration_mps2 (what the control-free car shall "
                 "reach) is needed"
             )
-            raise ManeuverError(msg)
 
 
 @dataclass(frozen=True)
@@ -73,12 +72,14 @@ class BrakeInTurn(Maneuver):
         """
         turn, brake = self.turn, self.brake
         if brake.start_s <= turn.start_s:
-            msg = f"brake.start_s: is {brake.start_s:g} s; it must be above turn.start_s, {turn.start_s:g} s"
-            raise ManeuverError(msg)
+            raise ManeuverError(
+                f"brake.start_s: is {brake.start_s:g} s; it must be above turn.start_s, {turn.start_s:g} s"
+            )
         if brake.start_s + brake.rise_s >= self.duration_s:
             end = brake.start_s + brake.rise_s
-            msg = f"brake.start_s: the brake is pressed down at {end:g} s, but the run ends at {self.duration_s:g} s"
-            raise ManeuverError(msg)
+            raise ManeuverError(
+                f"brake.start_s: the brake is pressed down at {end:g} s, but the run ends at {self.duration_s:g} s"
+            )
         if turn.steering_wheel_rad is None:
             check_search_speed(self.speed_mps, "turn.lateral_acceleration_mps2", "turn.steering_wheel_deg")
 

@@ -41,14 +41,12 @@ class ConstantRadius(Maneuver):
         """
         circle = self.circle
         if abs(circle.radius_m) < 10.0:
-            msg = f"circle.radius_m: is {circle.radius_m:g} m; at least 10 m to either side are needed"
-            raise ManeuverError(msg)
+            raise ManeuverError(f"circle.radius_m: is {circle.radius_m:g} m; at least 10 m to either side are needed")
         if circle.end_speed_mps <= self.speed_mps:
-            msg = (
+            raise ManeuverError(
                 f"circle.end_speed_kmh: is {3.6 * circle.end_speed_mps:g} km/h; it must be above the speed at the "
                 f"start, {3.6 * self.speed_mps:g} km/h (speed_kmh)"
             )
-            raise ManeuverError(msg)
 
     def reference(self, time_s: float) -> Reference:
         """Curvature and speed; see the base class."""

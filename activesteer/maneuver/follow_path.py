@@ -35,8 +35,7 @@ class PathTable:
             ManeuverError: there are none, or they do not.
         """
         if self.x_m is None or self.y_m is None:
-            msg = "csv (a file with the columns x_m and y_m) or both lists x_m and y_m are needed"
-            raise ManeuverError(msg)
+            raise ManeuverError("csv (a file with the columns x_m and y_m) or both lists x_m and y_m are needed")
         check_points(self.x_m, self.y_m, lambda index: f"point {index + 1}")
 
 

@@ -90,11 +90,10 @@ class LaneChange(AlongCourse):
         lane_width = narrowest.left_y_m - narrowest.right_y_m
         most = 0.5 * (lane_width - width) - _SLACK_M
         if self.lane.margin_m > most:
-            msg = (
+            raise ManeuverError(
                 f"lane.margin_m: is {self.lane.margin_m:g} m, but the {narrowest.name} is {lane_width:.3g} m wide and "
                 f"the car {width:g} m; allowed is 0 to {most:.3f} m"
             )
-            raise ManeuverError(msg)
 
 
 def _middle(course: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:

@@ -124,7 +124,6 @@ def _bounded(a: Array, b: Array, g: Array, low: Array, high: Array) -> Array:
     dual, _ = nnls(e, f)
     residual = e @ dual - f
     if -residual[-1] < _INCOMPATIBLE:
-        msg = "no path keeps all bounds: the gates are too narrow or too close to each other"
-        raise ManeuverError(msg)
+        raise ManeuverError("no path keeps all bounds: the gates are too narrow or too close to each other")
     w = -residual[:-1] / residual[-1]
     return solve_triangular(r, w + target)

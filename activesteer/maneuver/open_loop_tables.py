@@ -22,12 +22,12 @@ def check_table(times_s: Sequence[float], values: Sequence[float]) -> None:
         ManeuverError: it has not.
     """
     if not times_s or len(times_s) != len(values):
-        msg = f"has {len(times_s)} times and {len(values)} values; as many of each are needed, at least one"
-        raise ManeuverError(msg)
+        raise ManeuverError(
+            f"has {len(times_s)} times and {len(values)} values; as many of each are needed, at least one"
+        )
     for earlier, later in pairwise(times_s):
         if later <= earlier:
-            msg = f"time_s: does not increase from {earlier:g} to {later:g} s"
-            raise ManeuverError(msg)
+            raise ManeuverError(f"time_s: does not increase from {earlier:g} to {later:g} s")
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,9 @@ class SteeringTable:
             ManeuverError: both are given, or times alone.
         """
         if self.steering_wheel_rad is not None and self.rack_m is not None:
-            msg = "steering_wheel_rad and rack_m are two ways to say where the front wheels go; leave one out"
-            raise ManeuverError(msg)
+            raise ManeuverError(
+                "steering_wheel_rad and rack_m are two ways to say where the front wheels go; leave one out"
+            )
         if self.steering_wheel_rad is None and self.rack_m is None:
             if self.time_s != (0.0,):
                 raise ManeuverError("given without angles; add steering_wheel_deg or rack_m", key="time_s")

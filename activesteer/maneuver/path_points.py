@@ -13,17 +13,17 @@ from activesteer.maneuver.csv_table import read_columns
 COLUMNS: Final = ("x_m", "y_m")
 """Columns that a CSV must have, others may stand beside them."""
 
-LEAST_POINTS: Final = 4
-_MOST_GAP_M: Final = 20.0
+MIN_POINTS: Final = 4
+_MAX_GAP_M: Final = 20.0
 """Points further apart than this count as a jump [m]."""
-_LEAST_GAP_M: Final = 1e-3
-_MOST_TURN_RAD: Final = math.radians(90.0)
+_MIN_GAP_M: Final = 1e-3
+_MAX_TURN_RAD: Final = math.radians(90.0)
 """Turning by more than this at a point counts as going back [rad]."""
-_LEAST_RADIUS_M: Final = 6.0
+_MIN_RADIUS_M: Final = 6.0
 """A car of the compact class turns on 5.2 m; a tighter bend counts as a kink [m]."""
-_MOST_START_M: Final = 1.0
+_MAX_START_M: Final = 1.0
 """How far from the car the first point may be [m]."""
-_MOST_START_RAD: Final = math.radians(15.0)
+_MAX_START_RAD: Final = math.radians(15.0)
 """By how much the first stretch may point off the car's heading [rad]."""
 
 
@@ -55,41 +55,41 @@ def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[in
         ManeuverError: there are too few points, or the path jumps, goes back, has a kink, or does not begin at the car.
     """
     count = len(x_m)
-    if count != len(y_m) or count < LEAST_POINTS:
-        msg = f"the path has {count} x_m and {len(y_m)} y_m; as many of each are needed, at least {LEAST_POINTS}"
-        raise ManeuverError(msg)
+    if count != len(y_m) or count < MIN_POINTS:
+        raise ManeuverError(
+            f"the path has {count} x_m and {len(y_m)} y_m; as many of each are needed, at least {MIN_POINTS}"
+        )
 
     def fail(index: int, problem: str) -> NoReturn:
-        msg = f"{place(index)}: the point ({x_m[index]:g}, {y_m[index]:g}) m {problem}"
-        raise ManeuverError(msg)
+        raise ManeuverError(f"{place(index)}: the point ({x_m[index]:g}, {y_m[index]:g}) m {problem}")
 
     gaps = [math.hypot(x_m[i + 1] - x_m[i], y_m[i + 1] - y_m[i]) for i in range(count - 1)]
     for i, gap in enumerate(gaps, 1):
-        if gap < _LEAST_GAP_M:
+        if gap < _MIN_GAP_M:
             fail(i, "is the same as the one before; leave one of them out")
-        if gap > _MOST_GAP_M:
-            fail(i, f"is a jump of {gap:.3g} m from the one before; at most {_MOST_GAP_M:g} m are allowed, add points")
+        if gap > _MAX_GAP_M:
+            fail(i, f"is a jump of {gap:.3g} m from the one before; at most {_MAX_GAP_M:g} m are allowed, add points")
     for i in range(1, count - 1):
         ahead = math.atan2(y_m[i + 1] - y_m[i], x_m[i + 1] - x_m[i])
         behind = math.atan2(y_m[i] - y_m[i - 1], x_m[i] - x_m[i - 1])
         turn = abs(math.remainder(ahead - behind, math.tau))
-        if turn > _MOST_TURN_RAD:
+        if turn > _MAX_TURN_RAD:
             fail(i, f"turns the path back, by {math.degrees(turn):.0f} deg; are the points in the order of travel?")
         # Radius of the circle through this point and its neighbours: chord over twice the sine of the angle between.
         chord = math.hypot(x_m[i + 1] - x_m[i - 1], y_m[i + 1] - y_m[i - 1])
-        if 2.0 * math.sin(turn) * _LEAST_RADIUS_M > chord:
+        if 2.0 * math.sin(turn) * _MIN_RADIUS_M > chord:
             radius = chord / (2.0 * math.sin(turn))
-            fail(i, f"is a kink of {radius:.2g} m radius; at least {_LEAST_RADIUS_M:g} m are needed, round it off")
-    if math.hypot(x_m[0], y_m[0]) > _MOST_START_M:
+            fail(i, f"is a kink of {radius:.2g} m radius; at least {_MIN_RADIUS_M:g} m are needed, round it off")
+    if math.hypot(x_m[0], y_m[0]) > _MAX_START_M:
         fail(
             0,
             f"is {math.hypot(x_m[0], y_m[0]):.3g} m from the car: the path must begin at the car, at (0, 0), at most "
-            f"{_MOST_START_M:g} m off; shift it by ({-x_m[0]:g}, {-y_m[0]:g}) m",
+            f"{_MAX_START_M:g} m off; shift it by ({-x_m[0]:g}, {-y_m[0]:g}) m",
         )
     heading = math.atan2(y_m[1] - y_m[0], x_m[1] - x_m[0])
-    if abs(heading) > _MOST_START_RAD:
+    if abs(heading) > _MAX_START_RAD:
         fail(
             0,
             f"begins with a heading of {math.degrees(heading):.0f} deg: the car starts along x, the path may be at "
-            f"most {math.degrees(_MOST_START_RAD):g} deg off; turn it by {-math.degrees(heading):.0f} deg about (0, 0)",
+            f"most {math.degrees(_MAX_START_RAD):g} deg off; turn it by {-math.degrees(heading):.0f} deg about (0, 0)",
         )

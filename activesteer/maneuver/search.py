@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
     from activesteer.maneuver.step_steer import StepSteer
 
-LEAST_SEARCH_SPEED_MPS: Final = 30.0 / 3.6
+MIN_SEARCH_SPEED_MPS: Final = 30.0 / 3.6
 """Slower than this, lateral acceleration hardly depends on the steering wheel angle [m/s]."""
 
 
@@ -27,12 +27,11 @@ def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
     Raises:
         ManeuverError: the speed is too low.
     """
-    if speed_mps < LEAST_SEARCH_SPEED_MPS:
-        msg = (
-            f"speed_kmh: is {3.6 * speed_mps:g} km/h; {aim} needs at least {3.6 * LEAST_SEARCH_SPEED_MPS:g} km/h, or "
+    if speed_mps < MIN_SEARCH_SPEED_MPS:
+        raise ManeuverError(
+            f"speed_kmh: is {3.6 * speed_mps:g} km/h; {aim} needs at least {3.6 * MIN_SEARCH_SPEED_MPS:g} km/h, or "
             f"give {amplitude}"
         )
-        raise ManeuverError(msg)
 
 
 class SteadyTurn(NamedTuple):

@@ -50,11 +50,10 @@ class DwellInput:
         """
         check_choice("direction", self.direction, SIDES)
         if self.steering_wheel_rad is None and self.amplitude_factor is None:
-            msg = (
+            raise ManeuverError(
                 "steering_wheel_deg (the amplitude) or amplitude_factor (the same as a multiple of the steering wheel "
                 "angle at 0.3 g) is needed"
             )
-            raise ManeuverError(msg)
 
     @property
     def completion_s(self) -> float:
@@ -80,11 +79,10 @@ class SineWithDwell(Maneuver):
         check_choice("drive", self.drive, DRIVES)
         steer = self.steer
         if steer.completion_s > self.duration_s:
-            msg = (
+            raise ManeuverError(
                 f"duration_s: is {self.duration_s:g} s, but the sine ends at {steer.completion_s:.3g} s; its "
                 f"evaluation needs 1.75 s more, {steer.completion_s + 1.75:.3g} s"
             )
-            raise ManeuverError(msg)
         if steer.steering_wheel_rad is None:
             check_search_speed(self.speed_mps, "steer.amplitude_factor", "steer.steering_wheel_deg")
 

@@ -41,11 +41,10 @@ class ConeRow:
         """
         check_choice("side", self.side, SIDES)
         if self.entry_m < self.spacing_m:
-            msg = (
+            raise ManeuverError(
                 f"entry_m: is {self.entry_m:g} m; the path leaves the straight line one spacing before the first cone, "
                 f"so that at least {self.spacing_m:g} m are needed (spacing_m)"
             )
-            raise ManeuverError(msg)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,11 +65,10 @@ class Slalom(AlongCourse):
     def _make_course(self) -> Course:
         row, width = self.cones, known_width(self.vehicle_width_m)
         if row.offset_m <= 0.5 * width:
-            msg = (
+            raise ManeuverError(
                 f"cones.offset_m: is {row.offset_m:g} m; a car of {width:g} m width touches the cones unless it is "
                 f"above {0.5 * width:g} m"
             )
-            raise ManeuverError(msg)
         places = row.entry_m + row.spacing_m * np.arange(row.count, dtype=np.float64)
         path_x, path_y = _slalom_path(places, row.spacing_m, row.offset_m)
         cones = np.column_stack([places, np.zeros_like(places)])

@@ -48,14 +48,14 @@ class StepSteer(Maneuver):
         """
         step = self.steer
         if step.steering_wheel_rad is None and step.lateral_acceleration_mps2 is None:
-            msg = (
+            raise ManeuverError(
                 "steer: steering_wheel_deg (the amplitude) or lateral_acceleration_g (what the control-free car shall "
                 "reach) is needed"
             )
-            raise ManeuverError(msg)
         if step.start_s >= self.duration_s:
-            msg = f"steer.start_s: is {step.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)"
-            raise ManeuverError(msg)
+            raise ManeuverError(
+                f"steer.start_s: is {step.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)"
+            )
 
     def reference(self, time_s: float) -> Reference:
         """Steering wheel angle of the ramp; see the base class."""

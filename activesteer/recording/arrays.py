@@ -21,18 +21,16 @@ def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.
     """
     times = np.asarray(time_s, np.float64)
     if times.ndim != 1:
-        message = f"{what} has shape {times.shape} in place of (n,)"
-        raise RecordingError(message)
+        raise RecordingError(f"{what} has shape {times.shape} in place of (n,)")
     usable = (times >= 0.0) & (times < 2.0**35)
     if not usable.all():
-        message = f"{what} is {times[~usable][0]} s: it must be finite and not negative"
-        raise RecordingError(message)
+        raise RecordingError(f"{what} is {times[~usable][0]} s: it must be finite and not negative")
     result = np.rint(times * 1e9).astype(np.int64)
     steps = np.diff(result, prepend=after_ns)
     if (steps <= 0).any():
         row = int(np.argmax(steps <= 0))
-        message = f"{what} must increase: row {row} is at {times[row]} s, the one before it at "
-        raise RecordingError(message + f"{(result[row] - steps[row]) * 1e-9} s")
+        before_s = (result[row] - steps[row]) * 1e-9
+        raise RecordingError(f"{what} must increase: row {row} is at {times[row]} s, the one before it at {before_s} s")
     return result.astype(np.uint64)
 
 
@@ -45,11 +43,9 @@ def shaped(array: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.fl
     try:
         numbers = np.asarray(array, np.float64)
     except (TypeError, ValueError) as error:
-        message = f"{what}: {error}"
-        raise RecordingError(message) from None
+        raise RecordingError(f"{what}: {error}") from None
     if numbers.size == 0 and 0 in shape:
         return numbers.reshape(shape)
     if numbers.shape != shape:
-        message = f"{what} has shape {numbers.shape} in place of {shape}"
-        raise RecordingError(message)
+        raise RecordingError(f"{what} has shape {numbers.shape} in place of {shape}")
     return numbers

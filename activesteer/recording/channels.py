@@ -35,21 +35,23 @@ class ChannelTable:
         self._index = {channel.name: column for column, channel in enumerate(self._channels)}
         for column, channel in enumerate(self._channels):
             if not _NAME.fullmatch(channel.name) or channel.name == TIME:
-                message = f"channel name {channel.name!r:.300}: allowed are letters, digits, '_', a letter first, but "
-                raise RecordingError(message + f"not {TIME!r}")
+                raise RecordingError(
+                    f"channel name {channel.name!r:.300}: allowed are letters, digits, '_', a letter first, but not "
+                    f"{TIME!r}"
+                )
             for text in (channel.unit, channel.meaning):
                 if not isinstance(text, str) or len(text) > _MAX_LETTERS or not text.isprintable():
-                    message = f"channel {channel.name!r}: unit and meaning are texts of one line, not {text!r:.100}"
-                    raise RecordingError(message)
+                    raise RecordingError(
+                        f"channel {channel.name!r}: unit and meaning are texts of one line, not {text!r:.100}"
+                    )
             if not _GROUP.fullmatch(channel.group):
-                message = (
+                raise RecordingError(
                     f"group {channel.group!r:.300} of channel {channel.name!r}: allowed are a to z, 0 to 9 and '_', "
                     "a letter first"
                 )
-                raise RecordingError(message)
             if self._index[channel.name] != column:
-                message = f"channel name {channel.name!r} occurs twice, in columns {column} and "
-                raise RecordingError(message + str(self._index[channel.name]))
+                other = self._index[channel.name]
+                raise RecordingError(f"channel name {channel.name!r} occurs twice, in columns {column} and {other}")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -65,8 +67,9 @@ class ChannelTable:
         try:
             return self._index[name]
         except (KeyError, TypeError):
-            message = f"no channel {name!r} in this recording: {nearest_names(str(name), self._index)}"
-            raise RecordingError(message) from None
+            raise RecordingError(
+                f"no channel {name!r} in this recording: {nearest_names(str(name), self._index)}"
+            ) from None
 
     def groups(self) -> dict[str, list[int]]:
         """Columns of each group, groups in the order of their first channel."""

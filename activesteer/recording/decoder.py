@@ -114,8 +114,7 @@ class BlockDecoder:
             if row_ns is None:
                 row_ns, first = times[:, 0], group.topic
             elif not np.array_equal(times[:, 0], row_ns):
-                message = f"{group.topic} and {first} do not have the same times"
-                raise RecordingError(message)
+                raise RecordingError(f"{group.topic} and {first} do not have the same times")
             values = (run[:, place] for run in runs for place in range(run.shape[1]))
             columns.update(zip(group.columns, values, strict=True))
         poses = [] if self._transforms_id is None else starts[self._transforms_id]

@@ -70,8 +70,9 @@ def to_dataframe(recording: Exportable) -> pd.DataFrame:
     try:
         import pandas as pd  # noqa: PLC0415 - an extra, and slow to import
     except ImportError:
-        message = "to_dataframe needs pandas, which is not installed: pip install 'activesteer[data]'"
-        raise RecordingError(message) from None
+        raise RecordingError(
+            "to_dataframe needs pandas, which is not installed: pip install 'activesteer[data]'"
+        ) from None
     index = pd.Index(recording.time_s, name=TIME)
     frame = pd.DataFrame(recording.values, index=index, columns=list(recording.channels.names), copy=True)
     frame.attrs["units"] = {channel.name: channel.unit for channel in recording.channels}
@@ -126,11 +127,9 @@ def to_mat(recording: Exportable, path: str | os.PathLike[str]) -> Path:
     taken = {TIME, *MATLAB_TABLES}
     for name in (*recording.channels.names, *recording.metrics):
         if len(name) > MATLAB_NAME_LENGTH:
-            message = f"{name!r} has {len(name)} letters; MATLAB allows {MATLAB_NAME_LENGTH}"
-            raise RecordingError(message)
+            raise RecordingError(f"{name!r} has {len(name)} letters; MATLAB allows {MATLAB_NAME_LENGTH}")
     if clash := taken.intersection(recording.channels.names):
-        message = f"a channel is called {clash.pop()!r}, which is taken by what stands beside the channels"
-        raise RecordingError(message)
+        raise RecordingError(f"a channel is called {clash.pop()!r}, which is taken by what stands beside the channels")
     variables: dict[str, Any] = {TIME: recording.time_s}
     variables |= {name: recording[name] for name in recording.channels.names}
     variables["units"] = {channel.name: channel.unit for channel in recording.channels}

@@ -55,8 +55,7 @@ def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict
     texts: dict[str, str] = {}
     metrics = metadata.get("metrics", {})
     if not isinstance(metrics, Mapping):
-        message = f"metadata 'metrics' is a {type(metrics).__name__} in place of numbers by name"
-        raise RecordingError(message)
+        raise RecordingError(f"metadata 'metrics' is a {type(metrics).__name__} in place of numbers by name")
     metrics = {name: value.item() if isinstance(value, np.generic) else value for name, value in metrics.items()}
     check_metrics(metrics)
     for key, value in metadata.items():
@@ -65,8 +64,7 @@ def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict
         try:
             texts[str(key)] = json.dumps(value, default=_plain, ensure_ascii=False)
         except (TypeError, ValueError, RecursionError) as error:
-            message = f"metadata {key!r} cannot be kept as JSON: {error}"
-            raise RecordingError(message) from None
+            raise RecordingError(f"metadata {key!r} cannot be kept as JSON: {error}") from None
     check_metadata({key: json.loads(text) for key, text in texts.items()})
     return texts, {name: repr(float(value)) for name, value in metrics.items()}
 
@@ -76,5 +74,4 @@ def _plain(value: object) -> object:
         return value.tolist()
     if isinstance(value, Mapping):
         return dict(value)
-    message = f"a {type(value).__name__} ({value!r})"
-    raise TypeError(message)
+    raise TypeError(f"a {type(value).__name__} ({value!r})")

@@ -170,8 +170,9 @@ class FixedMessage:
         template, constant = self._constants
         wrong = np.flatnonzero(((block ^ template) & constant).any(axis=1))
         if len(wrong):
-            message = f"{what}: message {wrong[0]} does not have the fields that its schema lists, in their order"
-            raise RecordingError(message)
+            raise RecordingError(
+                f"{what}: message {wrong[0]} does not have the fields that its schema lists, in their order"
+            )
         return self.views(block)
 
     @cached_property

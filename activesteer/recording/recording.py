@@ -82,8 +82,7 @@ class Recording:
         self.metadata: dict[str, Any] = {"complete": True, **(metadata or {})}
         found = self.metadata.pop("metrics", {})
         if not isinstance(found, Mapping):
-            message = f"metadata 'metrics' is {found!r} in place of numbers by name"
-            raise RecordingError(message)
+            raise RecordingError(f"metadata 'metrics' is {found!r} in place of numbers by name")
         self.metrics: dict[str, float] = {**found, **(metrics or {})}
         self.attachments: dict[str, bytes] = dict(attachments or {})
         self.scene: tuple[ScenePart, ...] = tuple(scene)
@@ -130,8 +129,7 @@ class Recording:
                 scene=contents.scene,
             )
         except RecordingError as error:
-            message = f"{path}: {error}"
-            raise RecordingError(message) from None
+            raise RecordingError(f"{path}: {error}") from None
 
     def save(self, path: str | Path, *, overwrite: bool = True) -> None:
         """Write the recording to an MCAP file; channels with `single` are kept to 32 bit, all others exactly.

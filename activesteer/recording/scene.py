@@ -96,8 +96,9 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
         if isinstance(primitive, Link):
             continue
         if primitive.kind not in _FIELDS:
-            message = f"{primitive.body}: primitive of kind {primitive.kind!r}, known are: {', '.join(_FIELDS)}"
-            raise RecordingError(message)
+            raise RecordingError(
+                f"{primitive.body}: primitive of kind {primitive.kind!r}, known are: {', '.join(_FIELDS)}"
+            )
         if primitive.body not in entities:
             entity = entities[primitive.body] = update.entities.add(
                 frame_id=primitive.body, id=primitive.body, frame_locked=True
@@ -118,8 +119,9 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
                 for name, value in zip(names, values, strict=True):
                     setattr(target, name, float(value))
         except (TypeError, ValueError) as error:
-            message = f"{primitive.body}: a number of the {primitive.kind} is missing or wrong: {primitive} ({error})"
-            raise RecordingError(message) from None
+            raise RecordingError(
+                f"{primitive.body}: a number of the {primitive.kind} is missing or wrong: {primitive} ({error})"
+            ) from None
     for part in parts:
         if isinstance(part, Link):
             _add_link(update, part)
@@ -130,14 +132,14 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
 
 def _add_link(update: Any, link: Link) -> None:
     if link.kind not in LINK_KINDS:
-        message = f"{link.name}: link of kind {link.kind!r}, known are: {', '.join(LINK_KINDS)}"
-        raise RecordingError(message)
+        raise RecordingError(f"{link.name}: link of kind {link.kind!r}, known are: {', '.join(LINK_KINDS)}")
     try:
         text = json.dumps(_link_table(link))
         _link_of(json.loads(text))
     except (TypeError, ValueError) as error:
-        message = f"{link.name}: a number of the {link.kind} is missing or wrong: {link} ({error})"
-        raise RecordingError(message) from None
+        raise RecordingError(
+            f"{link.name}: a number of the {link.kind} is missing or wrong: {link} ({error})"
+        ) from None
     entity = update.entities.add(frame_id=link.points[0][0], id=link.name, frame_locked=True)
     entity.timestamp.SetInParent()
     entity.lifetime.SetInParent()
@@ -147,8 +149,7 @@ def _add_link(update: Any, link: Link) -> None:
 def _link_table(link: Link) -> dict[str, Any]:
     points = [[body, [float(value) for value in point]] for body, point in link.points]
     if len(points) < 2:
-        message = "two points at least"
-        raise ValueError(message)
+        raise ValueError("two points at least")
     colour = [float(value) for value in link.rgba]
     return {"name": link.name, "kind": link.kind, "points": points, "radius_m": float(link.radius_m), "rgba": colour}
 

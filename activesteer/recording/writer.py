@@ -103,8 +103,9 @@ class McapWriter:
         self.channels = ChannelTable(channels)
         self.body_names = tuple(body_names)
         if len({WORLD, *self.body_names}) != len(self.body_names) + 1:
-            message = f"body names must differ from each other and from {WORLD!r}: {', '.join(self.body_names)}"
-            raise RecordingError(message)
+            raise RecordingError(
+                f"body names must differ from each other and from {WORLD!r}: {', '.join(self.body_names)}"
+            )
         if len(self.channels) > MAX_CHANNELS:
             raise RecordingError(f"{len(self.channels)} channels, a recording has at most {MAX_CHANNELS}")
         check_names(self.body_names, "bodies", MAX_BODIES)
@@ -186,8 +187,7 @@ class McapWriter:
                 written.
         """
         if self._closed:
-            message = f"{self.path} is closed"
-            raise RecordingError(message)
+            raise RecordingError(f"{self.path} is closed")
         row_ns = nanoseconds(time_s, "time_s", self._last_row_ns)
         pose_ns = nanoseconds(pose_time_s, "pose_time_s", self._last_pose_ns)
         rows, poses, bodies = len(row_ns), len(pose_ns), len(self.body_names)
@@ -318,24 +318,22 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
     """
     path = Path(path)
     if not path.parent.is_dir():
-        message = f"cannot write {path}: folder {path.parent} does not exist"
-        raise RecordingError(message)
+        raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist")
     if path.is_dir():
-        message = f"cannot write {path}: Is a directory"
-        raise RecordingError(message)
+        raise RecordingError(f"cannot write {path}: Is a directory")
     if not os.access(path if path.exists() else path.parent, os.W_OK):
-        message = f"cannot write {path}: Permission denied"
-        raise RecordingError(message)
+        raise RecordingError(f"cannot write {path}: Permission denied")
     if not path.is_file():  # nothing there, or a device
         return
     if not overwrite:
-        message = f"cannot write {path}: it exists already"
-        raise RecordingError(message)
+        raise RecordingError(f"cannot write {path}: it exists already")
     with reading(path, RecordingError), path.open("rb") as stream:
         ours = is_recording_start(stream.read(_START_BYTES))
     if not ours:
-        message = f"cannot write {path}: it exists already and is no recording of activesteer; delete it, or choose "
-        raise RecordingError(message + "another name")
+        raise RecordingError(
+            f"cannot write {path}: it exists already and is no recording of activesteer; delete it, or choose another "
+            "name"
+        )
 
 
 def _open(path: Path, *, overwrite: bool) -> BinaryIO:
@@ -363,7 +361,6 @@ def _lock(stream: BinaryIO, path: Path) -> None:
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        message = f"cannot write {shown_path(path)}: another run or program is writing it"
-        raise RecordingError(message) from None
+        raise RecordingError(f"cannot write {shown_path(path)}: another run or program is writing it") from None
     except OSError:
         return  # A file system without locks.

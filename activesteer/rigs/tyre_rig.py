@@ -32,7 +32,7 @@ _SPIN_ANGLE_RAD: Final = 0.7
 _LOAD_TOLERANCE: Final = 1e-10
 _RATE_TOLERANCE_MPS: Final = 1e-9
 """How far from steady the relaxation may be: at 3 m/s and 0.5 m of relaxation length 2e-10 of slip."""
-_MOST_STEPS: Final = 30
+_MAX_STEPS: Final = 30
 _LOWERING_M: Final = 0.005
 
 
@@ -180,7 +180,7 @@ class TyreRig:
         )
         residual = self._residual(motion(unknown[0]), unknown, load_N)
         scale = np.array([_LOAD_TOLERANCE * load_N, _RATE_TOLERANCE_MPS, _RATE_TOLERANCE_MPS])
-        for _ in range(_MOST_STEPS):
+        for _ in range(_MAX_STEPS):
             if (np.abs(residual) <= scale).all():
                 return self._read(motion(unknown[0]), unknown[1:])
             if residual[0] <= -load_N:
@@ -279,7 +279,7 @@ class TyreRig:
         """Spin [rad/s] at a slip ratio; the rolling radius grows with it."""
         tyre = self.formula.parameters.record
         spin = 0.0
-        for _ in range(_MOST_STEPS):
+        for _ in range(_MAX_STEPS):
             radius = effective_rolling_radius(tyre, load_N, spin, self.pressure_Pa)
             spin = (speed_mps + slip_ratio * abs(speed_mps)) / radius
         return spin

@@ -41,8 +41,9 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
     lines = source.text.splitlines()
     header = next((number for number, line in enumerate(lines) if _is_header(line, table)), None)
     if header is None:
-        msg = f"{vehicle_file}: there is no table [{table}] to write to; add such a line where it shall stand"
-        raise ParameterError(msg)
+        raise ParameterError(
+            f"{vehicle_file}: there is no table [{table}] to write to; add such a line where it shall stand"
+        )
     end = next((number for number in range(header + 1, len(lines)) if _is_header(lines[number])), len(lines))
     # Blank lines and comments above the next header belong to that.
     while end > header + 1 and not re.match(r"\s*[\w\"'-]+\s*=", lines[end - 1]):
@@ -66,8 +67,9 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
         after = {}
     kept = {key: value for key, value in before[table].items() if key not in {*values, *_SAME}}
     if {**before, table: None} != {**after, table: None} or kept.items() - after[table].items():
-        msg = f"{vehicle_file}: the table [{table}] is not written as one key a line; write it so, or edit it by hand"
-        raise ParameterError(msg)
+        raise ParameterError(
+            f"{vehicle_file}: the table [{table}] is not written as one key a line; write it so, or edit it by hand"
+        )
     write_text(vehicle_file, written, ParameterError)
 
 

@@ -112,12 +112,11 @@ def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> f
                 break
             angle = a1 + (wanted - r1) * (a1 - a0) / (r1 - r0)
     best = min(tried, key=lambda pair: abs(pair[1] - wanted))
-    msg = (
+    raise ManeuverError(
         f"{probe.name}: no steering wheel angle found that gives {wanted:.3g} m/s2 in the control-free car; the "
         f"closest was {np.degrees(best[0]):.1f} deg with {best[1]:.3g} m/s2: is the road too slippery "
         f"(road.mu {probe.road.mu:g})?"
     )
-    raise ManeuverError(msg)
 
 
 def _steady_acceleration(simulation: ClosedLoop, maneuver: StepSteer, start: Any) -> float:
@@ -147,12 +146,11 @@ def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> flo
         ay = _rows(recorder, "ay_mps2")
     wheel = _rows(recorder, "steering_wheel_rad")
     if ay.max() < high:
-        msg = (
+        raise ManeuverError(
             f"{probe.name}: the control-free car reaches {ay.max():.3g} m/s2 with {np.degrees(wheel.max()):.0f} deg at "
             f"the steering wheel, but {high:.3g} m/s2 ({high / GRAVITY_MPS2:.3g} g) are needed: is the road too "
             f"slippery (road.mu {probe.road.mu:g})? Give the amplitude instead (steering_wheel_deg)"
         )
-        raise ManeuverError(msg)
     line = slice(int(np.argmax(ay > low)), int(np.argmax(ay > high)))
     slope, offset = np.polynomial.Polynomial.fit(wheel[line], ay[line], 1).convert().coef[::-1]
     return round((wanted - offset) / slope / _ROUNDED_RAD) * _ROUNDED_RAD

@@ -241,8 +241,7 @@ class Recorder:
         else:
             pose, body = np.argwhere(~np.isfinite(poses.positions_m).all(axis=2))[0]
             time_s, what = poses.time_s[pose], f"the position of {poses.names[body]} is not finite"
-        msg = f"{what} at {time_s:.3f} s"
-        raise SimulationDiverged(msg)
+        raise SimulationDiverged(f"{what} at {time_s:.3f} s")
 
     def _times(self, first: int, last: int) -> NDArray[np.float64]:
         return np.asarray(np.arange(first, last) * self._timestep_s, dtype=np.float64)

@@ -12,11 +12,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer.analysis.handling import Car, Handling, evaluate
+from activesteer.analysis.handling import CarGeometry, Handling, evaluate
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ModelError
-from activesteer.scenario import Car as CarFiles
-from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.scenario import Car, FileOrTable, Scenario, resolve
 from activesteer.theory.single_track import IDENTIFIED, SingleTrackParameters, characteristic_speed
 from activesteer.vehicle.mass_properties import mass_properties
 
@@ -70,7 +70,7 @@ def with_identified_single_track(scenario: Scenario, run: Run) -> Scenario:
     return replace(scenario, car=replace(car, config=replace(car.config, single_track=found)))
 
 
-def body_of(car: CarFiles) -> Body:
+def body_of(car: Car) -> Body:
     """Mass properties of the whole car, from the model at static ride."""
     vehicle = car.on()
     body = mass_properties(vehicle.model, vehicle.data)
@@ -81,7 +81,9 @@ def body_of(car: CarFiles) -> Body:
 
 def handling_in(scenario: Scenario, body: Body, run: Run) -> Handling:
     """Steady-state handling of a car in a test."""
-    return evaluate(run(scenario), Car(body.cg_to_front_m, body.cg_to_rear_m, scenario.car.config.steering.ratio))
+    return evaluate(
+        run(scenario), CarGeometry(body.cg_to_front_m, body.cg_to_rear_m, scenario.car.config.steering.ratio)
+    )
 
 
 def fitted(body: Body, tests: list[Handling]) -> SingleTrackParameters:
@@ -93,11 +95,11 @@ def fitted(body: Body, tests: list[Handling]) -> SingleTrackParameters:
 
     understeer, front, rear = (mean(f"{name}_gradient_radpmps2") for name in ("understeer", "front_slip", "rear_slip"))
     if understeer <= 0.0:
-        msg = (
-            f"the car oversteers: its understeer gradient is {math.degrees(understeer) * 9.81:.3g} deg/g, and the "
-            "characteristic speed of the single-track model needs one above 0"
+        gradient_degpg = math.degrees(understeer) * GRAVITY_MPS2
+        raise ModelError(
+            f"the car oversteers: its understeer gradient is {gradient_degpg:.3g} deg/g, and the characteristic speed "
+            "of the single-track model needs one above 0"
         )
-        raise ModelError(msg)
     return SingleTrackParameters(
         source=IDENTIFIED,
         mass_kg=body.mass_kg,

@@ -27,7 +27,7 @@ _SOLVER_TOLERANCE: Final = 1e-14
 """Of the engine's solver: its error of 1e-8 in a run would be divided by the small difference here."""
 
 
-class StepMap:
+class DiscreteTimeMap:
     """One step of the engine about a reference state, as a function of state x, inputs u and drive torque."""
 
     def __init__(self, vehicle: Vehicle) -> None:
@@ -73,11 +73,10 @@ class StepMap:
             self._rebase(move)
             residual = self(np.zeros(size), rest)
         worst = self.local.names[int(np.abs(residual).argmax())]
-        msg = (
+        raise ModelError(
             f"the car does not roll steadily straight ahead at {speed_mps:g} m/s: in a step of the engine {worst} "
             f"still changes by {np.abs(residual).max():.3g} (allowed {_TRIM_TOLERANCE:g})"
         )
-        raise ModelError(msg)
 
     def _rebase(self, x: Array) -> None:
         self.local.write(x)

@@ -34,7 +34,7 @@ from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.studies.discrete_time_map import INPUTS, OUTPUTS, StepMap
+from activesteer.studies.discrete_time_map import INPUTS, OUTPUTS, DiscreteTimeMap
 from activesteer.vehicle.modes import Mode, find_modes
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 CUT_OFF_HZ: Final = 30.0
 """Natural frequency above which a mode is replaced by its static part [Hz]."""
-LEAST_SPEED_MPS: Final = 3.0
+MIN_SPEED_MPS: Final = 3.0
 """Below this the standstill behaviour of the tyres fades in and speed is no parameter any more [m/s]."""
 
 _SETTLE_S: Final = 1.0
@@ -199,14 +199,13 @@ def linear_cars(
 
 
 def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, Any] | None) -> LinearCar:
-    if not LEAST_SPEED_MPS <= speed_mps < math.inf:
-        msg = f"speed_mps is {speed_mps:g} m/s; a car can be linearised from {LEAST_SPEED_MPS:g} m/s on"
-        raise ParameterError(msg)
+    if not MIN_SPEED_MPS <= speed_mps < math.inf:
+        raise ParameterError(f"speed_mps is {speed_mps:g} m/s; a car can be linearised from {MIN_SPEED_MPS:g} m/s on")
     straight = {
         "kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0, "settle_s": _SETTLE_S,
     }  # fmt: skip
     sliding = {**(overrides or {}), "vehicle.friction.rack_N": 0.0}
-    step = StepMap(ClosedLoop(resolve(straight, vehicle, sliding)).vehicle)
+    step = DiscreteTimeMap(ClosedLoop(resolve(straight, vehicle, sliding)).vehicle)
     step.trim(speed_mps)
     a, c = step.derivatives("x")
     b, d = step.derivatives("u")

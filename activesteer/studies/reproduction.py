@@ -108,8 +108,9 @@ def recordings_in(folder: str | os.PathLike[str]) -> dict[str, dict[str, Recordi
         if all(path.is_file() for path in paths.values()):
             found[name] = {system: Recording.open(path) for system, path in paths.items()}
     if not found:
-        msg = f"{folder} holds no runs of {', '.join(SCENARIOS)}; make them with `activesteer reproduce -o {folder}`"
-        raise RecordingError(msg)
+        raise RecordingError(
+            f"{folder} holds no runs of {', '.join(SCENARIOS)}; make them with `activesteer reproduce -o {folder}`"
+        )
     return found
 
 

@@ -104,11 +104,10 @@ class SingleTrack:
             square = cv * ch * wheelbase**2 / (p.mass_kg * moment) if moment else math.inf
             self.characteristic_speed_mps = math.sqrt(square)
         else:
-            msg = (
+            raise ParameterError(
                 f"single_track: C_H l_H - C_V l_V is {moment:.4g} N m/rad; it must not be below 0 (an oversteering "
                 "car) for eq. 4 to give a characteristic speed, or characteristic_speed_kmh must be given"
             )
-            raise ParameterError(msg)
         self._stiffness_ratio = cv / ch
         self._front_moment_kgm, self._rear_moment_kgm = p.mass_kg * lv, p.mass_kg * lh
         self._front_moment_Nm, self._rear_moment_Nm = cv * lv * wheelbase, ch * lh * wheelbase
@@ -160,8 +159,7 @@ class SingleTrack:
         import control  # noqa: PLC0415 - takes longer to import than a run takes to start
 
         if speed_mps <= 0.0:
-            msg = f"speed_mps is {speed_mps:g} m/s; the single-track model needs a speed above 0"
-            raise ParameterError(msg)
+            raise ParameterError(f"speed_mps is {speed_mps:g} m/s; the single-track model needs a speed above 0")
         a, b = self.matrices(speed_mps)
         return control.StateSpace(
             a,

@@ -58,14 +58,11 @@ class TyreConventions:
         """
         for key, words in _CHOICES.items():
             if (word := getattr(self, key)) not in words:
-                msg = f"{key}: there is no {word!r}; {nearest_names(str(word), words)}"
-                raise ParameterError(msg)
+                raise ParameterError(f"{key}: there is no {word!r}; {nearest_names(str(word), words)}")
         if not 0.0 <= self.speed_offset_mps <= 1.0:
-            msg = f"speed_offset_mps: {self.speed_offset_mps:g} m/s is outside 0 to 1 m/s"
-            raise ParameterError(msg)
+            raise ParameterError(f"speed_offset_mps: {self.speed_offset_mps:g} m/s is outside 0 to 1 m/s")
         if not 0.1 <= self.reference_friction <= 2.0 or not math.isfinite(self.reference_friction):
-            msg = f"reference_friction: {self.reference_friction:g} is outside 0.1 to 2"
-            raise ParameterError(msg)
+            raise ParameterError(f"reference_friction: {self.reference_friction:g} is outside 0.1 to 2")
 
     def numbers(self) -> dict[str, float]:
         """What the kernels read of the conventions, by the field of the tyre's record."""

@@ -87,8 +87,7 @@ class Vehicle:
             self._bind()
             self._place()
         except ModelError as reason:
-            msg = f"{mjcf}: {reason}"
-            raise ModelError(msg) from reason
+            raise ModelError(f"{mjcf}: {reason}") from reason
 
     def _bind(self) -> None:
         """Looks up addresses once; the step uses nothing but integers and views."""
@@ -135,8 +134,7 @@ class Vehicle:
         ]
         self._spin_armature_kgm2 = model.dof_armature[self._spins].tolist()
         if self._root or self._root_dof:
-            msg = "the free joint 'root' of the chassis must be the first joint of the model"
-            raise ModelError(msg)
+            raise ModelError("the free joint 'root' of the chassis must be the first joint of the model")
 
     def _place(self) -> None:
         """Static equilibrium at the origin of the world, heading along x."""
@@ -296,16 +294,15 @@ class Vehicle:
         for kind, warning in enumerate(data.warning):
             if warning.number:
                 text = mujoco.mju_warningText(kind, warning.lastinfo)
-                msg = f"MuJoCo warns at {data.time:.3f} s: {text}"
-                raise SimulationDiverged(msg)
+                raise SimulationDiverged(f"MuJoCo warns at {data.time:.3f} s: {text}")
         if not np.isfinite(data.qpos).all() or not np.isfinite(data.qvel).all():
             bad = np.flatnonzero(~np.isfinite(data.qvel))
             joints = sorted({self.model.joint(int(self.model.dof_jntid[dof])).name for dof in bad})
-            msg = f"the state is not finite at {data.time:.3f} s; joints: {', '.join(joints)}"
-            raise SimulationDiverged(msg)
+            raise SimulationDiverged(f"the state is not finite at {data.time:.3f} s; joints: {', '.join(joints)}")
         if not np.isfinite(data.act).all():
-            msg = f"an activation (slip of a tyre, angle of a servo) is not finite at {data.time:.3f} s"
-            raise SimulationDiverged(msg)
+            raise SimulationDiverged(
+                f"an activation (slip of a tyre, angle of a servo) is not finite at {data.time:.3f} s"
+            )
         speed = data.sensordata[self._places.velocimeter]
         if not -FASTEST_MPS < speed < FASTEST_MPS:
             raise SimulationDiverged(f"the speed is {speed:g} m/s at {data.time:.3f} s")

@@ -89,8 +89,7 @@ class ChannelMap:
     def _sensor(self, name: str) -> slice:
         index = self._sensors.get(name)
         if index is None:
-            msg = f"the model has no sensor {name!r}; {nearest_names(name, self._sensors)}"
-            raise ModelError(msg)
+            raise ModelError(f"the model has no sensor {name!r}; {nearest_names(name, self._sensors)}")
         start = int(self._model.sensor_adr[index])
         return slice(start, start + int(self._model.sensor_dim[index]))
 

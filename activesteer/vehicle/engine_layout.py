@@ -91,8 +91,9 @@ def _find(address: int, wanted: int, limit_bytes: int, what: str) -> int:
         hits = np.flatnonzero(words[start : start + block] == np.uint64(wanted))
         if hits.size:
             return (start + int(hits[0])) * _WORD_BYTES
-    msg = f"MuJoCo {mujoco.__version__}: cannot locate {what} in its structures; this version is not supported"
-    raise ModelError(msg)
+    raise ModelError(
+        f"MuJoCo {mujoco.__version__}: cannot locate {what} in its structures; this version is not supported"
+    )
 
 
 def _measure(model: mujoco.MjModel, data: mujoco.MjData, numbers: int) -> EngineLayout:
@@ -126,6 +127,5 @@ def measure_engine_layout() -> EngineLayout:
     first = _measure(*_probe(7919, 0.00123456789), 7919)
     second = _measure(*_probe(6421, 0.00098765432), 6421)
     if first != second:
-        msg = f"MuJoCo {mujoco.__version__}: two models give different struct layouts ({first}, {second})"
-        raise ModelError(msg)
+        raise ModelError(f"MuJoCo {mujoco.__version__}: two models give different struct layouts ({first}, {second})")
     return first

@@ -72,11 +72,10 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
         residual = smaller
     worst = int(free[np.abs(residual).argmax()])
     joint = model.joint(int(model.dof_jntid[worst])).name
-    msg = (
+    raise ModelError(
         f"no static equilibrium found in {_ITERATIONS} iterations: {np.abs(residual).max():.3g} N (or N m) remain at "
         f"joint {joint!r}; are the springs' free lengths right for the car's weight?"
     )
-    raise ModelError(msg)
 
 
 def _residual(model: mujoco.MjModel, data: mujoco.MjData, free: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -33,8 +33,7 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
     """
     chassis = spec.body("chassis")
     if chassis is None:
-        msg = "there is no body 'chassis'"
-        raise ModelError(msg)
+        raise ModelError("there is no body 'chassis'")
     load, factors = parameters.load, parameters.factors
     if load == Load() and factors == Factors():
         return
@@ -46,8 +45,9 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
     scale = 1.0 + (factors.mass - 1.0) * share
     if scale <= 0.0:
         least = 1.0 - 1.0 / share
-        msg = f"factors.mass = {factors.mass:g} leaves nothing of the chassis; more than {least:.2f} is needed"
-        raise ModelError(msg)
+        raise ModelError(
+            f"factors.mass = {factors.mass:g} leaves nothing of the chassis; more than {least:.2f} is needed"
+        )
     mass = scale * float(body.mass[0])
     # The whole empty car's moves by what is asked for; only the chassis is moved.
     cg = body.ipos + np.array([0.0, 0.0, load.cg_height_change_m * factors.mass * before.mass_kg / mass])

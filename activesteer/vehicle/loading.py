@@ -115,8 +115,7 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
             mujoco.mjtObj.mjOBJ_ACTUATOR: model.nu,
         }[kind]
         names = [mujoco.mj_id2name(model, kind, number) or "" for number in range(count)]
-        msg = f"the model has no {word} {name!r}; {nearest_names(name, names)}"
-        raise ModelError(msg)
+        raise ModelError(f"the model has no {word} {name!r}; {nearest_names(name, names)}")
     return index
 
 
@@ -158,8 +157,7 @@ def _force_block(
 
 def _triple(values: tuple[float, ...]) -> tuple[float, float, float]:
     if len(values) != 3:
-        msg = f"aerodynamics.pressure_point_m: {len(values)} numbers given; 3 are needed"
-        raise ModelError(msg)
+        raise ModelError(f"aerodynamics.pressure_point_m: {len(values)} numbers given; 3 are needed")
     return values[0], values[1], values[2]
 
 
@@ -169,8 +167,9 @@ def _wheel(
     body = find(model, mujoco.mjtObj.mjOBJ_BODY, f"{corner}_wheel")
     chain = chain_to(model, body)
     if len(chain) > fb.MAX_CHAIN:
-        msg = f"{corner}_wheel: {len(chain)} degrees of freedom above the wheel; at most {fb.MAX_CHAIN} are supported"
-        raise ModelError(msg)
+        raise ModelError(
+            f"{corner}_wheel: {len(chain)} degrees of freedom above the wheel; at most {fb.MAX_CHAIN} are supported"
+        )
     fitment = parameters.tyres
     pressure = fitment.front_pressure_Pa if corner.startswith("f") else fitment.rear_pressure_Pa
     return fb.WheelEntry(
@@ -194,8 +193,7 @@ def _activation(model: mujoco.MjModel, actuator: str) -> int:
     index = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
     address = int(model.actuator_actadr[index])
     if address < 0:
-        msg = f'actuator {actuator!r} has no activation; it needs dyntype="user"'
-        raise ModelError(msg)
+        raise ModelError(f'actuator {actuator!r} has no activation; it needs dyntype="user"')
     return address
 
 
@@ -238,7 +236,8 @@ def _actuator(
         return (fb.KIND_FRICTION, address, vibration, float(part), force / stiffness, along)
     lag, rate = (float(value) for value in model.actuator_dynprm[index, :2])
     if lag <= 0.0 or rate <= 0.0:
-        msg = f"actuator {name!r}: dynprm is {lag:g} {rate:g}; a lag [s] and a rate limit [rad/s] above 0 are needed"
-        raise ModelError(msg)
+        raise ModelError(
+            f"actuator {name!r}: dynprm is {lag:g} {rate:g}; a lag [s] and a rate limit [rad/s] above 0 are needed"
+        )
     low, high = (float(value) for value in model.actuator_ctrlrange[index])
     return (fb.KIND_SERVO, address, lag, rate, low, high)

@@ -306,11 +306,10 @@ def install_native_forces() -> None:
     )
     for name, present, _ in slots:
         if present is not None and not any(present is ours for ours in _installed):
-            msg = (
+            raise ModelError(
                 f"MuJoCo's {name} is already taken by {present!r}; there is one per process and the tyre forces need "
                 f"it: call mujoco.set_{name}(None) before using activesteer"
             )
-            raise ModelError(msg)
     if not _installed:
         compiled = _make_callbacks(engine_layout())
         _installed.extend(callback.ctypes for callback in compiled)

@@ -69,14 +69,12 @@ class DamperCurve:
         """
         count = len(self.velocity_mps)
         if not 2 <= count <= MAX_CURVE_POINTS or len(self.force_N) != count:
-            msg = (
+            raise ParameterError(
                 f"{count} velocities and {len(self.force_N)} forces given; 2 to {MAX_CURVE_POINTS} points are needed, "
                 "as many velocities as forces"
             )
-            raise ParameterError(msg)
         if any(right <= left for left, right in pairwise(self.velocity_mps)):
-            msg = f"the velocities {list(self.velocity_mps)} m/s do not increase"
-            raise ParameterError(msg)
+            raise ParameterError(f"the velocities {list(self.velocity_mps)} m/s do not increase")
 
 
 @dataclass(frozen=True)

@@ -121,11 +121,10 @@ def _axle(
         "radius of gyration 0.56 of the tyre's radius", "kg m2",
     )  # fmt: skip
     if spin > 2.0 * across:
-        msg = (
+        raise ParameterError(
             f"{axle}: wheel_spin_inertia_kgm2 is {spin:.3g} and wheel_inertia_kgm2, about a diameter, {across:.3g} "
             "kg m2; no body has more than twice of that about its axle"
         )
-        raise ParameterError(msg)
     toe, camber = (0.05, -0.5) if front else (0.1, -1.0)
     spring_on = table.spring_on
     if spring_on is None:
@@ -187,8 +186,7 @@ def _solid(
         inertia = tuple(float(f"{value * kg / of_kg:.3g}") for value in default_inertia)
         log.note(f"{key}_inertia_kgm2", " ".join(f"{value:g}" for value in inertia), "the compact's, in proportion")
     if min(inertia) <= 0.0 or 2.0 * max(inertia) > sum(inertia):
-        msg = f"{key}_inertia_kgm2: {list(inertia)} given; each can be at most the sum of the others"
-        raise ParameterError(msg)
+        raise ParameterError(f"{key}_inertia_kgm2: {list(inertia)} given; each can be at most the sum of the others")
     return Solid(kg, default_cg if cg is None else np.array(cg), np.array(inertia))
 
 
@@ -203,8 +201,9 @@ def _link(axle: str, kind: LinkKind, table: LinkTable | None, log: Log) -> Link:
     elif table.bushing is not None:
         if table.bushing not in BUSHINGS_NPM:
             words = nearest_names(table.bushing, BUSHINGS_NPM)
-            msg = f"{axle}.links.{kind.name}.bushing: no class of bushings is named {table.bushing!r}; {words}"
-            raise ParameterError(msg)
+            raise ParameterError(
+                f"{axle}.links.{kind.name}.bushing: no class of bushings is named {table.bushing!r}; {words}"
+            )
         stiffness, remark = 0.5 * BUSHINGS_NPM[table.bushing], f"two bushings of class {table.bushing}"
         log.note(f"{axle}.links.{kind.name}.stiffness_Npm", f"{stiffness:g} N/m", remark)
     else:
@@ -247,16 +246,16 @@ def _rack_per_steer(axis: tuple[Array, Array], inner: Array, outer: Array) -> fl
     along = (axis[1] - axis[0]) / np.linalg.norm(axis[1] - axis[0])
     rod = outer - inner
     if abs(rod[1]) < 1e-3:
-        msg = "front: the tie rod does not run across the car: tie_rod_inner and tie_rod_outer have the same y"
-        raise ParameterError(msg)
+        raise ParameterError(
+            "front: the tie rod does not run across the car: tie_rod_inner and tie_rod_outer have the same y"
+        )
     moved = np.cross(along, outer - axis[0])
     per_steer = float(rod @ moved / rod[1])
     if abs(per_steer) < 0.02:
-        msg = (
+        raise ParameterError(
             f"front: the tie rod passes the steering axis at {1e3 * abs(per_steer):.0f} mm: it cannot steer the wheel; "
             "tie_rod_outer has to lie ahead of or behind the line through the upper and the lower joint"
         )
-        raise ParameterError(msg)
     return per_steer
 
 
@@ -296,16 +295,14 @@ def check_origin(car: Car, given: CarTable) -> None:
     if abs(centre[0]) > 0.05 or not 0.75 * radius < centre[2] < 1.15 * radius:
         off = np.array([centre[0], 0.0, centre[2] - 0.94 * radius]) / UNITS[given.units]
         say = ", ".join(f"{value:.4g}" for value in np.array(given.origin) + off)
-        msg = (
+        raise ParameterError(
             f"front.points.wheel_centre is at x {centre[0]:.3f} m, {centre[2]:.3f} m above the origin; vehicle "
             f"coordinates begin on the road below the front axle, and the tyre's radius is {radius:.3f} m. Say where "
             f"that point lies in the table's coordinates: about origin = [{say}] ({given.units})"
         )
-        raise ParameterError(msg)
     rear = car.rear.wheel_centre_m[0]
     if rear > -0.5:
-        msg = (
+        raise ParameterError(
             f"rear.points.wheel_centre is at x {rear:.3f} m; x points forward, so the rear axle lies at minus the "
             "wheelbase. Are the rear points those of the axle by itself?"
         )
-        raise ParameterError(msg)

@@ -58,18 +58,18 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
     upper, lower = points[f"{part}_inner"], points[f"{part}_outer"]
     length = float(np.linalg.norm(upper - lower))
     if length < 0.02:
-        msg = f"{axle}: {part}_inner and {part}_outer are {1e3 * length:.1f} mm apart; a {part} needs length"
-        raise ParameterError(msg)
+        raise ParameterError(
+            f"{axle}: {part}_inner and {part}_outer are {1e3 * length:.1f} mm apart; a {part} needs length"
+        )
     if carrier == "knuckle":
         return Mount(carrier, 1.0, f"{part}_outer", upper, length)
     inner, outer = kind.arms[carrier]
     lever = _lever([points[name] for name in inner], points[outer], lower, (upper - lower) / length)
     if not _LEAST < lever < _MOST:
-        msg = (
+        raise ParameterError(
             f"{axle}: {part}_outer lies at {lever:.2f} of the length of {carrier}, seen from its inner end; a {part} "
             f"on an arm lies between {_LEAST:g} and {_MOST:g}. Is {part}_on right, and {part}_outer on the left side?"
         )
-        raise ParameterError(msg)
     return Mount(carrier, lever, outer, points[outer] + (upper - lower) / lever, length)
 
 

@@ -211,8 +211,7 @@ def read_table(path: Path) -> tuple[CarTable, Source]:
     elif path.suffix.lower() == ".toml":
         raw, source = read_toml(path)
     else:
-        msg = f"{path}: a table ends in .toml or .csv"
-        raise ParameterError(msg)
+        raise ParameterError(f"{path}: a table ends in .toml or .csv")
     table = build(CarTable, raw, source)
     if table.units not in UNITS:
         raise source.fail(("units",), f"{table.units!r} is no unit of length here; {nearest_names(table.units, UNITS)}")

@@ -91,8 +91,9 @@ def trim(car: Car, write: Write, log: Log) -> Trimmed:
         "rear": 0.5 * body.mass_kg * (1 - share) * GRAVITY_MPS2,
     }
     if min(loads.values()) <= 0.0:
-        msg = f"the centre of gravity, at x {body.cg_m[0]:.3f} m, does not lie between the axles: the car falls over"
-        raise ModelError(msg)
+        raise ModelError(
+            f"the centre of gravity, at x {body.cg_m[0]:.3f} m, does not lie between the axles: the car falls over"
+        )
     ratios: dict[str, tuple[float, float]] = {}
     rates: dict[str, float | None] = {}
     sprung: dict[str, float] = {}
@@ -101,12 +102,11 @@ def trim(car: Car, write: Write, log: Log) -> Trimmed:
         ratios[axle.name] = motion[f"{axle.corner}_spring"], motion[f"{axle.corner}_damper"]
         for part, ratio in zip(("spring", "damper"), ratios[axle.name], strict=True):
             if not 0.15 < ratio < 1.6:
-                msg = (
+                raise ModelError(
                     f"{axle.name}: the {part} shortens by {ratio:.2f} of the wheel's travel in bump; 0.15 to 1.6 are "
                     f"possible in a car. Are {part}_inner (chassis) and {part}_outer (suspension) exchanged, or is "
                     f"{part}_on wrong?"
                 )
-                raise ModelError(msg)
         unsprung = float(model.body_subtreemass[model.body(f"{axle.corner}_knuckle").id])
         sprung[axle.name] = loads[axle.name] / GRAVITY_MPS2 - unsprung
         rates[axle.name] = _wanted_rate(axle, loads[axle.name], sprung[axle.name])
@@ -125,8 +125,7 @@ def _compiled(mjcf: Path) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_path(str(mjcf))
     except ValueError as reason:
-        msg = f"{mjcf.name}: {reason}"
-        raise ModelError(msg) from reason
+        raise ModelError(f"{mjcf.name}: {reason}") from reason
 
 
 def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
@@ -144,11 +143,10 @@ def _wanted_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
     ride = sprung_kg * (2.0 * math.pi * axle.ride_frequency_Hz) ** 2
     tyre = tyre_rate_Npm(axle.tyre_parameters, load_N)
     if ride > 0.8 * tyre:
-        msg = (
+        raise ModelError(
             f"{axle.name}.ride_frequency_Hz: {axle.ride_frequency_Hz:g} Hz of {sprung_kg:.0f} kg needs {ride:.0f} N/m, "
             f"and the tyre alone has {tyre:.0f} N/m"
         )
-        raise ModelError(msg)
     return ride * tyre / (tyre - ride)
 
 
@@ -238,16 +236,16 @@ def _let_stand(
             if rate is not None and abs(travel) < 0.01:
                 found.spring_rate_Npm -= off * rate / ratio**2
                 if found.spring_rate_Npm <= 0.0:
-                    msg = f"{axle.name}: the links alone give a wheel rate above the {rate:.0f} N/m that are asked for"
-                    raise ModelError(msg)
+                    raise ModelError(
+                        f"{axle.name}: the links alone give a wheel rate above the {rate:.0f} N/m that are asked for"
+                    )
         if done:
             return rates
     where = ", ".join(f"{1e3 * value:.2f}" for value in left_m)
-    msg = (
+    raise ModelError(
         f"the car does not come to stand in its design position within {_ROUNDS} rounds: wheels at {where} mm of "
         "travel; are spring rates and stops possible?"
     )
-    raise ModelError(msg)
 
 
 def _fit_steering(car: Car, trimmed: Trimmed, write: Write, log: Log) -> None:

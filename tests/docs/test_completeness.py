@@ -12,7 +12,7 @@ from activesteer.maneuver import KINDS
 from activesteer.resources import list_maneuvers
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-MOST_BYTES = 1_500_000
+MAX_BYTES = 1_500_000
 
 
 @pytest.mark.parametrize("name", list_maneuvers())
@@ -45,4 +45,4 @@ def test_every_picture_is_shown_and_all_are_small() -> None:
     shown = "".join(page.read_text(encoding="utf-8") for page in DOCS.rglob("*.md"))
     pictures = [*DOCS.glob("pictures/*")]
     assert not [picture.name for picture in pictures if f"pictures/{picture.name}" not in shown]
-    assert sum(picture.stat().st_size for picture in pictures) < MOST_BYTES
+    assert sum(picture.stat().st_size for picture in pictures) < MAX_BYTES

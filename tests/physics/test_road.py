@@ -14,7 +14,7 @@ from tests.physics.runs import COAST_OR_BRAKE, corners
 
 BRAKE = {"time_s": [0.0, 0.5, 0.6], "pedal": [0.0, 0.0, 0.3]}
 FULL_BRAKE = {"time_s": [0.0, 0.5, 0.6], "pedal": [0.0, 0.0, 1.0]}
-MOST_USE = 1.08
+MAX_USE = 1.08
 """Combined slip and camber let the formula exceed the ellipse of its own peaks by up to 7 % with the compact's tyre."""
 
 
@@ -84,11 +84,11 @@ def test_cornering_beyond_the_limit_uses_the_front_tyres_up(mu: float) -> None:
     use = corners(recording, "friction_use")
     assert use[-1000:, 1].min() > 0.9
     assert use[:450].max() < 0.2
-    assert use.max() < MOST_USE
+    assert use.max() < MAX_USE
 
 
 def test_braking_at_the_limit_of_cornering_keeps_the_resultant_within_the_friction() -> None:
     steer = {"time_s": [0.0, 0.5, 0.8], "steering_wheel_rad": [0.0, 0.0, 2.0]}
     brake = {"time_s": [0.0, 1.0, 1.1], "pedal": [0.0, 0.0, 0.5]}
     recording = drive({"mu": 0.9}, steering=steer, hold_last=True, brake=brake)
-    assert 0.98 < corners(recording, "friction_use").max() < MOST_USE
+    assert 0.98 < corners(recording, "friction_use").max() < MAX_USE

@@ -44,8 +44,7 @@ class Car:
 
     def __post_init__(self) -> None:
         if self.doors == 13:
-            msg = "doors: 13 bring bad luck"
-            raise ParameterError(msg)
+            raise ParameterError("doors: 13 bring bad luck")
 
 
 TEXT = """\

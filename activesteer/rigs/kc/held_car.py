@@ -187,11 +187,10 @@ class HeldCar:
             if size > _STALE * before and size > _TOLERANCE:
                 self._renew(case, residual)
         dofs = [*(self.model.joint(int(self.model.dof_jntid[dof])).name for dof in self._free), *CORNERS]
-        msg = (
+        raise ModelError(
             f"kinematics and compliance rig: no equilibrium found in {_ITERATIONS} iterations; {size:.3g} N (or N m) "
             f"remain at {dofs[int(np.abs(residual).argmax())]!r}; do the links leave each wheel one way to travel?"
         )
-        raise ModelError(msg)
 
     def _command(self, case: Case) -> None:
         """Commands the servos. The search begins where they will arrive: further away one is at its torque's limit."""
@@ -255,6 +254,7 @@ class HeldCar:
         try:
             self._inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
         except np.linalg.LinAlgError as reason:
-            msg = "kinematics and compliance rig: a part of the car moves without any force; is a link missing?"
-            raise ModelError(msg) from reason
+            raise ModelError(
+                "kinematics and compliance rig: a part of the car moves without any force; is a link missing?"
+            ) from reason
         self._held = case.hold

@@ -187,8 +187,7 @@ def _named(linear: _Linear) -> dict[str, Mode]:
         if not share.size or share.max() < 0.1:
             if name.startswith("body"):
                 where = f"of the standing car below {_FASTEST_HZ:g} Hz"
-                msg = f"kinematics and compliance rig: no mode {where} is its {name}"
-                raise ModelError(msg)
+                raise ModelError(f"kinematics and compliance rig: no mode {where} is its {name}")
             # Hard dampers leave no oscillation of a wheel between spring and tyre.
             named[name] = Mode(math.nan, math.nan)
             continue

@@ -56,6 +56,7 @@ def kinematics_compliance(
         raise ModelError(f"{car.mjcf}: the car has no equilibrium on the rig: {reason}") from reason
     except KeyError as reason:
         # The engine's look-up by name: its message says which there are.
-        msg = f"{car.mjcf}: the kinematics and compliance rig needs a part that the model lacks: {reason}"
-        raise ModelError(msg) from reason
+        raise ModelError(
+            f"{car.mjcf}: the kinematics and compliance rig needs a part that the model lacks: {reason}"
+        ) from reason
     return evaluated(car.name, measured, bands)

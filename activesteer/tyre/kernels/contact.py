@@ -53,7 +53,7 @@ _NO_TURN_SLIP_1PM: Final = 1e-12
 """Stands for no turn slip where the formula with turn slip is meant; zero would choose the formula without it."""
 _SMALLEST_SLIP_LIMIT: Final = 0.01
 """Slip that a deflection may stand for at least, whatever the range of a tyre file."""
-_MOST_LOAD_STEPS: Final = 8
+_MAX_LOAD_STEPS: Final = 8
 _CAUTIOUS: Final = 0.1
 """What is left of the load where a step of its search would lift the tyre."""
 _LOAD_TOLERANCE: Final = 1e-9
@@ -296,7 +296,7 @@ def tyre_on_road(
         fz_before = fz
         step = _load(p, deflection, spin, pressure_Pa, damping, rolling.fx_N, rolling.fy_N, gamma) - fz
         fz = fz + step if fz + step > 0.0 else _CAUTIOUS * fz
-        for _ in range(_MOST_LOAD_STEPS):
+        for _ in range(_MAX_LOAD_STEPS):
             rolling = _rolling_tyre(
                 p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn_z, gamma,
                 deflection_x_m, deflection_y_m, deflection_z_rad,

@@ -13,7 +13,7 @@ from activesteer.compilation import compiled
 from activesteer.tyre.kernels.pure_slip import EPSILON, cornering_stiffness, guarded
 from activesteer.tyre.kernels.vertical import effective_rolling_radius
 
-_MOST_TURN_SLIP = 1e6
+_MAX_TURN_SLIP = 1e6
 """Turn slip times radius beyond which the factors have long reached their limits."""
 
 
@@ -59,7 +59,7 @@ def turn_slip_factors(
     epsilon_g = min(p.PECP1 * (1.0 + p.PECP2 * dfz), 0.99)
     _, rolling_radius = rolling_speed(p, fz, kappa, pressure, vx)
     spin_of_camber = (1.0 - epsilon_g) * (1.0 + kappa) * math.sin(gamma) / rolling_radius
-    r_phi_t = min(max(r0 * turn_slip, -_MOST_TURN_SLIP), _MOST_TURN_SLIP)
+    r_phi_t = min(max(r0 * turn_slip, -_MAX_TURN_SLIP), _MAX_TURN_SLIP)
     r_phi = r_phi_t + r0 * spin_of_camber
     size = abs(r_phi)
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.analysis.handling import Car, car_of, evaluate, metrics
+from activesteer.analysis.handling import CarGeometry, car_of, evaluate, metrics
 from activesteer.errors import RecordingError
 from tests.unit.analysis.synthetic import SyntheticRun
 
-CAR = Car(1.1, 1.5, 16.0)
+CAR = CarGeometry(1.1, 1.5, 16.0)
 EG, ROLL, REAR = 0.0045, 0.009, 0.004
 """Gradients of the synthetic car [rad/(m/s2)]."""
 

@@ -78,8 +78,7 @@ def test_an_exception_in_the_run_keeps_what_was_written(tmp_path: Path) -> None:
     def run() -> None:
         with McapWriter(path, SPEED, metadata={"maneuver": {"name": "step_steer"}}) as writer:
             writer.write([0.0, 0.1], [[1.0], [2.0]])
-            message = "no more road"
-            raise ArithmeticError(message)
+            raise ArithmeticError("no more road")
 
     with pytest.raises(ArithmeticError, match="no more road"):
         run()

@@ -1,4 +1,4 @@
-"""A drive at the pace of a clock, before a viewer that is none."""
+"""A drive at the pace of a clock, in front of a stand-in for the viewer."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def test_viewer_that_is_far_too_slow_makes_the_drive_slower():
     assert pacer.lost_s == pytest.approx((driven.pictures - 2) * 0.3)
 
 
-def test_pause_is_not_made_up_for():
+def test_pause_is_not_caught_up_with():
     clock = Clock()
     pacer = Pacer(1.0, clock, clock.sleep)
     shown = pacer.next(0.0)
