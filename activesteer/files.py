@@ -209,7 +209,9 @@ class CsvRow(NamedTuple):
     cells: list[str]
 
 
-def read_csv(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> list[CsvRow]:
+def read_csv(
+    path: str | os.PathLike[str], error: type[ActiveSteerError], *, empty_cells_count: bool = False
+) -> list[CsvRow]:
     """Reads the rows of a CSV, whose cells are apart by commas, semicolons or tabs; the first line with any decides.
 
     What is behind a `#` is a comment. Where cells are apart by semicolons or tabs, 1,5 is the number 1.5.
@@ -217,6 +219,7 @@ def read_csv(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> lis
     Args:
         path: The file.
         error: Class of the error where it cannot be read.
+        empty_cells_count: Whether a row of nothing but empty cells, as spreadsheets leave them at the end, is a row.
 
     Returns:
         Rows that are not empty.
@@ -233,7 +236,7 @@ def read_csv(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> lis
             cells = [cell.strip() for cell in given]
             if separator != ",":
                 cells = [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in cells]
-            if any(cells):
+            if any(cells) or (empty_cells_count and len(cells) > 1):
                 rows.append(CsvRow(reader.line_num, cells))
     except csv.Error as reason:
         raise error(f"no valid CSV: {reason}", file=Path(path).name, line=reader.line_num) from reason

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from activesteer.config import parse_value
-from activesteer.errors import nearest_names, shown
+from activesteer.errors import ParameterError, nearest_names, shown
+from activesteer.files import is_file, read_bytes, shown_path, user_path, why_no_file
 from activesteer.plugins.kind import Kind, in_one_line
 
 _FORM: Final = re.compile(r"(?P<path>.+?):(?P<name>[^:?]+)(?:\?(?P<parameters>.*))?", re.DOTALL)
@@ -53,33 +54,33 @@ def from_file(text: str, kind: Kind) -> FromFile:
         problem = f"there is no {kind.word} {shown(text)}; {hint} Your own is given as {kind.example}"
         raise kind.error(problem, value=text, allowed=tuple(kind.built_in))
     if not form["name"].isidentifier():
-        raise fail(f"{form['name']} cannot be the name of a class; your own is given as {kind.example}")
-    path = Path(form["path"]).expanduser()
-    if not path.is_file():
-        raise fail(f"there is no file {path}")
+        raise fail(f"{shown(form['name'])} cannot be the name of a class; your own is given as {kind.example}")
+    path = user_path(form["path"], kind.error)
+    if not is_file(path):
+        raise fail(f"cannot read {shown_path(path)}: it {why_no_file(path)}")
     name = f"activesteer_user_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise fail(f"{path} is no Python file")
+        raise fail(f"{shown_path(path)} is no Python file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
+    content = read_bytes(path, kind.error)
     try:
-        content = path.read_bytes()
         spec.loader.exec_module(module)
-    except Exception as reason:
-        raise fail(f"{path} cannot be run: {in_one_line(reason)}") from reason
+    except (Exception, SystemExit) as reason:  # a script may end with exit()
+        raise fail(f"{shown_path(path)} cannot be run: {in_one_line(reason)}") from reason
     found = getattr(module, form["name"], None)
     if found is None or not (callable(found) or hasattr(found, "step")):
         own = [key for key, value in vars(module).items() if getattr(value, "__module__", "") == name]
-        raise fail(f"{path} has no class {form['name']!r}; {nearest_names(form['name'], own)}")
+        raise fail(f"{shown_path(path)} has no class {shown(form['name'])}; {nearest_names(form['name'], own)}")
     return FromFile(path, content, found, _parameters(form["parameters"] or "", fail))
 
 
 def source_of(text: str) -> dict[str, bytes]:
     """The file that a text names, by its name, without running it; empty for anything else, as a built-in one."""
     form = _FORM.fullmatch(text)
-    path = None if form is None else Path(form["path"]).expanduser()
-    return {path.name: path.read_bytes()} if path is not None and path.is_file() else {}
+    path = None if form is None else user_path(form["path"], ParameterError)
+    return {path.name: read_bytes(path, ParameterError)} if path is not None and is_file(path) else {}
 
 
 def _parameters(text: str, fail: Any) -> dict[str, Any]:
@@ -88,7 +89,7 @@ def _parameters(text: str, fail: Any) -> dict[str, Any]:
     for part in re.split(r"&(?=[A-Za-z_]\w*=)", text) if text else ():
         pair = _PARAMETER.fullmatch(part)
         if pair is None:
-            raise fail(f"{part!r} is no parameter; name=value is needed, as in ?gain=2&limit_rad=0.05")
+            raise fail(f"{shown(part)} is no parameter; name=value is needed, as in ?gain=2&limit_rad=0.05")
         if pair[1] in parameters:
             raise fail(f"the parameter {pair[1]} is given twice")
         parameters[pair[1]] = parse_value(pair[2])

@@ -313,7 +313,12 @@ class TyreRig:
         """Force [N] and moment about a point [Nm] that the passive forces stand for, world frame."""
         model, data, jacobian = self._model, self._data, self._jacobian
         mujoco.mj_jac(model, data, jacobian[:3], jacobian[3:], point, self._wheel)
-        return np.linalg.solve(jacobian.T, data.qfrc_passive)
+        try:
+            return np.linalg.solve(jacobian.T, data.qfrc_passive)
+        except np.linalg.LinAlgError as reason:
+            raise ParameterError(
+                "a wheel that lies flat has no contact point: the axes of the rig fall together"
+            ) from reason
 
     def _read(self, motion: Motion, deflections_m: Vector) -> RigForces:
         point = self._contact_point()

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from activesteer.config import Range, Source
-from activesteer.errors import StudyError, nearest_names, shown
+from activesteer.config import Range, Source, parse_value
+from activesteer.errors import ParameterError, StudyError, nearest_names, shown
+from activesteer.files import read_csv
 from activesteer.studies.factors import Factor, Value
 
 DESIGNS: Final = ("grid", "list", "sobol", "latin_hypercube", "random", "saltelli", "morris")
@@ -142,27 +141,29 @@ def read_cases(path: Path) -> Samples:
     Raises:
         StudyError: the file cannot be read, has no rows, or a row of another length.
     """
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as reason:
-        raise StudyError(f"design.cases: cannot read {path}: {reason}") from reason
-    header, *body = [[cell.strip() for cell in row] for row in rows] or [[]]
-    if not body:
-        raise StudyError(f"design.cases: {path.name} holds no cases; a header with keys and rows of values are needed")
-    if len(set(header)) != len(header) or "" in header:
-        raise StudyError(f"design.cases: {path.name}, line 1: every column needs a key of its own, found {header}")
-    for number, row in enumerate(body, 2):
-        if len(row) != len(header):
-            raise StudyError(f"design.cases: {path.name}, row {number}: has {len(row)} cells, the header {len(header)}")
-    return cases({key: _cell(cell) for key, cell in zip(header, row, strict=True) if cell} for row in body)
 
+    def fail(problem: str, line: int, key: str | None = None) -> StudyError:
+        return StudyError(problem, file=path.name, line=line, key=key)
 
-def _cell(text: str) -> Value:
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
+    rows = read_csv(path, StudyError, empty_cells_count=True)
+    if len(rows) < 2:
+        raise StudyError("holds no cases; a header with keys and rows of values are needed", file=path.name)
+    header, *body = rows
+    keys = header.cells
+    if len(set(keys)) != len(keys) or "" in keys:
+        raise fail(f"every column of the cases needs a key of its own, found {shown(keys)}", header.line)
+    found: list[dict[str, Value]] = []
+    for line, cells in body:
+        if len(cells) != len(keys):
+            raise fail(f"the case has {len(cells)} cells, the header {len(keys)}", line)
+        found.append({})
+        for key, cell in zip(keys, cells, strict=True):
+            if cell:
+                try:
+                    found[-1][key] = parse_value(cell)
+                except ParameterError as reason:
+                    raise fail(reason.problem, line, key) from reason
+    return cases(found)
 
 
 def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool, source: Source) -> DesignTable:

@@ -67,6 +67,8 @@ class DiscreteTimeMap:
             jacobian[:, speed] = (self(np.zeros(size), rest, torque) - self(np.zeros(size), rest, -torque)) / (
                 2 * torque
             )
+            if not np.isfinite(jacobian).all():
+                break
             move: Array = np.linalg.lstsq(jacobian, -residual, rcond=None)[0].astype(np.float64)
             self.torque_Nm += float(move[speed])
             move[speed] = 0.0

@@ -13,6 +13,7 @@ from typing import Any, Final
 from activesteer.config import Source, build, read_toml
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import StudyError, nearest_names, shown
+from activesteer.files import user_path
 from activesteer.resources import find_study
 from activesteer.scenario import FileOrTable
 from activesteer.studies.design import DesignTable, Samples, cases, choose_design, draw, read_cases
@@ -192,7 +193,10 @@ def _cases(given: object, folder: Path, source: Source) -> Samples | None:
     if given is None:
         return None
     if isinstance(given, str):
-        return read_cases(folder / Path(given).expanduser())
+        try:
+            return read_cases(folder / user_path(given, StudyError))
+        except StudyError as reason:
+            raise source.fail(where, str(reason), given) from reason
     if not isinstance(given, Sequence) or not given or not all(isinstance(row, Mapping) and row for row in given):
         raise source.fail(where, "is neither a CSV file nor a list of tables with at least one key each")
     return cases(given)
@@ -239,13 +243,13 @@ def _located(item: FileOrTable, folder: Path) -> FileOrTable:
         return item
     text = os.fspath(item)
     is_path = text.endswith(".toml") or os.sep in text
-    return str((folder / Path(text).expanduser()).resolve()) if is_path else text
+    return str((folder / user_path(text, StudyError)).resolve()) if is_path else text
 
 
 def _located_controller(item: str, folder: Path) -> str:
     name, mark, parameters = item.partition("?")
     path, colon, class_name = name.rpartition(":")
-    return f"{(folder / Path(path).expanduser()).resolve()}:{class_name}{mark}{parameters}" if colon else item
+    return f"{(folder / user_path(path, StudyError)).resolve()}:{class_name}{mark}{parameters}" if colon else item
 
 
 def _toml(value: Any) -> str:

@@ -10,7 +10,8 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.errors import ParameterError, nearest_names
+from activesteer.errors import ParameterError, nearest_names, shown
+from activesteer.files import MAX_CSV_BYTES, is_file, is_folder, read_text, shown_path
 from activesteer.resources import models_dir
 
 Table = dict[str, Array]
@@ -55,11 +56,11 @@ class ReferenceData:
         """
         home = models_dir() / "reference"
         folder = home / name
-        if not (folder / "reference.toml").is_file():
-            names = [path.parent.name for path in home.glob("*/reference.toml")]
-            raise ParameterError(f"there is no reference named {name!r}; {nearest_names(name, names)}")
-        if more is not None and not more.is_dir():
-            raise ParameterError(f"the folder of reference runs {more} does not exist")
+        names = [path.parent.name for path in home.glob("*/reference.toml")]
+        if name not in names:
+            raise ParameterError(f"there is no reference named {shown(name)}; {nearest_names(name, names)}")
+        if more is not None and not is_folder(more):
+            raise ParameterError(f"the folder of reference runs {shown_path(more)} does not exist")
         table: dict[str, Any] = tomllib.loads((folder / "reference.toml").read_text(encoding="utf-8"))
         x, y, z = table["point_from_cg_m"]
         folders = (folder / "runs",) if more is None else (more, folder / "runs")
@@ -89,7 +90,7 @@ class ReferenceData:
         """What the other code says of a run, by column; None where that is not known."""
         for folder in self.folders:
             for path in (folder / f"{run}.csv", folder / f"{run}{_ENDING}"):
-                if path.is_file():
+                if is_file(path):
                     return read_table(path)
         return None
 
@@ -100,12 +101,13 @@ def read_table(path: Path) -> Table:
     Raises:
         ParameterError: it cannot be read.
     """
+    first, *lines = read_text(path, ParameterError, MAX_CSV_BYTES).split("\n")
+    header = first.strip().split(",")
     try:
-        with path.open(encoding="utf-8") as file:
-            header = file.readline().strip().split(",")
-            values = np.loadtxt(file, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as reason:
-        raise ParameterError(f"cannot read the reference {path}: {reason}") from reason
+        values = np.loadtxt(lines, delimiter=",", ndmin=2)
+    except ValueError as reason:
+        raise ParameterError(f"cannot read the reference {shown_path(path)}: {reason}") from reason
     if values.shape[1] != len(header):
-        raise ParameterError(f"cannot read the reference {path}: {len(header)} names and {values.shape[1]} columns")
+        problem = f"{len(header)} names and {values.shape[1]} columns"
+        raise ParameterError(f"cannot read the reference {shown_path(path)}: {problem}")
     return {name: values[:, column] for column, name in enumerate(header)}

@@ -19,6 +19,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.errors import ModelError
+
 _PARTS: Final = (
     ("speed", r"d_x"),
     ("yaw/sideslip", r"d_y|d_yaw"),
@@ -95,9 +97,15 @@ def find_modes(a: NDArray[np.float64], states: tuple[str, ...], timestep_s: floa
 
     Returns:
         Modes by natural frequency; of a conjugate pair the one with positive imaginary part.
+
+    Raises:
+        ModelError: the matrix is not finite, or its eigenvectors do not span the states.
     """
-    values, right = np.linalg.eig(a)
-    left = np.linalg.inv(right)
+    try:
+        values, right = np.linalg.eig(a)
+        left = np.linalg.inv(right)
+    except np.linalg.LinAlgError as reason:
+        raise ModelError(f"the car's motion has no full set of modes: {reason}") from reason
     shares = np.abs(right * left.T)
     shares /= shares.sum(axis=0)
     parts = [_part_of(state) for state in states]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import os
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -167,6 +168,30 @@ def test_object_that_cannot_be_copied_is_answered(tmp_path):
     mine = Logging(tmp_path / "log")
     with mine.file, pytest.raises(ControllerError, match=r"Logging cannot be made: TypeError: cannot pickle"):
         find_controller(mine).make(setup())
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo, lambda path: path.symlink_to("/dev/zero"), lambda path: None])
+def test_what_is_no_file_is_answered(tmp_path, make):
+    make(tmp_path / "mine.py")
+    with pytest.raises(ControllerError, match=r"cannot read .*mine\.py: it (is a folder|is no regular|does not exist)"):
+        find_controller(f"{tmp_path}/mine.py:Mine")
+
+
+@pytest.mark.parametrize(
+    "name", ["~nobody_of_this_name/mine.py:Mine", "x" * 300 + ".py:Mine", "\udcff\0.py:Mine", "x:" + "y" * 9999, "x:\n"]
+)
+def test_name_that_no_file_can_have_is_answered(name):
+    with pytest.raises(ControllerError) as told:
+        find_controller(name)
+    assert len(told.value.problem) < 700
+
+
+@pytest.mark.parametrize("text", ["exit(3)", "raise KeyboardInterrupted", "x" * 3_000_000, "(" * 500, "\0", "1/0"])
+def test_file_that_does_not_run_is_answered(tmp_path, text):
+    path = tmp_path / "mine.py"
+    path.write_text(text)
+    with pytest.raises(ControllerError, match=r"mine\.py"):
+        find_controller(f"{path}:Mine")
 
 
 def test_source_and_parameters_are_recorded():

@@ -74,6 +74,21 @@ def test_cases_come_from_a_csv_file(tmp_path):
     ]  # fmt: skip
 
 
+def test_cases_may_come_from_a_spreadsheet_and_a_row_of_empty_cells_is_the_usual_run(tmp_path):
+    path = tmp_path / "cases.csv"
+    path.write_bytes("\ufeffroad.mu;speed_kmh\r\n0,5;80\r\n;\r\n".encode())
+    assert read_cases(path).columns == {"road.mu": [0.5, None], "speed_kmh": [80, None]}
+
+
+@pytest.mark.parametrize("cell", ["[" * 3000 + "]" * 3000, "9" * 6000, "x" * 200_000])
+def test_cell_that_no_value_can_be_is_answered_with_file_and_line(tmp_path, cell):
+    path = tmp_path / "cases.csv"
+    path.write_text(f'road.mu,title\n1,"{cell}"\n')
+    with pytest.raises(StudyError, match=r"cases\.csv, line 2") as told:
+        read_cases(path)
+    assert len(str(told.value)) < 500
+
+
 @pytest.mark.parametrize("text", ["", "road.mu\n", "a,a\n1,2\n", "a,b\n1\n", ",b\n1,2\n"])
 def test_a_csv_file_without_cases_is_refused(tmp_path, text):
     (tmp_path / "cases.csv").write_text(text)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, expm
 
+from activesteer.errors import ModelError
 from activesteer.vehicle.modes import find_modes
 
 STEP_S = 0.001
@@ -58,3 +59,9 @@ def test_left_and_right_eigenvectors_belong_together():
 
 def test_state_of_no_known_part_is_named_itself():
     assert modes(np.array([[-3.0]]), ("d_trailer",))[0].name == "trailer"
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_motion_without_a_full_set_of_modes_is_answered(value):
+    with pytest.raises(ModelError, match="no full set of modes"):
+        find_modes(np.array([[value, 0.0], [0.0, 1.0]]), ("d_x", "d_y"), STEP_S)
