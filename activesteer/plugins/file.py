@@ -57,7 +57,7 @@ def from_file(text: str, kind: Kind) -> FromFile:
         raise fail(f"{shown(form['name'])} cannot be the name of a class; your own is given as {kind.example}")
     path = user_path(form["path"], kind.error)
     if not is_file(path):
-        raise fail(f"cannot read {shown_path(path)}: it {why_no_file(path)}")
+        raise fail(f"there is no file {shown_path(path)}: it {why_no_file(path)}")
     name = f"activesteer_user_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

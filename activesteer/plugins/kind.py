@@ -106,7 +106,7 @@ class Kind:
             raise self.fail(name, f"{said} {key} = {shown(value)}; {needed}", value, limits)
 
 
-def in_one_line(error: Exception) -> str:
+def in_one_line(error: BaseException) -> str:
     """An error of somebody else's code in one line, with the place where it was raised."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
