@@ -173,7 +173,7 @@ def test_object_that_cannot_be_copied_is_answered(tmp_path):
 @pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo, lambda path: path.symlink_to("/dev/zero"), lambda path: None])
 def test_what_is_no_file_is_answered(tmp_path, make):
     make(tmp_path / "mine.py")
-    with pytest.raises(ControllerError, match=r"there is no file .*mine\.py: it (is a folder|is no regular|does not exist)"):
+    with pytest.raises(ControllerError, match=r"there is no file .*mine\.py: it (is|does) "):
         find_controller(f"{tmp_path}/mine.py:Mine")
 
 
