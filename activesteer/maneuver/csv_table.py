@@ -52,7 +52,8 @@ def read_columns(
         Column name -> values in SI, and the line in which each row stands.
 
     Raises:
-        ManeuverError: the file cannot be read, a column is missing or given twice, or a value is no number.
+        ManeuverError: the file cannot be read, a column is missing or given twice, a row has more cells than there
+            are columns, or a value is no number.
     """
     rows = read_csv(path, ManeuverError)
     if not rows:
@@ -67,6 +68,10 @@ def read_columns(
             problem = f"{places[name][1]} and {given} are the same column; leave one out"
             raise ManeuverError(problem, file=path.name, line=header.line, key=given)
         places[name] = place, given, factor
+    for row in rows:
+        if any(row.cells[len(header.cells) :]):
+            problem = f"has {len(row.cells)} cells, the first line {len(header.cells)}; decimal commas need semicolons"
+            raise ManeuverError(problem, file=path.name, line=row.line)
     for name in required:
         if name not in places:
             problem = f"must name the columns {' and '.join(required)}; {name} is missing"
