@@ -8,6 +8,7 @@ This module is imported before all others, and imports next to nothing, so that 
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -59,6 +60,12 @@ class StopSignals:
             if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
                 signal.signal(number, self._interrupt)
         threading.Thread(target=self._end_in_time, args=(read,), daemon=True).start()
+        # First in, last out: when everything else has ended, the status stands, and Python would take its handlers away.
+        atexit.register(self._ignore)
+
+    def _ignore(self) -> None:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
 
     def _interrupt(self, number: int, _frame: FrameType | None) -> None:
         self.number = number

@@ -21,7 +21,7 @@ class Maneuver(ABC):
 
     Example:
         >>> from activesteer.scenario import resolve
-        >>> table = {"kind": "open_loop", "speed_kmh": 72.0, "duration_s": 4.0,
+        >>> table = {"kind": "open_loop", "speed_kmh": 72.0, "duration_s": 4.0, "hold_last": True,
         ...          "steering": {"time_s": [1.0, 2.0], "steering_wheel_deg": [0.0, 45.0]}}
         >>> maneuver = resolve(table).maneuver
         >>> maneuver.speed_mps

@@ -42,8 +42,8 @@ class Recording:
         >>> again = activesteer.Recording.open("straight.mcap")
         >>> len(again), again["speed_mps"].shape, again.metadata["controller"]
         (2000, (2000,), 'none')
-        >>> [channel.name for channel in again.channels if channel.unit == "rad/s"][:1]
-        ['yaw_rate_radps']
+        >>> next(channel.name for channel in again.channels if channel.unit == "rad/s")
+        'yaw_rate_radps'
         >>> float(again.metrics["speed_end_mps"]) == float(recording.metrics["speed_end_mps"])
         True
     """

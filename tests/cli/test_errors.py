@@ -67,7 +67,7 @@ def test_bad_files_are_answered_with_file_key_and_line(call, tmp_path):
     (tmp_path / "car.xml").write_text("<mujoco><worldbody></worldbody></mujoco>")
     refused(call("run", "standstill", "--vehicle", "car.toml"), "car.xml: ", "chassis")
     (tmp_path / "car.xml").write_text("<mujoco><worldbody>")
-    refused(call("run", "standstill", "--vehicle", "car.toml"), "car.xml: ")
+    refused(call("run", "standstill", "--vehicle", "car.toml"), "car.xml, line 1: ")
 
 
 def test_two_files_with_a_class_of_the_same_name_are_answered(call, controller):

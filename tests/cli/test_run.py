@@ -104,7 +104,7 @@ def test_output_goes_to_runs_where_nothing_is_said(call, tmp_path):
 
 
 def test_recording_that_exists_is_replaced_but_one_of_other_settings_only_where_that_is_said(call, tmp_path):
-    words = ("run", "straight_line", *SHORT, "-o", "run.mcap", "--set")
+    words = ("run", "straight_line", "--set", "settle_s=0", "-o", "run.mcap", "--set")
     for _ in range(2):
         assert call(*words, "duration_s=0.2").status == 0
     told = call(*words, "duration_s=0.3")
@@ -142,9 +142,10 @@ def test_set_takes_values_as_toml_does(call, text, key, value):
     assert found == (pytest.approx(value) if isinstance(value, float) else value)
 
 
-def test_last_of_two_values_counts(call):
-    call("run", "straight_line", *SHORT, "--set", "road.mu=0.4", "--set", "road.mu=0.6", "-o", "run.mcap")
-    assert Recording.open("run.mcap").metadata["maneuver"]["road"]["mu"] == 0.6
+def test_value_given_twice_is_refused(call, tmp_path):
+    told = call("run", "straight_line", *SHORT, "--set", "road.mu=0.4", "--set", "road.mu=0.6", "-o", "run.mcap")
+    assert (told.status, told.err) == (1, "activesteer: override road.mu: is given twice; leave one out\n")
+    assert not (tmp_path / "run.mcap").exists()
 
 
 def test_maneuver_and_vehicle_may_be_files(call, tmp_path):

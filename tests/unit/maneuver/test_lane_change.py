@@ -137,9 +137,9 @@ def test_largest_margin_that_is_told_can_be_driven(standard):
     [
         (
             {"lane": {"standard": "iso_3888"}},
-            r"lane: standard: is 'iso_3888'; allowed are 'iso_3888_1' and 'iso_3888_2'",
+            r"lane.standard: is 'iso_3888'; allowed are 'iso_3888_1' and 'iso_3888_2'",
         ),
-        ({"lane": {"side": "up"}}, r"lane: side: is 'up'; allowed are 'left' and 'right'"),
+        ({"lane": {"side": "up"}}, r"lane.side: is 'up'; allowed are 'left' and 'right'"),
         (
             {"lane": {"path": "least_jerk", "margin_m": 0.3}},
             r"lane\.margin_m: is 0\.3 m, but the entry lane is 2\.23 m wide and the car 1\.8 m; .* 0 to 0\.205 m",

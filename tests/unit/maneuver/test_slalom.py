@@ -76,7 +76,7 @@ def test_first_pass_on_the_right_is_the_mirror_image():
         ({"cones": {"count": 1}}, r"cones\.count: 1 is out of range; allowed is 2 to 100"),
         ({"cones": {"count": 5.5}}, r"cones\.count: 5\.5 is not a whole number"),
         ({"cones": {"spacing_m": -36}}, r"cones\.spacing_m: -36 is out of range; allowed is 5 to 200"),
-        ({"cones": {"side": "l"}}, r"cones: side: is 'l'; allowed are 'left' and 'right'"),
+        ({"cones": {"side": "l"}}, r"cones.side: is 'l'; allowed are 'left' and 'right'"),
         ({"speed_kmh": -100}, r"speed_kmh: .* out of range"),
         ({"speed_kmh": -50}, r"speed_kmh: is -50 km/h; a course is driven forwards"),
         ({"duration_s": 8.0}, r"duration_s: is 8 s, but at 100 km/h the last gate, 230 m .* after 8\.3 s; 11\.8 s"),
