@@ -60,7 +60,7 @@ class StopSignals:
             if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
                 signal.signal(number, self._interrupt)
         threading.Thread(target=self._end_in_time, args=(read,), daemon=True).start()
-        # First in, last out: when everything else has ended, the status stands, and Python would take its handlers away.
+        # First in, last out: when all else has ended the status stands, and Python would take its handlers away.
         atexit.register(self._ignore)
 
     def _ignore(self) -> None:
