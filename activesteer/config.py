@@ -198,7 +198,7 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
             continue
         if field.default_factory is not dataclasses.MISSING:
             continue
-        raise source.fail((*path, name), f"the key {' or '.join(_spellings(name))} is missing")
+        raise source.fail((*path, name), f"the key {' or '.join(spellings(name))} is missing")
     try:
         return cls(**values)
     except ActiveSteerError as reason:  # from the class's own checks, which know no file
@@ -240,9 +240,9 @@ def merged(
         result[key] = value
         return result
     hint = hints[name]
-    if (inner := _dataclass_in(hint)) is not None:
+    if (inner := dataclass_in(hint)) is not None:
         result[key] = merged(inner, result.get(key, {}), rest, value, source, where)
-    elif (element := _element_of(hint)) is not None:
+    elif (element := element_of(hint)) is not None:
         result[key] = _merged_list(element, result.get(key, ()), rest, value, source, where)
     elif typing.get_origin(hint) is dict:
         item, branch = typing.get_args(hint)[1], result.get(key, {})
@@ -281,11 +281,11 @@ def key_paths(cls: type, prefix: str = "") -> list[str]:
     paths: list[str] = []
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
-        inner = _dataclass_in(hints[field.name])
+        inner = dataclass_in(hints[field.name])
         if inner is not None:
             paths += key_paths(inner, f"{prefix}{field.name}.")
         else:
-            paths += [prefix + spelling for spelling in _spellings(field.name)]
+            paths += [prefix + spelling for spelling in spellings(field.name)]
     return paths
 
 
@@ -297,9 +297,9 @@ def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:
     if name is None:
         return tuple(path)
     hint, rest = typing.get_type_hints(cls)[name], path[1:]
-    if (inner := _dataclass_in(hint)) is not None:
+    if (inner := dataclass_in(hint)) is not None:
         return (name, *field_path(inner, rest))
-    if (inner := _element_of(hint)) is not None and rest:
+    if (inner := element_of(hint)) is not None and rest:
         return (name, rest[0], *field_path(inner, rest[1:]))
     return (name, *rest)
 
@@ -319,7 +319,7 @@ def check_overruled(cls: type, table: Mapping[str, Any], source: Source, given: 
     for path in given:
         owner, within = cls, table
         for key in path[:-1]:
-            inner = _dataclass_in(typing.get_type_hints(owner).get(key))
+            inner = dataclass_in(typing.get_type_hints(owner).get(key))
             if inner is None or not isinstance(within := within.get(key, {}), Mapping):
                 break
             owner = inner
@@ -349,7 +349,7 @@ def leaf_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
 def key_hint(cls: type, key: str) -> str | None:
     """What a class, or that of a table in it, says to those who look for a dotted key that it does not have."""
     first, _, rest = key.partition(".")
-    inner = _dataclass_in(typing.get_type_hints(cls).get(first)) if rest else None
+    inner = dataclass_in(typing.get_type_hints(cls).get(first)) if rest else None
     return getattr(cls, "KEY_HINTS", {}).get(key) if inner is None else key_hint(inner, rest)
 
 
@@ -410,13 +410,14 @@ def _fields(cls: type) -> dict[str, dataclasses.Field[Any]]:
     return {field.name: field for field in dataclasses.fields(cls)}
 
 
-def _spellings(name: str) -> list[str]:
+def spellings(name: str) -> list[str]:
+    """The keys that fill a field: its own name, and the one in a unit of the edge."""
     edges = [name[: -len(si)] + edge for edge, (si, _) in _EDGE_UNITS.items() if name.endswith(si)]
     return [name, *edges]
 
 
 def _names_in_file(fields: Mapping[str, Any]) -> list[str]:
-    return [spelling for name in fields for spelling in _spellings(name)]
+    return [spelling for name in fields for spelling in spellings(name)]
 
 
 def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, float]:
@@ -449,14 +450,15 @@ def _numbered(name: str, elements: Mapping[str, int]) -> str:
     return key
 
 
-def _dataclass_in(hint: Any) -> type | None:
+def dataclass_in(hint: Any) -> type | None:
+    """The dataclass of a table that a field holds, also of one that may be left out; None for other fields."""
     for candidate in (hint, *typing.get_args(hint)):
         if isinstance(candidate, type) and dataclasses.is_dataclass(candidate):
             return candidate if typing.get_origin(hint) not in (dict, tuple) else None
     return None
 
 
-def _element_of(hint: Any) -> type | None:
+def element_of(hint: Any) -> type | None:
     """The dataclass that the elements of a tuple are made of, or None."""
     item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
     return item if isinstance(item, type) and dataclasses.is_dataclass(item) else None
@@ -492,7 +494,7 @@ def _elements(
     hint: Any, raw: Any, factor: float, limits: Range, source: Source, path: Sequence[str]
 ) -> tuple[Any, ...]:
     """A list of numbers, or of tables."""
-    element = _element_of(hint)
+    element = element_of(hint)
     if not isinstance(raw, (list, tuple)):
         wanted = "no list of numbers" if element is None else f"no list; tables [[{'.'.join(path)}]] are needed"
         raise source.fail(path, f"{shown(raw)} is {wanted}", raw)
