@@ -18,19 +18,16 @@ class DesiredYawRate:
     Source: Dorsch 2012, section V.
     """
 
-    def __init__(
-        self, single_track: SingleTrack, parameters: DesiredYawRateParameters, mu: float, timestep_s: float
-    ) -> None:
+    def __init__(self, single_track: SingleTrack, parameters: DesiredYawRateParameters, timestep_s: float) -> None:
         """Computes the constants.
 
         Args:
             single_track: The reference model.
             parameters: Limit and delay.
-            mu: Friction of the road; scales the limit.
             timestep_s: Time between two steps [s].
         """
         self._gain = single_track.yaw_rate_gain
-        self._limit_mps2 = parameters.max_lateral_acceleration_mps2 * mu
+        self._limit_mps2 = parameters.max_lateral_acceleration_mps2
         self._share = 1.0 - math.exp(-timestep_s / parameters.delay_s)
         self._state_radps = 0.0
 

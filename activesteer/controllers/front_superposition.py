@@ -28,9 +28,7 @@ class FrontSuperposition:
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> FrontSuperposition:
         """Makes the controller for a car."""
-        desired = DesiredYawRate(
-            SingleTrack(setup.single_track), setup.gains.desired_yaw_rate, setup.mu, setup.timestep_s
-        )
+        desired = DesiredYawRate(SingleTrack(setup.single_track), setup.gains.desired_yaw_rate, setup.timestep_s)
         return cls(desired, setup.gains.afs, setup.timestep_s)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:

@@ -19,7 +19,7 @@ class NoControl:
     def from_vehicle(cls, setup: ControllerSetup) -> NoControl:
         """Makes the controller for a car."""
         single_track = SingleTrack(setup.single_track)
-        return cls(DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.mu, setup.timestep_s))
+        return cls(DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.timestep_s))
 
     def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:
         """No angles; the desired yaw rate for the recording."""

@@ -17,7 +17,8 @@ class DesiredYawRateParameters:
     """How the driver's demand becomes a desired yaw rate (eqs. 3 and 6)."""
 
     max_lateral_acceleration_mps2: Annotated[float, Range(0.1, 20.0)] = 8.0
-    """a_y_max: the desired yaw rate stays below a_y_max / v [m/s2]."""
+    """a_y_max: the desired yaw rate stays below a_y_max / v. It is what the controllers assume that the road gives,
+    whatever road it is: nobody tells them its friction [m/s2]."""
     delay_s: Annotated[float, Range(0.001, 1.0)] = 0.06
     """Time constant of the delay element: a car cannot follow a sudden change [s]."""
 
@@ -82,12 +83,10 @@ class ControllerSetup:
         single_track: The car as a single-track model sees it.
         gains: Gains and limits from the vehicle file.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
-        mu: Friction of the road relative to a dry one; a real car would estimate it [-].
         timestep_s: Time between two calls [s].
     """
 
     single_track: SingleTrackParameters
     gains: ControllerParameters
     steering_ratio: float
-    mu: float
     timestep_s: float

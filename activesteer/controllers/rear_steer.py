@@ -78,7 +78,7 @@ class RearSteer:
         """Makes the controller for a car."""
         single_track = SingleTrack(setup.single_track)
         return cls(
-            DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.mu, setup.timestep_s),
+            DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.timestep_s),
             RearPrediction(single_track, setup.timestep_s),
             setup.gains.ars,
             setup.timestep_s,

@@ -36,7 +36,7 @@ class Scenario:
     def controller_setup(self, timestep_s: float) -> ControllerSetup:
         """What controllers may know."""
         car = self.car.config
-        return ControllerSetup(car.single_track, car.controllers, car.steering.ratio, self.maneuver.road.mu, timestep_s)
+        return ControllerSetup(car.single_track, car.controllers, car.steering.ratio, timestep_s)
 
     def driver_setup(
         self, timestep_s: float, rack_per_steering_wheel_m: float | None, wheel_radius_m: float

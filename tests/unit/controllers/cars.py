@@ -22,13 +22,12 @@ NO_PREDICTION_MPS = math.sqrt(120_000.0 * 1.5 * 2.5 / (1400.0 * 1.0))
 """Speed at which K_H of this car is zero: m v^2 l_V = C_H l_H l [m/s], about 65 km/h."""
 
 
-def setup(*, gains: ControllerParameters | None = None, mu: float = 1.0, **car: float) -> ControllerSetup:
+def setup(*, gains: ControllerParameters | None = None, **car: float) -> ControllerSetup:
     """What a controller is made from."""
     return ControllerSetup(
         single_track=replace(CAR, **car),
         gains=gains or ControllerParameters(),
         steering_ratio=16.0,
-        mu=mu,
         timestep_s=0.001,
     )
 

@@ -77,8 +77,11 @@ def test_overrides_reach_manoeuvre_and_vehicle_in_any_unit():
     assert scenario.car.config.controllers.ars.limit_rad == pytest.approx(math.radians(2.0))
     assert scenario.car.config.driver.speed_gain_Nmspm == 1000.0
     assert scenario.car.config.factors.mass == 1.1
-    assert scenario.maneuver.road.mu == 0.4
-    assert scenario.controller_setup(0.002).mu == 0.4
+
+
+def test_controllers_are_told_nothing_of_the_road():
+    dry, slippery = (resolve("step_steer", overrides={"road.mu": mu}).controller_setup(0.001) for mu in (0.9, 0.3))
+    assert dry == slippery
 
 
 def test_overrides_may_come_from_numpy():
