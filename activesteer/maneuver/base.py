@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Final
 
 from activesteer.config import Range
-from activesteer.maneuver.search import Search
+from activesteer.errors import ManeuverError
 from activesteer.road.course import Course
 from activesteer.road.road import Road
 from activesteer.signals import Reference
 
 Speed = Annotated[float, Range(-20.0, 100.0)]
+
+MIN_SEARCH_SPEED_MPS: Final = 30.0 / 3.6
+"""Slower than this, lateral acceleration hardly depends on the steering wheel angle [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,3 +73,36 @@ class Maneuver(ABC):
     def settling_reference(self) -> Reference:
         """What is asked of the driver while the car settles before the recording."""
         return self.reference(0.0)
+
+
+@dataclass(frozen=True)
+class Search:
+    """What must be found by driving the control-free car before a manoeuvre can be run: a steering wheel angle."""
+
+    probe: Maneuver
+    """The manoeuvre by which it is found."""
+    lateral_acceleration_mps2: float
+    """What is to be reached [m/s2], left positive."""
+    accept: Callable[[float], Maneuver]
+    """Steering wheel angle found [rad] -> the manoeuvre with it."""
+
+
+def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
+    """A search needs a car that drives forwards, and not slowly.
+
+    Args:
+        speed_mps: Speed of the manoeuvre [m/s].
+        aim: Key that makes the search necessary.
+        amplitude: Key to give instead.
+
+    Raises:
+        ManeuverError: the speed is too low.
+    """
+    if speed_mps < MIN_SEARCH_SPEED_MPS:
+        least = 3.6 * MIN_SEARCH_SPEED_MPS
+        raise ManeuverError(
+            f"is {3.6 * speed_mps:g} km/h; {aim} needs at least {least:g} km/h, or give {amplitude}",
+            key="speed_kmh",
+            value=3.6 * speed_mps,
+            allowed=Range(least),
+        )

@@ -9,9 +9,8 @@ from typing import Annotated, ClassVar
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver
-from activesteer.maneuver.search import SteadyTurn, check_search_speed
-from activesteer.maneuver.step_steer import StepInput, StepSteer
+from activesteer.maneuver.base import Maneuver, check_search_speed
+from activesteer.maneuver.step_steer import SteadyTurn, StepInput, StepSteer
 from activesteer.signals import Reference
 
 
@@ -94,7 +93,7 @@ class BrakeInTurn(Maneuver):
             settle_s=self.settle_s, road=self.road, steer=StepInput(lateral_acceleration_mps2=wanted),
         )  # fmt: skip
         found = step.search
-        return None if found is None else found._replace(accept=self.with_amplitude)
+        return None if found is None else dataclasses.replace(found, accept=self.with_amplitude)
 
     def with_amplitude(self, steering_wheel_rad: float) -> BrakeInTurn:
         """The same with its steering wheel angle known [rad]; the aim that led to it stays on record."""

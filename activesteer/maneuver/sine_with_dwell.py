@@ -10,10 +10,9 @@ from typing import Annotated, ClassVar, Final
 from activesteer.config import Range
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.base import Maneuver, check_search_speed
 from activesteer.maneuver.choices import DRIVES, SIDES, check_choice
-from activesteer.maneuver.search import RampAngle, check_search_speed
-from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer, SlowRamp
+from activesteer.maneuver.slowly_increasing_steer import RampAngle, SlowlyIncreasingSteer, SlowRamp
 from activesteer.signals import Reference
 
 _REFERENCE_MPS2: Final = 0.3 * GRAVITY_MPS2

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.base import Maneuver, Search
 from activesteer.signals import Reference
 
 
@@ -50,3 +50,10 @@ class SlowlyIncreasingSteer(Maneuver):
         ramp = self.steer
         turned = min(max(time_s - ramp.start_s, 0.0) * abs(ramp.rate_radps), ramp.end_rad)
         return Reference(math.copysign(turned, ramp.rate_radps), self.speed_mps, 0.0, hold_speed=True)
+
+
+@dataclass(frozen=True)
+class RampAngle(Search):
+    """Search for the angle at which a slow ramp to the left passes a lateral acceleration."""
+
+    probe: SlowlyIncreasingSteer

@@ -9,8 +9,7 @@ from typing import Annotated, ClassVar, Final
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver
-from activesteer.maneuver.search import SteadyTurn
+from activesteer.maneuver.base import Maneuver, Search
 from activesteer.signals import Reference
 
 _SEARCH_S: Final = 4.5
@@ -81,3 +80,10 @@ class StepSteer(Maneuver):
     def with_amplitude(self, steering_wheel_rad: float) -> StepSteer:
         """The same step with its amplitude known [rad]; the aim that led to it stays on record."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
+
+
+@dataclass(frozen=True)
+class SteadyTurn(Search):
+    """Search for the amplitude of a step steer that leads to a steady-state lateral acceleration."""
+
+    probe: StepSteer

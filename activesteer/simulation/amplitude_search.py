@@ -21,8 +21,9 @@ from activesteer.compilation import content_key, processor
 from activesteer.config import to_table
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.search import RampAngle, Search, SteadyTurn
-from activesteer.maneuver.step_steer import StepSteer
+from activesteer.maneuver.base import Search
+from activesteer.maneuver.slowly_increasing_steer import RampAngle
+from activesteer.maneuver.step_steer import SteadyTurn, StepSteer
 from activesteer.scenario import Scenario
 from activesteer.simulation import amplitude_store
 from activesteer.simulation.closed_loop import ClosedLoop
@@ -63,6 +64,7 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
         if isinstance(search, RampAngle):
             angle = _ramp_angle(probed, search, timestep_s)
         else:
+            assert isinstance(search, SteadyTurn)
             angle = _steady_turn(probed, search, timestep_s)
         amplitude_store.keep(key, angle)
     return angle

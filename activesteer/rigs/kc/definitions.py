@@ -10,9 +10,10 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.rigs.kc.programme import Measured, TyreStiffness
+from activesteer.rigs.kc.programme import Measured
 from activesteer.rigs.kc.steering_axis import SteeringAxis
 from activesteer.rigs.kc.sweep import Sweep
+from activesteer.rigs.kc.tyre_stiffness import TyreStiffness
 
 AxleName = Literal["front", "rear", "car"]
 

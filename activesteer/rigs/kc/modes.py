@@ -9,18 +9,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import mujoco
 import numpy as np
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
+from activesteer.rigs.kc.tyre_stiffness import TyreStiffness
 from activesteer.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from activesteer.rigs.kc.programme import TyreStiffness
-
 
 _LIFT_M: Final = 1.0
 _DIFFERENCE: Final = 1e-6

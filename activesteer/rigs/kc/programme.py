@@ -14,8 +14,7 @@ from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
 from activesteer.rigs.kc.modes import Modes, modes
 from activesteer.rigs.kc.steering_axis import SteeringAxis, steering_axis
 from activesteer.rigs.kc.sweep import INWARDS, Sweep, run
-from activesteer.tyre.kernels.relaxation import carcass_stiffnesses
-from activesteer.tyre.kernels.vertical import deflection_under_load, vertical_force
+from activesteer.rigs.kc.tyre_stiffness import TyreStiffness, parking_moment_Nm, tyre_stiffness
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle, VehicleParameters
 from activesteer.vehicle import force_block as fb
@@ -30,18 +29,6 @@ _STEERING_POINTS: Final = 24
 _AXIS_STEER_RAD: Final = math.radians(5.0)
 """Steering wheel angle to either side between which the steering axis is found: a third of a degree at the wheel."""
 _AXIS_REAR_RAD: Final = math.radians(0.3)
-PARKING_FRICTION: Final = 0.9
-"""Coefficient of friction under the tyres that are turned at rest."""
-
-
-@dataclass(frozen=True)
-class TyreStiffness:
-    """A tyre under its static load."""
-
-    vertical_Npm: float
-    lateral_Npm: float
-    width_m: float
-    pressure_Pa: float
 
 
 @dataclass(frozen=True)
@@ -80,8 +67,8 @@ def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> M
     slots = vehicle.data.userdata[: 4 * fb.USERDATA_PER_WHEEL].reshape(4, fb.USERDATA_PER_WHEEL)
     load_N = slots[:, fb.U_FZ].copy()
     stiffness = (
-        _stiffness(tyres[0], vehicle.parameters.tyres.front_pressure_Pa, float(load_N[:2].mean())),
-        _stiffness(tyres[1], vehicle.parameters.tyres.rear_pressure_Pa, float(load_N[2:].mean())),
+        tyre_stiffness(tyres[0], vehicle.parameters.tyres.front_pressure_Pa, float(load_N[:2].mean())),
+        tyre_stiffness(tyres[1], vehicle.parameters.tyres.rear_pressure_Pa, float(load_N[2:].mean())),
     )
     car = HeldCar(vehicle)
     return Measured(
@@ -92,16 +79,6 @@ def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> M
         load_N,
         modes(vehicle, load_N, stiffness),
     )
-
-
-def _stiffness(tyre: TyreParameters, pressure_Pa: float | None, load_N: float) -> TyreStiffness:
-    record = tyre.record
-    pressure = tyre["INFLPRES"] if pressure_Pa is None else pressure_Pa
-    deflection = deflection_under_load(record, load_N, 0.0, pressure, 0.0, 0.0, 0.0)
-    step = 1e-4
-    more, less = (vertical_force(record, deflection + sign * step, 0.0, pressure) for sign in (1.0, -1.0))
-    lateral = carcass_stiffnesses(record, load_N, pressure)[1]
-    return TyreStiffness((more - less) / (2.0 * step), float(lateral), tyre["WIDTH"], pressure)
 
 
 def _sweeps(
@@ -180,14 +157,6 @@ def _sweeps(
             lambda angle: Case("contact", rear_steer_rad=angle),
         ),
     }  # fmt: skip
-
-
-def parking_moment_Nm(load_N: float, tyre: TyreStiffness) -> float:
-    """Moment with which a standing tyre resists being turned about the vertical on a dry road [N m].
-
-    Source: V. E. Gough, Practical Tire Research, SAE Transactions 64 (1956): mu / 3 sqrt(load^3 / pressure).
-    """
-    return PARKING_FRICTION / 3.0 * math.sqrt(load_N**3 / tyre.pressure_Pa)
 
 
 def _steering_angles(vehicle: Vehicle) -> Array:

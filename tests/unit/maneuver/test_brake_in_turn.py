@@ -10,7 +10,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import BrakeInTurn, build_maneuver
-from activesteer.maneuver.search import SteadyTurn
+from activesteer.maneuver.step_steer import SteadyTurn
 
 SOURCE = Source("my_turn.toml", error=ManeuverError)
 

@@ -11,7 +11,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import SineWithDwell, build_maneuver
-from activesteer.maneuver.search import RampAngle
+from activesteer.maneuver.slowly_increasing_steer import RampAngle
 from activesteer.signals import Reference
 
 SOURCE = Source("my_dwell.toml", error=ManeuverError)
