@@ -9,19 +9,19 @@ if TYPE_CHECKING:
     from typing import Any
 
     from activesteer.recording import Recording
-    from activesteer.signals import DriverCommand, Measurement, Motion, Reference, SteerCommand
+    from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
     from activesteer.simulation.runner import simulate
     from activesteer.simulation.simulation import Simulation
     from activesteer.studies.study import study
 
 __all__ = [
+    "ActuatorCommand",
     "DriverCommand",
     "Measurement",
     "Motion",
     "Recording",
     "Reference",
     "Simulation",
-    "SteerCommand",
     "__version__",
     "simulate",
     "study",
@@ -35,7 +35,7 @@ _HOMES = {
     "Motion": "activesteer.signals",
     "Reference": "activesteer.signals",
     "Simulation": "activesteer.simulation.simulation",
-    "SteerCommand": "activesteer.signals",
+    "ActuatorCommand": "activesteer.signals",
     "simulate": "activesteer.simulation.runner",
     "study": "activesteer.studies.study",
 }

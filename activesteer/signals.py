@@ -6,7 +6,7 @@ They are named tuples because they are made every millisecond: a frozen dataclas
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
     from activesteer.road.path import Path
@@ -138,8 +138,12 @@ class Motion(NamedTuple):
     yaw_rate_radps: float
 
 
-class SteerCommand(NamedTuple):
-    """What a controller asks of the steering actuators, with its intermediate results for the recording.
+NO_BRAKES: Final = (0.0, 0.0, 0.0, 0.0)
+"""No brake torque at any wheel [Nm]."""
+
+
+class ActuatorCommand(NamedTuple):
+    """What a controller asks of the actuators, with its intermediate results for the recording.
 
     Attributes:
         rear_steer_demand_rad: Rear wheel angle demanded [rad], left positive.
@@ -148,6 +152,10 @@ class SteerCommand(NamedTuple):
         prediction_rad: Feed-forward part [rad].
         correction_rad: Feedback part [rad].
         saturated: Whether a limit of the controller is active.
+        brake_torque_demand_Nm: Brake torques of the wheels beside the driver's, against the rotation, order of
+            `CORNERS` [Nm]; below 0 they release what the pedal asks for.
+        drive_torque_change_Nm: Change of the torque that the driver demands at the driven wheels together, forward
+            positive [Nm].
     """
 
     rear_steer_demand_rad: float = 0.0
@@ -156,3 +164,5 @@ class SteerCommand(NamedTuple):
     prediction_rad: float = 0.0
     correction_rad: float = 0.0
     saturated: bool = False
+    brake_torque_demand_Nm: tuple[float, float, float, float] = NO_BRAKES
+    drive_torque_change_Nm: float = 0.0

@@ -9,7 +9,7 @@ More of it: docs/controller.md.
 import math
 
 import activesteer
-from activesteer import SteerCommand
+from activesteer import ActuatorCommand
 
 
 class YawDamper:
@@ -29,7 +29,7 @@ class YawDamper:
         wanted_rad = self.gain_s * quick_radps
         angle_rad = min(max(wanted_rad, -self.limit_rad), self.limit_rad)
         # Left is positive: rear wheels to the left push the rear end to the left, and the car turns less to the left.
-        return SteerCommand(rear_steer_demand_rad=angle_rad, saturated=angle_rad != wanted_rad)
+        return ActuatorCommand(rear_steer_demand_rad=angle_rad, saturated=angle_rad != wanted_rad)
 
 
 def compare():

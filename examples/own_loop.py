@@ -6,7 +6,7 @@ More of it: docs/stepping.md.
 """
 
 import activesteer
-from activesteer import DriverCommand, SteerCommand
+from activesteer import ActuatorCommand, DriverCommand
 
 
 def drive(radius_m=50.0, speed_mps=15.0):
@@ -16,7 +16,7 @@ def drive(radius_m=50.0, speed_mps=15.0):
     while not simulation.done:
         wheel_rad += 0.05 * (measurement.speed_mps / radius_m - measurement.yaw_rate_radps)
         torque_Nm = min(1500.0 * (speed_mps - measurement.speed_mps), 1200.0)
-        rear = SteerCommand(rear_steer_demand_rad=0.005 * wheel_rad)  # with the front wheels
+        rear = ActuatorCommand(rear_steer_demand_rad=0.005 * wheel_rad)  # with the front wheels
         measurement = simulation.advance(10, DriverCommand(wheel_rad, torque_Nm), rear)
     return simulation
 

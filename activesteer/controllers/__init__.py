@@ -1,4 +1,4 @@
-"""Active steering controllers: DriverCommand, Measurement -> SteerCommand."""
+"""Active steering controllers: DriverCommand, Measurement -> ActuatorCommand."""
 
 from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.loading import BUILT_IN, CONTROLLER, Controller, find_controller, load_controller

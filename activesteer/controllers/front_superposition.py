@@ -5,7 +5,7 @@ from __future__ import annotations
 from activesteer.controllers.corrector import Corrector, decide
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
 from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
-from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.theory.single_track import SingleTrack
 
 
@@ -31,7 +31,7 @@ class FrontSuperposition:
         desired = DesiredYawRate(SingleTrack(setup.single_track), setup.gains.desired_yaw_rate, setup.timestep_s)
         return cls(desired, setup.gains.afs, setup.timestep_s)
 
-    def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:
+    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Angle to add now.
 
         Args:
@@ -45,7 +45,7 @@ class FrontSuperposition:
         if measurement.speed_mps < MIN_SPEED_MPS:
             self._corrector.reset()
             self._saturated = 0
-            return SteerCommand(yaw_rate_desired_radps=desired)
+            return ActuatorCommand(yaw_rate_desired_radps=desired)
         yaw_rate = measurement.yaw_rate_radps
         feedback = self._corrector.step(desired - yaw_rate, self._saturated)
         angle = correction = decide(yaw_rate, feedback).front * abs(feedback)
@@ -54,4 +54,4 @@ class FrontSuperposition:
             angle, self._saturated = self._limit_rad, 1
         elif angle < -self._limit_rad:
             angle, self._saturated = -self._limit_rad, -1
-        return SteerCommand(0.0, angle, desired, 0.0, correction, self._saturated != 0)
+        return ActuatorCommand(0.0, angle, desired, 0.0, correction, self._saturated != 0)

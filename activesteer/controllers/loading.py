@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
 from activesteer.config import Range
@@ -9,9 +10,9 @@ from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
-from activesteer.errors import ControllerError
+from activesteer.errors import ControllerError, shown
 from activesteer.plugins import Kind, Plugin, find
-from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Measurement
 
 
 class Controller(Protocol):
@@ -25,14 +26,14 @@ class Controller(Protocol):
         ...
         ...     def step(self, command, measurement):
         ...         angle_rad = -self.gain * command.front_steer_demand_rad
-        ...         return activesteer.SteerCommand(rear_steer_demand_rad=angle_rad)
+        ...         return activesteer.ActuatorCommand(rear_steer_demand_rad=angle_rad)
         >>> recording = activesteer.simulate("step_steer", controller=CounterSteer(gain=0.05))
         >>> recording.metrics["rear_steer_steady_state_rad"] < 0.0 < recording.metrics["front_steer_steady_state_rad"]
         True
     """
 
-    def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:
-        """Steer command for the next step."""
+    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
+        """What to ask of the actuators in the next step."""
         ...
 
 
@@ -42,17 +43,45 @@ BUILT_IN: Final = {"none": NoControl, "ars": RearSteer, "afs": FrontSuperpositio
 _MAX_ANGLE_RAD: Final = 1.0
 """No road wheel is steered further by a controller; more is taken for a mistake, such as degrees [rad]."""
 
-CONTROLLER: Final = Kind(
+_MAX_TORQUE_NM: Final = 1e5
+"""No brake gives so much, and no engine has so much to be taken back [N m]."""
+
+
+@dataclass(frozen=True)
+class _ControllerKind(Kind):
+    """Controllers; their brake torques are four numbers in one field."""
+
+    def checked(self, command: Any, name: str, setup: Any, said: str = "step returned") -> ActuatorCommand:
+        """A command as it may be carried out; see the base class."""
+        super().checked(command, name, setup, said)
+        torques = command.brake_torque_demand_Nm
+        if torques is not NO_BRAKES and not _are_torques(torques):
+            needed = f"four finite torques of at most {_MAX_TORQUE_NM:g} Nm, fl fr rl rr, are needed"
+            raise self.fail(name, f"{said} brake_torque_demand_Nm = {shown(torques)}; {needed}", torques)
+        return command
+
+
+def _are_torques(torques: Any) -> bool:
+    try:
+        fl, fr, rl, rr = torques
+        return all(abs(float(torque)) <= _MAX_TORQUE_NM for torque in (fl, fr, rl, rr))
+    except (TypeError, ValueError):
+        return False
+
+
+CONTROLLER: Final = _ControllerKind(
     word="controller",
     example="my_file.py:MyController",
     inputs="command, measurement",
     built_in=BUILT_IN,
-    result=SteerCommand,
+    result=ActuatorCommand,
     ranges={
         "rear_steer_demand_rad": Range(-_MAX_ANGLE_RAD, _MAX_ANGLE_RAD),
         "superposition_demand_rad": Range(-_MAX_ANGLE_RAD, _MAX_ANGLE_RAD),
+        "drive_torque_change_Nm": Range(-_MAX_TORQUE_NM, _MAX_TORQUE_NM),
     },
     error=ControllerError,
+    unchecked=("brake_torque_demand_Nm",),
 )
 """What controllers have in common."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from activesteer.controllers.desired_yaw_rate import DesiredYawRate
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.theory.single_track import SingleTrack
 
 
@@ -21,7 +21,7 @@ class NoControl:
         single_track = SingleTrack(setup.single_track)
         return cls(DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.timestep_s))
 
-    def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:
+    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """No angles; the desired yaw rate for the recording."""
         desired = self._desired.step(command.front_steer_demand_rad, measurement.speed_mps)
-        return SteerCommand(yaw_rate_desired_radps=desired)
+        return ActuatorCommand(yaw_rate_desired_radps=desired)

@@ -7,7 +7,7 @@ import math
 from activesteer.controllers.corrector import Corrector, decide
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
 from activesteer.controllers.parameters import ControllerSetup, RearSteerParameters
-from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.theory.single_track import SingleTrack
 
 
@@ -84,7 +84,7 @@ class RearSteer:
             setup.timestep_s,
         )
 
-    def step(self, command: DriverCommand, measurement: Measurement) -> SteerCommand:
+    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Rear angle now.
 
         Args:
@@ -99,7 +99,7 @@ class RearSteer:
         if speed < MIN_SPEED_MPS:
             self._corrector.reset()
             self._saturated = 0
-            return SteerCommand(yaw_rate_desired_radps=desired)
+            return ActuatorCommand(yaw_rate_desired_radps=desired)
         yaw_rate = measurement.yaw_rate_radps
         prediction = self._prediction_gain * self._prediction.step(command.front_steer_demand_rad, speed)
         # The rear wheels turn against the corrector's angle, and so does their limit.
@@ -111,4 +111,4 @@ class RearSteer:
             angle, self._saturated = self._limit_rad, 1
         elif angle < -self._limit_rad:
             angle, self._saturated = -self._limit_rad, -1
-        return SteerCommand(angle, 0.0, desired, prediction, correction, self._saturated != 0)
+        return ActuatorCommand(angle, 0.0, desired, prediction, correction, self._saturated != 0)

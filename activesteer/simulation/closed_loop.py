@@ -13,7 +13,7 @@ from activesteer.controllers import Controller, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import Driver, find_driver
 from activesteer.scenario import Scenario
-from activesteer.signals import DriverCommand, Measurement, Motion, Reference, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
 from activesteer.simulation.recorder import Recorder
 from activesteer.vehicle import engine_warnings_held
 
@@ -26,7 +26,7 @@ class LoopState(NamedTuple):
     controller: Any
     measurement: Measurement
     motion: Motion
-    commands: tuple[DriverCommand, SteerCommand]
+    commands: tuple[DriverCommand, ActuatorCommand]
     step: int
 
 
@@ -77,7 +77,7 @@ class ClosedLoop:
         settling, steps = maneuver.settling_reference(), round(maneuver.settle_s / timestep_s)
         self.measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
         self.motion, self.step_count = vehicle.motion(), 0
-        self.commands = DriverCommand(front_steer_demand_rad=0.0), SteerCommand()
+        self.commands = DriverCommand(front_steer_demand_rad=0.0), ActuatorCommand()
         self._advance(lambda _: settling, self.driver, self.controller, steps, None)
         vehicle.rebase()
         self.measurement = self.measurement._replace(time_s=0.0)

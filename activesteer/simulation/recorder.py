@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from activesteer.errors import RecordingError, SimulationDiverged
 from activesteer.recording import McapWriter, Poses
-from activesteer.signals import Channel, DriverCommand, SteerCommand
+from activesteer.signals import ActuatorCommand, Channel, DriverCommand
 from activesteer.vehicle import Vehicle
 
 BLOCK_INTERVAL_S: Final = 0.5
@@ -52,7 +52,7 @@ _CONTROLLER_CHANNELS: Final = {
     "correction_rad": Channel("correction_rad", "rad", "feedback part of the controller's angle", "control"),
     "saturated": Channel("controller_saturated", "", "1 where a limit of the controller is active", "control"),
 }
-"""Field of `SteerCommand` -> its channel."""
+"""Field of `ActuatorCommand` -> its channel."""
 CONTROL_CHANNELS: Final = (*_DRIVER_CHANNELS.values(), *_CONTROLLER_CHANNELS.values())
 _CONTROL_ROW: Final = struct.Struct(f"{len(CONTROL_CHANNELS)}d")
 _driver_row, _controller_row = attrgetter(*_DRIVER_CHANNELS), attrgetter(*_CONTROLLER_CHANNELS)
@@ -129,7 +129,7 @@ class Recorder:
         # Rows so far, those of them that are channels already, and the first one in memory.
         self.rows = self._flushed = self._first = 0
 
-    def record(self, command: DriverCommand, steer: SteerCommand) -> None:
+    def record(self, command: DriverCommand, steer: ActuatorCommand) -> None:
         """Takes the row of the step that was just made, which the vehicle has left at `row_address`.
 
         Its values are those of the instant at which the step began.
@@ -185,7 +185,7 @@ class Recorder:
         self._kept.referred_rows = max(self._kept.referred_rows, last)
         return self._times(first, last), self._kept.values[: last - first], self._poses_between(first, last)
 
-    def present(self, command: DriverCommand, steer: SteerCommand) -> dict[str, float]:
+    def present(self, command: DriverCommand, steer: ActuatorCommand) -> dict[str, float]:
         """What would be recorded of the present instant, by channel name; nothing is recorded.
 
         Args:

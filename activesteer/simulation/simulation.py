@@ -16,7 +16,7 @@ from activesteer.driver import DRIVER, find_driver
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
 from activesteer.recording import McapWriter, Recording
 from activesteer.scenario import FileOrTable, Scenario, resolve
-from activesteer.signals import DriverCommand, Measurement, Motion, Reference, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
 from activesteer.simulation.closed_loop import ClosedLoop, LoopState
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.recorder import RecordedRows, Recorder
@@ -143,13 +143,13 @@ class Simulation:
         return self._recorder.present(*self.loop.commands)
 
     def step(
-        self, driver_command: DriverCommand | None = None, steer_command: SteerCommand | None = None
+        self, driver_command: DriverCommand | None = None, actuator_command: ActuatorCommand | None = None
     ) -> Measurement:
         """Drives one step; see `advance`."""
-        return self.advance(1, driver_command, steer_command)
+        return self.advance(1, driver_command, actuator_command)
 
     def advance(
-        self, steps: int, driver_command: DriverCommand | None = None, steer_command: SteerCommand | None = None
+        self, steps: int, driver_command: DriverCommand | None = None, actuator_command: ActuatorCommand | None = None
     ) -> Measurement:
         """Drives on for some steps.
 
@@ -157,7 +157,7 @@ class Simulation:
             steps: How many, at most to the end of the manoeuvre.
             driver_command: What the driver does in all of them. The driver is then not asked, and his state stands
                 still until he is.
-            steer_command: What the controller asks for, likewise.
+            actuator_command: What the controller asks for, likewise.
 
         Returns:
             What the sensors say afterwards.
@@ -165,7 +165,7 @@ class Simulation:
         Raises:
             ManeuverError: the manoeuvre ends before; nothing was driven.
             DriverError: the driver command is none, or the driver returned nonsense.
-            ControllerError: the same of the steer command and the controller.
+            ControllerError: the same of the actuator command and the controller.
             SimulationDiverged: the state became non-finite, or the engine raised a warning.
         """
         loop, left = self.loop, self.steps - self.loop.step_count
@@ -180,8 +180,8 @@ class Simulation:
         driver = controller = None
         if driver_command is not None:
             driver = _Given(DRIVER.checked(driver_command, "", loop.driver_setup, _SAID))
-        if steer_command is not None:
-            controller = _Given(CONTROLLER.checked(steer_command, "", loop.controller_setup, _SAID))
+        if actuator_command is not None:
+            controller = _Given(CONTROLLER.checked(actuator_command, "", loop.controller_setup, _SAID))
         rows = self._recorder.rows
         with self._watched():
             try:

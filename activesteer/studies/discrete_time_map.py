@@ -8,7 +8,7 @@ import numpy as np
 
 from activesteer.conventions import Array
 from activesteer.errors import ModelError
-from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.local_state import LocalState
 
@@ -43,7 +43,7 @@ class DiscreteTimeMap:
         self.local.write(x)
         steering_wheel, rear, added = (float(value) for value in u)
         command = DriverCommand(steering_wheel, self.torque_Nm + more_torque_Nm)
-        self.vehicle.step(command, SteerCommand(rear, added))
+        self.vehicle.step(command, ActuatorCommand(rear, added))
         return self.local.read()
 
     def trim(self, speed_mps: float) -> None:

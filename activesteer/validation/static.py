@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import CORNERS
-from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.validation.comparison import Comparison, absolute, relative
 from activesteer.validation.reference import ReferenceData
 from activesteer.vehicle import Vehicle, engine_warnings_held
@@ -58,7 +58,7 @@ def compare_static(vehicle: Vehicle, data: ReferenceData) -> list[Comparison]:
 
 def _rolling(vehicle: Vehicle, speed_mps: float) -> dict[str, float]:
     vehicle.start(speed_mps)
-    straight, nothing = DriverCommand(), SteerCommand()
+    straight, nothing = DriverCommand(), ActuatorCommand()
     with engine_warnings_held():
         for _ in range(round(_ROLLING_S / vehicle.timestep_s)):
             vehicle.step(straight, nothing)

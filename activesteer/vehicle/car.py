@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.errors import ModelError, SimulationDiverged
 from activesteer.road.road import Road
-from activesteer.signals import DriverCommand, Measurement, Motion, SteerCommand, WheelTorques
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, WheelTorques
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_step
@@ -23,7 +23,7 @@ from activesteer.vehicle.channels import ChannelMap, RawRows
 from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.loading import find, load_model
 from activesteer.vehicle.native_forces import install_native_forces
-from activesteer.vehicle.native_step import FASTEST_MPS, Places, Wheels, sensed, step_plan
+from activesteer.vehicle.native_step import DRIVE_CHANGE, FASTEST_MPS, Places, Wheels, sensed, step_plan
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 
@@ -83,6 +83,7 @@ class Vehicle:
         try:
             self.model = load_model(mjcf, parameters, tyres, road, timestep_s)
             self.data = mujoco.MjData(self.model)
+            self._asked = np.zeros(DRIVE_CHANGE + 1)
             self.channels = ChannelMap(self.model, parameters)
             self._bind()
             self._place()
@@ -121,7 +122,7 @@ class Vehicle:
             (front_Nm, front_Nm, rear_Nm, rear_Nm),
         )
         ratio = self.parameters.steering.ratio
-        self._plan = step_plan(model, data, self.live_arrays(), self._places, self._wheels, ratio)
+        self._plan = step_plan(model, data, self.live_arrays(), self._places, self._wheels, ratio, self._asked)
         self._plan_address = self._plan.ctypes.data
         block = int(model.numeric_data[-fb.TRAILER_SIZE])
         self._areas_felt = model.numeric_data[block + fb.AREAS_FELT : block + fb.AREAS_FELT + 1]
@@ -203,12 +204,12 @@ class Vehicle:
         site = self.data.site_xpos[self.model.site("cg").id]
         return float(site[0]), float(site[1])
 
-    def step(self, command: DriverCommand, steer: SteerCommand, row_address: int = 0) -> tuple[Measurement, Motion]:
+    def step(self, command: DriverCommand, asked: ActuatorCommand, row_address: int = 0) -> tuple[Measurement, Motion]:
         """Applies the commands and advances the engine by one step.
 
         Args:
             command: What the driver does.
-            steer: What the controller adds.
+            asked: What the controller asks for.
             row_address: Where the row of this step goes, in a block of `raw_rows`; 0 where none is wanted.
 
         Returns:
@@ -227,11 +228,14 @@ class Vehicle:
             self._plan_address,
             row_address,
             command.steering_wheel_demand_rad,
-            steer.superposition_demand_rad,
-            steer.rear_steer_demand_rad,
-            command.drive_torque_demand_Nm if gear != CLUTCH_OPEN else 0.0,
+            asked.superposition_demand_rad,
+            asked.rear_steer_demand_rad,
+            command.drive_torque_demand_Nm,
             command.brake_pedal,
+            asked.drive_torque_change_Nm,
+            *asked.brake_torque_demand_Nm,
             torques is not None,
+            gear != CLUTCH_OPEN,
         )
         if not sane:
             self.check()
@@ -322,11 +326,11 @@ class Vehicle:
         now = mujoco.MjData(self.model)
         mujoco.mj_copyData(now, self.model, self.data)
         mujoco.mj_forward(self.model, now)
-        return RawRows(*(array[np.newaxis] for array in self._arrays_of(now)))
+        return RawRows(*(array[np.newaxis] for array in (*self._arrays_of(now), self._asked)))
 
     def live_arrays(self) -> tuple[NDArray[np.float64], ...]:
         """The engine's arrays in the order of `RawRows`."""
-        return self._arrays_of(self.data)
+        return (*self._arrays_of(self.data), self._asked)
 
     @staticmethod
     def _arrays_of(data: mujoco.MjData) -> tuple[NDArray[np.float64], ...]:

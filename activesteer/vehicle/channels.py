@@ -36,6 +36,8 @@ class RawRows(NamedTuple):
     act: Array
     actuator_force: Array
     ctrl: Array
+    asked: Array
+    """Brake torques that the controller asks for, order of `CORNERS`, and the change of the drive torque."""
 
 
 class Signal(NamedTuple):
@@ -68,7 +70,9 @@ class ChannelMap:
         for name in _MOTION_SENSORS:
             # They are read block by block; a missing one is to show now.
             self._sensor(name)
-        signals = [*self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators()]
+        signals = [
+            *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(), *self._asked(),
+        ]  # fmt: skip
         self.channels = tuple(signal.channel for signal in signals)
         self._values = tuple(signal.values for signal in signals)
 
@@ -292,6 +296,18 @@ class ChannelMap:
                     )
                 )
         return signals
+
+    def _asked(self) -> list[Signal]:
+        """What the controller asks of brakes and drive."""
+        asked = [
+            (f"{corner}_brake_torque_demand_Nm", f"brake torque that the controller adds, {_CORNER_WORDS[corner]}")
+            for corner in CORNERS
+        ]
+        asked.append(("drive_torque_change_Nm", "change of the drive torque that the controller asks for"))
+        return [
+            Signal(Channel(name, "Nm", meaning, "control"), lambda rows, index=index: rows.asked[:, index])
+            for index, (name, meaning) in enumerate(asked)
+        ]
 
     def _saturated(self, rows: RawRows, index: int) -> Array:
         model = self._model

@@ -29,8 +29,10 @@ FASTEST_MPS: Final = 200.0
 """No car of ours goes faster; a speed beyond it, or none at all, is a run that has diverged [m/s]."""
 
 _N_WHEELS: Final = len(CORNERS)
-_SOURCES: Final = 7
+_SOURCES: Final = 8
 _WARNINGS: Final = len(mujoco.mjtWarning.__members__) - 1
+DRIVE_CHANGE: Final = _N_WHEELS
+"""Place of the change of the drive torque behind the brake torques of the wheels."""
 _EXPONENT: Final = 0x7FF0000000000000
 """Bits of a float64 that are all set where it is not finite, and only there."""
 
@@ -71,7 +73,7 @@ class Places(NamedTuple):
     """Place of the yaw rate in `qvel`."""
 
 
-_ADDRESSES: Final = ("mj_step", "model", "data", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata")
+_ADDRESSES: Final = ("mj_step", "model", "data", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata", "asked")
 STEP_PLAN: Final = np.dtype(
     (
         np.record,
@@ -97,6 +99,7 @@ def step_plan(
     places: Places,
     wheels: Wheels,
     ratio: float,
+    asked: NDArray[np.float64],
 ) -> NDArray[Any]:
     """Looks up all addresses.
 
@@ -107,6 +110,7 @@ def step_plan(
         places: Where the step finds what it needs.
         wheels: How torques come to the wheels.
         ratio: Overall steering ratio.
+        asked: Where the controller's brake torques and change of the drive torque are kept; must outlive the plan.
 
     Returns:
         The plan, shape (1,), at an address that stays.
@@ -122,6 +126,7 @@ def step_plan(
         "n_dofs": model.nv,
         "ctrl": data.ctrl.ctypes.data,
         "sensordata": data.sensordata.ctypes.data,
+        "asked": asked.ctypes.data,
         **places._asdict(),
     }
     for name, value in wheels._asdict().items():
@@ -207,10 +212,10 @@ def sense(plan_address):
     return _sense(carray(_plan_pointer(plan_address), (1,))[0])
 
 
-@compiled_call(_SENSED, types.intp, types.intp, *[types.float64] * 5, types.boolean)
+@compiled_call(_SENSED, types.intp, types.intp, *[types.float64] * 10, types.boolean, types.boolean)
 def step(
     plan_address, row_address, steering_wheel_rad, superposition_rad, rear_steer_rad, drive_torque_Nm, brake_pedal,
-    torques_stand,
+    drive_change_Nm, brake_fl_Nm, brake_fr_Nm, brake_rl_Nm, brake_rr_Nm, torques_stand, driven,
 ):  # fmt: skip
     """Writes the inputs, makes one step of the engine and reads everything.
 
@@ -222,7 +227,14 @@ def step(
         rear_steer_rad: Rear wheel angle demanded [rad].
         drive_torque_Nm: Torque at the driven wheels together [Nm].
         brake_pedal: Brake pedal position, 0 to 1.
-        torques_stand: Whether drive and brakes have their inputs already, and the last two do not count.
+        drive_change_Nm: Change of the drive torque that the controller asks for [Nm].
+        brake_fl_Nm: Brake torque that the controller asks for beside the pedal's, front left [Nm].
+        brake_fr_Nm: Front right [Nm].
+        brake_rl_Nm: Rear left [Nm].
+        brake_rr_Nm: Rear right [Nm].
+        torques_stand: Whether drive and brakes have their inputs already; what driver and controller want of the drive,
+            and the pedal, then do not count.
+        driven: Whether the engine is coupled to the wheels.
 
     Returns:
         Whether all is well, and what `sensed` takes.
@@ -233,11 +245,16 @@ def step(
     ctrl[plan.superposition] = superposition_rad * plan.ratio
     ctrl[plan.rear_left] = rear_steer_rad
     ctrl[plan.rear_right] = rear_steer_rad
-    if not torques_stand:
-        for wheel in range(_N_WHEELS):
+    asked = carray(f64_pointer(plan.asked), (_N_WHEELS + 1,))
+    asked[0], asked[1], asked[2], asked[3] = brake_fl_Nm, brake_fr_Nm, brake_rl_Nm, brake_rr_Nm
+    asked[DRIVE_CHANGE] = drive_change_Nm
+    drive_torque_Nm = drive_torque_Nm + drive_change_Nm if driven else 0.0
+    for wheel in range(_N_WHEELS):
+        if not torques_stand:
             # + 0.0: a wheel that is not driven would get -0.0 while the engine brakes.
             ctrl[plan.drives[wheel]] = plan.drive_shares[wheel] * drive_torque_Nm + 0.0
             ctrl[plan.brakes[wheel]] = brake_pedal * plan.brake_torques_Nm[wheel]
+        ctrl[plan.brakes[wheel]] += asked[wheel]
     _call(plan.mj_step, plan.model, plan.data)  # pyright: ignore[reportCallIssue] - numba adds the context
     if row_address != 0:
         row = f64_pointer(row_address)

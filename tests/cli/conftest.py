@@ -62,7 +62,7 @@ def controller(tmp_path: Path) -> Callable[..., str]:
 
     def write(body: str, name: str = "mine.py", cls: str = "Mine") -> str:
         (tmp_path / name).write_text(
-            "from activesteer import SteerCommand\n\n\n"
+            "from activesteer import ActuatorCommand\n\n\n"
             f"class {cls}:\n    steps = 0\n\n    def step(self, command, measurement):\n        self.steps += 1\n"
             + textwrap.indent(textwrap.dedent(body), " " * 8)
         )

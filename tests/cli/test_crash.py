@@ -50,7 +50,7 @@ def stock_messages(path: Path) -> dict[str, int]:
 # Just before a block is written, and just after: the last one may then still be on its way.
 @pytest.mark.parametrize("steps", [2999, 3001])
 def test_killed_run_can_be_opened_up_to_a_second_before_the_kill(call, controller, tmp_path, steps):
-    body = f"if self.steps > {steps}:\n    import os\n    os.kill(os.getpid(), 9)\nreturn SteerCommand()"
+    body = f"if self.steps > {steps}:\n    import os\n    os.kill(os.getpid(), 9)\nreturn ActuatorCommand()"
     words = ("run", "slalom", "-c", controller(body), "--set", "settle_s=0", "-o", "run.mcap")
     done = activesteer(tmp_path, *words)
     assert done.returncode == -9, done.stderr
@@ -76,7 +76,7 @@ def test_rerun_opens_what_a_killed_run_left(controller, tmp_path):
     binary = Path(spec.origin).with_name("rerun") if spec and spec.origin else None
     if binary is None or not binary.exists():
         pytest.skip("this rerun-sdk brings no rerun binary")
-    body = "if self.steps > 1700:\n    import os\n    os.kill(os.getpid(), 9)\nreturn SteerCommand()"
+    body = "if self.steps > 1700:\n    import os\n    os.kill(os.getpid(), 9)\nreturn ActuatorCommand()"
     activesteer(tmp_path, "run", "slalom", "-c", controller(body), "--set", "settle_s=0", "-o", "run.mcap")
     words = ("mcap", "convert", "--recover", "run.mcap", "-o", "run.rrd")
     environment = os.environ | {"HOME": str(tmp_path)}  # it keeps its settings out of the user's home
@@ -86,7 +86,7 @@ def test_rerun_opens_what_a_killed_run_left(controller, tmp_path):
 
 
 def test_recovered_file_of_a_killed_run_opens_in_readers_that_seek(call, controller, tmp_path):
-    body = "if self.steps > 1700:\n    import os\n    os.kill(os.getpid(), 9)\nreturn SteerCommand()"
+    body = "if self.steps > 1700:\n    import os\n    os.kill(os.getpid(), 9)\nreturn ActuatorCommand()"
     activesteer(tmp_path, "run", "slalom", "-c", controller(body), "--set", "settle_s=0", "-o", "run.mcap")
     left, whole = tmp_path / "run.mcap", tmp_path / "whole.mcap"
     done = call("recover", left, "-o", whole)

@@ -71,18 +71,18 @@ def test_bad_files_are_answered_with_file_key_and_line(call, tmp_path):
 
 
 def test_two_files_with_a_class_of_the_same_name_are_answered(call, controller):
-    first, second = (controller("return SteerCommand()", name) for name in ("a.py", "b.py"))
+    first, second = (controller("return ActuatorCommand()", name) for name in ("a.py", "b.py"))
     refused(call("run", "straight_line", "-c", first, "-c", second), "a.py:Mine", "b.py:Mine", "same name")
 
 
 @pytest.mark.parametrize(
     ("body", "text"),
     [
-        ("return None if self.steps > 1000 else SteerCommand()", "step returned None"),
-        ("return SteerCommand(float('nan') if self.steps > 1000 else 0.0)", "rear_steer_demand_rad = nan"),
-        ("return SteerCommand(superposition_demand_rad=3.0 if self.steps > 1000 else 0.0)", "radians, not degrees"),
+        ("return None if self.steps > 1000 else ActuatorCommand()", "step returned None"),
+        ("return ActuatorCommand(float('nan') if self.steps > 1000 else 0.0)", "rear_steer_demand_rad = nan"),
+        ("return ActuatorCommand(superposition_demand_rad=3.0 if self.steps > 1000 else 0.0)", "radians, not degrees"),
         (
-            "return SteerCommand(1.0 / (1001 - self.steps) if self.steps > 1000 else 0.0)",
+            "return ActuatorCommand(1.0 / (1001 - self.steps) if self.steps > 1000 else 0.0)",
             "step raised ZeroDivisionError",
         ),
     ],
@@ -107,7 +107,7 @@ def test_run_that_fails_keeps_what_was_recorded(call, controller, tmp_path, body
 
 
 def test_failing_run_prints_no_json(call, controller):
-    name = controller("return None if self.steps > 10 else SteerCommand()")
+    name = controller("return None if self.steps > 10 else ActuatorCommand()")
     told = call("run", "straight_line", "-c", "none", "-c", name, *SHORT, "--json")
     refused(told, "step returned None")
     assert Recording.open("runs/straight_line-none.mcap").metadata["complete"] is True
@@ -115,7 +115,7 @@ def test_failing_run_prints_no_json(call, controller):
 
 def test_controller_that_is_wrong_from_the_start_is_answered(call, controller):
     name = controller("return 0.1")
-    refused(call("run", "straight_line", "-c", name, "-o", "out"), "step returned 0.1", "SteerCommand is needed")
+    refused(call("run", "straight_line", "-c", name, "-o", "out"), "step returned 0.1", "ActuatorCommand is needed")
 
 
 def test_car_that_diverges_keeps_what_was_recorded(call):
@@ -157,7 +157,7 @@ def test_full_disk_is_answered(call, tmp_path):
 
 
 def test_interrupt_keeps_what_was_recorded(call, controller):
-    name = controller("if self.steps > 700:\n    raise KeyboardInterrupt\nreturn SteerCommand()")
+    name = controller("if self.steps > 700:\n    raise KeyboardInterrupt\nreturn ActuatorCommand()")
     told = call("run", "straight_line", "-c", name, "--set", "settle_s=0", "--set", "duration_s=3", "-o", "run.mcap")
     assert told.status == 130
     assert "stopped" in told.err

@@ -160,7 +160,7 @@ def test_maneuver_and_vehicle_may_be_files(call, tmp_path):
 
 
 def test_users_controller_drives_and_is_kept(call, controller, tmp_path):
-    name = controller("return SteerCommand(rear_steer_demand_rad=0.02)")
+    name = controller("return ActuatorCommand(rear_steer_demand_rad=0.02)")
     told = call("run", "straight_line", "-c", "none", "-c", name, *SHORT, "-o", "out")
     assert told.status == 0
     assert told.out.splitlines()[0].split() == ["none", "Mine"]

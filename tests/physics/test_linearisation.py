@@ -12,7 +12,7 @@ import pytest
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.errors import ParameterError
 from activesteer.scenario import load_car, resolve
-from activesteer.signals import SteerCommand
+from activesteer.signals import ActuatorCommand
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.studies.linearisation import (
     INPUTS,
@@ -55,7 +55,7 @@ def test_step_of_an_active_steering_gives_the_response_of_the_full_car(name, amp
     straight = {"kind": "open_loop", "speed_mps": SPEED_MPS, "duration_s": 1.0}
     # So small a superposition winds the column up by little more than the friction of the rack holds.
     vehicle_run = ClosedLoop(resolve(straight, overrides={"vehicle.friction.rack_N": 0.0}))
-    command = SteerCommand(**{name.replace("_rad", "_demand_rad"): amplitude_rad})
+    command = ActuatorCommand(**{name.replace("_rad", "_demand_rad"): amplitude_rad})
     vehicle_run.controller = type("Constant", (), {"step": lambda *_: command})()  # type: ignore[assignment]
     values = go_on(vehicle_run, 1000)
     names = [channel.name for channel in vehicle_run.vehicle.channels.channels]

@@ -12,7 +12,7 @@ import numpy as np
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import SimulationDiverged
 from activesteer.scenario import Car
-from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle, engine_warnings_held
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.mass_properties import mass_properties
@@ -173,7 +173,7 @@ def _stays(vehicle: Vehicle) -> Iterator[Finding]:
     try:
         with engine_warnings_held():
             for _ in range(_STEPS):
-                vehicle.step(DriverCommand(), SteerCommand())
+                vehicle.step(DriverCommand(), ActuatorCommand())
         speed = float(np.abs(vehicle.data.qvel[:6]).max())
         warned = int(sum(warning.number for warning in vehicle.data.warning))
     except SimulationDiverged:

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from activesteer.controllers import Controller, ControllerParameters, ControllerSetup, SingleTrackParameters
-from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 
 CAR = SingleTrackParameters(
     mass_kg=1400.0,
@@ -52,6 +52,8 @@ def measured(yaw_rate_radps: float, speed_mps: float = 25.0) -> Measurement:
     )
 
 
-def held(controller: Controller, command: DriverCommand, measurement: Measurement, steps: int = 1000) -> SteerCommand:
+def held(
+    controller: Controller, command: DriverCommand, measurement: Measurement, steps: int = 1000
+) -> ActuatorCommand:
     """What a controller answers in the end to messages that do not change."""
     return [controller.step(command, measurement) for _ in range(steps)][-1]

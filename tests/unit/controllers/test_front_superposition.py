@@ -8,7 +8,7 @@ import pytest
 
 from activesteer.controllers import ControllerParameters, FrontSuperposition, NoControl, RearSteer
 from activesteer.controllers.parameters import CorrectorParameters, FrontSuperpositionParameters, RearSteerParameters
-from activesteer.signals import SteerCommand
+from activesteer.signals import ActuatorCommand
 from activesteer.theory.tolerance import tolerance
 from tests.unit.controllers.cars import held, measured, setup, steering
 
@@ -99,7 +99,7 @@ def test_no_control_turns_nothing_and_tells_the_same_desired_yaw_rate():
     for count in range(300):
         message = steering(0.02 * math.sin(0.05 * count)), measured(0.2)
         steer = none.step(*message)
-        assert steer == SteerCommand(yaw_rate_desired_radps=steer.yaw_rate_desired_radps)
+        assert steer == ActuatorCommand(yaw_rate_desired_radps=steer.yaw_rate_desired_radps)
         assert steer.yaw_rate_desired_radps == front.step(*message).yaw_rate_desired_radps
         assert steer.yaw_rate_desired_radps == rear.step(*message).yaw_rate_desired_radps
         told.add(steer.yaw_rate_desired_radps)

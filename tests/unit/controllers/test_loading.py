@@ -18,10 +18,10 @@ from activesteer.controllers import (
     load_controller,
 )
 from activesteer.errors import ControllerError
-from activesteer.signals import DriverCommand, Measurement, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from tests.unit.controllers.cars import measured, setup, steering
 
-HEAD = "import math\nimport numpy as np\nfrom activesteer import SteerCommand\n\n"
+HEAD = "import math\nimport numpy as np\nfrom activesteer import ActuatorCommand\n\n"
 
 
 @pytest.fixture
@@ -56,11 +56,11 @@ def test_users_controller_is_made_and_asked(write):
         """
         class Mine:
             def step(self, command, measurement):
-                return SteerCommand(rear_steer_demand_rad=-0.1 * command.front_steer_demand_rad)
+                return ActuatorCommand(rear_steer_demand_rad=-0.1 * command.front_steer_demand_rad)
         """
     )
     controller = load_controller(f"{path}:Mine", setup())
-    assert controller.step(steering(0.2), measured(0.0)) == SteerCommand(rear_steer_demand_rad=-0.1 * 0.2)
+    assert controller.step(steering(0.2), measured(0.0)) == ActuatorCommand(rear_steer_demand_rad=-0.1 * 0.2)
 
 
 def test_users_controller_may_ask_for_the_car(write):
@@ -75,7 +75,7 @@ def test_users_controller_may_ask_for_the_car(write):
                 return cls(setup.single_track.cg_to_front_m + setup.single_track.cg_to_rear_m)
 
             def step(self, command, measurement):
-                return SteerCommand(yaw_rate_desired_radps=self.wheelbase_m)
+                return ActuatorCommand(yaw_rate_desired_radps=self.wheelbase_m)
         """
     )
     steer = load_controller(f"{path}:Mine", setup()).step(steering(0.0), measured(0.0))
@@ -90,7 +90,7 @@ def test_users_controller_can_be_copied_with_its_state(write):
 
             def step(self, command, measurement):
                 self.count += 1
-                return SteerCommand(0.001 * self.count)
+                return ActuatorCommand(0.001 * self.count)
         """
     )
     controller = load_controller(f"{path}:Mine", setup())
@@ -165,21 +165,25 @@ def test_class_without_step_is_answered(write):
 @pytest.mark.parametrize(
     ("expression", "told"),
     [
-        ("None", r"step returned None; an activesteer\.SteerCommand is needed"),
-        ("0.1", r"step returned 0\.1; an activesteer\.SteerCommand is needed"),
-        ("(0.1, 0.0, 0.0, 0.0, 0.0, False)", r"step returned \(0\.1, .*SteerCommand is needed"),
-        ("SteerCommand(math.nan)", r"step returned rear_steer_demand_rad = nan; a finite angle of at most 1 rad"),
-        ("SteerCommand(math.inf)", r"step returned rear_steer_demand_rad = inf; a finite angle"),
-        ("SteerCommand(3.0)", r"step returned rear_steer_demand_rad = 3\.0; .*radians, not degrees"),
+        ("None", r"step returned None; an activesteer\.ActuatorCommand is needed"),
+        ("0.1", r"step returned 0\.1; an activesteer\.ActuatorCommand is needed"),
+        ("(0.1, 0.0, 0.0, 0.0, 0.0, False)", r"step returned \(0\.1, .*ActuatorCommand is needed"),
+        ("ActuatorCommand(math.nan)", r"step returned rear_steer_demand_rad = nan; a finite angle of at most 1 rad"),
+        ("ActuatorCommand(math.inf)", r"step returned rear_steer_demand_rad = inf; a finite angle"),
+        ("ActuatorCommand(3.0)", r"step returned rear_steer_demand_rad = 3\.0; .*radians, not degrees"),
         (
-            "SteerCommand(superposition_demand_rad=-2.5)",
+            "ActuatorCommand(superposition_demand_rad=-2.5)",
             r"step returned superposition_demand_rad = -2\.5; .*radians, not degrees",
         ),
-        ("SteerCommand('left')", r"step returned rear_steer_demand_rad = 'left'; a number is needed"),
-        ("SteerCommand(None)", r"step returned rear_steer_demand_rad = None; a number is needed"),
-        ("SteerCommand(np.zeros(2))", r"step returned rear_steer_demand_rad = array.*; a number is needed"),
-        ("SteerCommand(0.0, 0.0, None)", r"step returned yaw_rate_desired_radps = None; a number is needed"),
-        ("SteerCommand(saturated='no')", r"step returned saturated = 'no'; a number is needed"),
+        ("ActuatorCommand('left')", r"step returned rear_steer_demand_rad = 'left'; a number is needed"),
+        ("ActuatorCommand(None)", r"step returned rear_steer_demand_rad = None; a number is needed"),
+        ("ActuatorCommand(np.zeros(2))", r"step returned rear_steer_demand_rad = array.*; a number is needed"),
+        ("ActuatorCommand(0.0, 0.0, None)", r"step returned yaw_rate_desired_radps = None; a number is needed"),
+        ("ActuatorCommand(brake_torque_demand_Nm=100.0)", ".*four finite torques of at most 100000 Nm, fl fr rl rr"),
+        ("ActuatorCommand(brake_torque_demand_Nm=(1.0, 2.0))", ".*four finite torques"),
+        ("ActuatorCommand(brake_torque_demand_Nm=(0.0, math.nan, 0.0, 0.0))", ".*four finite torques"),
+        ("ActuatorCommand(drive_torque_change_Nm=math.inf)", "step returned drive_torque_change_Nm = inf; a number"),
+        ("ActuatorCommand(saturated='no')", r"step returned saturated = 'no'; a number is needed"),
         ("1 / 0", r"step raised ZeroDivisionError: .*\(mine\.py, line 7\)"),
         ("command.speed", r"step raised AttributeError: .*speed"),
         ("measurement.sideslip_rad", r"step raised AttributeError: .*sideslip_rad"),
@@ -190,13 +194,22 @@ def test_nonsense_is_answered_with_file_and_class(returning, expression, told):
         returning(expression).step(steering(0.0), measured(0.0))
 
 
-@pytest.mark.parametrize("expression", ["SteerCommand(np.float32(0.1))", "SteerCommand(0)", "SteerCommand(-1.0, 1.0)"])
+@pytest.mark.parametrize(
+    "expression",
+    [
+        "ActuatorCommand(np.float32(0.1))",
+        "ActuatorCommand(0)",
+        "ActuatorCommand(-1.0, 1.0)",
+        "ActuatorCommand(brake_torque_demand_Nm=np.array([10.0, 0.0, 0.0, 0.0]))",
+        "ActuatorCommand(brake_torque_demand_Nm=[10, 0, -5, 0])",
+    ],
+)
 def test_numbers_of_all_kinds_are_taken(returning, expression):
-    assert isinstance(returning(expression).step(steering(0.0), measured(0.0)), SteerCommand)
+    assert isinstance(returning(expression).step(steering(0.0), measured(0.0)), ActuatorCommand)
 
 
 def test_good_command_passes_the_check():
-    steer = SteerCommand(0.05, -0.02, 0.3, 0.01, 0.04, True)
+    steer = ActuatorCommand(0.05, -0.02, 0.3, 0.01, 0.04, True)
     assert CONTROLLER.checked(steer, "mine.py:Mine", setup()) is steer
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer import DriverCommand, SteerCommand, simulate
+from activesteer import ActuatorCommand, DriverCommand, simulate
 from activesteer.controllers import find_controller
 from activesteer.driver import find_driver
 from activesteer.errors import ControllerError, DriverError
@@ -29,9 +29,9 @@ class Counting:
     def __init__(self, gain: float = 1.0, offset_rad: float = 0.0) -> None:
         self.gain, self.offset_rad, self.count = gain, offset_rad, 0
 
-    def step(self, command: Any, measurement: Any) -> SteerCommand:
+    def step(self, command: Any, measurement: Any) -> ActuatorCommand:
         self.count += 1
-        return SteerCommand(self.offset_rad + 1e-5 * self.gain * self.count)
+        return ActuatorCommand(self.offset_rad + 1e-5 * self.gain * self.count)
 
 
 class FromSetup(Counting):
@@ -52,7 +52,7 @@ def first_angle(given: Any) -> float:
 def write(tmp_path):
     def write(body: str, name: str = "mine.py") -> str:
         path = tmp_path / name
-        path.write_text("from activesteer import DriverCommand, SteerCommand\n\n" + textwrap.dedent(body))
+        path.write_text("from activesteer import DriverCommand, ActuatorCommand\n\n" + textwrap.dedent(body))
         return str(path)
 
     return write
@@ -67,7 +67,7 @@ def gains(write):
                 self.gain, self.side, self.limits = gain, side, limits
 
             def step(self, command, measurement):
-                return SteerCommand(0.001 * self.gain)
+                return ActuatorCommand(0.001 * self.gain)
         """
     )
 
@@ -246,7 +246,7 @@ def test_driver_on_a_path_is_given_the_path():
     ("expression", "said"),
     [
         ("None", r"step returned None; an activesteer\.DriverCommand is needed"),
-        ("SteerCommand()", r"an activesteer\.DriverCommand is needed"),
+        ("ActuatorCommand()", r"an activesteer\.DriverCommand is needed"),
         ("DriverCommand(float('nan'))", r"steering_wheel_demand_rad = nan; a finite angle"),
         ("DriverCommand(90.0)", r"steering_wheel_demand_rad = 90\.0; .*radians, not degrees"),
         ("DriverCommand(brake_pedal=1.5)", r"brake_pedal = 1\.5; a number from 0 to 1 is needed"),

@@ -12,7 +12,7 @@ from activesteer.conventions import CORNERS
 from activesteer.errors import SimulationDiverged
 from activesteer.recording import McapWriter, Recording
 from activesteer.scenario import resolve
-from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S, CONTROL_CHANNELS, POSE_INTERVAL_S, Recorder, channels_of
 from activesteer.simulation.runner import run_scenario
@@ -29,7 +29,7 @@ AT_EACH_WHEEL = """
     tyre_fx_N tyre_fy_N tyre_fz_N tyre_mz_Nm slip_ratio slip_angle_rad inclination_rad wheel_speed_radps travel_m
 """
 COMMAND = DriverCommand(0.3, 150.0, 0.25, saturated=True, front_steer_demand_rad=0.02)
-STEER = SteerCommand(-0.01, 0.003, 0.2, 0.004, -0.014, True)
+STEER = ActuatorCommand(-0.01, 0.003, 0.2, 0.004, -0.014, True)
 
 
 def simulation(controller: str = "ars", timestep_s: float = 0.001) -> ClosedLoop:

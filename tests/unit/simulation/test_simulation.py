@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer import DriverCommand, Recording, Simulation, SteerCommand
+from activesteer import ActuatorCommand, DriverCommand, Recording, Simulation
 from activesteer.errors import (
     ActiveSteerError,
     ControllerError,
@@ -54,7 +54,7 @@ def test_however_it_is_stepped_it_is_the_run_of_simulate(maneuver: str, controll
     assert_same(chunks.recording(), whole)
     restored.advance(777)
     state = restored.save_state()
-    restored.advance(400, DriverCommand(-1.0), SteerCommand(0.02))
+    restored.advance(400, DriverCommand(-1.0), ActuatorCommand(0.02))
     restored.restore_state(state)
     assert restored.time_s == pytest.approx(0.777)
     restored.advance(11)
@@ -80,11 +80,11 @@ def test_every_branch_keeps_its_own_rows() -> None:
     simulation = made()
     simulation.advance(600)
     early = simulation.save_state()
-    simulation.advance(300, steer_command=SteerCommand(0.01))
+    simulation.advance(300, actuator_command=ActuatorCommand(0.01))
     left = simulation.save_state()
     left_so_far = simulation.recording()
     simulation.restore_state(early)
-    simulation.advance(300, steer_command=SteerCommand(-0.01))
+    simulation.advance(300, actuator_command=ActuatorCommand(-0.01))
     right_so_far = simulation.recording()
     simulation.advance(100)
     simulation.restore_state(left)
@@ -112,7 +112,7 @@ def test_two_simulations_go_on_from_one_state_without_disturbing_each_other() ->
     state = one.save_state()
     other.restore_state(state)
     one.advance(200)
-    other.advance(200, steer_command=SteerCommand(0.01))
+    other.advance(200, actuator_command=ActuatorCommand(0.01))
     again = made()
     again.restore_state(pickle.loads(pickle.dumps(state)))
     again.advance(200)
@@ -191,11 +191,11 @@ def test_steps_are_a_whole_number(steps: Any) -> None:
         ({"driver_command": DriverCommand(float("nan"))}, DriverError, "given steering_wheel_demand_rad = nan"),
         ({"driver_command": DriverCommand(brake_pedal=1.5)}, DriverError, "given brake_pedal = 1.5"),
         ({"driver_command": DriverCommand(front_steer_demand_rad=1.0)}, DriverError, "given front_steer_demand_rad"),
-        ({"driver_command": SteerCommand()}, DriverError, "DriverCommand is needed"),
+        ({"driver_command": ActuatorCommand()}, DriverError, "DriverCommand is needed"),
         ({"driver_command": 0.1}, DriverError, "given 0.1; an activesteer.DriverCommand"),
-        ({"steer_command": SteerCommand(3.0)}, ControllerError, "given rear_steer_demand_rad = 3.0; .*degrees"),
-        ({"steer_command": SteerCommand("left")}, ControllerError, "a number is needed"),  # pyright: ignore[reportArgumentType]
-        ({"steer_command": [0.1]}, ControllerError, "SteerCommand is needed"),
+        ({"actuator_command": ActuatorCommand(3.0)}, ControllerError, "given rear_steer_demand_rad = 3.0; .*degrees"),
+        ({"actuator_command": ActuatorCommand("left")}, ControllerError, "a number is needed"),  # pyright: ignore[reportArgumentType]
+        ({"actuator_command": [0.1]}, ControllerError, "ActuatorCommand is needed"),
     ],
 )
 def test_a_wrong_command_is_refused_before_anything_is_driven(commands: Any, error: Any, message: str) -> None:
@@ -213,7 +213,7 @@ def test_commands_from_outside_are_carried_out_and_put_on_record() -> None:
     simulation = made(controller="none")
     simulation.advance(200)
     simulation.advance(10, DriverCommand(0.4, 100.0, 0.1))
-    simulation.step(steer_command=SteerCommand(0.01))
+    simulation.step(actuator_command=ActuatorCommand(0.01))
     recording = simulation.recording()
     ratio = simulation.loop.driver_setup.steering_ratio
     assert recording["front_steer_demand_rad"][200:210] == pytest.approx(0.4 / ratio)
@@ -240,11 +240,11 @@ class _Breaks:
     def __init__(self) -> None:
         self.steps = 0
 
-    def step(self, command: Any, measurement: Any) -> SteerCommand:
+    def step(self, command: Any, measurement: Any) -> ActuatorCommand:
         self.steps += 1
         if measurement.time_s > 0.2995:
             raise ValueError("broken")
-        return SteerCommand()
+        return ActuatorCommand()
 
 
 def test_a_failed_run_keeps_its_rows_and_goes_on_from_a_saved_state_only() -> None:
@@ -261,7 +261,7 @@ def test_a_failed_run_keeps_its_rows_and_goes_on_from_a_saved_state_only() -> No
     assert recording.metadata["complete"] is False
     assert "broken" in recording.metadata["error"]
     simulation.restore_state(state)
-    simulation.advance(1600, steer_command=SteerCommand())
+    simulation.advance(1600, actuator_command=ActuatorCommand())
     assert simulation.recording().metadata["complete"] is True
 
 
@@ -279,7 +279,7 @@ def test_an_interrupted_chunk_is_not_gone_on_with(monkeypatch: pytest.MonkeyPatc
 
 def test_a_recorded_value_that_is_not_finite_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
     simulation = made()
-    simulation.step(steer_command=SteerCommand(correction_rad=float("nan")))
+    simulation.step(actuator_command=ActuatorCommand(correction_rad=float("nan")))
     with pytest.raises(SimulationDiverged, match=r"correction_rad is nan at 0\.000 s"):
         simulation.recording()
     assert simulation.recording().metadata["error"].startswith("SimulationDiverged: correction_rad")

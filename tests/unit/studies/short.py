@@ -15,7 +15,7 @@ import os
 import signal
 from pathlib import Path
 
-from activesteer import SteerCommand
+from activesteer import ActuatorCommand
 
 
 class Kills:
@@ -32,7 +32,7 @@ class Kills:
         return cls(setup.mu)
 
     def step(self, command, measurement):
-        return SteerCommand(0.0, 0.0)
+        return ActuatorCommand(0.0, 0.0)
 
 
 class Fails(Kills):
@@ -44,7 +44,7 @@ class Fails(Kills):
     def step(self, command, measurement):
         if self.fails and measurement.steering_wheel_rad > 0.1:
             raise RuntimeError("on purpose")
-        return SteerCommand(0.0, 0.0)
+        return ActuatorCommand(0.0, 0.0)
 '''
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.conventions import CORNERS
-from activesteer.signals import DriverCommand, SteerCommand, WheelTorques
+from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.powertrain import Drive
 from tests.unit.vehicle.cars import activation, actuator, dof, floating, standing, step
@@ -89,7 +89,7 @@ def test_rear_hinges_stop_at_three_degrees(name: str, side: float) -> None:
 def test_the_commands_reach_their_actuators() -> None:
     vehicle = standing()
     ratio = vehicle.parameters.steering.ratio
-    vehicle.step(DriverCommand(0.3, 800.0, 0.25), SteerCommand(0.01, 0.02))
+    vehicle.step(DriverCommand(0.3, 800.0, 0.25), ActuatorCommand(0.01, 0.02))
     ctrl = vehicle.data.ctrl
     brakes = vehicle.parameters.brakes
     assert ctrl[actuator(vehicle, "steering_wheel")] == 0.3
@@ -98,6 +98,28 @@ def test_the_commands_reach_their_actuators() -> None:
     assert sum(ctrl[actuator(vehicle, f"{corner}_drive")] for corner in CORNERS) == pytest.approx(800.0)
     assert ctrl[actuator(vehicle, "fl_brake")] == pytest.approx(0.25 * brakes.front_torque_Nm)
     assert ctrl[actuator(vehicle, "rr_brake")] == pytest.approx(0.25 * brakes.rear_torque_Nm)
+
+
+def test_what_a_controller_asks_of_brakes_and_drive_comes_on_top_of_the_driver() -> None:
+    vehicle = standing()
+    rows = vehicle.raw_rows(1)
+    asked = ActuatorCommand(brake_torque_demand_Nm=(300.0, 0.0, -50.0, 20.0), drive_torque_change_Nm=-200.0)
+    vehicle.step(DriverCommand(0.0, 800.0, 0.25), asked, rows.sensordata.ctypes.data)
+    front_Nm, rear_Nm = (0.25 * torque for torque in (vehicle.parameters.brakes.front_torque_Nm, 700.0))
+    brakes = [vehicle.data.ctrl[actuator(vehicle, f"{corner}_brake")] for corner in CORNERS]
+    assert brakes == [front_Nm + 300.0, front_Nm, rear_Nm - 50.0, rear_Nm + 20.0]
+    assert vehicle.data.ctrl[actuator(vehicle, "fl_drive")] == pytest.approx(0.5 * 600.0)
+    values = np.empty((1, len(vehicle.channels.channels)))
+    vehicle.channels.evaluate(rows, values)
+    recorded = dict(zip((channel.name for channel in vehicle.channels.channels), values[0], strict=True))
+    assert [recorded[f"{corner}_brake_torque_demand_Nm"] for corner in CORNERS] == [300.0, 0.0, -50.0, 20.0]
+    assert recorded["drive_torque_change_Nm"] == -200.0
+
+
+def test_a_controller_does_not_drive_while_the_clutch_is_open() -> None:
+    vehicle = standing()
+    vehicle.step(DriverCommand(gear=0), ActuatorCommand(drive_torque_change_Nm=500.0))
+    assert [vehicle.data.ctrl[actuator(vehicle, f"{corner}_drive")] for corner in CORNERS] == [0.0] * 4
 
 
 def push(vehicle: Vehicle, corner: str, torque_Nm: float, steps: int) -> float:
@@ -177,7 +199,7 @@ def test_drive_torque_reacts_on_the_chassis(corner: str) -> None:
     vehicle = floating()
     torques = WheelTorques(tuple(100.0 * (each == corner) for each in CORNERS), (0.0,) * 4)  # type: ignore[arg-type]
     before = vehicle.data.qpos.copy()
-    vehicle.step(DriverCommand(wheel_torques=torques), SteerCommand())
+    vehicle.step(DriverCommand(wheel_torques=torques), ActuatorCommand())
     vehicle.data.qpos[:], vehicle.data.qvel[:] = before, 0.0
     force = generalised(vehicle, f"{corner}_drive")
     root = dof(vehicle, "root")
@@ -190,7 +212,7 @@ def test_drive_torque_reacts_on_the_chassis(corner: str) -> None:
 def test_drive_torque_lags_behind_its_demand() -> None:
     vehicle = floating()
     for _ in range(round(vehicle.parameters.powertrain.lag_s / vehicle.timestep_s)):
-        vehicle.step(DriverCommand(drive_torque_demand_Nm=200.0), SteerCommand())
+        vehicle.step(DriverCommand(drive_torque_demand_Nm=200.0), ActuatorCommand())
     assert activation(vehicle, "fl_drive") == pytest.approx(63.2, abs=0.1)
 
 
@@ -198,7 +220,7 @@ def test_open_clutch_takes_the_torque_away_at_once() -> None:
     vehicle = floating()
     for gear, torque_Nm in ((1, 86.5), (0, 0.0)):
         for _ in range(round(2.0 * vehicle.parameters.powertrain.lag_s / vehicle.timestep_s)):
-            vehicle.step(DriverCommand(drive_torque_demand_Nm=200.0, gear=gear), SteerCommand())
+            vehicle.step(DriverCommand(drive_torque_demand_Nm=200.0, gear=gear), ActuatorCommand())
         assert activation(vehicle, "fl_drive") == pytest.approx(torque_Nm, abs=0.1)
 
 
@@ -214,7 +236,7 @@ def test_the_drive_gives_what_the_engine_gives_at_the_mean_speed_of_its_wheels(s
             vehicle.data.qvel[:] = 0.0
             for corner, speed in zip(CORNERS, turning, strict=True):
                 vehicle.data.qvel[dof(vehicle, f"{corner}_spin")] = speed
-            vehicle.step(DriverCommand(drive_torque_demand_Nm=demand_Nm, gear=gear), SteerCommand())
+            vehicle.step(DriverCommand(drive_torque_demand_Nm=demand_Nm, gear=gear), ActuatorCommand())
         given = [float(vehicle.data.actuator_force[actuator(vehicle, f"{corner}_drive")]) for corner in CORNERS]
         low, high = Drive(engine).limits_Nm(speed_radps, gear)
         expected = high if demand_Nm > 0.0 else low
@@ -225,7 +247,7 @@ def test_the_drive_gives_what_the_engine_gives_at_the_mean_speed_of_its_wheels(s
 def test_torques_given_wheel_by_wheel_arrive_at_once_and_unlimited() -> None:
     vehicle = floating()
     torques = WheelTorques((9e3, -9e3, 8e3, 0.0), (0.0, 0.0, 0.0, 0.0))
-    vehicle.step(DriverCommand(wheel_torques=torques), SteerCommand())
+    vehicle.step(DriverCommand(wheel_torques=torques), ActuatorCommand())
     given = [vehicle.data.actuator_force[actuator(vehicle, f"{corner}_drive")] for corner in CORNERS]
     np.testing.assert_allclose(given, torques.drive_Nm, rtol=1e-12)
 
@@ -240,7 +262,7 @@ def test_engine_turns_with_the_wheels_that_it_drives_while_the_clutch_is_closed(
         for torque_Nm in (0.0, 10.0):
             vehicle.restore_state(rest)
             data.qfrc_applied[spin] = torque_Nm
-            vehicle.step(DriverCommand(gear=gear), SteerCommand())
+            vehicle.step(DriverCommand(gear=gear), ActuatorCommand())
             faster.append(float(data.qacc[spin]))
         return 10.0 / (faster[1] - faster[0])
 

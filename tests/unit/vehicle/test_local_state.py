@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.scenario import resolve
-from activesteer.signals import DriverCommand, SteerCommand
+from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.vehicle.local_state import LocalState
 
@@ -22,7 +22,7 @@ def local() -> LocalState:
 
 
 def step(local: LocalState) -> None:
-    local.vehicle.step(DriverCommand(0.02, 100.0), SteerCommand(0.001, 0.0))
+    local.vehicle.step(DriverCommand(0.02, 100.0), ActuatorCommand(0.001, 0.0))
 
 
 def test_what_was_written_is_read(local, rng):

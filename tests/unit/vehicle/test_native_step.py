@@ -11,12 +11,12 @@ import pytest
 
 from activesteer.conventions import CORNERS
 from activesteer.errors import SimulationDiverged
-from activesteer.signals import DriverCommand, SteerCommand, WheelTorques
+from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.channels import RawRows
 from tests.unit.vehicle.cars import standing
 
-COMMAND, STEER = DriverCommand(0.4, 300.0, 0.0), SteerCommand(0.01, 0.02)
+COMMAND, STEER = DriverCommand(0.4, 300.0, 0.0), ActuatorCommand(0.01, 0.02)
 
 
 def _rolling() -> Vehicle:
