@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Final
 
-from activesteer.config import check_overruled, key_hint, key_paths, leaf_keys, to_table
+from activesteer.config import check_overruled, field_in_unit, key_hint, key_paths, leaf_keys, to_table
 from activesteer.controllers import ControllerSetup
 from activesteer.driver import DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, nearest_names
@@ -120,6 +120,34 @@ def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
     help_ = key_hint(kind, key) or key_hint(VehicleConfig, key) or nearest_names(key, known)
     problem = f"neither manoeuvre nor vehicle has such a key; {help_}"
     raise ParameterError(problem, key=key, allowed=known, overridden=True)
+
+
+def value_of(scenario: Scenario, key: str) -> Any:
+    """What a key of the manoeuvre or of the vehicle is in a scenario.
+
+    Args:
+        scenario: The scenario.
+        key: Dotted key, as for the overrides of `resolve`.
+
+    Returns:
+        The value; a number in the unit of the key.
+
+    Raises:
+        ParameterError: there is no such key, or there is nothing behind it.
+    """
+    part, path = _which_part(key, type(scenario.maneuver))
+    value: Any = scenario.maneuver if part == "maneuver" else scenario.car.config
+    factor = 1.0
+    for name in path:
+        if isinstance(value, tuple) and name.isdigit() and int(name) < len(value):
+            value = value[int(name)]
+            continue
+        names = [field.name for field in fields(value)] if is_dataclass(value) else []
+        field_name, factor = field_in_unit(name, names)
+        if field_name is None:
+            raise ParameterError(f"there is nothing behind {name}", key=key)
+        value = getattr(value, field_name)
+    return value / factor if factor != 1.0 else value
 
 
 def describe(scenario: Scenario) -> dict[str, Any]:

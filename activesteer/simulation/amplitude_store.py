@@ -12,6 +12,7 @@ import hashlib
 import math
 import os
 import secrets
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -23,6 +24,7 @@ MAX_KEPT: Final = 1000
 _MAX_BYTES: Final = 200
 _SUFFIX: Final = ".amplitude"
 _in_process: dict[str, float] = {}
+_writes = True
 
 
 def folder() -> Path:
@@ -66,6 +68,8 @@ def keep(key: str, value: float) -> None:
         value: The number.
     """
     _remember(key, value)
+    if not _writes:
+        return
     with contextlib.suppress(OSError, RuntimeError):
         place = folder()
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -80,6 +84,17 @@ def keep(key: str, value: float) -> None:
         for file in kept[:-MAX_KEPT]:
             with contextlib.suppress(OSError):
                 file.unlink()
+
+
+@contextlib.contextmanager
+def not_on_disk() -> Iterator[None]:
+    """Numbers that are found inside stay in the process: the thousand cars of a study are not met again."""
+    global _writes  # noqa: PLW0603 - of the process, as the numbers are
+    before, _writes = _writes, False
+    try:
+        yield
+    finally:
+        _writes = before
 
 
 def _remember(key: str, value: float) -> None:

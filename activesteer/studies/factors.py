@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -17,6 +17,10 @@ from activesteer.errors import nearest_names, shown
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
 """The one of these keys that a factor's table must have."""
 _OPTIONS: Final = {"choice": ("weights",), "normal": ("truncate",)}
+_ANYWHERE: Final = ("nominal", "maneuvers")
+"""Keys that may stand beside any of them."""
+NOMINAL: Final = ("times", "plus")
+"""How a factor may be relative to what the files say."""
 _DEFAULT_TRUNCATION: Final = 3.0
 """Where a normal distribution is cut off by itself, in standard deviations."""
 
@@ -37,6 +41,8 @@ class Factor:
         high: Upper end of a range.
         mean: Of a normal distribution before it is truncated.
         deviation: Standard deviation of that.
+        nominal: One of `NOMINAL` where the values are factors on what the files say, or are added to it; else empty.
+        maneuvers: Names of the manoeuvres in which it is varied; all where empty.
     """
 
     key: str
@@ -47,6 +53,8 @@ class Factor:
     high: float = 0.0
     mean: float = 0.0
     deviation: float = 0.0
+    nominal: str = ""
+    maneuvers: tuple[str, ...] = ()
 
     def from_unit(self, unit: NDArray[np.float64]) -> list[Value]:
         """Values at cumulative probabilities: what turns a sample of the unit cube into one of the study.
@@ -78,12 +86,16 @@ class Factor:
 
     def to_table(self) -> dict[str, Any]:
         """The table that `read_factor` takes."""
-        if self.values:
-            table: dict[str, Any] = {self.kind: list(self.values)}
-            return table | ({"weights": list(self.weights)} if self.weights else {})
+        table: dict[str, Any] = {self.kind: list(self.values) or [self.low, self.high]}
+        if self.weights:
+            table["weights"] = list(self.weights)
         if self.kind == "normal":
-            return {"normal": [self.mean, self.deviation], "truncate": [self.low, self.high]}
-        return {self.kind: [self.low, self.high]}
+            table |= {"normal": [self.mean, self.deviation], "truncate": [self.low, self.high]}
+        if self.nominal:
+            table["nominal"] = self.nominal
+        if self.maneuvers:
+            table["maneuvers"] = list(self.maneuvers)
+        return table
 
 
 def read_factor(key: str, table: object, source: Source) -> Factor:
@@ -93,7 +105,9 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
         key: The key that is varied.
         table: `{ grid = [70, 80] }`, `{ choice = ["a", "b"], weights = [1, 2] }`, `{ uniform = [low, high] }`,
             `{ log_uniform = [low, high] }` or `{ normal = [mean, deviation], truncate = [low, high] }`; a normal
-            distribution is cut off at three standard deviations where no bounds are given.
+            distribution is cut off at three standard deviations where no bounds are given. With `nominal = "times"`
+            the values are factors on what the files say, with `nominal = "plus"` they are added to it; with
+            `maneuvers = ["slalom"]` the key is varied in these only.
         source: For error messages.
 
     Returns:
@@ -114,9 +128,21 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
         raise source.fail(where, f"exactly one of {_listed()} is needed{hint}")
     kind = kinds[0]
     for name in table:
-        if name != kind and name not in _OPTIONS.get(kind, ()):
-            allowed = ", ".join(_OPTIONS.get(kind, ())) or "nothing else"
-            raise source.fail((*where, name), f"does not belong to {kind}; beside it may stand: {allowed}")
+        allowed = (*_OPTIONS.get(kind, ()), *_ANYWHERE)
+        if name != kind and name not in allowed:
+            raise source.fail((*where, name), f"does not belong to {kind}; beside it may stand: {', '.join(allowed)}")
+    nominal = table.get("nominal", "")
+    if "nominal" in table and nominal not in NOMINAL:
+        raise source.fail((*where, "nominal"), f"{shown(nominal)} is none of {', '.join(NOMINAL)}")
+    maneuvers = table.get("maneuvers", [])
+    if not isinstance(maneuvers, Sequence) or isinstance(maneuvers, str) or ("maneuvers" in table and not maneuvers):
+        raise source.fail((*where, "maneuvers"), f"{shown(maneuvers)} is no list of names")
+    return replace(_read(key, kind, table, source), nominal=nominal, maneuvers=tuple(map(str, maneuvers)))
+
+
+def _read(key: str, kind: str, table: Mapping[str, Any], source: Source) -> Factor:
+    """The factor of a table whose keys belong together, as far as its values go."""
+    where = ("factors", key)
     given = table[kind]
     if kind in ("grid", "choice"):
         return _listed_values(key, kind, given, table.get("weights"), source)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -10,9 +11,11 @@ import numpy as np
 
 from activesteer.analysis.claims import SYSTEMS
 from activesteer.controllers import load_controller
-from activesteer.errors import ActiveSteerError
-from activesteer.scenario import FileOrTable, Scenario, describe, resolve
+from activesteer.errors import ActiveSteerError, nearest_names, shown
+from activesteer.scenario import Scenario, describe, resolve
+from activesteer.simulation.recorder import channels_of
 from activesteer.studies.design import Samples
+from activesteer.studies.factor_values import FactorValues, label_of
 from activesteer.studies.run_identity import digest
 from activesteer.studies.run_task import Request, Settings, present_inputs
 from activesteer.studies.study_file import StudyFile
@@ -44,6 +47,7 @@ class Plan:
         """
         self.study = study
         self.samples = study.samples()
+        self._values = FactorValues(study)
         labelled = {
             "maneuvers": _labelled(study, "maneuvers", study.maneuvers),
             "vehicles": _labelled(study, "vehicles", study.vehicles),
@@ -58,9 +62,10 @@ class Plan:
             recordings=study.recordings,
             folder=None if study.recordings == "none" else folder,
             claims=study.claims,
+            curves=study.curves,
             expected={},
         )
-        _check(study, self.samples)
+        _check(study, self.samples, self._values)
         self.settings.expected.update(present_inputs(self.settings))
         table = {key: value for key, value in study.to_table().items() if key not in (*labelled, "title", "tune")}
         table["design"] = [samples.columns for samples in self.samples]
@@ -79,7 +84,19 @@ class Plan:
         place, sample = divmod(place, len(self.samples[0]))
         maneuver, vehicle = divmod(place, len(shared.vehicles))
         samples = self.samples[controller if len(self.samples) > 1 else 0]
-        return Request(run, sample, maneuver, vehicle, controller, samples[sample])
+        return self.request_with(run, sample, (maneuver, vehicle, controller), samples[sample])
+
+    def request_with(self, run: int, sample: int, place: tuple[int, int, int], factors: dict[str, Any]) -> Request:
+        """A run with values of its own.
+
+        Args:
+            run: Its number.
+            sample: Number of the values.
+            place: Numbers of manoeuvre, vehicle and controller.
+            factors: The values.
+        """
+        overrides = self.study.overrides | self._values.overrides(*place[:2], factors)
+        return Request(run, sample, *place, factors, overrides)
 
     def requests(self, runs: Iterable[int]) -> list[Request]:
         """Several runs by their numbers."""
@@ -95,35 +112,26 @@ def _labelled(study: StudyFile, key: str, items: Sequence[Any]) -> tuple[tuple[s
     return tuple(zip(labels, items, strict=True))
 
 
-def label_of(item: FileOrTable) -> str:
-    """The name that a manoeuvre, vehicle or controller has in the result."""
-    if isinstance(item, Mapping):
-        return str(item.get("name") or "table")
-    path, colon, class_name = str(item).rpartition(":")
-    if colon:
-        return f"{Path(path).name}:{class_name}"
-    return Path(item).stem if str(item).endswith(".toml") else str(item)
-
-
-def _check(study: StudyFile, samples: Sequence[Samples]) -> None:
+def _check(study: StudyFile, samples: Sequence[Samples], factor_values: FactorValues) -> None:
     """Every key exists in every manoeuvre and vehicle, allows its extreme values, and changes something."""
     if study.claims and not set(SYSTEMS) <= set(study.controllers):
         raise study.source.fail(("claims",), f"needs the controllers {', '.join(SYSTEMS)}")
     first = samples[0][0] if len(samples[0]) else {}
     effective: set[str] = set()
-    for maneuver in study.maneuvers:
-        for vehicle in study.vehicles:
-            base = _resolved(study, maneuver, vehicle, {**study.overrides, **first})
-            for controller in study.controllers:
-                load_controller(controller, base.controller_setup(study.timestep_s))
-            for key, values in _extremes(study, samples).items():
-                described = [
-                    _leaves(_resolved(study, maneuver, vehicle, _with(key, value, {**study.overrides, **first}), key))
-                    for value in values
-                ]
-                changed = {leaf for other in described for leaf in _differing(described[0], other)}
-                if len(values) == 1 or any(_is_read(leaf, base, study.controllers) for leaf in changed):
+    for place in itertools.product(range(len(study.maneuvers)), range(len(study.vehicles))):
+        base = _resolved(factor_values, place, first)
+        for controller in study.controllers:
+            load_controller(controller, base.controller_setup(study.timestep_s))
+        _check_curves(study, base)
+        for key, values in _extremes(study, samples).items():
+            if len(values) == 1:
+                if key in factor_values.overrides(*place, {key: values[0]}):
                     effective.add(key)
+                continue
+            described = [_leaves(_resolved(factor_values, place, {**first, key: value}, key)) for value in values]
+            changed = {leaf for other in described for leaf in _differing(described[0], other)}
+            if any(_is_read(leaf, base, study.controllers) for leaf in changed):
+                effective.add(key)
     for key in study.keys:
         if key not in effective:
             place = ("design", "cases", key) if study.case_list else ("factors", key)
@@ -131,18 +139,27 @@ def _check(study: StudyFile, samples: Sequence[Samples]) -> None:
 
 
 def _resolved(
-    study: StudyFile, maneuver: FileOrTable, vehicle: FileOrTable, overrides: Mapping[str, Any], key: str = ""
+    factor_values: FactorValues, place: tuple[int, int], sample: Mapping[str, Any], key: str = ""
 ) -> Scenario:
+    study, (maneuver, vehicle) = factor_values.study, place
+    items = study.maneuvers[maneuver], study.vehicles[vehicle]
     try:
-        return resolve(maneuver, vehicle, overrides)
+        return resolve(*items, study.overrides | factor_values.overrides(*place, sample))
     except ActiveSteerError as error:
-        error.add_note(f"in {label_of(maneuver)} with {label_of(vehicle)}" + (f", factor {key}" if key else ""))
+        error.add_note(f"in {label_of(items[0])} with {label_of(items[1])}" + (f", factor {key}" if key else ""))
         raise
 
 
-def _with(key: str, value: Any, overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """The overrides with one of them replaced, in their order; left out where it is None."""
-    return {other: given for other, given in {**overrides, key: value}.items() if given is not None}
+def _check_curves(study: StudyFile, scenario: Scenario) -> None:
+    """Every channel of which curves are kept is recorded."""
+    if not study.curves:
+        return
+    known = [channel.name for channel in channels_of(scenario.car.on(scenario.maneuver.road))]
+    for name in study.curves:
+        if name not in known:
+            raise study.source.fail(
+                ("curves",), f"there is no channel {shown(name)}; {nearest_names(name, known)}", name
+            )
 
 
 def _extremes(study: StudyFile, samples: Sequence[Samples]) -> dict[str, list[Any]]:

@@ -19,7 +19,8 @@ from activesteer.files import write_text
 from activesteer.pages import render
 from activesteer.quantities import metric_label
 from activesteer.studies.column_units import unit_of
-from activesteer.studies.plan import label_of
+from activesteer.studies.factor_values import FactorValues, label_of
+from activesteer.studies.run_task import CURVE
 from activesteer.studies.sensitivity import MAX_SAMPLES, indices
 from activesteer.studies.store import IDENTITY, OUTCOME, Store
 from activesteer.studies.study_file import StudyFile, read_study
@@ -67,7 +68,8 @@ def write_report(folder: str | os.PathLike[str]) -> Path:
 
 def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
     """Everything that the page draws, as JSON values in the units that are shown."""
-    metrics = [name for name in table.column_names if name not in (*IDENTITY, *OUTCOME, *study.keys)]
+    others = (*IDENTITY, *OUTCOME, *study.keys)
+    metrics = [name for name in table.column_names if name not in others and not name.startswith(CURVE)]
     values = {name: table[name].to_numpy(zero_copy_only=False).astype(np.float64) for name in metrics}
     values = {name: column * metric_label(name)[2] for name, column in values.items() if np.isfinite(column).any()}
     who = {name: _codes(table[name]) for name in ("maneuver", "vehicle", "controller")}
@@ -133,6 +135,7 @@ def _of_group(
         np.intersect1d(samples[rows[0]], samples[each], assume_unique=True, return_indices=True)[1:]
         for each in (rows[1:] if study.design.paired else ())
     ]
+    factor_values = FactorValues(study)
     found = {}
     for name, column in values.items():
         parts = [column[each] for each in rows]
@@ -145,7 +148,7 @@ def _of_group(
             "paired": _paired(pairs, parts),
             "heat": _heat(study, table, rows, parts),
             "indices": _indices(study, points, parts) if indexed else [],
-            "extremes": [_extremes(study, driven, each, part) for each, part in zip(rows, parts, strict=True)],
+            "extremes": [_extremes(factor_values, driven, each, part) for each, part in zip(rows, parts, strict=True)],
         }
     return found
 
@@ -210,7 +213,7 @@ def _indices(study: StudyFile, points: Sequence[Mapping[str, Any]], parts: Seque
     return found if any(found) else []
 
 
-def _extremes(study: StudyFile, table: pa.Table, rows: Places, part: Array) -> list[list[Any]]:
+def _extremes(values: FactorValues, table: pa.Table, rows: Places, part: Array) -> list[list[Any]]:
     """The runs with the largest and the smallest magnitudes: run, value, and the line that drives it again."""
     good = np.flatnonzero(np.isfinite(part))
     if len(good) > 2 * _EXTREMES:
@@ -218,19 +221,23 @@ def _extremes(study: StudyFile, table: pa.Table, rows: Places, part: Array) -> l
         good = np.concatenate([good[:_EXTREMES], good[-_EXTREMES:]])
     chosen = good[np.argsort(-np.abs(part[good]), kind="stable")]
     return [
-        [row["run"], float(f"{part[place]:.5g}"), _command(study, row)]
+        [row["run"], float(f"{part[place]:.5g}"), _command(values, row)]
         for place, row in zip(chosen, table.take(pa.array(rows[chosen])).to_pylist(), strict=True)
     ]
 
 
-def _command(study: StudyFile, row: Mapping[str, Any]) -> str:
+def _command(factor_values: FactorValues, row: Mapping[str, Any]) -> str:
     """The command line that drives a run again and replays it; empty where its manoeuvre or vehicle has no file."""
+    study = factor_values.study
     given = {}
+    place = {}
     for part, items in (("maneuver", study.maneuvers), ("vehicle", study.vehicles), ("controller", study.controllers)):
-        given[part] = next((item for item in items if label_of(item) == row[part]), None)
+        place[part] = [label_of(item) for item in items].index(row[part])
+        given[part] = items[place[part]]
     if not all(isinstance(item, str) for item in given.values()):
         return ""
-    values = {**study.overrides, **{key: row[key] for key in study.keys if row[key] is not None}}
+    sample = {key: row[key] for key in study.keys}
+    values = study.overrides | factor_values.overrides(place["maneuver"], place["vehicle"], sample)
     words = ["activesteer", "run", given["maneuver"], "-c", given["controller"], "--vehicle", given["vehicle"]]
     for key, value in values.items():
         words += ["--set", f"{key}={value if isinstance(value, str) else json.dumps(value)}"]

@@ -12,11 +12,14 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from activesteer.analysis.claims import SCENARIOS
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import make_folder, writing
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.simulation import amplitude_store
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.run_identity import controller_digest, deciding_versions, digest, files_digest, run_id
@@ -24,6 +27,10 @@ from activesteer.vehicle.native_forces import install_native_forces
 
 _ERROR_CHARACTERS: Final = 500
 """What a row keeps of an error's text."""
+CURVE: Final = "curve_"
+"""What the name of a column begins with that holds a channel over time."""
+CURVE_STEP_S: Final = 0.02
+"""Time between two values of such a column [s]: enough for a picture."""
 _engine = threading.Lock()
 """The engine's callbacks belong to the process: of a worker's threads, one drives at a time."""
 
@@ -55,6 +62,7 @@ class Settings:
         recordings: `none`, `failed`, `all`, or n for every n-th sample.
         folder: Where recordings go.
         claims: Whether the paper's claims are checked for every sample.
+        curves: Channels that are kept of every run.
         expected: Hash of the files of each pair of manoeuvre and vehicle, of each controller, and the versions, as the
             study began with them.
     """
@@ -69,6 +77,7 @@ class Settings:
     recordings: str | int
     folder: Path | None
     claims: bool
+    curves: tuple[str, ...]
     expected: dict[str, str]
 
 
@@ -82,6 +91,7 @@ class Request(NamedTuple):
         vehicle: Number of the vehicle.
         controller: Number of the controller.
         factors: Values of the factors.
+        overrides: What they, and what is the same in all runs, are here.
     """
 
     run: int
@@ -90,6 +100,7 @@ class Request(NamedTuple):
     vehicle: int
     controller: int
     factors: dict[str, Any]
+    overrides: dict[str, Any]
 
 
 Row = dict[str, Any]
@@ -161,14 +172,14 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
     """The runs of one sample: the same car on the same road with one controller after the other."""
     first = requests[0]
     maneuver, vehicle = settings.maneuvers[first.maneuver], settings.vehicles[first.vehicle]
-    overrides = {**settings.overrides, **first.factors}
     try:
-        scenario = resolve(maneuver[1], vehicle[1], overrides)
+        scenario = resolve(maneuver[1], vehicle[1], first.overrides)
         if not any(isinstance(value, str) for value in first.factors.values()):
             key = f"files of {maneuver[0]} and {vehicle[0]}"
             if files_digest(scenario) != settings.expected[key]:
                 raise StudyError(f"{key}: changed while the study ran")
-        ready = prepared(scenario, settings.timestep_s)
+        with amplitude_store.not_on_disk():
+            ready = prepared(scenario, settings.timestep_s)
     except ActiveSteerError as error:
         return [failed_row(settings, request, Status.FAILED, _told(error)) for request in requests]
     rows = []
@@ -208,6 +219,8 @@ def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, 
         return None
     row["status"] = Status.OK.value
     row.update((name, float(value)) for name, value in recording.metrics.items() if _is_kept(settings.metrics, name))
+    every_steps = max(1, round(CURVE_STEP_S / settings.timestep_s))
+    row.update((f"{CURVE}{name}", np.float32(recording[name][::every_steps])) for name in settings.curves)
     return recording
 
 

@@ -26,7 +26,7 @@ from activesteer.errors import StudyError
 from activesteer.files import make_folder, reading, replacing, write_text
 from activesteer.studies.column_units import unit_of
 from activesteer.studies.run_identity import versions
-from activesteer.studies.run_task import Row
+from activesteer.studies.run_task import CURVE, Row
 
 try:
     import fcntl
@@ -194,6 +194,8 @@ class Store:
                 columns[name] = pa.array(values, _TYPES[name])
             elif name in self._factors:
                 columns[name] = _factor_column(values)
+            elif name.startswith(CURVE):
+                columns[name] = pa.array(values, pa.list_(pa.float32()))
             else:
                 columns[name] = pa.array(values, pa.float64(), from_pandas=False)
         fields = [pa.field(name, column.type, metadata={"unit": unit_of(name)}) for name, column in columns.items()]

@@ -21,7 +21,7 @@ from activesteer.studies.factors import Factor, read_factor
 
 _KEYS: Final = (
     "title", "maneuvers", "controllers", "vehicles", "overrides", "factors", "design", "seed", "metrics", "recordings",
-    "claims", "timestep_s", "tune",
+    "curves", "claims", "timestep_s", "tune",
 )  # fmt: skip
 _KEPT: Final = ("none", "failed", "all")
 
@@ -41,6 +41,7 @@ class StudyFile:
         seed: Of the samples.
         metrics: Patterns of the metrics that are kept, as `yaw_rate_*`; all of them where empty.
         recordings: `none`, `failed`, `all`, or a number n: those of every n-th sample.
+        curves: Channels that are kept of every run, every `run_task.CURVE_STEP_S`.
         claims: Whether the paper's claims are checked for every sample; needs its three systems.
         timestep_s: Step of engine, driver and controller [s].
         tune: The table [tune], as it is; see `tuning`.
@@ -58,6 +59,7 @@ class StudyFile:
     seed: int = 0
     metrics: tuple[str, ...] = ()
     recordings: str | int = "none"
+    curves: tuple[str, ...] = ()
     claims: bool = False
     timestep_s: float = DEFAULT_TIMESTEP_S
     tune: dict[str, Any] | None = None
@@ -98,8 +100,9 @@ class StudyFile:
             design["cases"] = [self.case_list[number] for number in range(len(self.case_list))]
         else:
             table["factors"] = {factor.key: factor.to_table() for factor in self.factors}
-        if self.metrics:
-            table["metrics"] = list(self.metrics)
+        for key, names in (("metrics", self.metrics), ("curves", self.curves)):
+            if names:
+                table[key] = list(names)
         if self.tune is not None:
             table["tune"] = self.tune
         return table | {"design": design}
@@ -145,6 +148,7 @@ def read_study(given: FileOrTable | StudyFile) -> StudyFile:
         "vehicles": lambda value: tuple(_located(item, folder) for item in _items(value, (str, Mapping))),
         "controllers": lambda value: tuple(_located_controller(item, folder) for item in _items(value, (str,))),
         "metrics": lambda value: tuple(_items(value, (str,))),
+        "curves": lambda value: tuple(_items(value, (str,))),
         "overrides": lambda value: dict(_typed(value, Mapping, "a table")),
         "tune": lambda value: dict(_typed(value, Mapping, "a table")),
         "claims": lambda value: _typed(value, bool, "true or false"),

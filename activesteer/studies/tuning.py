@@ -14,9 +14,10 @@ from activesteer.config import Range, build
 from activesteer.errors import StudyError, nearest_names
 from activesteer.files import make_folder, write_text
 from activesteer.scenario import FileOrTable
+from activesteer.studies.factor_values import label_of
 from activesteer.studies.factors import Factor
-from activesteer.studies.plan import Plan, label_of
-from activesteer.studies.run_task import Request, Row, Settings, Status, drive, prepare_worker
+from activesteer.studies.plan import Plan
+from activesteer.studies.run_task import Request, Row, Status, drive, prepare_worker
 from activesteer.studies.study_file import StudyFile, read_study
 from activesteer.studies.workers import TaskQueue, workers_for
 
@@ -170,7 +171,7 @@ def tune(
             for _ in range(wanted - begun):
                 trial = made.ask()
                 values = {factor.key: _suggest(trial, factor) for factor in study.factors}
-                yield trial, drive, plan.settings, _requests(plan.settings, trial.number, values)
+                yield trial, drive, plan.settings, _requests(plan, trial.number, values)
 
         for place, (trial, rows, error) in enumerate(TaskQueue(workers).outcomes(tasks()), begun + 1):
             values, violation = (None, 0.0) if error is not None else _judged(table, rows)
@@ -227,14 +228,15 @@ def _suggest(trial: Any, factor: Factor) -> Any:
     return trial.suggest_float(factor.key, factor.low, factor.high, log=factor.kind == "log_uniform")
 
 
-def _requests(settings: Settings, number: int, values: dict[str, Any]) -> list[Request]:
+def _requests(plan: Plan, number: int, values: dict[str, Any]) -> list[Request]:
+    settings = plan.settings
     places = [
         (maneuver, vehicle, controller)
         for maneuver in range(len(settings.maneuvers))
         for vehicle in range(len(settings.vehicles))
         for controller in range(len(settings.controllers))
     ]
-    return [Request(run, number, *place, values) for run, place in enumerate(places)]
+    return [plan.request_with(run, number, place, values) for run, place in enumerate(places)]
 
 
 def _judged(table: TuneTable, rows: Sequence[Row]) -> tuple[list[float] | None, float]:

@@ -50,11 +50,14 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
         )
     mass = scale * float(body.mass[0])
     # The whole empty car's moves by what is asked for; only the chassis is moved.
-    cg = body.ipos + np.array([0.0, 0.0, load.cg_height_change_m * factors.mass * before.mass_kg / mass])
+    move_m = np.array([load.cg_forward_change_m, 0.0, load.cg_height_change_m])
+    cg = body.ipos + move_m * factors.mass * before.mass_kg / mass
     axes = np.empty(9)
     mujoco.mju_quat2Mat(axes, body.iquat)
     axes = axes.reshape(3, 3)
     inertia = scale * axes @ np.diag(body.inertia) @ axes.T
+    spread = (factors.yaw_inertia - 1.0) * factors.mass * before.inertia_kgm2[2, 2]
+    inertia += np.diag([0.0, spread, spread])
     points = [*_points(bare, load), (mass, cg)]
     total = sum(weight for weight, _ in points)
     middle = sum(weight * place for weight, place in points) / total

@@ -20,7 +20,8 @@ _MASS_HINT: Final = (
     "believe of it"
 )
 _GRAVITY_HINT: Final = (
-    "load.cg_height_change_m moves the empty car's centre of gravity up, load.payload_position_m places the payload"
+    "load.cg_height_change_m and cg_forward_change_m move the empty car's centre of gravity, load.payload_position_m "
+    "places the payload"
 )
 _MASS_HINTS: Final = {
     **dict.fromkeys(("mass", "mass_kg", "mass_factor", "curb_mass_kg", "weight", "weight_kg", "weight_N"), _MASS_HINT),
@@ -187,6 +188,8 @@ class Load:
     """The tank, vehicle axes [m]; 0.4 m ahead of the rear axle, 0.35 m high, where not given."""
     cg_height_change_m: Annotated[float, Range(-0.3, 0.3)] = 0.0
     """The empty car's centre of gravity is moved up by this [m]; it is the chassis' that moves."""
+    cg_forward_change_m: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    """The same forward [m]."""
 
     def __post_init__(self) -> None:
         """Checks the positions.
@@ -208,6 +211,9 @@ class Factors:
 
     mass: Annotated[float, Range(0.5, 2.0)] = 1.0
     """On the mass of the empty car: the chassis takes all of the difference, its inertia in proportion to its mass."""
+    yaw_inertia: Annotated[float, Range(0.5, 2.0)] = 1.0
+    """On the yaw inertia of the empty car, as if masses of the chassis were moved along it, so that its pitch inertia
+    changes by the same amount."""
     spring_rate: Annotated[float, Range(0.2, 5.0)] = 1.0
     """On the rates of the springs; what they carry in the design position stays, and so does the ride height."""
     anti_roll_bar: Annotated[float, Range(0.0, 10.0)] = 1.0

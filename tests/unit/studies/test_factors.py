@@ -51,6 +51,7 @@ def test_a_factor_becomes_the_table_that_it_came_from():
     for table in (
         {"grid": [1, 2.5]}, {"choice": ["a", "b"], "weights": [1.0, 3.0]}, {"uniform": [0.0, 1.0]},
         {"normal": [1.0, 0.1], "truncate": [0.8, 1.2]},
+        {"uniform": [-0.1, 0.1], "nominal": "plus", "maneuvers": ["slalom"]},
     ):  # fmt: skip
         assert factor(**table).to_table() == table
 

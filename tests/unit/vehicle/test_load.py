@@ -94,6 +94,18 @@ def test_centre_of_gravity_moves_with_the_load_and_results_are_given_for_it() ->
     assert moved == pytest.approx(mass_properties(loaded.model).cg_m - mass_properties(empty.model).cg_m)
     higher = car({"load.cg_height_change_m": 0.05})
     assert higher.model.site("cg").pos - empty.model.site("cg").pos == pytest.approx([0.0, 0.0, 0.05])
+    further = car({"load.cg_forward_change_m": 0.05})
+    assert mass_properties(further.model).cg_m - mass_properties(empty.model).cg_m == pytest.approx([0.05, 0.0, 0.0])
+
+
+def test_yaw_inertia_grows_by_masses_that_move_along_the_car() -> None:
+    plain, spread = mass_properties(car().model), mass_properties(car({"factors.yaw_inertia": 1.1}).model)
+    more_kgm2 = 0.1 * plain.inertia_kgm2[2, 2]
+    np.testing.assert_allclose(
+        spread.inertia_kgm2 - plain.inertia_kgm2, np.diag([0.0, more_kgm2, more_kgm2]), atol=1e-6
+    )
+    assert spread.mass_kg == pytest.approx(plain.mass_kg)
+    assert spread.cg_m == pytest.approx(plain.cg_m)
 
 
 def test_inertia_of_the_loaded_car_is_that_of_its_parts() -> None:
