@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError, nearest_names
 from activesteer.signals import Channel
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.loading import find
+from activesteer.vehicle.native_channels import (
+    Actuator,
+    AxialForce,
+    axial_forces,
+    copy_columns,
+    record_of,
+    saturations,
+)
 from activesteer.vehicle.parameters import VehicleParameters
 
 _STANDSTILL_MPS: Final = 0.2
@@ -40,11 +49,18 @@ class RawRows(NamedTuple):
     """Brake torques that the controller asks for, order of `CORNERS`, and the change of the drive torque."""
 
 
+class Column(NamedTuple):
+    """A column of one of the arrays of `RawRows`, recorded as it is."""
+
+    array: str
+    column: int
+
+
 class Signal(NamedTuple):
-    """A channel and how to get it from raw rows."""
+    """A channel and how to get it from raw rows: by compiled code, or block by block."""
 
     channel: Channel
-    values: Callable[[RawRows], Array]
+    values: Column | AxialForce | Actuator | Callable[[RawRows], Array]
 
 
 class ChannelMap:
@@ -74,7 +90,14 @@ class ChannelMap:
             *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(), *self._asked(),
         ]  # fmt: skip
         self.channels = tuple(signal.channel for signal in signals)
-        self._values = tuple(signal.values for signal in signals)
+        wanted = [(place, signal.values) for place, signal in enumerate(signals)]
+        self._computed = [(place, values) for place, values in wanted if callable(values)]
+        self._forces, self._limits = _of_kind(AxialForce, wanted), _of_kind(Actuator, wanted)
+        self._copied = []
+        for array in RawRows._fields:
+            here = [(v.column, place) for place, v in wanted if isinstance(v, Column) and v.array == array]
+            if here:
+                self._copied.append((array, *np.array(here, np.intp).T.copy()))
 
     def evaluate(self, rows: RawRows, out: Array, last_yaw_rad: float = 0.0) -> None:
         """Values of all channels.
@@ -86,9 +109,17 @@ class ChannelMap:
         """
         # The last rows of a run that diverged are not finite; they are to be recorded, not complained about.
         with np.errstate(invalid="ignore", over="ignore"):
+            for array, columns, places in self._copied:
+                copy_columns(getattr(rows, array), columns, out, places)
+            laws, places = self._forces
+            axial_forces(rows.ten_length, rows.ten_velocity, laws, out, places)
+            laws, places = self._limits
+            saturations(rows.ctrl, rows.act, rows.actuator_force, laws, out, places)
+            # What follows works on whole columns, many times.
+            rows = rows._replace(sensordata=np.asfortranarray(rows.sensordata))
             self._frame = _Frame(rows, self._sensor, self._model.opt.gravity, last_yaw_rad)
-            for column, values in enumerate(self._values):
-                out[:, column] = values(rows)
+            for place, values in self._computed:
+                out[:, place] = values(rows)
 
     def _sensor(self, name: str) -> slice:
         index = self._sensors.get(name)
@@ -137,11 +168,11 @@ class ChannelMap:
         return [
             Signal(
                 channel("steering_wheel_rad", "rad", "steering wheel angle, left positive, not wrapped"),
-                lambda rows: rows.sensordata[:, wheel],
+                Column("sensordata", wheel),
             ),
             Signal(
                 channel("steering_wheel_demand_rad", "rad", "steering wheel angle that the driver demands"),
-                lambda rows: rows.ctrl[:, demand],
+                Column("ctrl", demand),
             ),
             Signal(
                 channel("front_steer_rad", "rad", "mean steer angle of the front wheels against the chassis"),
@@ -155,7 +186,7 @@ class ChannelMap:
                 channel("rear_steer_rad", "rad", "mean angle of the rear steering hinges"),
                 lambda rows: 0.5 * (rows.sensordata[:, rear[0]] + rows.sensordata[:, rear[1]]),
             ),
-            Signal(channel("rack_m", "m", "rack travel, positive steers left"), lambda rows: rows.sensordata[:, rack]),
+            Signal(channel("rack_m", "m", "rack travel, positive steers left"), Column("sensordata", rack)),
         ]
 
     def _corners(self) -> list[Signal]:
@@ -168,11 +199,8 @@ class ChannelMap:
                 slot: int, name: str, unit: str, meaning: str, *, first: int = first, corner: str = corner,
                 words: str = words,
             ) -> Signal:  # fmt: skip
-                column = first + slot
-                return Signal(
-                    Channel(f"{corner}_{name}", unit, f"{meaning}, {words}", "corners"),
-                    lambda rows: rows.userdata[:, column],
-                )
+                channel = Channel(f"{corner}_{name}", unit, f"{meaning}, {words}", "corners")
+                return Signal(channel, Column("userdata", first + slot))
 
             signals += [
                 user(fb.U_FX, "tyre_fx_N", "N", "longitudinal tyre force at the contact point, ISO-W"),
@@ -207,7 +235,7 @@ class ChannelMap:
             return Channel(f"{corner}_{name}", unit, f"{meaning}, {words}", "corners")
 
         return [
-            Signal(channel("wheel_speed_radps", "rad/s", "rotational speed"), lambda rows: rows.sensordata[:, spin]),
+            Signal(channel("wheel_speed_radps", "rad/s", "rotational speed"), Column("sensordata", spin)),
             Signal(
                 channel("travel_m", "m", "wheel travel from the design position, bump positive"),
                 lambda rows: rows.sensordata[:, height] - design_m,
@@ -222,7 +250,7 @@ class ChannelMap:
             ),
             Signal(
                 channel("damper_force_N", "N", "damper force, positive resists compression"),
-                lambda rows: rows.userdata[:, damper],
+                Column("userdata", damper),
             ),
         ]
 
@@ -243,21 +271,10 @@ class ChannelMap:
                 continue
             # What a damper's tendon has of a spring are the stops at both ends of its travel.
             name = model.tendon(index).name.replace("_damper", "_stop")
-            coefficients = (model.tendon_stiffness[index], *model.tendon_stiffnesspoly[index])
-            damping = float(model.tendon_damping[index])
-            low, high = (float(length) for length in model.tendon_lengthspring[index])
-
-            def force(
-                rows: RawRows, index: int = index, k: tuple[float, ...] = coefficients, damping: float = damping,
-                low: float = low, high: float = high,
-            ) -> Array:  # fmt: skip
-                length = rows.ten_length[:, index]
-                x = length - np.clip(length, low, high)
-                spring = x * (k[0] + x * (k[1] + x * k[2]))
-                return spring + damping * rows.ten_velocity[:, index] if damping else spring
-
+            stiffness = model.tendon_stiffness[index], *model.tendon_stiffnesspoly[index]
+            law = AxialForce._make((index, *stiffness, model.tendon_damping[index], *model.tendon_lengthspring[index]))
             signals.append(
-                Signal(Channel(f"{name}_force_N", "N", f"axial force of {name}, tension positive", "links"), force)
+                Signal(Channel(f"{name}_force_N", "N", f"axial force of {name}, tension positive", "links"), law)
             )
         return signals
 
@@ -271,7 +288,7 @@ class ChannelMap:
                 signals.append(
                     Signal(
                         Channel(f"{name}_torque_Nm", "Nm", f"torque of {name} on the wheel", "vehicle"),
-                        lambda rows, index=index: rows.actuator_force[:, index],
+                        Column("actuator_force", index),
                     )
                 )
             elif name.endswith("_friction"):
@@ -280,7 +297,7 @@ class ChannelMap:
                 signals.append(
                     Signal(
                         Channel(f"{name}_N", "N", f"dry friction of {part}, {sign}", "links"),
-                        lambda rows, index=index: rows.actuator_force[:, index],
+                        Column("actuator_force", index),
                     )
                 )
             elif model.actuator_actadr[index] >= 0 and model.actuator_gainprm[index, 0] > 0.0:
@@ -292,7 +309,7 @@ class ChannelMap:
                             f"1 where {name} is at its angle, rate or torque limit",
                             "vehicle",
                         ),
-                        lambda rows, index=index: self._saturated(rows, index),
+                        self._limits_of(index),
                     )
                 )
         return signals
@@ -305,22 +322,21 @@ class ChannelMap:
         ]
         asked.append(("drive_torque_change_Nm", "change of the drive torque that the controller asks for"))
         return [
-            Signal(Channel(name, "Nm", meaning, "control"), lambda rows, index=index: rows.asked[:, index])
+            Signal(Channel(name, "Nm", meaning, "control"), Column("asked", index))
             for index, (name, meaning) in enumerate(asked)
         ]
 
-    def _saturated(self, rows: RawRows, index: int) -> Array:
+    def _limits_of(self, index: int) -> Actuator:
         model = self._model
-        lag, rate = model.actuator_dynprm[index, :2]
-        low, high = model.actuator_ctrlrange[index]
-        command = rows.ctrl[:, index]
-        wanted = (np.clip(command, low, high) - rows.act[:, model.actuator_actadr[index]]) / lag
-        force = rows.actuator_force[:, index]
-        weakest, strongest = model.actuator_forcerange[index]
-        limited = (np.abs(wanted) >= rate) | (command < low) | (command > high)
-        if model.actuator_forcelimited[index]:
-            limited |= (force <= weakest) | (force >= strongest)
-        return limited.astype(float)
+        force = model.actuator_forcerange[index] if model.actuator_forcelimited[index] else (-np.inf, np.inf)
+        lag_and_rate, angle = model.actuator_dynprm[index, :2], model.actuator_ctrlrange[index]
+        return Actuator._make((index, model.actuator_actadr[index], *lag_and_rate, *angle, *force))
+
+
+def _of_kind(kind: type[AxialForce | Actuator], wanted: list[tuple[int, Any]]) -> tuple[NDArray[Any], NDArray[np.intp]]:
+    """What compiled code takes of a kind of channel: the laws, and the places of the channels."""
+    here = [(values, place) for place, values in wanted if isinstance(values, kind)]
+    return np.array([law for law, _ in here], record_of(kind)), np.array([place for _, place in here], np.intp)
 
 
 class _Frame:
@@ -336,7 +352,10 @@ class _Frame:
         w, x, y, z = columns("chassis_orientation")
         # Body axes in the world: yaw, pitch, roll in this order (ISO 8855).
         yaw = np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
-        self.yaw_rad = np.unwrap(np.concatenate(([last_yaw_rad], yaw)))[1:]
+        turned = np.diff(yaw, prepend=last_yaw_rad)
+        # Unwrapping takes longer than all the rest; where no jump is to be taken out, it adds 0.
+        jumps = not np.abs(turned).max() < np.pi
+        self.yaw_rad = np.unwrap(np.concatenate(([last_yaw_rad], yaw)))[1:] if jumps else yaw + 0.0
         self.pitch_rad = np.arcsin(np.clip(2 * (w * y - x * z), -1.0, 1.0))
         self.roll_rad = np.arctan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
         cos, sin = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
