@@ -525,9 +525,10 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
     number: Any = raw
     try:
         value = number * factor if factor != 1.0 else hint(number)
+        finite = math.isfinite(value)
     except OverflowError:  # a whole number too large for a float
-        value = math.inf
-    if not math.isfinite(value):
+        value, finite = math.inf, False
+    if not finite:
         raise source.fail(path, f"{shown(raw)} is not finite", raw, limits)
     if abs(value) > _MAX_NUMBER:
         problem = f"{shown(raw)} is larger than anything of a car; allowed is at most {_MAX_NUMBER:g}"

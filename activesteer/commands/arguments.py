@@ -74,12 +74,22 @@ def add_vehicle(parser: argparse.ArgumentParser) -> None:
 
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
-    """Adds what `scenario_of` reads: the manoeuvre, `--vehicle` and `--set`."""
+    """Adds what `scenario_of` reads: the manoeuvre, `--vehicle`, `--set` and `--fault`."""
     parser.add_argument("maneuver", metavar="MANEUVER", help="a name from `activesteer list`, or a TOML file")
     add_vehicle(parser)
     parser.add_argument(
         "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
         help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
+    )  # fmt: skip
+    add_faults(parser)
+
+
+def add_faults(parser: argparse.ArgumentParser) -> None:
+    """Adds `--fault`, which `scenario_of` reads."""
+    parser.add_argument(
+        "--fault", action="append", default=[], dest="faults", metavar="PART:KIND[=SIZE]@START[-END]",
+        help="let an actuator or a sensor fail, as rear:stuck@2.0 or yaw_rate_sensor:offset=2degps@1-3; "
+        "in place of the manoeuvre's own faults",
     )  # fmt: skip
 
 
@@ -160,9 +170,12 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
     Raises:
         ActiveSteerError: there is no such manoeuvre, vehicle or parameter, or a value is wrong.
     """
+    from activesteer.faults import fault_table
     from activesteer.scenario import resolve
 
     overrides: dict[str, Any] = {}
+    if options.faults:
+        overrides["fault"] = [fault_table(text) for text in options.faults]
     for key, value in map(_override, options.overrides):
         if key in overrides:
             raise ParameterError("is given twice; leave one out", key=key, value=value, overridden=True)

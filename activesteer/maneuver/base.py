@@ -9,6 +9,7 @@ from typing import Annotated, Final
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
+from activesteer.faults import Fault
 from activesteer.road.course import Course
 from activesteer.road.road import Road
 from activesteer.signals import Reference
@@ -48,6 +49,8 @@ class Maneuver(ABC):
     """Time before the recording in which the car rolls straight ahead and its speed settles [s]."""
     road: Road = Road()
     """What the wheels roll on."""
+    fault: tuple[Fault, ...] = ()
+    """What goes wrong with actuators and sensors, and when."""
 
     @abstractmethod
     def reference(self, time_s: float) -> Reference:

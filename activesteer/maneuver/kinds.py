@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from activesteer.config import Source, build
 from activesteer.errors import nearest_names, shown
+from activesteer.faults import check_faults
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.constant_radius import ConstantRadius
@@ -94,4 +95,6 @@ def build_maneuver(table: Mapping[str, Any], source: Source) -> Maneuver:
     Raises:
         ManeuverError: a key is unknown or missing, or a value is wrong.
     """
-    return build(maneuver_class(table, source), table, source)
+    maneuver = build(maneuver_class(table, source), table, source)
+    check_faults(maneuver.fault, maneuver.duration_s, source.fail)
+    return maneuver

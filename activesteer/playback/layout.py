@@ -7,7 +7,7 @@ from typing import Final
 
 import rerun.blueprint as rrb
 
-from activesteer.playback import plots
+from activesteer.playback import events, plots
 from activesteer.playback.car import ghost_paths
 from activesteer.playback.course import COURSE, MAP, ROAD, map_bounds
 from activesteer.playback.runs import Run
@@ -53,7 +53,7 @@ def _page(run: Run, runs: Sequence[Run], page: int) -> rrb.Horizontal:
         rrb.Vertical(
             _chase(run, runs),
             _map(runs),
-            rrb.Horizontal(_above(run, runs), _text()),
+            rrb.Horizontal(_above(run, runs), _words([run])),
             row_shares=[5, 2, 4],
         ),
         rrb.Tabs(
@@ -74,7 +74,7 @@ def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
         rrb.Vertical(
             rrb.Horizontal(*(_chase(run, runs) for run in runs)),
             _map(runs),
-            rrb.Horizontal(_above(runs[0], runs), _text(), column_shares=[2, 3]),
+            rrb.Horizontal(_above(runs[0], runs), _words(runs), column_shares=[2, 3]),
             row_shares=[5, 2, 4],
         ),
         rrb.Tabs(
@@ -124,5 +124,8 @@ def _map(runs: Sequence[Run]) -> rrb.Spatial2DView:
     )
 
 
-def _text() -> rrb.TextDocumentView:
-    return rrb.TextDocumentView(origin=f"/{SUMMARY}", name="Summary")
+def _words(runs: Sequence[Run]) -> rrb.Vertical | rrb.TextDocumentView:
+    """The summary, and below it the warnings where there are any."""
+    summary = rrb.TextDocumentView(origin=f"/{SUMMARY}", name="Summary")
+    warnings = events.view(runs)
+    return rrb.Vertical(summary, *warnings, row_shares=[3, 2]) if warnings else summary

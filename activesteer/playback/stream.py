@@ -10,6 +10,7 @@ import rerun.blueprint as rrb
 
 from activesteer.playback.car import send_car
 from activesteer.playback.course import send_course, send_road, send_track
+from activesteer.playback.events import send_events
 from activesteer.playback.layout import SUMMARY
 from activesteer.playback.links import send_links
 from activesteer.playback.plots import send_plots
@@ -51,6 +52,7 @@ def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint)
         send_tyre_forces(stream, run)
         send_track(stream, run)
         send_plots(stream, run, alone=not several)
+        send_events(stream, run)
     text = rr.TextDocument(summary(runs), media_type=rr.MediaType.MARKDOWN)
     stream.log(SUMMARY, text, static=True)
     stream.flush()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,16 +12,19 @@ from numpy.typing import NDArray
 from activesteer.controllers import Controller, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import Driver, find_driver
+from activesteer.faults import Fault
 from activesteer.scenario import Scenario
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
 from activesteer.simulation.recorder import Recorder
 from activesteer.vehicle import engine_warnings_held
+from activesteer.vehicle.faults import Faults
 
 
 class LoopState(NamedTuple):
     """Everything that a loop continues from."""
 
     engine: NDArray[np.float64]
+    faults: list[Any]
     driver: Any
     controller: Any
     measurement: Measurement
@@ -38,6 +41,7 @@ class ClosedLoop:
         driver: Who drives.
         controller: The active steering.
         vehicle: The car.
+        faults: What goes wrong with its actuators and sensors; see `fail`.
         driver_setup: What a driver may know of the car.
         controller_setup: What a controller may know of it.
         measurement: What the sensors say.
@@ -78,8 +82,10 @@ class ClosedLoop:
         self.measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
         self.motion, self.step_count = vehicle.motion(), 0
         self.commands = DriverCommand(front_steer_demand_rad=0.0), ActuatorCommand()
+        self.faults = Faults(vehicle)
         self._advance(lambda _: settling, self.driver, self.controller, steps, None)
         vehicle.rebase()
+        self.fail(maneuver.fault)
         self.measurement = self.measurement._replace(time_s=0.0)
         self.motion, self.step_count = vehicle.motion(), 0
 
@@ -87,6 +93,11 @@ class ClosedLoop:
     def steps(self) -> int:
         """Number of steps of the manoeuvre."""
         return round(self.maneuver.duration_s / self.vehicle.timestep_s)
+
+    def fail(self, faults: Sequence[Fault]) -> None:
+        """From now on these faults act, each at its time, and no others."""
+        self.faults.release()
+        self.faults = Faults(self.vehicle, faults)
 
     def run(self, recorder: Recorder | None = None) -> None:
         """Drives the manoeuvre to its end; see `advance`."""
@@ -126,13 +137,14 @@ class ClosedLoop:
         vehicle, (command, steer) = self.vehicle, self.commands
         timestep_s, measurement, motion = vehicle.timestep_s, self.measurement, self.motion
         with engine_warnings_held():
-            for step in range(self.step_count, self.step_count + steps):
-                reference = reference_at(step * timestep_s)
-                command = driver.step(reference, measurement, motion)
-                steer = controller.step(command, measurement)
-                measurement, motion = vehicle.step(command, steer, recorder.row_address if recorder else 0)
-                if recorder is not None:
-                    recorder.record(command, steer)
+            for first, last, step_car in self.faults.stretches(self.step_count, self.step_count + steps):
+                for step in range(first, last):
+                    reference = reference_at(step * timestep_s)
+                    command = driver.step(reference, measurement, motion)
+                    steer = controller.step(command, measurement)
+                    measurement, motion = step_car(command, steer, recorder.row_address if recorder else 0)
+                    if recorder is not None:
+                        recorder.record(command, steer)
         self.step_count, self.commands = self.step_count + steps, (command, steer)
         self.measurement, self.motion = measurement, motion
 
@@ -140,6 +152,7 @@ class ClosedLoop:
         """Everything that the loop continues from."""
         return LoopState(
             self.vehicle.save_state(),
+            self.faults.save_state(),
             copy.deepcopy(self.driver),
             copy.deepcopy(self.controller),
             self.measurement,
@@ -151,6 +164,7 @@ class ClosedLoop:
     def restore_state(self, state: LoopState) -> None:
         """Goes back to a saved state; what follows is bit-identical to what followed then."""
         self.vehicle.restore_state(state.engine)
+        self.faults.restore_state(state.faults)
         self.driver, self.controller = copy.deepcopy(state.driver), copy.deepcopy(state.controller)
         self.measurement, self.motion = state.measurement, state.motion
         self.commands, self.step_count = state.commands, state.step

@@ -30,10 +30,12 @@ def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scen
     """
     if scenario.car.config.single_track.source == IDENTIFY:
         scenario = with_identified_single_track(scenario, _test_drive)
-    search = scenario.maneuver.search
+    # The search drives the car in order.
+    search = replace(scenario.maneuver, fault=()).search
     if search is None:
         return scenario
-    return replace(scenario, maneuver=search.accept(amplitude(scenario, search, timestep_s)))
+    found = search.accept(amplitude(scenario, search, timestep_s))
+    return replace(scenario, maneuver=replace(found, fault=scenario.maneuver.fault))
 
 
 def _test_drive(scenario: Scenario) -> Recording:

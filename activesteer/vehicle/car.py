@@ -351,6 +351,16 @@ class Vehicle:
         # The step engages a gear only where it changes; this one never occurs, so it does so now.
         self._gear = math.nan
 
+    def actuator_record(self, index: int) -> NDArray[np.float64]:
+        """The record of an actuator in the block of the native forces (see `force_block`), to be changed by faults."""
+        block = self.model.numeric_data[int(self.model.numeric_data[-fb.TRAILER_SIZE]) :]
+        start = int(block[fb.ACTUATORS_START]) + index * fb.ACTUATOR_SIZE
+        return block[start : start + fb.ACTUATOR_SIZE]
+
+    def note_faults(self, count: int) -> None:
+        """Has it recorded from now on how many faults act."""
+        self.data.userdata[-1] = count
+
     def dimensions(self) -> dict[str, float | list[float]]:
         """What an evaluation needs of the car's outline [m]: width, wheelbase, tracks and tyre widths, as designed."""
         at_rest = mujoco.MjData(self.model)

@@ -89,6 +89,12 @@ class ChannelMap:
         signals = [
             *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(), *self._asked(),
         ]  # fmt: skip
+        signals.append(
+            Signal(
+                Channel("active_faults", "", "how many faults of actuators and sensors act", "vehicle"),
+                lambda rows: rows.userdata[:, -1],
+            )
+        )
         self.channels = tuple(signal.channel for signal in signals)
         wanted = [(place, signal.values) for place, signal in enumerate(signals)]
         self._computed = [(place, values) for place, values in wanted if callable(values)]

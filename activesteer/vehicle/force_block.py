@@ -47,8 +47,11 @@ DAMPER_SIZE: Final = D_FORCE + MAX_CURVE_POINTS
 
 # One record per actuator with user dynamics (all actuators have one; KIND_NONE where the engine does the dynamics).
 # A_FIRST to A_HIGH hold what its kind needs; `loading._actuator` fills them.
-A_KIND, A_ACT, A_FIRST, A_SECOND, A_LOW, A_HIGH = range(6)
-ACTUATOR_SIZE: Final = 6
+# A_SCALE and A_OFFSET stand between the command and what is made of it; see `IN_ORDER`.
+A_KIND, A_ACT, A_FIRST, A_SECOND, A_LOW, A_HIGH, A_SCALE, A_OFFSET = range(8)
+ACTUATOR_SIZE: Final = 8
+IN_ORDER: Final = (1.0, -0.0)
+"""A_SCALE and A_OFFSET of an actuator without a fault; adding -0.0 changes nothing, not even the sign of a zero."""
 KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE, KIND_FRICTION, KIND_DRIVE = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 ALONG_JOINT, ALONG_TENDON = 0.0, 1.0
 
@@ -57,7 +60,8 @@ ALONG_JOINT, ALONG_TENDON = 0.0, 1.0
 R_START_m, R_END_m, R_RIGHT_m, R_LEFT_m, R_MU = range(5)
 AREA_SIZE: Final = 5
 
-# What the callback writes into mjData.userdata: one record per wheel, then the force of each damper.
+# What the callback writes into mjData.userdata: one record per wheel, then the force of each damper. Behind that stands
+# what it does not write: how many faults act.
 (
     U_FX, U_FY, U_FZ, U_MX, U_MY, U_MZ, U_SLIP_RATIO, U_SLIP_ANGLE, U_INCLINATION, U_RATE_X, U_RATE_Y,
     U_RATE_Z, U_LOADED_RADIUS, U_LIMITED, U_FRICTION_USE, U_MU, U_CONTACT_X, U_CONTACT_Y,
@@ -165,7 +169,8 @@ class ForceBlock:
             record[D_VELOCITY : D_VELOCITY + points] = damper.velocity_mps
             record[D_FORCE : D_FORCE + points] = damper.force_N
         if self.actuators:
-            block[actuators_start:areas_start] = np.asarray(self.actuators, float).ravel()
+            records = [(*record, *IN_ORDER) for record in self.actuators]
+            block[actuators_start:areas_start] = np.asarray(records, float).ravel()
         if self.areas:
             block[areas_start:tyres_start] = np.asarray(self.areas, float).ravel()
         return block

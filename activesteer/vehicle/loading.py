@@ -51,7 +51,7 @@ def load_model(
         spec.option.gravity = [-GRAVITY_MPS2 * math.sin(angle), 0.0, -GRAVITY_MPS2 * math.cos(angle)]
         # A state that is not finite must end the run; the engine would start again from its reference position.
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-        spec.nuserdata = len(CORNERS) * (fb.USERDATA_PER_WHEEL + 1)
+        spec.nuserdata = len(CORNERS) * (fb.USERDATA_PER_WHEEL + 1) + 1
         _fit_actuators(spec, parameters)
         apply_load(spec, parameters)
         block = _force_block(spec.compile(), parameters, tyres, road).to_array()

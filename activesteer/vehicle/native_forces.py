@@ -263,7 +263,7 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any]:
         if kind == fb.KIND_SLIP:
             return array_at(data, d_userdata, int(block[fb.N_USERDATA]))[int(entry[fb.A_FIRST])]
         state = array_at(data, d_act, int(block[fb.N_ACTIVATIONS]))[int(entry[fb.A_ACT])]
-        command = array_at(data, d_ctrl, int(block[fb.N_CONTROLS]))[actuator]
+        command = entry[fb.A_SCALE] * array_at(data, d_ctrl, int(block[fb.N_CONTROLS]))[actuator] + entry[fb.A_OFFSET]
         if kind == fb.KIND_SERVO:
             # First-order lag behind the limited command, its rate limited.
             command = min(max(command, entry[fb.A_LOW]), entry[fb.A_HIGH])

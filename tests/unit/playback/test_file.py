@@ -16,6 +16,7 @@ from activesteer.playback import runs_of, save
 from activesteer.playback.course import extent, map_bounds
 from activesteer.playback.tyres import FORCE_SCALE_NPM, force_arrows, use_colours
 from activesteer.recording import Recording
+from activesteer.signals import Channel
 from tests.unit.playback import synthetic
 from tests.unit.playback.rrd import Rrd
 from tests.unit.playback.synthetic import COURSE, circle
@@ -240,3 +241,21 @@ def test_twenty_seconds_take_less_than_15_MB(driven: Path, tmp_path: Path) -> No
     path = tmp_path / "out.rrd"
     save(runs_of({"ars": recording}), path)
     assert path.stat().st_size < 15e6
+
+
+def test_faults_and_limits_are_warnings_at_their_time(tmp_path: Path) -> None:
+    fault = {"part": "rear", "kind": "offset", "start_s": 1.0, "end_s": 2.0, "size_rad": math.radians(1.5)}
+    recording = circle(metadata={"maneuver": {"name": "circle", "fault": [fault, "no table", {"start_s": 99.0}]}})
+    limited = np.zeros(len(recording))
+    limited[[*range(500, 700), *range(710, 800), 2500]] = 1.0
+    table = [*recording.channels, Channel("rl_steer_saturated", "", "", "vehicle")]
+    recording = Recording(
+        table, recording.time_s, np.column_stack([recording.values, limited]), poses=recording.poses,
+        metadata=recording.metadata, scene=recording.scene,
+    )  # fmt: skip
+    rrd = saved(tmp_path, {"ars": recording})
+    said = [text[0] for text in rrd.column("/ars/warnings", "TextLog:text")]
+    limit = ["rl steer at its limit", "rl steer no longer at its limit"]
+    assert said == [*limit[:1], *limit[1:], "FAULT rear: offset 1.5 deg", "rear: offset 1.5 deg is over", *limit]
+    assert np.allclose(rrd.time_s("/ars/warnings"), [0.5, 0.8, 1.0, 2.0, 2.5, 2.51])
+    assert "/ars/warnings" not in saved(tmp_path, {"ars": circle()}).entities

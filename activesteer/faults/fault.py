@@ -1,0 +1,191 @@
+"""One fault: which part, what happens to it, when, and how much."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Annotated, Any, Final, NamedTuple
+
+from activesteer.config import Range
+from activesteer.conventions import CORNERS
+from activesteer.errors import ManeuverError, nearest_names
+from activesteer.signals import Measurement
+
+
+class Actuator(NamedTuple):
+    """An actuator as faults name it.
+
+    Attributes:
+        members: The engine's actuators that it stands for.
+        by_ratio: Whether their angle is the steering ratio times that of a road wheel, which a size is given at.
+    """
+
+    members: tuple[str, ...]
+    by_ratio: bool = False
+
+
+class Sensor(NamedTuple):
+    """A signal of `Measurement` as faults name it.
+
+    Attributes:
+        field: Its name there.
+        wheel: Place in it, where it is a tuple of the four wheels.
+        unit: Its unit, as names end in it.
+    """
+
+    field: str
+    wheel: int | None
+    unit: str
+
+
+_UNITS: Final = ("radps", "mps2", "mps", "rad", "Pa", "Nm")
+
+
+def _sensors() -> dict[str, Sensor]:
+    """The signals that a controller gets, but for the time."""
+    found: dict[str, Sensor] = {}
+    for field in Measurement._fields:
+        name, _, unit = field.rpartition("_")
+        if unit not in _UNITS:
+            continue
+        if "tuple" in str(Measurement.__annotations__[field]):
+            found |= {f"{corner}_{name}_sensor": Sensor(field, place, unit) for place, corner in enumerate(CORNERS)}
+        else:
+            found[f"{name}_sensor"] = Sensor(field, None, unit)
+    return found
+
+
+ACTUATORS: Final = {
+    "rear": Actuator(("rl_steer", "rr_steer")),
+    "rear_left": Actuator(("rl_steer",)),
+    "rear_right": Actuator(("rr_steer",)),
+    "superposition": Actuator(("superposition",), by_ratio=True),
+}
+"""Part -> which actuators it stands for."""
+SENSORS: Final = _sensors()
+"""Part -> which signal it stands for."""
+
+KINDS: Final = {
+    "stuck": "an actuator stays where it is, a sensor at its last reading",
+    "runaway": "an actuator runs to its stop, a sensor reads the end of its range",
+    "float": "an actuator is cut from its drive and moves freely",
+    "offset": "the demand of an actuator, or the reading of a sensor, is off",
+    "reversed": "demand or reading has the opposite sign",
+    "delayed": "demand or reading comes late",
+    "dropout": "demand or reading is missing and taken for zero",
+}
+"""Kind of fault -> what it does."""
+
+_SIZES: Final = ("size_rad", "size_radps", "size_mps", "size_mps2")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault of one part."""
+
+    part: str
+    """What fails: `rear`, `rear_left`, `rear_right`, `superposition`, or a sensor as `yaw_rate_sensor`."""
+    kind: str
+    """What happens: `stuck`, `runaway`, `float`, `offset`, `reversed`, `delayed` or `dropout`."""
+    start_s: Annotated[float, Range(0.0)]
+    """When it begins [s]."""
+    end_s: Annotated[float, Range(0.0)] | None = None
+    """When the part works again [s]; never where not given."""
+    side: str | None = None
+    """To which stop an actuator runs away: `left` or `right`."""
+    size_rad: float | None = None
+    """Offset of an actuator (at the road wheel) or an angle sensor, or what such a sensor reads at runaway [rad]."""
+    size_radps: float | None = None
+    """The same of a yaw rate or wheel speed sensor [rad/s]."""
+    size_mps: float | None = None
+    """The same of a speed sensor [m/s]."""
+    size_mps2: float | None = None
+    """The same of an acceleration sensor [m/s2]."""
+    delay_s: Annotated[float, Range(0.001, 10.0)] | None = None
+    """How late demand or reading come [s]."""
+
+    def __post_init__(self) -> None:
+        """The part can fail so, and has all that says how, and nothing else.
+
+        Raises:
+            ManeuverError: it cannot or has not.
+        """
+        if self.part not in ACTUATORS and self.part not in SENSORS:
+            names = [*ACTUATORS, *SENSORS]
+            problem = f"there is no part {self.part!r}; {nearest_names(self.part, names)}"
+            raise ManeuverError(problem, key="part", value=self.part, allowed=names)
+        if self.kind not in KINDS:
+            problem = f"there is no kind of fault {self.kind!r}; {nearest_names(self.kind, KINDS)}"
+            raise ManeuverError(problem, key="kind", value=self.kind, allowed=list(KINDS))
+        if self.kind == "float" and self.part in SENSORS:
+            problem = "a sensor has nothing that could move freely; a broken wire is a dropout"
+            raise ManeuverError(problem, key="kind", value=self.kind)
+        if self.end_s is not None and self.end_s <= self.start_s:
+            problem = f"is {self.end_s:g} s; the fault begins at {self.start_s:g} s (start_s)"
+            raise ManeuverError(problem, key="end_s", value=self.end_s)
+        needed = self._needed
+        given = [name for name in ("side", *_SIZES, "delay_s") if getattr(self, name) is not None]
+        for name in given:
+            if name != needed:
+                problem = f"has no effect on {self.part} with kind {self.kind!r}"
+                raise ManeuverError(f"{problem}; " + (f"{needed} has" if needed else "leave it out"), key=name)
+        if needed and not given:
+            raise ManeuverError(f"is needed for kind {self.kind!r} of {self.part}", key=needed)
+        if self.kind == "offset" and self.size == 0.0:
+            raise ManeuverError("is 0, which has no effect", key=needed, value=0.0)
+        if self.side not in (None, "left", "right"):
+            raise ManeuverError(f"is {self.side!r}; allowed are 'left' and 'right'", key="side", value=self.side)
+
+    @property
+    def _needed(self) -> str | None:
+        """The key that says how much."""
+        if self.kind == "delayed":
+            return "delay_s"
+        if self.kind == "runaway" and self.part in ACTUATORS:
+            return "side"
+        if self.kind in ("offset", "runaway"):
+            return "size_rad" if self.part in ACTUATORS else f"size_{SENSORS[self.part].unit}"
+        return None
+
+    @property
+    def size(self) -> float:
+        """How much, in the unit of the part; 0 where nothing is to be said."""
+        return next((value for name in _SIZES if (value := getattr(self, name)) is not None), 0.0)
+
+    @property
+    def name(self) -> str:
+        """The fault without its time, as it is written on the command line."""
+        needed = self._needed
+        if needed is None:
+            return f"{self.part}:{self.kind}"
+        value, unit = getattr(self, needed), needed.rpartition("_")[2]
+        return f"{self.part}:{self.kind}={value}" if needed == "side" else f"{self.part}:{self.kind}={value:g}{unit}"
+
+    def shares_a_part_with(self, other: Fault) -> bool:
+        """Whether both act on the same thing."""
+        if self.part in ACTUATORS and other.part in ACTUATORS:
+            return bool({*ACTUATORS[self.part].members} & {*ACTUATORS[other.part].members})
+        return self.part == other.part
+
+
+def check_faults(faults: Sequence[Fault], duration_s: float, fail: Any) -> None:
+    """Every fault begins before the end, and no two act on a part at the same time.
+
+    Args:
+        faults: The faults.
+        duration_s: Length of the manoeuvre [s].
+        fail: Makes the error of a key, as `config.Source.fail`.
+
+    Raises:
+        ManeuverError: they do not.
+    """
+    for number, fault in enumerate(faults):
+        if fault.start_s >= duration_s:
+            problem = f"is {fault.start_s:g} s, but the run ends at {duration_s:g} s (duration_s): it has no effect"
+            raise fail(("fault", str(number), "start_s"), problem, fault.start_s)
+    for (number, one), (later, other) in combinations(enumerate(faults), 2):
+        apart = any(a.end_s is not None and a.end_s <= b.start_s for a, b in ((one, other), (other, one)))
+        if one.shares_a_part_with(other) and not apart:
+            problem = f"{other.part} has fault {number} at the same time, {one.name}; one part has one fault at a time"
+            raise fail(("fault", str(later)), problem)

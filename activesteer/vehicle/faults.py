@@ -1,0 +1,234 @@
+"""Faults of actuators and sensors in a car: the one place where they act.
+
+What an actuator's fault needs is written into the model when the fault begins, and taken out when it ends; in between
+a step costs nothing more. Only a sensor's fault, and a delay, do something every step. A car without faults is stepped
+by its own `step`.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from typing import Any, Final, NamedTuple
+
+import mujoco
+from numpy.typing import NDArray
+
+from activesteer.faults import ACTUATORS, SENSORS, Fault
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.car import Vehicle
+from activesteer.vehicle.loading import find
+
+Step = Callable[[DriverCommand, ActuatorCommand, int], tuple[Measurement, Motion]]
+_STOPS: Final = {"left": fb.A_HIGH, "right": fb.A_LOW}
+
+
+class Stretch(NamedTuple):
+    """Steps between which no fault begins or ends.
+
+    Attributes:
+        first: The first one.
+        last: The one behind the last.
+        step: What steps the car in them.
+    """
+
+    first: int
+    last: int
+    step: Step
+
+
+class Faults:
+    """The faults of a run."""
+
+    def __init__(self, vehicle: Vehicle, faults: Sequence[Fault] = ()) -> None:
+        """Looks up what they act on; nothing is changed yet.
+
+        Args:
+            vehicle: The car.
+            faults: What happens to it; times count from the start of the recording.
+        """
+        self._vehicle = vehicle
+        self._acting: list[_ActuatorFault | _SensorFault] = []
+        for fault in faults:
+            if fault.part in SENSORS:
+                self._acting.append(_SensorFault(fault, vehicle.timestep_s))
+            else:
+                members = ACTUATORS[fault.part].members
+                self._acting += [_ActuatorFault(fault, name, vehicle) for name in members]
+
+    def stretches(self, first: int, last: int) -> Iterator[Stretch]:
+        """The steps from one to another, divided where a fault begins or ends.
+
+        Args:
+            first: Number of the first step of the recording.
+            last: Of the one behind the last.
+
+        Yields:
+            The stretches. What acts in one is put into the model before it is yielded.
+        """
+        if not self._acting:
+            yield Stretch(first, last, self._vehicle.step)
+            return
+        changes = {step for acting in self._acting for step in (acting.listens, acting.begins, acting.ends)}
+        for begin, end in pairwise(sorted({first, last, *(step for step in changes if first < step < last)})):
+            self.act(begin)
+            watching = [a for a in self._acting if a.watches and a.listens <= begin < a.ends]
+            yield Stretch(begin, end, self._watched(watching, begin) if watching else self._vehicle.step)
+
+    def act(self, step: int) -> None:
+        """Puts into the model what acts from a step on, and takes out what does not."""
+        for acting in self._acting:
+            acting.release()
+        active = [acting for acting in self._acting if acting.begins <= step < acting.ends]
+        for acting in active:
+            acting.engage()
+        self._vehicle.note_faults(len({acting.fault for acting in active}))
+
+    def release(self) -> None:
+        """Takes all faults out of the model."""
+        for acting in self._acting:
+            acting.release()
+        self._vehicle.note_faults(0)
+
+    def save_state(self) -> list[Any]:
+        """What the faults have to remember."""
+        return copy.deepcopy([acting.memory for acting in self._acting])
+
+    def restore_state(self, state: list[Any]) -> None:
+        """Goes back to a saved state."""
+        for acting, memory in zip(self._acting, copy.deepcopy(state), strict=True):
+            acting.memory = memory
+
+    def _watched(self, watching: Sequence[_ActuatorFault | _SensorFault], begin: int) -> Step:
+        vehicle = self._vehicle
+        delays = [acting for acting in watching if isinstance(acting, _ActuatorFault)]
+        sensors = [(acting, acting.begins <= begin) for acting in watching if isinstance(acting, _SensorFault)]
+
+        def step(command: DriverCommand, steer: ActuatorCommand, row_address: int = 0) -> tuple[Measurement, Motion]:
+            for delay in delays:
+                delay.before_step()
+            measurement, motion = vehicle.step(command, steer, row_address)
+            for delay in delays:
+                delay.after_step()
+            for sensor, active in sensors:
+                measurement = sensor.read(measurement, active=active)
+            return measurement, motion
+
+        return step
+
+
+class _ActuatorFault:
+    """A fault of one of the engine's actuators.
+
+    Attributes:
+        fault: What happens.
+        begins: Step at which it begins; `ends`: that from which on the part works again.
+        listens: Step from which on it must know the demands.
+        watches: Whether it has something to do every step.
+        memory: The last demands, of a delay.
+    """
+
+    def __init__(self, fault: Fault, name: str, vehicle: Vehicle) -> None:
+        model = self._model = vehicle.model
+        self.fault = fault
+        self._index = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+        self._record: NDArray[Any] = vehicle.actuator_record(self._index)
+        self._healthy = (
+            self._record.copy(),
+            model.actuator_gainprm[self._index].copy(),
+            (model.actuator_biasprm[self._index].copy()),
+        )
+        self._ctrl = vehicle.data.ctrl
+        ratio = vehicle.parameters.steering.ratio if ACTUATORS[fault.part].by_ratio else 1.0
+        self._offset = fault.size * ratio
+        self.begins, self.ends = _steps(fault, vehicle.timestep_s)
+        self.watches = fault.delay_s is not None
+        delay = round((fault.delay_s or 0.0) / vehicle.timestep_s)
+        self.listens = self.begins - delay
+        self.memory: deque[float] = deque(maxlen=max(1, delay))
+
+    def engage(self) -> None:
+        """Lets the fault act."""
+        record, kind = self._record, self.fault.kind
+        if kind == "stuck":
+            # No rate: the servo holds the angle that it has reached, with its stiffness and its strength.
+            record[fb.A_SECOND] = 0.0
+        elif kind == "float":
+            self._model.actuator_gainprm[self._index] = self._model.actuator_biasprm[self._index] = 0.0
+        elif kind == "reversed":
+            record[fb.A_SCALE] = -1.0
+        elif kind == "offset":
+            record[fb.A_OFFSET] = self._offset
+        else:
+            record[fb.A_SCALE] = 0.0
+            record[fb.A_OFFSET] = record[_STOPS[self.fault.side]] if self.fault.side is not None else 0.0
+
+    def release(self) -> None:
+        """The actuator works as built."""
+        index = self._index
+        self._record[:], self._model.actuator_gainprm[index], self._model.actuator_biasprm[index] = self._healthy
+
+    def before_step(self) -> None:
+        """Gives the actuator the demand of a while ago."""
+        if self._record[fb.A_SCALE] == 0.0:
+            self._record[fb.A_OFFSET] = self.memory[0] if self.memory else self._ctrl[self._index]
+
+    def after_step(self) -> None:
+        """Keeps the demand."""
+        self.memory.append(float(self._ctrl[self._index]))
+
+
+class _SensorFault:
+    """A fault of one signal; attributes as those of `_ActuatorFault`."""
+
+    watches = True
+
+    def __init__(self, fault: Fault, timestep_s: float) -> None:
+        self.fault = fault
+        self._sensor = SENSORS[fault.part]
+        self._place = Measurement._fields.index(self._sensor.field)
+        self.begins, self.ends = _steps(fault, timestep_s)
+        delay = round((fault.delay_s or 0.0) / timestep_s)
+        # A sensor that sticks must know its last reading.
+        self.listens = self.begins - max(1, delay)
+        self.memory: deque[float] = deque(maxlen=delay + 1 if delay else 1)
+
+    def engage(self) -> None:
+        """Nothing: a sensor's fault changes nothing in the car."""
+
+    def release(self) -> None:
+        """Nothing, likewise."""
+
+    def read(self, measurement: Measurement, *, active: bool) -> Measurement:
+        """What comes out for what would have."""
+        whole: Any = measurement[self._place]
+        index = self._sensor.wheel
+        good = whole if index is None else whole[index]
+        if not (active and self.fault.kind == "stuck" and self.memory):
+            self.memory.append(good)
+        if not active:
+            return measurement
+        read = self._reading(good)
+        if index is not None:
+            read = (*whole[:index], read, *whole[index + 1 :])
+        return measurement._replace(**{self._sensor.field: read})
+
+    def _reading(self, good: float) -> float:
+        kind = self.fault.kind
+        if kind in ("stuck", "delayed"):
+            return self.memory[0]
+        if kind == "offset":
+            return good + self.fault.size
+        if kind == "runaway":
+            return self.fault.size
+        return -good if kind == "reversed" else 0.0
+
+
+def _steps(fault: Fault, timestep_s: float) -> tuple[int, int]:
+    """First step at which a fault acts, and the first one at which it does not any more."""
+    begins = round(fault.start_s / timestep_s)
+    never = 2**62
+    return begins, never if fault.end_s is None else max(begins + 1, round(fault.end_s / timestep_s))

@@ -1,0 +1,207 @@
+"""What a fault does to the car: actuators that stick, run away or let go, sensors that lie."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import activesteer
+from activesteer import ActuatorCommand, Recording, Simulation
+from activesteer.faults import fault_table
+
+AT_S = 1.0
+ROW = round(1000 * AT_S)
+STEP = {"steer.steering_wheel_deg": 36.5, "duration_s": 2.0, "settle_s": 0.5, "speed_kmh": 120.0}
+
+
+class Weaves:
+    """A controller that steers both axles to and fro."""
+
+    def step(self, command: Any, measurement: Any) -> ActuatorCommand:
+        angle = 0.02 * np.sin(2.0 * np.pi * max(measurement.time_s, 0.0))
+        return ActuatorCommand(rear_steer_demand_rad=angle, superposition_demand_rad=angle)
+
+
+class Reads:
+    """A controller that asks for nothing and shows what it was told."""
+
+    def step(self, command: Any, measurement: Any) -> ActuatorCommand:
+        return ActuatorCommand(yaw_rate_desired_radps=measurement.yaw_rate_radps, prediction_rad=measurement.ay_mps2)
+
+
+def driven(*faults: str, controller: Any = Weaves, **overrides: Any) -> Recording:
+    changes = {**STEP, **overrides}
+    if faults:
+        changes["fault"] = [fault_table(text) for text in faults]
+    return activesteer.simulate("step_steer", controller, overrides=changes)
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Recording:
+    return driven()
+
+
+@pytest.fixture(scope="module")
+def told() -> Recording:
+    return driven(controller=Reads)
+
+
+def test_nothing_differs_before_the_fault_and_what_differs_after_it_is_recorded(healthy: Recording) -> None:
+    failed = driven(f"rear:stuck@{AT_S}-1.5")
+    for name in ("rear_steer_rad", "yaw_rate_radps", "x_m", "y_m"):
+        np.testing.assert_array_equal(failed[name][:ROW], healthy[name][:ROW])
+        assert (failed[name][ROW + 50 :] != healthy[name][ROW + 50 :]).all()
+    active = failed["active_faults"]
+    assert (active[ROW:1500] == 1).all()
+    assert not active[:ROW].any()
+    assert not active[1500:].any()
+    assert not healthy["active_faults"].any()
+
+
+@pytest.mark.parametrize(("part", "channel"), [("rear", "rear_steer_rad"), ("superposition", "superposition_rad")])
+def test_stuck_means_that_the_angle_stays(part: str, channel: str) -> None:
+    failed = driven(f"{part}:stuck@1.2")
+    demand = failed[channel.replace("_rad", "_demand_rad")]
+    assert np.ptp(demand[1200:]) > 0.02
+    # What is left is the give of the servo's screw and of the housing under the wheel's forces.
+    assert np.ptp(failed[channel][1250:]) < 0.04 * np.ptp(demand[1200:])
+
+
+def test_one_side_sticks_and_the_other_goes_on() -> None:
+    failed = driven("rear_left:stuck@1.2")
+    left, right = failed["rl_steer_rad"][1250:], failed["rr_steer_rad"][1250:]
+    assert np.ptp(left) < 0.3 * np.ptp(right)
+
+
+@pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
+def test_runaway_goes_to_the_stop_at_the_actuator_s_own_rate(side: str, sign: float) -> None:
+    failed = driven(f"rear:runaway={side}@{AT_S}", controller="none")
+    angle, rate = sign * failed["rear_steer_rad"], np.gradient(sign * failed["rear_steer_rad"], 1e-3)
+    assert angle[-1] == pytest.approx(np.radians(3.0), abs=np.radians(0.05))
+    # dynprm of the model: 0.5 rad/s; 0.05 rad at that rate are 0.1 s.
+    assert np.median(rate[ROW + 20 : ROW + 70]) == pytest.approx(0.5, rel=0.1)
+
+
+def test_mirrored_faults_in_mirrored_runs_mirror() -> None:
+    one = driven(f"rear:runaway=left@{AT_S}", controller="none")
+    other = driven(f"rear:runaway=right@{AT_S}", controller="none", **{"steer.steering_wheel_deg": -36.5})
+    for name in ("y_m", "yaw_rate_radps", "rear_steer_rad"):
+        np.testing.assert_allclose(one[name], -other[name], atol=1e-6)
+
+
+def test_a_floating_rear_wheel_gives_way_to_its_forces() -> None:
+    failed = driven(f"rear:float@{AT_S}", controller="none")
+    # The tyres' side force acts behind the hinge and turns the wheels out of the bend until they are at the stop.
+    assert abs(failed["rear_steer_rad"][ROW - 1]) < np.radians(0.1)
+    assert abs(failed["rear_steer_rad"][-1]) == pytest.approx(np.radians(3.0), abs=np.radians(0.05))
+    assert failed["rear_steer_rad"][-1] < 0.0 < failed["ay_mps2"][ROW]
+
+
+SLOW: dict[str, Any] = {"speed_kmh": 20.0, "steer.steering_wheel_deg": 5.0}
+"""The wheels' forces are small, and with them the give of the servos."""
+
+
+@pytest.fixture(scope="module")
+def healthy_and_slow() -> Recording:
+    return driven(**SLOW)
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [
+        ("offset=0.5deg", lambda angle: angle[1300:] + np.radians(0.5)),
+        ("reversed", lambda angle: -angle[1300:]),
+        ("dropout", lambda angle: 0.0 * angle[1300:]),
+        ("delayed=0.1s", lambda angle: angle[1200:-100]),
+    ],
+)
+def test_faults_of_the_demand(fault: str, expected: Any, healthy_and_slow: Recording) -> None:
+    failed = driven(f"rear:{fault}@{AT_S}", **SLOW)
+    good = healthy_and_slow["rear_steer_rad"]
+    assert np.ptp(good[1300:]) > 0.03
+    np.testing.assert_allclose(failed["rear_steer_rad"][1300:], expected(good), atol=2e-4)
+
+
+def test_a_sensor_s_fault_changes_what_the_controller_is_told_and_not_the_car(told: Recording) -> None:
+    failed = driven(
+        f"yaw_rate_sensor:stuck@{AT_S}", f"ay_sensor:offset=0.5mps2@{AT_S}-1.5", controller=Reads
+    )  # fmt: skip
+    np.testing.assert_array_equal(failed["yaw_rate_radps"], told["yaw_rate_radps"])
+    good, read = told["yaw_rate_desired_radps"], failed["yaw_rate_desired_radps"]
+    # A controller's row holds what it made of the reading of the step before.
+    np.testing.assert_array_equal(read[: ROW + 1], good[: ROW + 1])
+    assert (read[ROW + 1 :] == good[ROW]).all()
+    off = failed["prediction_rad"] - told["prediction_rad"]
+    np.testing.assert_allclose(off[ROW + 1 : 1501], 0.5, rtol=1e-12)
+    assert not off[: ROW + 1].any()
+    assert not off[1501:].any()
+    assert failed["active_faults"][ROW] == 2
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [
+        ("delayed=0.05s", lambda good: good[ROW + 1 - 50 : -50]),
+        ("reversed", lambda good: -good[ROW + 1 :]),
+        ("dropout", lambda good: 0.0 * good[ROW + 1 :]),
+        ("runaway=1.3radps", lambda good: 0.0 * good[ROW + 1 :] + 1.3),
+    ],
+)
+def test_the_kinds_of_sensor_faults(fault: str, expected: Any, told: Recording) -> None:
+    failed = driven(f"yaw_rate_sensor:{fault}@{AT_S}", controller=Reads)
+    np.testing.assert_array_equal(failed["yaw_rate_desired_radps"][ROW + 1 :], expected(told["yaw_rate_desired_radps"]))
+
+
+def test_a_wheel_speed_sensor_is_one_of_four() -> None:
+    speeds = []
+
+    class Keeps:
+        def step(self, command: Any, measurement: Any) -> ActuatorCommand:
+            speeds.append(measurement.wheel_speed_radps)
+            return ActuatorCommand()
+
+    overrides = {
+        **STEP,
+        "duration_s": 0.2,
+        "steer.start_s": 0.1,
+        "fault": [fault_table("fr_wheel_speed_sensor:dropout@0.1")],
+    }
+    activesteer.simulate("step_steer", Keeps, overrides=overrides)
+    assert speeds[-1][1] == 0.0
+    assert min(speeds[-1][0], *speeds[-1][2:]) > 50.0
+
+
+def test_a_state_saved_in_the_midst_of_faults_goes_on_bit_by_bit() -> None:
+    texts = ("rear:delayed=0.08s@0.6", "yaw_rate_sensor:stuck@0.9-1.4", "superposition:offset=1deg@0.7-1.1")
+    overrides = {**STEP, "fault": [fault_table(text) for text in texts]}
+    whole = activesteer.simulate("step_steer", "ars", overrides=overrides)
+    simulation = Simulation("step_steer", "ars", overrides=overrides)
+    simulation.advance(950)
+    state = simulation.save_state()
+    simulation.advance(800)
+    simulation.restore_state(state)
+    simulation.advance(3)
+    simulation.run()
+    np.testing.assert_array_equal(simulation.recording().values, whole.values)
+
+
+def test_after_the_last_fault_the_car_is_as_built() -> None:
+    simulation = Simulation("step_steer", "ars", overrides={**STEP, "fault": [fault_table("rear:float@0.5-0.6")]})
+    model = simulation.loop.vehicle.model
+    before = model.numeric_data.copy(), model.actuator_gainprm.copy(), model.actuator_biasprm.copy()
+    simulation.advance(550)
+    assert (model.actuator_gainprm != before[1]).any()
+    simulation.run()
+    for now, then in zip((model.numeric_data, model.actuator_gainprm, model.actuator_biasprm), before, strict=True):
+        # But for the gear, which the drive has engaged.
+        assert np.count_nonzero(now != then) <= 2
+
+
+def test_the_search_for_an_amplitude_drives_the_car_in_order() -> None:
+    aimed = {key: value for key, value in STEP.items() if key != "steer.steering_wheel_deg"} | {"speed_kmh": 80.0}
+    fault = {"fault": [fault_table("rear:runaway=left@0.1")]}
+    one, other = (Simulation("step_steer", overrides={**aimed, **more}) for more in ({}, fault))
+    found, expected = (simulation.context.metadata["maneuver"]["steer"] for simulation in (one, other))
+    assert found == expected

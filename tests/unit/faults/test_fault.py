@@ -1,0 +1,84 @@
+"""What may be written of a fault, and what is said to the rest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
+from activesteer.faults import ACTUATORS, KINDS, SENSORS, Fault, fault_table
+from activesteer.scenario import resolve
+
+
+def faults_of(*tables: dict[str, Any]) -> tuple[Fault, ...]:
+    return resolve("straight_line", overrides={"fault": list(tables)}).maneuver.fault
+
+
+@pytest.mark.parametrize(
+    ("text", "table"),
+    [
+        ("rear:stuck@2.0", {"part": "rear", "kind": "stuck", "start_s": 2.0}),
+        (
+            "rear:offset=-1.5deg@2-3.5",
+            {"part": "rear", "kind": "offset", "start_s": 2.0, "end_s": 3.5, "size_deg": -1.5},
+        ),
+        ("rear_left:runaway=right@.5", {"part": "rear_left", "kind": "runaway", "start_s": 0.5, "side": "right"}),
+        ("ay_sensor:delayed=0.1s@1", {"part": "ay_sensor", "kind": "delayed", "start_s": 1.0, "delay_s": 0.1}),
+    ],
+)
+def test_the_command_line_s_form_is_a_table(text: str, table: dict[str, Any]) -> None:
+    assert fault_table(text) == table
+
+
+@pytest.mark.parametrize("text", ["rear", "rear:stuck", "rear:stuck@", "rear:stuck@x", "rear:offset=1@2", "a:b@1-2-3"])
+def test_what_is_no_fault_is_said_with_the_form(text: str) -> None:
+    with pytest.raises(ParameterError, match=r"--fault: .*PART:KIND"):
+        fault_table(text)
+
+
+def test_a_unit_of_the_edge_fills_the_si_field() -> None:
+    (fault,) = faults_of(fault_table("yaw_rate_sensor:offset=90degps@1"))
+    assert fault.size_radps == pytest.approx(1.5708, abs=1e-4)
+    assert fault.name == "yaw_rate_sensor:offset=1.5708radps"
+
+
+def test_every_signal_that_a_controller_gets_can_fail() -> None:
+    assert {"yaw_rate_sensor", "ay_sensor", "steering_wheel_sensor", "rear_steer_sensor", "rr_wheel_speed_sensor"} <= {
+        *SENSORS
+    }
+    assert not {*SENSORS} & {*ACTUATORS}
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"part": "raer", "kind": "stuck", "start_s": 1.0}, r"fault\.0\.part: .*'rear'"),
+        ({"part": "rear", "kind": "broken", "start_s": 1.0}, r"fault\.0\.kind: .*stuck"),
+        ({"part": "rear", "kind": "stuck"}, r"fault\.0\.start_s: .*missing"),
+        ({"part": "rear", "kind": "stuck", "start_s": 1.0, "size_deg": 1.0}, r"size_rad: has no effect"),
+        ({"part": "rear", "kind": "offset", "start_s": 1.0}, r"size_rad: is needed"),
+        ({"part": "rear", "kind": "offset", "start_s": 1.0, "size_radps": 1.0}, r"size_radps: has no effect.*size_rad"),
+        ({"part": "rear", "kind": "offset", "start_s": 1.0, "size_deg": 0.0}, r"is 0, which has no effect"),
+        ({"part": "rear", "kind": "runaway", "start_s": 1.0, "side": "up"}, r"'left' and 'right'"),
+        ({"part": "rear", "kind": "stuck", "start_s": 2.0, "end_s": 1.0}, r"end_s: .*begins at 2 s"),
+        ({"part": "rear", "kind": "stuck", "start_s": 99.0}, r"start_s: is 99 s, but the run ends at 10 s"),
+        ({"part": "yaw_rate_sensor", "kind": "float", "start_s": 1.0}, r"dropout"),
+        ({"part": "rear", "kind": "stuck", "start_s": 1.0, "tiem": 2.0}, r"fault\.0\.tiem: there is no such key"),
+    ],
+)
+def test_what_cannot_be_or_has_no_effect_is_said(table: dict[str, Any], message: str) -> None:
+    with pytest.raises(ActiveSteerError, match=message) as caught:
+        faults_of(table)
+    assert "\n" not in str(caught.value)
+
+
+def test_one_part_has_one_fault_at_a_time() -> None:
+    stuck = fault_table("rear:stuck@1-2")
+    with pytest.raises(ManeuverError, match="at the same time"):
+        faults_of(stuck, fault_table("rear_left:float@1.5"))
+    assert len(faults_of(stuck, fault_table("rear_left:float@2"), fault_table("superposition:stuck@1"))) == 2 + 1
+
+
+def test_every_kind_says_what_it_does() -> None:
+    assert all("actuator" in words or "demand" in words for words in KINDS.values())
