@@ -60,7 +60,7 @@ class OpenLoopDriver:
             return self.turn(reference.steering_wheel_demand_rad, reference, measurement)
         if self._rack_per_steering_wheel_m is None:
             raise ManeuverError(
-                "steering.rack_m: the car has no rack that its steering wheel drives; give steering_wheel_rad"
+                "the car has no rack that its steering wheel drives; give steering_wheel_rad", key="steering.rack_m"
             )
         return self.turn(reference.rack_demand_m / self._rack_per_steering_wheel_m, reference, measurement)
 

@@ -33,15 +33,20 @@ class AlongCourse(Maneuver):
         """
         if self.speed_mps < _MIN_SPEED_MPS:
             raise ManeuverError(
-                f"speed_kmh: is {3.6 * self.speed_mps:g} km/h; a course is driven forwards, with at least "
-                f"{3.6 * _MIN_SPEED_MPS:g} km/h"
+                f"is {3.6 * self.speed_mps:g} km/h; a course is driven forwards, with at least "
+                f"{3.6 * _MIN_SPEED_MPS:g} km/h",
+                key="speed_kmh",
+                value=3.6 * self.speed_mps,
             )
         last = self.course.last_gate_x_m
         if last is not None and self.duration_s * self.speed_mps < last:
             least = last / self.speed_mps
             raise ManeuverError(
-                f"duration_s: is {self.duration_s:g} s, but at {3.6 * self.speed_mps:g} km/h the last gate, {last:g} m "
-                f"from the start, is reached after {least:.1f} s; {least + _AFTER_S:.1f} s show how the car settles"
+                f"is {self.duration_s:g} s, but at {3.6 * self.speed_mps:g} km/h the last gate, {last:g} m "
+                f"from the start, is reached after {least:.1f} s; {least + _AFTER_S:.1f} s show how the car settles",
+                key="duration_s",
+                value=self.duration_s,
+                allowed=Range(least + _AFTER_S),
             )
 
     @property
@@ -78,6 +83,6 @@ def known_width(vehicle_width_m: float | None) -> float:
     """
     if vehicle_width_m is None:
         raise ManeuverError(
-            "vehicle_width_m: is missing; it comes from the vehicle file (width_m) unless it is given here"
+            "is missing; it comes from the vehicle file (width_m) unless it is given here", key="vehicle_width_m"
         )
     return vehicle_width_m

@@ -72,12 +72,15 @@ class BrakeInTurn(Maneuver):
         turn, brake = self.turn, self.brake
         if brake.start_s <= turn.start_s:
             raise ManeuverError(
-                f"brake.start_s: is {brake.start_s:g} s; it must be above turn.start_s, {turn.start_s:g} s"
+                f"is {brake.start_s:g} s; it must be above turn.start_s, {turn.start_s:g} s",
+                key="brake.start_s",
+                value=brake.start_s,
             )
         if brake.start_s + brake.rise_s >= self.duration_s:
             end = brake.start_s + brake.rise_s
             raise ManeuverError(
-                f"brake.start_s: the brake is pressed down at {end:g} s, but the run ends at {self.duration_s:g} s"
+                f"the brake is pressed down at {end:g} s, but the run ends at {self.duration_s:g} s",
+                key="brake.start_s",
             )
         if turn.steering_wheel_rad is None:
             check_search_speed(self.speed_mps, "turn.lateral_acceleration_mps2", "turn.steering_wheel_deg")

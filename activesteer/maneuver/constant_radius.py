@@ -41,11 +41,17 @@ class ConstantRadius(Maneuver):
         """
         circle = self.circle
         if abs(circle.radius_m) < 10.0:
-            raise ManeuverError(f"circle.radius_m: is {circle.radius_m:g} m; at least 10 m to either side are needed")
+            raise ManeuverError(
+                f"is {circle.radius_m:g} m; at least 10 m to either side are needed",
+                key="circle.radius_m",
+                value=circle.radius_m,
+            )
         if circle.end_speed_mps <= self.speed_mps:
             raise ManeuverError(
-                f"circle.end_speed_kmh: is {3.6 * circle.end_speed_mps:g} km/h; it must be above the speed at the "
-                f"start, {3.6 * self.speed_mps:g} km/h (speed_kmh)"
+                f"is {3.6 * circle.end_speed_mps:g} km/h; it must be above the speed at the "
+                f"start, {3.6 * self.speed_mps:g} km/h (speed_kmh)",
+                key="circle.end_speed_kmh",
+                value=3.6 * circle.end_speed_mps,
             )
 
     def reference(self, time_s: float) -> Reference:

@@ -91,8 +91,11 @@ class LaneChange(AlongCourse):
         most = 0.5 * (lane_width - width) - _SLACK_M
         if self.lane.margin_m > most:
             raise ManeuverError(
-                f"lane.margin_m: is {self.lane.margin_m:g} m, but the {narrowest.name} is {lane_width:.3g} m wide and "
-                f"the car {width:g} m; allowed is 0 to {most:.3f} m"
+                f"is {self.lane.margin_m:g} m, but the {narrowest.name} is {lane_width:.3g} m wide and "
+                f"the car {width:g} m; allowed is 0 to {most:.3f} m",
+                key="lane.margin_m",
+                value=self.lane.margin_m,
+                allowed=Range(0.0, most),
             )
 
 

@@ -52,14 +52,14 @@ class OpenLoop(Maneuver):
             columns = [*(torques.columns("drive") or ()), *(torques.columns("brake") or ())]
             tables += [("wheel_torques", torques.time_s, column) for column in columns]
             if self.speed is not None or self.brake is not None:
-                raise ManeuverError("wheel_torques: given beside a speed or a brake pedal; either the one or the other")
+                raise ManeuverError(
+                    "given beside a speed or a brake pedal; either the one or the other", key="wheel_torques"
+                )
         for key, times_s, values in tables:
             try:
                 check_table(times_s, values)
             except ManeuverError as reason:
-                raise ManeuverError(
-                    f"{key}.{reason}" if str(reason).startswith("time_s") else f"{key}: {reason}"
-                ) from reason
+                raise ManeuverError(reason.problem, key=f"{key}.{reason.key}" if reason.key else key) from reason
         self._check_end("steering", self.steering.time_s)
         if torques is not None:
             self._check_end("wheel_torques", torques.time_s)

@@ -27,7 +27,7 @@ def check_table(times_s: Sequence[float], values: Sequence[float]) -> None:
         )
     for earlier, later in pairwise(times_s):
         if later <= earlier:
-            raise ManeuverError(f"time_s: does not increase from {earlier:g} to {later:g} s")
+            raise ManeuverError(f"does not increase from {earlier:g} to {later:g} s", key="time_s")
 
 
 @dataclass(frozen=True)

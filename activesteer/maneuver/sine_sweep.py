@@ -48,16 +48,19 @@ class SineSweep(Maneuver):
         sweep = self.sweep
         if sweep.last_Hz <= sweep.first_Hz:
             raise ManeuverError(
-                f"sweep.last_Hz: is {sweep.last_Hz:g} Hz; it must be above first_Hz, {sweep.first_Hz:g} Hz"
+                f"is {sweep.last_Hz:g} Hz; it must be above first_Hz, {sweep.first_Hz:g} Hz",
+                key="sweep.last_Hz",
+                value=sweep.last_Hz,
             )
         if sweep.start_s + sweep.length_s > self.duration_s:
             end = sweep.start_s + sweep.length_s
             raise ManeuverError(
-                f"sweep.length_s: the sweep ends at {end:g} s, but the run at {self.duration_s:g} s (duration_s)"
+                f"the sweep ends at {end:g} s, but the run at {self.duration_s:g} s (duration_s)", key="sweep.length_s"
             )
         if 2.0 * sweep.fade_s > sweep.length_s:
             raise ManeuverError(
-                f"sweep.fade_s: twice {sweep.fade_s:g} s is longer than the sweep, {sweep.length_s:g} s (length_s)"
+                f"twice {sweep.fade_s:g} s is longer than the sweep, {sweep.length_s:g} s (length_s)",
+                key="sweep.fade_s",
             )
 
     def reference(self, time_s: float) -> Reference:

@@ -79,8 +79,11 @@ class SineWithDwell(Maneuver):
         steer = self.steer
         if steer.completion_s > self.duration_s:
             raise ManeuverError(
-                f"duration_s: is {self.duration_s:g} s, but the sine ends at {steer.completion_s:.3g} s; its "
-                f"evaluation needs 1.75 s more, {steer.completion_s + 1.75:.3g} s"
+                f"is {self.duration_s:g} s, but the sine ends at {steer.completion_s:.3g} s; its "
+                f"evaluation needs 1.75 s more, {steer.completion_s + 1.75:.3g} s",
+                key="duration_s",
+                value=self.duration_s,
+                allowed=Range(steer.completion_s + 1.75),
             )
         if steer.steering_wheel_rad is None:
             check_search_speed(self.speed_mps, "steer.amplitude_factor", "steer.steering_wheel_deg")

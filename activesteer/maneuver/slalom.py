@@ -42,8 +42,11 @@ class ConeRow:
         check_choice("side", self.side, SIDES)
         if self.entry_m < self.spacing_m:
             raise ManeuverError(
-                f"entry_m: is {self.entry_m:g} m; the path leaves the straight line one spacing before the first cone, "
-                f"so that at least {self.spacing_m:g} m are needed (spacing_m)"
+                f"is {self.entry_m:g} m; the path leaves the straight line one spacing before the first cone, "
+                f"so that at least {self.spacing_m:g} m are needed (spacing_m)",
+                key="entry_m",
+                value=self.entry_m,
+                allowed=Range(self.spacing_m),
             )
 
 
@@ -66,8 +69,11 @@ class Slalom(AlongCourse):
         row, width = self.cones, known_width(self.vehicle_width_m)
         if row.offset_m <= 0.5 * width:
             raise ManeuverError(
-                f"cones.offset_m: is {row.offset_m:g} m; a car of {width:g} m width touches the cones unless it is "
-                f"above {0.5 * width:g} m"
+                f"is {row.offset_m:g} m; a car of {width:g} m width touches the cones unless it is "
+                f"above {0.5 * width:g} m",
+                key="cones.offset_m",
+                value=row.offset_m,
+                allowed=Range(0.5 * width),
             )
         places = row.entry_m + row.spacing_m * np.arange(row.count, dtype=np.float64)
         path_x, path_y = _slalom_path(places, row.spacing_m, row.offset_m)

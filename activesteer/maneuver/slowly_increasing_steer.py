@@ -40,10 +40,14 @@ class SlowlyIncreasingSteer(Maneuver):
         ramp = self.steer
         if ramp.start_s >= self.duration_s:
             raise ManeuverError(
-                f"steer.start_s: is {ramp.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)"
+                f"is {ramp.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)",
+                key="steer.start_s",
+                value=ramp.start_s,
             )
         if ramp.rate_radps == 0.0 or ramp.end_rad == 0.0:
-            raise ManeuverError("steer: rate_degps and end_deg must not be 0, or the steering wheel does not turn")
+            raise ManeuverError(
+                "rate_degps and end_deg must not be 0, or the steering wheel does not turn", key="steer"
+            )
 
     def reference(self, time_s: float) -> Reference:
         """Steering wheel angle of the ramp; see the base class."""

@@ -48,12 +48,15 @@ class StepSteer(Maneuver):
         step = self.steer
         if step.steering_wheel_rad is None and step.lateral_acceleration_mps2 is None:
             raise ManeuverError(
-                "steer: steering_wheel_deg (the amplitude) or lateral_acceleration_g (what the control-free car shall "
-                "reach) is needed"
+                "steering_wheel_deg (the amplitude) or lateral_acceleration_g (what the control-free car shall "
+                "reach) is needed",
+                key="steer",
             )
         if step.start_s >= self.duration_s:
             raise ManeuverError(
-                f"steer.start_s: is {step.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)"
+                f"is {step.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)",
+                key="steer.start_s",
+                value=step.start_s,
             )
 
     def reference(self, time_s: float) -> Reference:

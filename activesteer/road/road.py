@@ -46,7 +46,7 @@ class RoadPatch:
                 f"the patch ends at {self.end_m:g} m, which is not behind its start_m of {self.start_m:g} m"
             )
         if self.side not in _SIDES:
-            raise ManeuverError(f"side: is {self.side!r}; {nearest_names(self.side, _SIDES)}")
+            raise ManeuverError(f"is {self.side!r}; {nearest_names(self.side, _SIDES)}", key="side", value=self.side)
 
 
 class Area(NamedTuple):

@@ -115,7 +115,7 @@ def _unit_sample(kind: str, dimensions: int, count: int, seed: list[int]) -> NDA
     try:
         from SALib.sample import morris, sobol  # noqa: PLC0415 - an extra
     except ImportError as reason:
-        raise StudyError(f"design.kind: {kind} needs SALib; install activesteer[study]") from reason
+        raise StudyError(f"{kind} needs SALib; install activesteer[study]", key="design.kind", value=kind) from reason
     number = int(rng.integers(2**31))
     if kind == "saltelli":
         return np.asarray(sobol.sample(problem, count, calc_second_order=False, seed=number))

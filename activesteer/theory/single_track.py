@@ -60,7 +60,9 @@ class SingleTrackParameters:
             ParameterError: it has an unknown name.
         """
         if self.source not in SOURCES:
-            raise ParameterError(f"source: is {self.source!r}; allowed are {', '.join(SOURCES)}")
+            raise ParameterError(
+                f"is {self.source!r}; allowed are {', '.join(SOURCES)}", key="source", value=self.source
+            )
 
 
 def characteristic_speed(wheelbase_m: float, understeer_gradient_radpmps2: float) -> float:
@@ -105,8 +107,9 @@ class SingleTrack:
             self.characteristic_speed_mps = math.sqrt(square)
         else:
             raise ParameterError(
-                f"single_track: C_H l_H - C_V l_V is {moment:.4g} N m/rad; it must not be below 0 (an oversteering "
-                "car) for eq. 4 to give a characteristic speed, or characteristic_speed_kmh must be given"
+                f"C_H l_H - C_V l_V is {moment:.4g} N m/rad; it must not be below 0 (an oversteering "
+                "car) for eq. 4 to give a characteristic speed, or characteristic_speed_kmh must be given",
+                key="single_track",
             )
         self._stiffness_ratio = cv / ch
         self._front_moment_kgm, self._rear_moment_kgm = p.mass_kg * lv, p.mass_kg * lh

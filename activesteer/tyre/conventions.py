@@ -58,11 +58,19 @@ class TyreConventions:
         """
         for key, words in _CHOICES.items():
             if (word := getattr(self, key)) not in words:
-                raise ParameterError(f"{key}: there is no {word!r}; {nearest_names(str(word), words)}")
+                raise ParameterError(f"there is no {word!r}; {nearest_names(str(word), words)}", key=key, value=word)
         if not 0.0 <= self.speed_offset_mps <= 1.0:
-            raise ParameterError(f"speed_offset_mps: {self.speed_offset_mps:g} m/s is outside 0 to 1 m/s")
+            raise ParameterError(
+                f"{self.speed_offset_mps:g} m/s is outside 0 to 1 m/s",
+                key="speed_offset_mps",
+                value=self.speed_offset_mps,
+            )
         if not 0.1 <= self.reference_friction <= 2.0 or not math.isfinite(self.reference_friction):
-            raise ParameterError(f"reference_friction: {self.reference_friction:g} is outside 0.1 to 2")
+            raise ParameterError(
+                f"{self.reference_friction:g} is outside 0.1 to 2",
+                key="reference_friction",
+                value=self.reference_friction,
+            )
 
     def numbers(self) -> dict[str, float]:
         """What the kernels read of the conventions, by the field of the tyre's record."""

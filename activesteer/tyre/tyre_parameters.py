@@ -70,7 +70,7 @@ class TyreParameters(Mapping[str, float]):
         if not is_finite(record):
             name = culprit(record, self.given)
             blamed = "the tyre is" if name is None else f"{name} = {values[name]:g} makes forces that are"
-            raise ParameterError(f"{source}: {blamed} not finite inside the file's own ranges of load and slip")
+            raise ParameterError(f"{blamed} not finite inside the file's own ranges of load and slip", file=source)
 
     def __reduce__(self) -> tuple[type[TyreParameters], tuple[object, ...]]:
         """Travels between processes by what it was made from: read-only views cannot be copied."""
@@ -141,32 +141,34 @@ def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
     """Every coefficient: the given value, else the default, else what stands in for it."""
     for key, value in given.items():
         if key not in BY_NAME:
-            raise ParameterError(f"{source}: there is no tyre coefficient {key!r}: {nearest_names(key, BY_NAME)}")
+            raise ParameterError(f"no tyre coefficient; {nearest_names(key, BY_NAME)}", file=source, key=key)
         if not math.isfinite(value):
-            raise ParameterError(f"{source}: {key} = {value}, must be finite")
+            raise ParameterError(f"is {value}; must be finite", file=source, key=key, value=value)
     missing = [
         coefficient.name for coefficient in COEFFICIENTS if coefficient.required and coefficient.name not in given
     ]
     if missing:
-        raise ParameterError(
-            f"{source}: {', '.join(missing)} missing, a tyre needs {'it' if len(missing) == 1 else 'them'}"
-        )
+        needed = "it" if len(missing) == 1 else "them"
+        raise ParameterError(f"missing; a tyre needs {needed}", file=source, key=", ".join(missing))
     values = {
         coefficient.name: float(given.get(coefficient.name, coefficient.default or 0.0)) for coefficient in COEFFICIENTS
     }
     if values["FITTYP"] not in _MF_VERSIONS:
-        allowed = ", ".join(str(version) for version in _MF_VERSIONS)
-        raise ParameterError(f"{source}: FITTYP = {values['FITTYP']:g}, allowed are {allowed}")
+        known = ", ".join(str(version) for version in _MF_VERSIONS)
+        raise ParameterError(
+            f"is {values['FITTYP']:g}; allowed are {known}", file=source, key="FITTYP", value=values["FITTYP"]
+        )
     _fill(values, given, source)
     for key in _POSITIVE:
-        if not values[key] > 0.0:
-            raise ParameterError(f"{source}: {key} = {values[key]:g}, must be greater than 0")
+        if not (value := values[key]) > 0.0:
+            raise ParameterError(f"is {value:g}; must be greater than 0", file=source, key=key, value=value)
     for low, high in _RANGES:
         if not values[low] < values[high]:
-            raise ParameterError(f"{source}: {low} = {values[low]:g} must be less than {high} = {values[high]:g}")
+            problem = f"is {values[low]:g}; must be less than {high}, {values[high]:g}"
+            raise ParameterError(problem, file=source, key=low, value=values[low])
     for key in ("VXLOW", "FZMIN"):
-        if values[key] < 0.0:
-            raise ParameterError(f"{source}: {key} = {values[key]:g}, must not be negative")
+        if (value := values[key]) < 0.0:
+            raise ParameterError(f"is {value:g}; must not be negative", file=source, key=key, value=value)
     return values
 
 
@@ -190,17 +192,18 @@ def _fill(values: dict[str, float], given: Mapping[str, float], source: str) -> 
         return
     if "Q_FZ1" not in given or values["Q_FZ1"] == 0.0:
         if "VERTICAL_STIFFNESS" not in given:
-            raise ParameterError(f"{source}: VERTICAL_STIFFNESS and Q_FZ1 missing, a tyre needs one of them")
+            raise ParameterError("missing; a tyre needs one of them", file=source, key="VERTICAL_STIFFNESS, Q_FZ1")
         relative = values["VERTICAL_STIFFNESS"] * r0 / fz0
         square = relative * relative - 4.0 * values["Q_FZ2"]
         if not square > 0.0:
-            raise ParameterError(
-                f"{source}: Q_FZ2 = {values['Q_FZ2']:g} is too great for VERTICAL_STIFFNESS = "
-                f"{values['VERTICAL_STIFFNESS']:g} N/m, must be below {relative * relative / 4.0:g}"
+            problem = (
+                f"is {values['Q_FZ2']:g}; with VERTICAL_STIFFNESS {values['VERTICAL_STIFFNESS']:g} N/m it must be "
+                f"below {relative * relative / 4.0:g}"
             )
+            raise ParameterError(problem, file=source, key="Q_FZ2", value=values["Q_FZ2"])
         values["Q_FZ1"] = math.sqrt(square)
     elif "VERTICAL_STIFFNESS" not in given:
         square = values["Q_FZ1"] * values["Q_FZ1"] + 4.0 * values["Q_FZ2"]
         values["VERTICAL_STIFFNESS"] = fz0 / r0 * math.sqrt(max(square, 0.0))
     if not (math.isfinite(values["Q_FZ1"]) and math.isfinite(values["VERTICAL_STIFFNESS"])):
-        raise ParameterError(f"{source}: the vertical stiffness is not finite, check VERTICAL_STIFFNESS, Q_FZ1, Q_FZ2")
+        raise ParameterError("is not finite, or Q_FZ1 or Q_FZ2 is not", file=source, key="VERTICAL_STIFFNESS")

@@ -88,7 +88,7 @@ class Vehicle:
             self._bind()
             self._place()
         except ModelError as reason:
-            raise ModelError(f"{mjcf}: {reason}") from reason
+            raise ModelError(str(reason), file=str(mjcf)) from reason
 
     def _bind(self) -> None:
         """Looks up addresses once; the step uses nothing but integers and views."""

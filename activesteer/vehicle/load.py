@@ -46,7 +46,9 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
     if scale <= 0.0:
         least = 1.0 - 1.0 / share
         raise ModelError(
-            f"factors.mass = {factors.mass:g} leaves nothing of the chassis; more than {least:.2f} is needed"
+            f"{factors.mass:g} leaves nothing of the chassis; more than {least:.2f} is needed",
+            key="factors.mass",
+            value=factors.mass,
         )
     mass = scale * float(body.mass[0])
     # The whole empty car's moves by what is asked for; only the chassis is moved.

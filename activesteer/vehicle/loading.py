@@ -157,7 +157,9 @@ def _force_block(
 
 def _triple(values: tuple[float, ...]) -> tuple[float, float, float]:
     if len(values) != 3:
-        raise ModelError(f"aerodynamics.pressure_point_m: {len(values)} numbers given; 3 are needed")
+        raise ModelError(
+            f"{len(values)} numbers given; 3 are needed", key="aerodynamics.pressure_point_m", value=values
+        )
     return values[0], values[1], values[2]
 
 

@@ -200,7 +200,7 @@ class Load:
         for name in ("payload_position_m", "fuel_position_m"):
             position = getattr(self, name)
             if position is not None and len(position) != 3:
-                raise ParameterError(f"{name}: {len(position)} numbers given; 3 are needed")
+                raise ParameterError(f"{len(position)} numbers given; 3 are needed", key=name, value=position)
 
 
 @dataclass(frozen=True)

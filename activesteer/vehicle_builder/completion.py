@@ -122,8 +122,10 @@ def _axle(
     )  # fmt: skip
     if spin > 2.0 * across:
         raise ParameterError(
-            f"{axle}: wheel_spin_inertia_kgm2 is {spin:.3g} and wheel_inertia_kgm2, about a diameter, {across:.3g} "
-            "kg m2; no body has more than twice of that about its axle"
+            f"is {spin:.3g} and wheel_inertia_kgm2, about a diameter, {across:.3g} kg m2; no body has more than twice "
+            "of that about its axle",
+            key=f"{axle}.wheel_spin_inertia_kgm2",
+            value=spin,
         )
     toe, camber = (0.05, -0.5) if front else (0.1, -1.0)
     spring_on = table.spring_on
@@ -202,7 +204,9 @@ def _link(axle: str, kind: LinkKind, table: LinkTable | None, log: Log) -> Link:
         if table.bushing not in BUSHINGS_NPM:
             words = nearest_names(table.bushing, BUSHINGS_NPM)
             raise ParameterError(
-                f"{axle}.links.{kind.name}.bushing: no class of bushings is named {table.bushing!r}; {words}"
+                f"no class of bushings is named {table.bushing!r}; {words}",
+                key=f"{axle}.links.{kind.name}.bushing",
+                value=table.bushing,
             )
         stiffness, remark = 0.5 * BUSHINGS_NPM[table.bushing], f"two bushings of class {table.bushing}"
         log.note(f"{axle}.links.{kind.name}.stiffness_Npm", f"{stiffness:g} N/m", remark)
@@ -247,14 +251,15 @@ def _rack_per_steer(axis: tuple[Array, Array], inner: Array, outer: Array) -> fl
     rod = outer - inner
     if abs(rod[1]) < 1e-3:
         raise ParameterError(
-            "front: the tie rod does not run across the car: tie_rod_inner and tie_rod_outer have the same y"
+            "the tie rod does not run across the car: tie_rod_inner and tie_rod_outer have the same y", key="front"
         )
     moved = np.cross(along, outer - axis[0])
     per_steer = float(rod @ moved / rod[1])
     if abs(per_steer) < 0.02:
         raise ParameterError(
-            f"front: the tie rod passes the steering axis at {1e3 * abs(per_steer):.0f} mm: it cannot steer the wheel; "
-            "tie_rod_outer has to lie ahead of or behind the line through the upper and the lower joint"
+            f"the tie rod passes the steering axis at {1e3 * abs(per_steer):.0f} mm: it cannot steer the wheel; "
+            "tie_rod_outer has to lie ahead of or behind the line through the upper and the lower joint",
+            key="front",
         )
     return per_steer
 
@@ -296,13 +301,15 @@ def check_origin(car: Car, given: CarTable) -> None:
         off = np.array([centre[0], 0.0, centre[2] - 0.94 * radius]) / UNITS[given.units]
         say = ", ".join(f"{value:.4g}" for value in np.array(given.origin) + off)
         raise ParameterError(
-            f"front.points.wheel_centre is at x {centre[0]:.3f} m, {centre[2]:.3f} m above the origin; vehicle "
-            f"coordinates begin on the road below the front axle, and the tyre's radius is {radius:.3f} m. Say where "
-            f"that point lies in the table's coordinates: about origin = [{say}] ({given.units})"
+            f"is at x {centre[0]:.3f} m, {centre[2]:.3f} m above the origin; vehicle coordinates begin on the road "
+            f"below the front axle, and the tyre's radius is {radius:.3f} m. Say where that point lies in the table's "
+            f"coordinates: about origin = [{say}] ({given.units})",
+            key="front.points.wheel_centre",
         )
     rear = car.rear.wheel_centre_m[0]
     if rear > -0.5:
         raise ParameterError(
-            f"rear.points.wheel_centre is at x {rear:.3f} m; x points forward, so the rear axle lies at minus the "
-            "wheelbase. Are the rear points those of the axle by itself?"
+            f"is at x {rear:.3f} m; x points forward, so the rear axle lies at minus the wheelbase. Are the rear "
+            "points those of the axle by itself?",
+            key="rear.points.wheel_centre",
         )

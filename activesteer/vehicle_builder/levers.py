@@ -59,7 +59,7 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
     length = float(np.linalg.norm(upper - lower))
     if length < 0.02:
         raise ParameterError(
-            f"{axle}: {part}_inner and {part}_outer are {1e3 * length:.1f} mm apart; a {part} needs length"
+            f"is {1e3 * length:.1f} mm from {part}_outer; a {part} needs length", key=f"{axle}.points.{part}_inner"
         )
     if carrier == "knuckle":
         return Mount(carrier, 1.0, f"{part}_outer", upper, length)
@@ -67,8 +67,9 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
     lever = _lever([points[name] for name in inner], points[outer], lower, (upper - lower) / length)
     if not _LEAST < lever < _MOST:
         raise ParameterError(
-            f"{axle}: {part}_outer lies at {lever:.2f} of the length of {carrier}, seen from its inner end; a {part} "
-            f"on an arm lies between {_LEAST:g} and {_MOST:g}. Is {part}_on right, and {part}_outer on the left side?"
+            f"lies at {lever:.2f} of the length of {carrier}, seen from its inner end; a {part} on an arm lies between "
+            f"{_LEAST:g} and {_MOST:g}. Is {part}_on right, and {part}_outer on the left side?",
+            key=f"{axle}.points.{part}_outer",
         )
     return Mount(carrier, lever, outer, points[outer] + (upper - lower) / lever, length)
 

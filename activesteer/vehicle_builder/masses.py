@@ -31,12 +31,14 @@ def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
             log.note("mass.chassis_inertia_kgm2", _words(inertia), _INERTIA_RULE)
         return Solid(table.chassis_kg, np.array(table.chassis_cg), np.array(inertia))
     if table.total_kg is None or table.front_share is None or table.cg_height_m is None:
-        raise ParameterError("mass: total_kg, front_share and cg_height_m are needed, or chassis_kg and chassis_cg")
+        raise ParameterError(
+            "total_kg, front_share and cg_height_m are needed, or chassis_kg and chassis_cg", key="mass"
+        )
     mass = table.total_kg - others.mass_kg
     cg = np.array([_cg_x(car, table.front_share), 0.0, table.cg_height_m])
     if mass < 0.3 * table.total_kg:
         raise ParameterError(
-            f"mass.total_kg: wheels, knuckles and rack weigh {others.mass_kg:.0f} kg of {table.total_kg:.0f} kg"
+            f"wheels, knuckles and rack weigh {others.mass_kg:.0f} kg of {table.total_kg:.0f} kg", key="mass.total_kg"
         )
     chassis_cg = (table.total_kg * cg - others.mass_kg * others.cg_m) / mass
     chassis_cg[1] = 0.0
@@ -49,8 +51,9 @@ def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
     own = np.diag(left)
     if own.min() <= 0.0 or 2.0 * own.max() > own.sum():
         raise ParameterError(
-            f"mass.inertia_kgm2: of {_words(inertia)} kg m2 of the whole car {_words(own)} are left for the chassis "
-            "when wheels and suspensions are taken away; no body has such an inertia (each at most both others)"
+            f"of {_words(inertia)} kg m2 of the whole car {_words(own)} are left for the chassis "
+            "when wheels and suspensions are taken away; no body has such an inertia (each at most both others)",
+            key="mass.inertia_kgm2",
         )
     return Solid(mass, chassis_cg, own)
 

@@ -54,7 +54,7 @@ def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
     if free != 1:
         many = "no way" if free < 1 else f"{free} ways"
         counts = f"{len(dofs)} degrees of freedom and {len(links)} links"
-        raise ModelError(f"{corner}: {counts} leave the wheel {many} to travel; 1 is needed")
+        raise ModelError(f"{counts} leave the wheel {many} to travel; 1 is needed", key=corner)
     direction = vectors[-1] / scale
     along = np.zeros((3, model.nv))
     wheel = model.body(f"{corner}_wheel").id
@@ -62,7 +62,7 @@ def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
     rise = float(along[2, dofs] @ direction)
     if abs(rise) < 0.05 * float(np.linalg.norm(along[:, dofs] @ direction)):
         raise ModelError(
-            f"{corner}: the links let the wheel move, but not up and down; are two of their points exchanged?"
+            "the links let the wheel move, but not up and down; are two of their points exchanged?", key=corner
         )
     per_travel = {name: -float(row @ direction) / rise for name, row in rows.items()}
     return CornerMotion(len(dofs), links, float(values[-1]), per_travel)

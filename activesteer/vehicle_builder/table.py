@@ -211,7 +211,7 @@ def read_table(path: Path) -> tuple[CarTable, Source]:
     elif path.suffix.lower() == ".toml":
         raw, source = read_toml(path)
     else:
-        raise ParameterError(f"{path}: a table ends in .toml or .csv")
+        raise ParameterError("a table ends in .toml or .csv", file=str(path))
     table = build(CarTable, raw, source)
     if table.units not in UNITS:
         raise source.fail(("units",), f"{table.units!r} is no unit of length here; {nearest_names(table.units, UNITS)}")

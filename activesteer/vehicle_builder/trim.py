@@ -103,9 +103,9 @@ def trim(car: Car, write: Write, log: Log) -> Trimmed:
         for part, ratio in zip(("spring", "damper"), ratios[axle.name], strict=True):
             if not 0.15 < ratio < 1.6:
                 raise ModelError(
-                    f"{axle.name}: the {part} shortens by {ratio:.2f} of the wheel's travel in bump; 0.15 to 1.6 are "
-                    f"possible in a car. Are {part}_inner (chassis) and {part}_outer (suspension) exchanged, or is "
-                    f"{part}_on wrong?"
+                    f"the {part} shortens by {ratio:.2f} of the wheel's travel in bump; 0.15 to 1.6 are possible in a "
+                    f"car. Are {part}_inner (chassis) and {part}_outer (suspension) exchanged, or is {part}_on wrong?",
+                    key=axle.name,
                 )
         unsprung = float(model.body_subtreemass[model.body(f"{axle.corner}_knuckle").id])
         sprung[axle.name] = loads[axle.name] / GRAVITY_MPS2 - unsprung
@@ -125,7 +125,7 @@ def _compiled(mjcf: Path) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_path(str(mjcf))
     except ValueError as reason:
-        raise ModelError(f"{mjcf.name}: {reason}") from reason
+        raise ModelError(str(reason), file=mjcf.name) from reason
 
 
 def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
@@ -144,8 +144,10 @@ def _wanted_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
     tyre = tyre_rate_Npm(axle.tyre_parameters, load_N)
     if ride > 0.8 * tyre:
         raise ModelError(
-            f"{axle.name}.ride_frequency_Hz: {axle.ride_frequency_Hz:g} Hz of {sprung_kg:.0f} kg needs {ride:.0f} N/m, "
-            f"and the tyre alone has {tyre:.0f} N/m"
+            f"{axle.ride_frequency_Hz:g} Hz of {sprung_kg:.0f} kg needs {ride:.0f} N/m, and the tyre alone has "
+            f"{tyre:.0f} N/m",
+            key=f"{axle.name}.ride_frequency_Hz",
+            value=axle.ride_frequency_Hz,
         )
     return ride * tyre / (tyre - ride)
 
@@ -237,7 +239,7 @@ def _let_stand(
                 found.spring_rate_Npm -= off * rate / ratio**2
                 if found.spring_rate_Npm <= 0.0:
                     raise ModelError(
-                        f"{axle.name}: the links alone give a wheel rate above the {rate:.0f} N/m that are asked for"
+                        f"the links alone give a wheel rate above the {rate:.0f} N/m that are asked for", key=axle.name
                     )
         if done:
             return rates

@@ -69,7 +69,7 @@ def check(path: Path, size: tuple[int, int]) -> None:
         PlaybackError: there is no ffmpeg, or the folder does not exist.
     """
     if path.suffix.lower() not in FORMATS:
-        raise ParameterError(f"{path}: a video's name must end in {' or '.join(FORMATS)}")
+        raise ParameterError(f"a video's name must end in {' or '.join(FORMATS)}", file=str(path), allowed=FORMATS)
     if min(size) < 16 or max(size) > _SIDE_LIMIT:
         raise ParameterError(
             f"a picture of {size[0]} x {size[1]} pixels cannot be made; each side must be 16 to {_SIDE_LIMIT}"

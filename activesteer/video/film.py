@@ -56,7 +56,7 @@ class Settings:
             ("speed", self.speed, 0.01, 100.0),
         ):
             if not low <= value <= high:
-                raise ParameterError(f"{name}: is {value:g}, must be {low:g} to {high:g}")
+                raise ParameterError(f"is {value:g}, must be {low:g} to {high:g}", key=name, value=value)
 
 
 class Film:

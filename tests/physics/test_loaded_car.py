@@ -7,6 +7,7 @@ import pytest
 from activesteer.errors import ParameterError
 from activesteer.scenario import describe, resolve
 from activesteer.simulation.preparation import prepared
+from tests.raising import raises
 
 LOAD = {"load.payload_kg": 300.0}
 
@@ -28,5 +29,5 @@ def test_belief_is_identified_where_asked_for_and_said_so(key: str) -> None:
 
 
 def test_unknown_source_is_refused() -> None:
-    with pytest.raises(ParameterError, match="source: is 'guess'; allowed are file, identify, identified"):
+    with raises(ParameterError, file="compact.toml", key="single_track.source", value="guess"):
         resolve("straight_line", overrides={"single_track.source": "guess"})

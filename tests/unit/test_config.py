@@ -12,6 +12,7 @@ import pytest
 
 from activesteer.config import Range, Source, build, key_paths, merged, read_toml, to_table
 from activesteer.errors import ManeuverError, ParameterError
+from tests.raising import raises
 
 
 @dataclass(frozen=True)
@@ -130,33 +131,33 @@ def test_both_ends_of_a_range_are_allowed():
 
 
 @pytest.mark.parametrize(
-    ("keys", "told"),
+    ("keys", "key"),
     [
-        ({"speed_mps": "fast"}, r"speed_mps: 'fast' is not a number"),
-        ({"speed_mps": True}, r"speed_mps: True is not a number"),
-        ({"speed_mps": [1.0]}, r"speed_mps: \[1\.0\] is not a number"),
-        ({"speed_mps": math.nan}, r"speed_mps: nan is not finite"),
-        ({"yaw_rate_degps": math.inf}, r"yaw_rate_degps: inf is not finite"),
-        ({"yaw_rate_radps": 10**400}, r"yaw_rate_radps: 1000+\.\.\.0+ is not finite"),
-        ({"yaw_rate_degps": 10**400}, r"yaw_rate_degps: 1000+\.\.\.0+ is not finite"),
-        ({"doors": 2.5}, r"doors: 2\.5 is not a whole number"),
-        ({"doors": True}, r"doors: True is not a whole number"),
-        ({"open": 1}, r"open: 1 is not true or false"),
-        ({"curve": 1.0}, r"curve: 1\.0 is no list of numbers"),
-        ({"curve": [1.0, "x"]}, r"curve: 'x' is not a number"),
-        ({"spare": 3}, r"spare: 3 is no table; a table \[spare\] is needed"),
-        ({"spare": {"radius_m": 0.3, "name": 7}}, r"spare\.name: 7 is not a text"),
-        ({"wheels": 3}, r"wheels: 3 is no table"),
-        ({"axles": 3}, r"axles: 3 is no list; tables \[\[axles\]\] are needed"),
-        ({"axles": {"track_m": 1.5}}, r"axles: \{'track_m': 1\.5\} is no list; tables \[\[axles\]\] are needed"),
-        ({"axles": [1.5]}, r"axles\.0: 1\.5 is no table"),
-        ({"axles": [{"track_m": 1.5}, {"track_m": 5}]}, r"axles\.1\.track_m: 5 is out of range; allowed is 0\.5 to 3$"),
-        ({"axles": [{}]}, r"axles\.0\.track_m: the key track_m is missing"),
-        ({"wheels": {"rear": {}}}, r"wheels\.rear\.radius_m: the key radius_m is missing"),
+        ({"speed_mps": "fast"}, "speed_mps"),
+        ({"speed_mps": True}, "speed_mps"),
+        ({"speed_mps": [1.0]}, "speed_mps"),
+        ({"speed_mps": math.nan}, "speed_mps"),
+        ({"yaw_rate_degps": math.inf}, "yaw_rate_degps"),
+        ({"yaw_rate_radps": 10**400}, "yaw_rate_radps"),
+        ({"yaw_rate_degps": 10**400}, "yaw_rate_degps"),
+        ({"doors": 2.5}, "doors"),
+        ({"doors": True}, "doors"),
+        ({"open": 1}, "open"),
+        ({"curve": 1.0}, "curve"),
+        ({"curve": [1.0, "x"]}, "curve"),
+        ({"spare": 3}, "spare"),
+        ({"spare": {"radius_m": 0.3, "name": 7}}, "spare.name"),
+        ({"wheels": 3}, "wheels"),
+        ({"axles": 3}, "axles"),
+        ({"axles": {"track_m": 1.5}}, "axles"),
+        ({"axles": [1.5]}, "axles.0"),
+        ({"axles": [{"track_m": 1.5}, {"track_m": 5}]}, "axles.1.track_m"),
+        ({"axles": [{}]}, "axles.0.track_m"),
+        ({"wheels": {"rear": {}}}, "wheels.rear.radius_m"),
     ],
 )
-def test_value_of_the_wrong_type_is_answered(keys, told):
-    with pytest.raises(ParameterError, match=told):
+def test_value_of_the_wrong_type_is_answered(keys, key):
+    with raises(ParameterError, file="car.toml", key=key):
         car(**keys)
 
 
@@ -166,9 +167,7 @@ def test_whole_number_is_taken_for_a_number_and_becomes_one():
 
 
 def test_unknown_key_is_answered_with_the_nearest_its_file_and_line(read):
-    with pytest.raises(
-        ParameterError, match=r"^car\.toml, line 2: sped_kmh: there is no such key; did you mean 'speed_"
-    ):
+    with raises(ParameterError, file="car.toml", line=2, key="sped_kmh"):
         read("# A car.\nsped_kmh = 90\n")
 
 
@@ -229,19 +228,19 @@ def test_error_in_a_list_names_the_element_and_the_line(read, old, new, line, ke
 
 
 def test_error_in_an_inline_table_names_the_line_of_its_key(read):
-    with pytest.raises(ParameterError, match=r"^car\.toml, line 2: spare\.radius_m: 30 is out of range"):
+    with raises(ParameterError, file="car.toml", line=2, key="spare.radius_m", value=30):
         read("speed_kmh = 90\nspare = { radius_m = 30 }\n")
-    with pytest.raises(ParameterError, match=r"^car\.toml, line 2: axles\.1\.track_m: 9 is out of range"):
+    with raises(ParameterError, file="car.toml", line=2, key="axles.1.track_m", value=9):
         read("speed_kmh = 90\naxles = [{ track_m = 1 }, { track_m = 9 }]\n")
 
 
 def test_missing_key_is_answered_with_its_spellings():
-    with pytest.raises(ParameterError, match=r"^car\.toml: speed_mps: the key speed_mps or speed_kmh is missing$"):
+    with raises(ParameterError, file="car.toml", key="speed_mps"):
         build(Car, {}, source())
 
 
 def test_key_given_in_two_units_is_answered():
-    with pytest.raises(ParameterError, match=r"speed_kmh: speed_mps and speed_kmh are the same in two units"):
+    with raises(ParameterError, file="car.toml", key="speed_kmh"):
         car(speed_kmh=36)
 
 
@@ -251,17 +250,17 @@ def test_checks_of_the_class_itself_are_told_with_the_file():
 
 
 def test_error_is_of_the_class_that_the_source_asks_for():
-    with pytest.raises(ManeuverError, match=r"^m\.toml: speed_mps: 'x' is not a number"):
+    with raises(ManeuverError, file="m.toml", key="speed_mps", value="x"):
         build(Car, {"speed_mps": "x"}, Source("m.toml", error=ManeuverError))
 
 
 def test_overridden_value_is_not_blamed_on_the_file():
     overridden = Source("car.toml", TEXT, overridden=frozenset({"speed_kmh", "spare"}))
-    with pytest.raises(ParameterError, match=r"^override speed_kmh: 900 is out of range"):
+    with raises(ParameterError, file="car.toml", key="speed_kmh", value=900):
         build(Car, {"speed_kmh": 900}, overridden)
-    with pytest.raises(ParameterError, match=r"^override spare\.radius_m: 9 is out of range"):
+    with raises(ParameterError, file="car.toml", key="spare.radius_m", value=9):
         build(Car, {"speed_mps": 9, "spare": {"radius_m": 9}}, overridden)
-    with pytest.raises(ParameterError, match=r"^car\.toml, line 6: wheels\.front\.radius_m: 9 is out of range"):
+    with raises(ParameterError, file="car.toml", line=6, key="wheels.front.radius_m", value=9):
         build(Car, {"speed_mps": 9, "wheels": {"front": {"radius_m": 9}}}, overridden)
 
 
@@ -314,25 +313,25 @@ def test_override_does_not_change_the_table_it_is_given():
 
 
 @pytest.mark.parametrize(
-    ("path", "told"),
+    ("path", "key"),
     [
-        ("sped_kmh", r"^override sped_kmh: sped_kmh: there is no such key; did you mean 'speed_kmh'"),
-        ("spare.radus_m", r"radus_m: there is no such key; did you mean 'radius_m'\?"),
-        ("speed_mps.x", r"speed_mps is a value, not a table"),
-        ("axles.2.track_m", r"axles\.2\.track_m: there is no element '2' of axles; there are 0 to 1$"),
-        ("axles.x.track_m", r"axles\.x\.track_m: there is no element 'x' of axles; there are 0 to 1$"),
-        ("axles.0.trak_m", r"trak_m: there is no such key; did you mean 'track_m'\?"),
-        ("wheels.frnt.radius_m", r"wheels\.frnt\.radius_m: there is no such key; did you mean 'front'\?"),
+        ("sped_kmh", "sped_kmh"),
+        ("spare.radus_m", "spare.radus_m"),
+        ("speed_mps.x", "speed_mps.x"),
+        ("axles.2.track_m", "axles.2.track_m"),
+        ("axles.x.track_m", "axles.x.track_m"),
+        ("axles.0.trak_m", "axles.0.trak_m"),
+        ("wheels.frnt.radius_m", "wheels.frnt.radius_m"),
     ],
 )
-def test_override_of_a_key_that_does_not_exist_is_answered(path, told):
+def test_override_of_a_key_that_does_not_exist_is_answered(path, key):
     table = {"wheels": {"front": {"radius_m": 0.31}}, "axles": [{"track_m": 1.5}, {"track_m": 1.4}]}
-    with pytest.raises(ParameterError, match=told):
+    with raises(ParameterError, key=key):
         replaced(path, 1.0, table)
 
 
 def test_override_of_an_element_of_an_empty_list_is_answered():
-    with pytest.raises(ParameterError, match=r"axles\.0: there is no element '0' of axles; there are none"):
+    with raises(ParameterError, file="override axles.0", key="axles.0", value="0"):
         replaced("axles.0", {})
 
 

@@ -85,7 +85,10 @@ def tir_from_text(
     values: dict[str, float] = {}
     for name, entry in lines.items():
         if isinstance(entry.value, str):
-            raise TyreFileError(f"{source}, line {entry.line}: {entry.key} = {entry.value[:60]!r}, expected a number")
+            raise TyreFileError(
+                f"{entry.value[:60]!r} is not a number",
+                file=str(source), line=entry.line, key=entry.key, value=entry.value,
+            )  # fmt: skip
         values[name] = entry.value * si_factor(BY_NAME[name].quantity, units)
     words = {key: word for (_, key), word in texts.items()}
     if "FITTYP" not in values:
@@ -94,7 +97,10 @@ def tir_from_text(
     try:
         return TyreParameters(values, source, side, mounted or side, slip_tangent, texts, unused, syntax.tables)
     except ParameterError as error:
-        raise TyreFileError(_with_line(str(error), lines)) from error
+        entry = lines.get(error.key or "")
+        raise TyreFileError(
+            error.problem, file=error.file, line=entry and entry.line, key=error.key, value=error.value
+        ) from error
 
 
 def _place(lines: dict[str, Entry], name: str, entry: Entry, source: Path) -> None:
@@ -106,10 +112,8 @@ def _place(lines: dict[str, Entry], name: str, entry: Entry, source: Path) -> No
     home = BY_NAME[name].section
     at_home = (before.section == home, entry.section == home)
     if at_home[0] == at_home[1]:
-        raise TyreFileError(
-            f"{source}, line {entry.line}: {entry.key} = {entry.value} contradicts line {before.line}, "
-            f"where it is {before.value}"
-        )
+        problem = f"is {entry.value} and contradicts line {before.line}, where it is {before.value}"
+        raise TyreFileError(problem, file=str(source), line=entry.line, key=entry.key, value=entry.value)
     if at_home[1]:
         lines[name] = entry
 
@@ -123,10 +127,8 @@ def _units(entries: tuple[Entry, ...], source: Path) -> dict[str, float]:
         known = BASE_UNITS[entry.key]
         word = str(entry.value).lower()
         if word not in known:
-            raise TyreFileError(
-                f"{source}, line {entry.line}: {entry.key} = {str(entry.value)[:60]!r} in [UNITS], "
-                f"allowed are {', '.join(known)}"
-            )
+            problem = f"is {str(entry.value)[:60]!r} in [UNITS]; allowed are {', '.join(known)}"
+            raise TyreFileError(problem, file=str(source), line=entry.line, key=entry.key, value=entry.value)
         sizes[entry.key] = known[word]
     return sizes
 
@@ -136,8 +138,11 @@ def _version_without_fittyp(words: Mapping[str, str], source: Path) -> float:
     model = words.get("PROPERTY_FILE_FORMAT", "PAC2002").upper()
     if not model.startswith(("PAC2002", "USER", "MF")):
         raise TyreFileError(
-            f"{source}: PROPERTY_FILE_FORMAT = {model[:60]!r} is not a Magic Formula that can be read here; "
-            "allowed are PAC2002 and files with FITTYP 5, 6, 21, 52, 60, 61 or 62"
+            f"{model[:60]!r} is not a Magic Formula that can be read here; allowed are PAC2002 and files with FITTYP "
+            "5, 6, 21, 52, 60, 61 or 62",
+            file=str(source),
+            key="PROPERTY_FILE_FORMAT",
+            value=model,
         )
     return _PAC2002_FITTYP
 
@@ -148,13 +153,6 @@ def _side(words: Mapping[str, str], source: Path) -> Side:
     if side == "RIGHT":
         return "RIGHT"
     if side not in ("LEFT", "SYMMETRIC", "SYM", "UNKNOWN", ""):
-        raise TyreFileError(f"{source}: TYRESIDE = {side[:60]!r}, allowed are 'LEFT', 'RIGHT' and 'SYMMETRIC'")
+        problem = f"is {side[:60]!r}; allowed are 'LEFT', 'RIGHT' and 'SYMMETRIC'"
+        raise TyreFileError(problem, file=str(source), key="TYRESIDE", value=side)
     return "LEFT"
-
-
-def _with_line(message: str, lines: Mapping[str, Entry]) -> str:
-    """Add the line of the coefficient that a message is about."""
-    for name, entry in lines.items():
-        if f": {name} = " in message:
-            return message.replace(f": {name} = ", f", line {entry.line}: {name} = ", 1)
-    return message

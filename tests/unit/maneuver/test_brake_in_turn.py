@@ -11,6 +11,7 @@ from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import BrakeInTurn, build_maneuver
 from activesteer.maneuver.step_steer import SteadyTurn
+from tests.raising import raises
 
 SOURCE = Source("my_turn.toml", error=ManeuverError)
 
@@ -59,21 +60,15 @@ def test_aim_asks_for_the_search_of_the_step_steer():
 
 
 @pytest.mark.parametrize(
-    ("keys", "told"),
+    ("keys", "key"),
     [
-        ({"turn": {}}, r"turn: steering_wheel_deg .* or lateral_acceleration_mps2 .* is needed"),
-        ({"brake": {"pedal": 1.5}}, r"brake\.pedal: 1\.5 is out of range; allowed is 0 to 1"),
-        (
-            {"brake": {"pedal": 0.5, "start_s": 0.2}},
-            r"brake\.start_s: is 0\.2 s; it must be above turn\.start_s, 0\.5 s",
-        ),
-        ({"brake": {"pedal": 0.5, "start_s": 9.4}}, r"brake\.start_s: the brake is pressed down at 9\.6 s, .* 9\.5 s"),
-        (
-            {"speed_kmh": -20, "turn": {"lateral_acceleration_mps2": 5.0}},
-            r"speed_kmh: is -20 km/h; turn\.lateral_acceleration_mps2 needs at least 30 km/h, or give",
-        ),
+        ({"turn": {}}, "turn"),
+        ({"brake": {"pedal": 1.5}}, "brake.pedal"),
+        ({"brake": {"pedal": 0.5, "start_s": 0.2}}, "brake.start_s"),
+        ({"brake": {"pedal": 0.5, "start_s": 9.4}}, "brake.start_s"),
+        ({"speed_kmh": -20, "turn": {"lateral_acceleration_mps2": 5.0}}, "speed_kmh"),
     ],
 )
-def test_wrong_values_are_answered_with_what_is_allowed(keys, told):
-    with pytest.raises(ManeuverError, match=r"^my_turn\.toml: " + told):
+def test_wrong_values_are_answered_with_what_is_allowed(keys, key):
+    with raises(ManeuverError, file="my_turn.toml", key=key):
         maneuver(**keys)

@@ -10,6 +10,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import ConstantRadius, build_maneuver
+from tests.raising import raises
 
 SOURCE = Source("mine.toml", error=ManeuverError)
 
@@ -45,8 +46,8 @@ def test_car_settles_straight_ahead():
 
 
 @pytest.mark.parametrize(
-    ("keys", "words"), [({"radius_m": 5.0}, "at least 10 m"), ({"end_speed_kmh": 20.0}, "above the speed at the start")]
+    ("keys", "key"), [({"radius_m": 5.0}, "circle.radius_m"), ({"end_speed_kmh": 20.0}, "circle.end_speed_kmh")]
 )
-def test_circle_that_cannot_be_driven_is_an_error(keys, words):
-    with pytest.raises(ManeuverError, match=words):
+def test_circle_that_cannot_be_driven_is_an_error(keys, key):
+    with raises(ManeuverError, file="mine.toml", key=key):
         circle(**keys)

@@ -10,6 +10,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import OpenLoop, build_maneuver
+from tests.raising import raises
 
 SOURCE = Source("mine.toml", error=ManeuverError)
 
@@ -70,28 +71,22 @@ def test_speed_follows_its_table():
 
 
 @pytest.mark.parametrize(
-    ("keys", "told"),
+    ("keys", "key"),
     [
-        ({"drive": "cruise"}, r"drive: is 'cruise'; allowed are 'hold_speed' and 'coast'"),
-        ({"steering": {"time_s": [0, 1], "steering_wheel_deg": [0]}}, r"steering: has 2 times and 1 values"),
-        ({"brake": {"time_s": [], "pedal": []}}, r"brake: has 0 times and 0 values; .* at least one"),
-        ({"speed": {"time_s": [0, 2, 2], "speed_kmh": [0, 1, 2]}}, r"speed\.time_s: does not increase from 2 to 2 s"),
-        ({"brake": {"time_s": [0], "pedal": [1.5]}}, r"brake\.pedal: 1\.5 is out of range; allowed is 0 to 1"),
-        ({"speed": {"time_s": [0]}}, r"speed\.speed_mps: the key speed_mps or speed_kmh is missing"),
+        ({"drive": "cruise"}, "drive"),
+        ({"steering": {"time_s": [0, 1], "steering_wheel_deg": [0]}}, "steering"),
+        ({"brake": {"time_s": [], "pedal": []}}, "brake"),
+        ({"speed": {"time_s": [0, 2, 2], "speed_kmh": [0, 1, 2]}}, "speed.time_s"),
+        ({"brake": {"time_s": [0], "pedal": [1.5]}}, "brake.pedal"),
+        ({"speed": {"time_s": [0]}}, "speed.speed_mps"),
     ],
 )
-def test_wrong_table_is_answered_with_file_and_key(keys, told):
-    with pytest.raises(ManeuverError, match=rf"^mine\.toml: {told}"):
+def test_wrong_table_is_answered_with_file_and_key(keys, key):
+    with raises(ManeuverError, file="mine.toml", key=key):
         open_loop(**keys)
 
 
-@pytest.mark.parametrize(
-    ("table", "told"),
-    [
-        ({"speed_kmh": 80}, r"mine\.toml: kind: is missing; known are: .*open_loop, .*step_steer"),
-        ({"kind": "step_ster"}, r"mine\.toml: kind: there is no kind 'step_ster'; did you mean 'step_steer'"),
-    ],
-)
-def test_unknown_kind_is_answered_with_the_known_ones(table, told):
-    with pytest.raises(ManeuverError, match=told):
+@pytest.mark.parametrize(("table", "key"), [({"speed_kmh": 80}, "kind"), ({"kind": "step_ster"}, "kind")])
+def test_unknown_kind_is_answered_with_the_known_ones(table, key):
+    with raises(ManeuverError, file="mine.toml", key=key):
         build_maneuver(table, SOURCE)

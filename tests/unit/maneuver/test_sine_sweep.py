@@ -10,6 +10,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import SineSweep, build_maneuver
+from tests.raising import raises
 
 SOURCE = Source("mine.toml", error=ManeuverError)
 TIME_S = np.arange(0.0, 30.0, 0.001)
@@ -44,8 +45,9 @@ def test_frequency_rises_from_the_first_to_the_last():
 
 
 @pytest.mark.parametrize(
-    ("keys", "words"), [({"last_Hz": 0.1}, "last_Hz"), ({"length_s": 40.0}, "ends at"), ({"fade_s": 20.0}, "fade_s")]
+    ("keys", "key"),
+    [({"last_Hz": 0.1}, "sweep.last_Hz"), ({"length_s": 40.0}, "sweep.length_s"), ({"fade_s": 20.0}, "sweep.fade_s")],
 )
-def test_sweep_that_cannot_be_driven_is_an_error(keys, words):
-    with pytest.raises(ManeuverError, match=words):
+def test_sweep_that_cannot_be_driven_is_an_error(keys, key):
+    with raises(ManeuverError, file="mine.toml", key=key):
         sweep(**keys)

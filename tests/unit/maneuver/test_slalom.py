@@ -11,6 +11,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import Slalom, build_maneuver
+from tests.raising import raises
 
 SOURCE = Source("my_cones.toml", error=ManeuverError)
 
@@ -66,22 +67,29 @@ def test_first_pass_on_the_right_is_the_mirror_image():
 
 
 @pytest.mark.parametrize(
-    ("keys", "told"),
+    ("keys", "key"),
     [
-        (
-            {"cones": {"offset_m": 0.8}},
-            r"cones\.offset_m: is 0\.8 m; a car of 1\.8 m width touches the cones unless it is above 0\.9 m",
-        ),
-        ({"cones": {"entry_m": 20.0}}, r"cones: entry_m: is 20 m; .* at least 36 m are needed \(spacing_m\)"),
-        ({"cones": {"count": 1}}, r"cones\.count: 1 is out of range; allowed is 2 to 100"),
-        ({"cones": {"count": 5.5}}, r"cones\.count: 5\.5 is not a whole number"),
-        ({"cones": {"spacing_m": -36}}, r"cones\.spacing_m: -36 is out of range; allowed is 5 to 200"),
-        ({"cones": {"side": "l"}}, r"cones.side: is 'l'; allowed are 'left' and 'right'"),
-        ({"speed_kmh": -100}, r"speed_kmh: .* out of range"),
-        ({"speed_kmh": -50}, r"speed_kmh: is -50 km/h; a course is driven forwards"),
-        ({"duration_s": 8.0}, r"duration_s: is 8 s, but at 100 km/h the last gate, 230 m .* after 8\.3 s; 11\.8 s"),
+        ({"cones": {"offset_m": 0.8}}, "cones.offset_m"),
+        ({"cones": {"entry_m": 20.0}}, "cones.entry_m"),
+        ({"cones": {"count": 1}}, "cones.count"),
+        ({"cones": {"count": 5.5}}, "cones.count"),
+        ({"cones": {"spacing_m": -36}}, "cones.spacing_m"),
+        ({"cones": {"side": "l"}}, "cones.side"),
+        ({"speed_kmh": -100}, "speed_kmh"),
+        ({"speed_kmh": -50}, "speed_kmh"),
+        ({"duration_s": 8.0}, "duration_s"),
     ],
 )
-def test_wrong_values_are_answered_with_what_is_allowed(keys, told):
-    with pytest.raises(ManeuverError, match=r"^my_cones\.toml: " + told):
+def test_wrong_values_are_answered_with_what_is_allowed(keys, key):
+    with raises(ManeuverError, file="my_cones.toml", key=key):
         slalom(**keys)
+
+
+@pytest.mark.parametrize(
+    ("keys", "least"),
+    [({"cones": {"offset_m": 0.8}}, 0.9), ({"cones": {"entry_m": 20.0}}, 36.0), ({"duration_s": 8.0}, 11.8)],
+)
+def test_least_that_is_allowed_is_part_of_the_answer(keys, least):
+    with raises(ManeuverError) as refused:
+        slalom(**keys)
+    assert refused.value.allowed.low == pytest.approx(least, abs=0.05)

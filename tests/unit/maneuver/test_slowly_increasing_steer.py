@@ -10,6 +10,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import SlowlyIncreasingSteer, build_maneuver
+from tests.raising import raises
 
 SOURCE = Source("mine.toml", error=ManeuverError)
 
@@ -33,9 +34,8 @@ def test_steering_wheel_turns_at_the_rate_to_its_end(side):
 
 
 @pytest.mark.parametrize(
-    ("steer", "words"),
-    [({"start_s": 20.0}, "start_s"), ({"rate_degps": 0.0}, "rate_degps"), ({"end_deg": 0}, "end_deg")],
+    ("steer", "key"), [({"start_s": 20.0}, "steer.start_s"), ({"rate_degps": 0.0}, "steer"), ({"end_deg": 0}, "steer")]
 )
-def test_ramp_that_does_not_turn_is_an_error(steer, words):
-    with pytest.raises(ManeuverError, match=words):
+def test_ramp_that_does_not_turn_is_an_error(steer, key):
+    with raises(ManeuverError, file="mine.toml", key=key):
         ramp(**steer)

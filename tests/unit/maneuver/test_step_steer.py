@@ -11,6 +11,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import StepSteer, build_maneuver
+from tests.raising import raises
 
 SOURCE = Source("my_step.toml", error=ManeuverError)
 
@@ -63,10 +64,10 @@ def test_amplitude_found_by_a_search_keeps_the_aim_on_record():
 
 
 def test_step_without_amplitude_and_aim_is_answered():
-    with pytest.raises(ManeuverError, match=r"my_step\.toml: steer: steering_wheel_deg .* or lateral_acceleration_g"):
+    with raises(ManeuverError, file="my_step.toml", key="steer"):
         step(steer={"steering_wheel_deg": None})
 
 
 def test_step_after_the_end_is_answered():
-    with pytest.raises(ManeuverError, match=r"my_step\.toml: steer\.start_s: is 3 s, but the run ends at 3 s"):
+    with raises(ManeuverError, file="my_step.toml", key="steer.start_s", value=3.0):
         step(steer={"start_s": 3.0})

@@ -18,6 +18,7 @@ from activesteer.driver import find_driver
 from activesteer.errors import ControllerError, DriverError
 from activesteer.scenario import resolve
 from activesteer.signals import WheelTorques
+from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
 
 SHORT = {"settle_s": 0.05, "duration_s": 0.3, "steer.start_s": 0.05, "steer.steering_wheel_deg": 30}
@@ -142,9 +143,9 @@ def test_parameters_of_two_runs_tell_their_labels_apart(gains):
 
 @pytest.mark.parametrize("given", [5, None, ["ars"], {"ars": 1}, np.zeros(3), object()])
 def test_wrong_object_is_answered(given):
-    with pytest.raises(ControllerError, match=r"controller: is .*; a name \(none, ars, afs\), a file"):
+    with raises(ControllerError, key="controller"):
         simulate("step_steer", given)
-    with pytest.raises(DriverError, match=r"driver: is .*step\(reference, measurement, motion\)"):
+    with raises(DriverError, key="driver"):
         simulate("step_steer", driver=given)
 
 
@@ -155,7 +156,7 @@ def test_class_that_is_no_controller_is_answered(given):
 
 
 def test_factory_that_makes_something_else_is_answered():
-    with pytest.raises(ControllerError, match=r"int has no method step"):
+    with raises(ControllerError, key="controller test_plugins.py:_lambda", value=5):
         find_controller(lambda: 5).make(setup())
 
 
@@ -166,7 +167,7 @@ def test_object_that_cannot_be_copied_is_answered(tmp_path):
             self.file = path.open("w")
 
     mine = Logging(tmp_path / "log")
-    with mine.file, pytest.raises(ControllerError, match=r"Logging cannot be made: TypeError: cannot pickle"):
+    with mine.file, raises(ControllerError, key="controller test_plugins.py:Logging"):
         find_controller(mine).make(setup())
 
 
@@ -273,10 +274,10 @@ def test_torques_of_the_wheels_are_checked():
 
     simulate("step_steer", driver=Torquey((10.0,) * 4, (0.0,) * 4), overrides=SHORT)
     for wrong in (((math.nan,) * 4, (0.0,) * 4), ((1.0,) * 3, (0.0,) * 4), (5.0, 5.0)):
-        with pytest.raises(DriverError, match="wheel_torques"):
+        with raises(DriverError, key="driver test_plugins.py:Torquey"):
             simulate("step_steer", driver=Torquey(*wrong), overrides=SHORT)
 
 
 def test_unknown_driver_is_answered():
-    with pytest.raises(DriverError, match=r"no driver 'standart'; did you mean 'standard'\?.*my_file\.py:MyDriver"):
+    with raises(DriverError, value="standart"):
         find_driver("standart")

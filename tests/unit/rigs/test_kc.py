@@ -16,6 +16,7 @@ from activesteer.rigs.kc.definitions import DEFINITIONS
 from activesteer.rigs.kc.held_car import WheelPose
 from activesteer.rigs.kc.steering_axis import steering_axis
 from activesteer.rigs.kc.targets import load_targets
+from tests.raising import raises
 
 
 @functools.cache
@@ -168,7 +169,7 @@ def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
 
 
 def test_an_override_that_is_no_part_of_the_car_is_explained() -> None:
-    with pytest.raises(ParameterError, match="speed_kmh"):
+    with raises(ParameterError, key="speed_kmh"):
         kinematics_compliance("compact", {"speed_kmh": 80.0})
 
 

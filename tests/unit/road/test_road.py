@@ -11,6 +11,7 @@ import pytest
 from activesteer.config import Source, build, read_toml, to_table
 from activesteer.errors import ManeuverError
 from activesteer.road.road import Road, RoadPatch
+from tests.raising import raises
 
 TEXT = """\
 mu = 0.9
@@ -52,20 +53,20 @@ def test_areas_come_in_the_order_in_which_they_count(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "line", "key"),
     [
-        ("end_m = 42", "end_m = 30", r"line 4: patches\.0: the patch ends at 30 m, .* its start_m of 30 m"),
-        ("end_m = 42", "end_m = nan", r"line 6: patches\.0\.end_m: nan is not finite"),
-        ('"left"', '"lft"', r"line 4: patches\.0: side: is 'lft'; did you mean 'left'"),
-        ("mu = 0.6", "mu = 0.0", r"line 13: patches\.1\.mu: 0\.0 is out of range; allowed is 0\.01 to 2"),
-        ("mu = 0.6", "frction = 1", r"line 13: patches\.1\.frction: there is no such key"),
-        ("start_m = 40\n", "", r"line 10: patches\.1\.start_m: the key start_m is missing"),
-        ("mu_right = 0.5", "mu_right = 7", r"line 2: mu_right: 7 is out of range; allowed is 0\.01 to 2"),
+        ("end_m = 42", "end_m = 30", 4, "patches.0"),
+        ("end_m = 42", "end_m = nan", 6, "patches.0.end_m"),
+        ('"left"', '"lft"', 8, "patches.0.side"),
+        ("mu = 0.6", "mu = 0.0", 13, "patches.1.mu"),
+        ("mu = 0.6", "frction = 1", 13, "patches.1.frction"),
+        ("start_m = 40\n", "", 10, "patches.1.start_m"),
+        ("mu_right = 0.5", "mu_right = 7", 2, "mu_right"),
     ],
 )
-def test_a_wrong_road_is_answered_with_its_line(tmp_path: Path, old: str, new: str, told: str) -> None:
+def test_a_wrong_road_is_answered_with_its_line(tmp_path: Path, old: str, new: str, line: int, key: str) -> None:
     assert old in TEXT
-    with pytest.raises(ManeuverError, match=rf"^road\.toml, {told}"):
+    with raises(ManeuverError, file="road.toml", line=line, key=key):
         read(TEXT.replace(old, new), tmp_path)
 
 
@@ -74,5 +75,5 @@ def test_the_friction_of_every_road_is_within_the_same_range() -> None:
         {"mu": 3.0}, {"mu_left": 3.0}, {"patches": [{"start_m": 0, "end_m": 1, "mu": 3.0}]},
     ]  # fmt: skip
     for table in values:
-        with pytest.raises(ManeuverError, match=r"3\.0 is out of range; allowed is 0\.01 to 2$"):
+        with raises(ManeuverError, file="road", value=3.0):
             build(Road, table, Source("road", error=ManeuverError))

@@ -18,7 +18,7 @@ import pytest
 from activesteer import study
 from activesteer.errors import StudyError
 from activesteer.studies.workers import TaskQueue, workers_for
-from tests.unit.studies.short import short_study, write_controller
+from tests.unit.studies.short import RATIO, short_study, write_controller
 
 MU = tuple(0.7 + 0.01 * number for number in range(20))
 
@@ -77,7 +77,7 @@ def test_a_cluster_gives_the_same_bits_as_this_process(cluster, tmp_path):
 @pytest.mark.slow
 def test_a_worker_of_a_cluster_that_dies_is_replaced(cluster, tmp_path):
     path = write_controller(tmp_path, MU[5], str(tmp_path / "once"))
-    rows = study(short_study(*MU, controllers=[f"{path}:Kills"]), scheduler=str(cluster.file)).to_pylist()
+    rows = study(short_study(*MU, key=RATIO, controllers=[f"{path}:Kills"]), scheduler=str(cluster.file)).to_pylist()
     assert (tmp_path / "once").exists()
     assert {row["status"] for row in rows} == {"ok"}
 

@@ -9,6 +9,7 @@ from activesteer.errors import StudyError
 from activesteer.studies.design import draw, read_cases
 from activesteer.studies.factors import Factor
 from activesteer.studies.study_file import read_study
+from tests.raising import raises
 
 SPEED = Factor("speed_kmh", "grid", (70.0, 80.0, 90.0))
 DRIVE = Factor("drive", "grid", ("hold", "coast"))
@@ -84,7 +85,7 @@ def test_cases_may_come_from_a_spreadsheet_and_a_row_of_empty_cells_is_the_usual
 def test_cell_that_no_value_can_be_is_answered_with_file_and_line(tmp_path, cell):
     path = tmp_path / "cases.csv"
     path.write_text(f'road.mu,title\n1,"{cell}"\n')
-    with pytest.raises(StudyError, match=r"cases\.csv, line 2") as told:
+    with raises(StudyError, file="cases.csv", line=2) as told:
         read_cases(path)
     assert len(str(told.value)) < 500
 

@@ -15,7 +15,7 @@ from activesteer.studies.design import draw
 from activesteer.studies.factors import Factor
 from activesteer.studies.report import write_report
 from activesteer.studies.sensitivity import indices
-from tests.unit.studies.short import short_study, write_controller
+from tests.unit.studies.short import RATIO, short_study, write_controller
 
 ISHIGAMI = [Factor(key, "uniform", low=-np.pi, high=np.pi) for key in ("x1", "x2", "x3")]
 """Ishigami and Homma (1990), with a = 7 and b = 0.1: S1 0.3139, 0.4424, 0; ST 0.5576, 0.4424, 0.2437."""
@@ -67,7 +67,8 @@ def test_a_design_that_lost_runs_gives_no_indices():
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     path = write_controller(folder, 0.9)
-    table = short_study(0.8, 0.9, 1.0, controllers=["none", "ars", f"{path}:Fails"], title="Grip </script><b>")
+    controllers = ["none", "ars", f"{path}:Fails"]
+    table = short_study(0.8, 0.9, 1.0, key=RATIO, controllers=controllers, title="Ratio </script><b>")
     table["factors"]["speed_kmh"] = {"grid": [70.0, 80.0]}
     rows = study(table, output=folder / "s", jobs=1).to_pylist()
     text = write_report(folder / "s").read_text(encoding="utf-8")
@@ -88,7 +89,7 @@ def test_the_page_needs_nothing_from_elsewhere_and_escapes_what_it_shows(page):
 def test_the_page_holds_what_the_rows_say(page):
     _, data, rows = page
     found = data["by_group"][0]["yaw_rate_peak_radps"]
-    peaks = {(row["controller"], row["road.mu"], row["speed_kmh"]): row["yaw_rate_peak_radps"] for row in rows}
+    peaks = {(row["controller"], row[RATIO], row["speed_kmh"]): row["yaw_rate_peak_radps"] for row in rows}
     degps = {key: np.degrees(value) for key, value in peaks.items() if value is not None}
     none = [value for key, value in degps.items() if key[0] == "none"]
     assert found["quantiles"][0][1] == pytest.approx(np.median(none), rel=1e-4)

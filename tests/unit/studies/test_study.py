@@ -18,7 +18,7 @@ from activesteer import study
 from activesteer.errors import StudyError
 from activesteer.recording import Recording
 from activesteer.studies.store import Store
-from tests.unit.studies.short import MANEUVER, short_study, write_controller
+from tests.unit.studies.short import MANEUVER, RATIO, short_study, write_controller
 
 MU = (0.7, 0.8, 0.9, 1.0)
 MANY = tuple(0.7 + 0.01 * number for number in range(10))
@@ -95,22 +95,22 @@ def test_a_killed_study_goes_on_with_what_is_missing(tmp_path):
 
 def test_a_worker_that_dies_is_replaced(tmp_path):
     path = write_controller(tmp_path, 0.9, str(tmp_path / "once"))
-    rows = study(short_study(*MU, controllers=["none", f"{path}:Kills"]), jobs=2).to_pylist()
+    rows = study(short_study(*MU, key=RATIO, controllers=["none", f"{path}:Kills"]), jobs=2).to_pylist()
     assert (tmp_path / "once").exists()
     assert {row["status"] for row in rows} == {"ok"}
 
 
 def test_only_the_run_is_lost_that_kills_its_worker_every_time(tmp_path):
     path = write_controller(tmp_path, 0.9)
-    rows = study(short_study(*MU, controllers=["none", f"{path}:Kills"]), jobs=2).to_pylist()
+    rows = study(short_study(*MU, key=RATIO, controllers=["none", f"{path}:Kills"]), jobs=2).to_pylist()
     assert [row["status"] for row in rows] == ["ok"] * 5 + ["crashed"] + ["ok"] * 2
     assert "died" in rows[5]["error"]
-    assert (rows[5]["road.mu"], rows[5]["controller"]) == (0.9, "bad.py:Kills")
+    assert (rows[5][RATIO], rows[5]["controller"]) == (0.9, "bad.py:Kills")
 
 
 def test_a_failed_run_is_a_row(tmp_path):
     path = write_controller(tmp_path, 0.9)
-    rows = study(short_study(*MU, controllers=["none", f"{path}:Fails"]), jobs=1).to_pylist()
+    rows = study(short_study(*MU, key=RATIO, controllers=["none", f"{path}:Fails"]), jobs=1).to_pylist()
     assert [row["status"] for row in rows] == ["ok"] * 5 + ["failed"] + ["ok"] * 2
     assert "on purpose" in rows[5]["error"]
     assert rows[5]["yaw_rate_steady_state_radps"] is None
@@ -168,11 +168,11 @@ def test_an_input_that_changes_while_the_study_runs_is_noticed(tmp_path):
 )
 def test_recordings_are_kept_as_asked(tmp_path, kept, runs):
     path = write_controller(tmp_path, 0.9)
-    study(short_study(*MU, controllers=[f"{path}:Fails"], recordings=kept), output=tmp_path / "s", jobs=1)
+    study(short_study(*MU, key=RATIO, controllers=[f"{path}:Fails"], recordings=kept), output=tmp_path / "s", jobs=1)
     found = sorted((tmp_path / "s" / "recordings").glob("*.mcap"))
     assert [int(file.name[:7]) for file in found] == runs
     for file in found:
-        assert Recording.open(file, recover=True).metadata["overrides"]["road.mu"] == MU[int(file.name[:7])]
+        assert Recording.open(file, recover=True).metadata["overrides"][RATIO] == MU[int(file.name[:7])]
 
 
 def test_only_the_metrics_asked_for_are_kept():

@@ -8,7 +8,8 @@ import pytest
 
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.studies.tuning import Trial, _dominates, tune
-from tests.unit.studies.short import MANEUVER, write_controller
+from tests.raising import raises
+from tests.unit.studies.short import MANEUVER, RATIO, write_controller
 
 GAINS = {
     "maneuvers": [MANEUVER],
@@ -45,11 +46,11 @@ def test_a_search_is_gone_on_with_and_another_is_refused(tmp_path):
 
 def test_a_set_whose_run_fails_is_counted_and_not_chosen(tmp_path):
     path = write_controller(tmp_path, 0.9)
-    table = {**GAINS, "controllers": [f"{path}:Fails", "none"], "factors": {"road.mu": {"choice": [0.8, 0.9]}}}
+    table = {**GAINS, "controllers": [f"{path}:Fails", "none"], "factors": {RATIO: {"choice": [0.8, 0.9]}}}
     table["tune"] = {**GAINS["tune"], "trials": 8, "constraints": []}
     result = tune(table, tmp_path / "t", jobs=1)
     assert result.failed > 0
-    assert {trial.values["road.mu"] for trial in result.trials} == {0.8}
+    assert {trial.values[RATIO] for trial in result.trials} == {0.8}
 
 
 @pytest.mark.parametrize(
@@ -65,7 +66,7 @@ def test_a_set_whose_run_fails_is_counted_and_not_chosen(tmp_path):
 def test_a_wrong_table_is_refused_before_anything_runs(tmp_path, change):
     with pytest.raises(ActiveSteerError):
         tune({**GAINS, "tune": {**GAINS["tune"], **change}}, tmp_path, jobs=1)
-    with pytest.raises(StudyError, match="tune"):
+    with raises(StudyError, file="study given as a table", key="tune"):
         tune({key: value for key, value in GAINS.items() if key != "tune"}, tmp_path, jobs=1)
 
 

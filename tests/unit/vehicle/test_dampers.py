@@ -11,6 +11,7 @@ from activesteer.errors import ParameterError
 from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb
+from tests.raising import raises
 from tests.unit.vehicle.cars import standing
 
 CURVE_MPS = [-0.8, -0.2, 0.0, 0.1, 0.5]
@@ -76,17 +77,17 @@ def test_bump_of_a_wheel_compresses_its_damper() -> None:
 
 
 @pytest.mark.parametrize(
-    ("velocity_mps", "force_N", "words"),
+    ("velocity_mps", "force_N", "key"),
     [
-        ([0.0, 0.1, 0.1], [0.0, 1.0, 2.0], "do not increase"),
-        ([0.2, 0.1], [0.0, 1.0], "do not increase"),
-        ([0.0, 0.1], [0.0, 1.0, 2.0], "2 velocities and 3 forces"),
-        ([0.0], [0.0], "1 velocities and 1 forces.*2 to 12"),
-        ([0.1 * i for i in range(13)], [0.0] * 13, "13 velocities.*2 to 12"),
+        ([0.0, 0.1, 0.1], [0.0, 1.0, 2.0], "dampers.rear"),
+        ([0.2, 0.1], [0.0, 1.0], "dampers.rear"),
+        ([0.0, 0.1], [0.0, 1.0, 2.0], "dampers.rear"),
+        ([0.0], [0.0], "dampers.rear"),
+        ([0.1 * i for i in range(13)], [0.0] * 13, "dampers.rear"),
     ],
 )
 def test_a_wrong_curve_is_an_error_that_names_file_and_axle(
-    velocity_mps: list[float], force_N: list[float], words: str
+    velocity_mps: list[float], force_N: list[float], key: str
 ) -> None:
-    with pytest.raises(ParameterError, match=rf"compact\.toml.*dampers\.rear.*{words}"):
+    with raises(ParameterError, file="compact.toml", key=key):
         load_car(overrides={"dampers.rear.velocity_mps": velocity_mps, "dampers.rear.force_N": force_N})

@@ -15,6 +15,7 @@ from activesteer.errors import ModelError, ParameterError
 from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.dry_friction import friction_rate
+from tests.raising import raises
 from tests.unit.vehicle.cars import activation, actuator, changed_model, dof, floating, standing, step
 
 SLIP_M = 4e-4
@@ -173,5 +174,5 @@ def test_friction_without_a_place_in_the_model_is_answered(tmp_path: Path) -> No
 
 
 def test_negative_friction_is_answered() -> None:
-    with pytest.raises(ParameterError, match=r"rack_N: -1\.0 is out of range"):
+    with raises(ParameterError, file="compact.toml", key="friction.rack_N", value=-1.0):
         load_car(overrides={"friction.rack_N": -1.0})

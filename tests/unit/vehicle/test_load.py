@@ -14,6 +14,7 @@ from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.mass_properties import mass_properties, point_mass_inertia
+from tests.raising import raises
 from tests.unit.vehicle.cars import dof, record
 
 LOADS: dict[str, dict[str, Any]] = {
@@ -166,5 +167,5 @@ def test_who_looks_for_the_mass_is_led_to_the_load(key: str) -> None:
 
 
 def test_position_of_two_numbers_is_refused() -> None:
-    with pytest.raises(ParameterError, match="payload_position_m: 2 numbers given; 3 are needed"):
+    with raises(ParameterError, file="compact.toml", key="load.payload_position_m", value=(1.0, 2.0)):
         load_car(overrides={"load.payload_kg": 10.0, "load.payload_position_m": [1.0, 2.0]})

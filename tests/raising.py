@@ -1,0 +1,22 @@
+"""What an error must say, apart from its words: where it is, which key, which value."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from activesteer.errors import ActiveSteerError
+
+
+@contextmanager
+def raises(
+    error: type[ActiveSteerError], cause: type[BaseException] | None = None, **fields: Any
+) -> Iterator[pytest.ExceptionInfo[Any]]:
+    """The body raises an error whose attributes are these; `cause` is the class of what it came from."""
+    with pytest.raises(error) as caught:
+        yield caught
+    assert {name: getattr(caught.value, name) for name in fields} == fields
+    assert cause is None or isinstance(caught.value.__cause__, cause)
