@@ -69,8 +69,13 @@ class TyreParameters(Mapping[str, float]):
         record = self.record
         if not is_finite(record):
             name = culprit(record, self.given)
-            blamed = "the tyre is" if name is None else f"{name} = {values[name]:g} makes forces that are"
-            raise ParameterError(f"{blamed} not finite inside the file's own ranges of load and slip", file=source)
+            blamed = "the tyre is" if name is None else f"is {values[name]:g} and makes forces that are"
+            raise ParameterError(
+                f"{blamed} not finite inside the file's own ranges of load and slip",
+                file=source,
+                key=name,
+                value=None if name is None else values[name],
+            )
 
     def __reduce__(self) -> tuple[type[TyreParameters], tuple[object, ...]]:
         """Travels between processes by what it was made from: read-only views cannot be copied."""

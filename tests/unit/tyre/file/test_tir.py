@@ -98,27 +98,26 @@ def test_units_are_converted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("change", "line", "key"),
     [
-        (("PDX1 = 1", "PDX1 = one"), "a.tir, line 11: PDX1 = 'one', expected a number"),
-        (("PDX1 = 1", "PDX1 = 1\nPDX1 = 2"), "line 12: PDX1 = 2.0 contradicts line 11, where it is 1.0"),
-        (("PDX1 = 1", "PDX1"), "line 11: 'PDX1' is neither KEY = value"),
-        (("PDX1 = 1", ""), "PDX1 missing, a tyre needs it"),
-        (("FNOMIN = 4000", "FNOMIN = -4000"), "line 7: FNOMIN = -4000, must be greater than 0"),
-        (("FITTYP = 61", "FITTYP = 70"), "line 3: FITTYP = 70, allowed are 5, 6, 21, 52, 60, 61, 62"),
-        (("FNOMIN = 4000", "FNOMIN = 1e400"), "expected a number"),
-        (("VERTICAL_STIFFNESS = 200000", "Q_FZ2 = 1"), "VERTICAL_STIFFNESS and Q_FZ1 missing"),
-        (("VERTICAL_STIFFNESS = 200000", "VERTICAL_STIFFNESS = 2000\nQ_FZ2 = 15"), "Q_FZ2 = 15 is too great"),
-        (("[MODEL]", "[UNITS]\nLENGTH = 'parsec'\n[MODEL]"), "LENGTH = 'parsec' in [UNITS], allowed are meter"),
-        (("FITTYP = 61", "FITTYP = 61\nTYRESIDE = 'UP'"), "TYRESIDE = 'UP', allowed are 'LEFT', 'RIGHT'"),
-        (("[MODEL]", "[MODEL"), "is no section"),
-        (("FITTYP = 61", "FITTYP = 61\nKPUMIN = 2"), "KPUMIN = 2 must be less than KPUMAX = 1.5"),
+        (("PDX1 = 1", "PDX1 = one"), 11, "PDX1"),
+        (("PDX1 = 1", "PDX1 = 1\nPDX1 = 2"), 12, "PDX1"),
+        (("PDX1 = 1", "PDX1"), 11, None),
+        (("PDX1 = 1", ""), None, "PDX1"),
+        (("FNOMIN = 4000", "FNOMIN = -4000"), 7, "FNOMIN"),
+        (("FITTYP = 61", "FITTYP = 70"), 3, "FITTYP"),
+        (("FNOMIN = 4000", "FNOMIN = 1e400"), 7, "FNOMIN"),
+        (("VERTICAL_STIFFNESS = 200000", "Q_FZ2 = 1"), None, "VERTICAL_STIFFNESS, Q_FZ1"),
+        (("VERTICAL_STIFFNESS = 200000", "VERTICAL_STIFFNESS = 2000\nQ_FZ2 = 15"), 9, "Q_FZ2"),
+        (("[MODEL]", "[UNITS]\nLENGTH = 'parsec'\n[MODEL]"), 3, "LENGTH"),
+        (("FITTYP = 61", "FITTYP = 61\nTYRESIDE = 'UP'"), None, "TYRESIDE"),
+        (("[MODEL]", "[MODEL"), 2, None),
+        (("FITTYP = 61", "FITTYP = 61\nKPUMIN = 2"), 4, "KPUMIN"),
     ],
 )
-def test_errors_say_where_and_what_is_allowed(change: tuple[str, str], message: str) -> None:
-    with pytest.raises(TyreFileError) as caught:
+def test_errors_say_where_and_what(change: tuple[str, str], line: int | None, key: str | None) -> None:
+    with raises(TyreFileError, file="a.tir", line=line, key=key):
         _read(MINIMAL.replace(*change, 1))
-    assert message in str(caught.value)
 
 
 def test_a_file_that_is_not_there_or_too_long_is_an_error(tmp_path: Path) -> None:
