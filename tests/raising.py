@@ -13,7 +13,9 @@ from activesteer.errors import ActiveSteerError
 
 @contextmanager
 def raises(
-    error: type[ActiveSteerError], cause: type[BaseException] | None = None, **fields: Any
+    error: type[ActiveSteerError] | tuple[type[ActiveSteerError], ...],
+    cause: type[BaseException] | None = None,
+    **fields: Any,
 ) -> Iterator[pytest.ExceptionInfo[Any]]:
     """The body raises an error whose attributes are these; `cause` is the class of what it came from."""
     with pytest.raises(error) as caught:

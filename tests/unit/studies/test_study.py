@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -23,7 +24,7 @@ from tests.unit.studies.short import MANEUVER, RATIO, short_study, write_control
 MU = (0.7, 0.8, 0.9, 1.0)
 MANY = tuple(0.7 + 0.01 * number for number in range(10))
 """More than a task holds."""
-BOTH = {"controllers": ["none", "ars"]}
+BOTH: dict[str, Any] = {"controllers": ["none", "ars"]}
 
 
 @pytest.fixture(scope="module")
