@@ -144,7 +144,7 @@ class ClosedLoop:
                     steer = controller.step(command, measurement)
                     measurement, motion = step_car(command, steer, recorder.row_address if recorder else 0)
                     if recorder is not None:
-                        recorder.record(command, steer)
+                        recorder.record()
         self.step_count, self.commands = self.step_count + steps, (command, steer)
         self.measurement, self.motion = measurement, motion
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import Final, NamedTuple, Self
 
 import numpy as np
@@ -12,7 +10,7 @@ from numpy.typing import NDArray
 
 from activesteer.errors import RecordingError, SimulationDiverged
 from activesteer.recording import McapWriter, Poses
-from activesteer.signals import ActuatorCommand, Channel, DriverCommand
+from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle
 
 BLOCK_INTERVAL_S: Final = 0.5
@@ -24,38 +22,6 @@ POSE_INTERVAL_S: Final = 0.01
 """Time between two recorded poses of all bodies [s]."""
 MAX_VALUE: Final = float(np.finfo(np.float32).max)
 """Most that a recorded value may be: files keep most channels to 32 bit."""
-
-_DRIVER_CHANNELS: Final = {
-    "front_steer_demand_rad": Channel(
-        "front_steer_demand_rad", "rad", "the driver's demand at the road wheel", "control"
-    ),
-    "drive_torque_demand_Nm": Channel(
-        "drive_torque_demand_Nm", "Nm", "drive torque demanded, all wheels together", "control"
-    ),
-    "brake_pedal": Channel("brake_pedal", "", "brake pedal position, 0 to 1", "control"),
-    "saturated": Channel(
-        "driver_saturated", "", "1 where the steering is at its lock or the engine at its limit", "control"
-    ),
-}
-"""Field of `DriverCommand` -> its channel."""
-_CONTROLLER_CHANNELS: Final = {
-    "rear_steer_demand_rad": Channel(
-        "rear_steer_demand_rad", "rad", "rear angle that the controller demands", "control"
-    ),
-    "superposition_demand_rad": Channel(
-        "superposition_demand_rad", "rad", "angle that the controller adds at the front wheels", "control"
-    ),
-    "yaw_rate_desired_radps": Channel(
-        "yaw_rate_desired_radps", "rad/s", "yaw rate that the controller steers for", "control"
-    ),
-    "prediction_rad": Channel("prediction_rad", "rad", "feed-forward part of the controller's angle", "control"),
-    "correction_rad": Channel("correction_rad", "rad", "feedback part of the controller's angle", "control"),
-    "saturated": Channel("controller_saturated", "", "1 where a limit of the controller is active", "control"),
-}
-"""Field of `ActuatorCommand` -> its channel."""
-CONTROL_CHANNELS: Final = (*_DRIVER_CHANNELS.values(), *_CONTROLLER_CHANNELS.values())
-_CONTROL_ROW: Final = struct.Struct(f"{len(CONTROL_CHANNELS)}d")
-_driver_row, _controller_row = attrgetter(*_DRIVER_CHANNELS), attrgetter(*_CONTROLLER_CHANNELS)
 
 
 @dataclass
@@ -107,7 +73,7 @@ class Recorder:
             writer: File to write to.
             keep: Whether all rows stay in memory; else only the block that is being filled does.
         """
-        self.channels = channels_of(vehicle)
+        self.channels = vehicle.channels.channels
         self._vehicle = vehicle
         self._writer = writer
         self._timestep_s = vehicle.timestep_s
@@ -117,8 +83,6 @@ class Recorder:
         self._yaw_column = [channel.name for channel in self.channels].index("yaw_rad")
         self._yaw_rad = 0.0
         self._raw = vehicle.raw_rows(self._block_rows)
-        self._control = np.empty((len(self._raw.sensordata), len(CONTROL_CHANNELS)))
-        self._control_memory = self._control.data
         self.row_address = self._block_address = self._raw.sensordata.ctypes.data
         self._row_bytes = self._raw.sensordata.strides[0]
         self._pose_every = max(1, round(POSE_INTERVAL_S / vehicle.timestep_s))
@@ -129,27 +93,19 @@ class Recorder:
         # Rows so far, those of them that are channels already, and the first one in memory.
         self.rows = self._flushed = self._first = 0
 
-    def record(self, command: DriverCommand, steer: ActuatorCommand) -> None:
+    def record(self) -> None:
         """Takes the row of the step that was just made, which the vehicle has left at `row_address`.
 
         Its values are those of the instant at which the step began.
-
-        Args:
-            command: What the driver did.
-            steer: What the controller asked for.
         """
         count = self.rows
-        row = count - self._flushed
-        _CONTROL_ROW.pack_into(
-            self._control_memory, row * _CONTROL_ROW.size, *_driver_row(command), *_controller_row(steer)
-        )
         if count % self._pose_every == 0:
             pose = count // self._pose_every - self._poses_before(self._first)
             self._kept.positions_m[pose] = self._xpos
             self._kept.quaternions[pose] = self._xquat
         self.rows = count + 1
         self.row_address += self._row_bytes
-        if row + 1 == self._block_rows:
+        if self.rows - self._flushed == self._block_rows:
             self.flush()
 
     def flush(self, *, checked: bool = True) -> None:
@@ -185,18 +141,17 @@ class Recorder:
         self._kept.referred_rows = max(self._kept.referred_rows, last)
         return self._times(first, last), self._kept.values[: last - first], self._poses_between(first, last)
 
-    def present(self, command: DriverCommand, steer: ActuatorCommand) -> dict[str, float]:
+    def present(self, command: DriverCommand, asked: ActuatorCommand) -> dict[str, float]:
         """What would be recorded of the present instant, by channel name; nothing is recorded.
 
         Args:
             command: What the driver last did.
-            steer: What the controller last asked for.
+            asked: What the controller last asked for.
         """
         # Into the place of the next row, which is free.
         row = self.rows - self._flushed
-        for raw, now in zip(self._raw, self._vehicle.present_row(), strict=True):
+        for raw, now in zip(self._raw, self._vehicle.present_row(command, asked), strict=True):
             raw[row] = now[0]
-        self._control[row] = (*_driver_row(command), *_controller_row(steer))
         values = np.empty((row + 1, len(self.channels)))
         self._evaluate(row + 1, values)
         return {channel.name: float(value) for channel, value in zip(self.channels, values[-1], strict=True)}
@@ -224,10 +179,8 @@ class Recorder:
 
     def _evaluate(self, count: int, values: NDArray[np.float64]) -> None:
         """Channels of the first raw rows."""
-        split = len(self.channels) - len(CONTROL_CHANNELS)
         rows = type(self._raw)(*(raw[:count] for raw in self._raw))
-        self._vehicle.channels.evaluate(rows, values[:, :split], self._yaw_rad)
-        values[:, split:] = self._control[:count]
+        self._vehicle.channels.evaluate(rows, values, self._yaw_rad)
 
     def _check(self, first: int, values: NDArray[np.float64], poses: Poses) -> None:
         # NaN compares as false, and is what `max` and `min` return where there is one.
@@ -255,8 +208,3 @@ class Recorder:
         times = np.asarray(np.arange(begin, end) * (every * self._timestep_s), dtype=np.float64)
         rows = slice(begin - kept, end - kept)
         return Poses(times, self._vehicle.body_names, self._kept.positions_m[rows], self._kept.quaternions[rows])
-
-
-def channels_of(vehicle: Vehicle) -> tuple[Channel, ...]:
-    """All channels that a run with this vehicle records."""
-    return (*vehicle.channels.channels, *CONTROL_CHANNELS)

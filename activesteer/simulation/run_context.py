@@ -13,7 +13,7 @@ from activesteer.recording import McapWriter, Recording, ScenePart
 from activesteer.scenario import Scenario, describe
 from activesteer.signals import Channel
 from activesteer.simulation.appearance import scene_of
-from activesteer.simulation.recorder import Recorder, channels_of
+from activesteer.simulation.recorder import Recorder
 from activesteer.vehicle import Vehicle
 from activesteer.version import __version__
 
@@ -49,7 +49,7 @@ class RunContext(NamedTuple):
         if (course := scenario.maneuver.course) is not None:
             metadata["course"] = course.to_table()
         files = scenario.files | {name: text for plugin in plugins for name, text in plugin.files.items()}
-        return cls(channels_of(vehicle), vehicle.body_names, metadata, files, scene_of(vehicle.model))
+        return cls(vehicle.channels.channels, vehicle.body_names, metadata, files, scene_of(vehicle.model))
 
     def recording(self, recorder: Recorder) -> Recording:
         """What a recorder that keeps all rows has taken."""

@@ -243,13 +243,13 @@ def _blocks(scenario: Scenario) -> dict[str, float]:
     for _ in range(_CALLS):
         # So that the rows of the recorder's block hold something when it is measured alone.
         vehicle.step(command, steer, recorder.row_address)
-        recorder.record(command, steer)
+        recorder.record()
     blocks: dict[str, Callable[[], object]] = {
         "maneuver_us": lambda: maneuver.reference(0.6),
         "driver_us": lambda: driver.step(reference, measurement, motion),
         "controller_us": lambda: controller.step(command, measurement),
         "vehicle_us": lambda: vehicle.step(command, steer),
-        "recorder_us": lambda: recorder.record(command, steer),
+        "recorder_us": recorder.record,
     }
     return {name: _per_step_us(lambda block=block: _call(block, _CALLS), _CALLS) for name, block in blocks.items()}
 

@@ -13,7 +13,6 @@ from activesteer.analysis.claims import SYSTEMS
 from activesteer.controllers import load_controller
 from activesteer.errors import ActiveSteerError, nearest_names, shown
 from activesteer.scenario import Scenario, describe, resolve
-from activesteer.simulation.recorder import channels_of
 from activesteer.studies.design import Samples
 from activesteer.studies.factor_values import FactorValues, label_of
 from activesteer.studies.run_identity import digest
@@ -154,7 +153,7 @@ def _check_curves(study: StudyFile, scenario: Scenario) -> None:
     """Every channel of which curves are kept is recorded."""
     if not study.curves:
         return
-    known = [channel.name for channel in channels_of(scenario.car.on(scenario.maneuver.road))]
+    known = [channel.name for channel in scenario.car.on(scenario.maneuver.road).channels.channels]
     for name in study.curves:
         if name not in known:
             raise study.source.fail(

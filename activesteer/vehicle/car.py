@@ -20,10 +20,11 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_step
 from activesteer.vehicle.channels import ChannelMap, RawRows
+from activesteer.vehicle.command_row import CARRIED_OUT, COMMANDS, write_commands
 from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.loading import find, load_model
 from activesteer.vehicle.native_forces import install_native_forces
-from activesteer.vehicle.native_step import DRIVE_CHANGE, FASTEST_MPS, Places, Wheels, sensed, step_plan
+from activesteer.vehicle.native_step import FASTEST_MPS, Places, Wheels, sensed, step_plan
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 
@@ -83,7 +84,8 @@ class Vehicle:
         try:
             self.model = load_model(mjcf, parameters, tyres, road, timestep_s)
             self.data = mujoco.MjData(self.model)
-            self._asked = np.zeros(DRIVE_CHANGE + 1)
+            self._commands = np.zeros(len(COMMANDS))
+            self._command_memory = self._commands.data
             self.channels = ChannelMap(self.model, parameters)
             self._bind()
             self._place()
@@ -122,7 +124,7 @@ class Vehicle:
             (front_Nm, front_Nm, rear_Nm, rear_Nm),
         )
         ratio = self.parameters.steering.ratio
-        self._plan = step_plan(model, data, self.live_arrays(), self._places, self._wheels, ratio, self._asked)
+        self._plan = step_plan(model, data, self.live_arrays(), self._places, self._wheels, ratio)
         self._plan_address = self._plan.ctypes.data
         block = int(model.numeric_data[-fb.TRAILER_SIZE])
         self._areas_felt = model.numeric_data[block + fb.AREAS_FELT : block + fb.AREAS_FELT + 1]
@@ -218,25 +220,14 @@ class Vehicle:
         Raises:
             SimulationDiverged: the engine warns, or something recorded is not finite or beyond all reason.
         """
+        write_commands(self._command_memory, command, asked)
         torques = command.wheel_torques
         gear = command.gear if torques is None else CLUTCH_OPEN
         if gear != self._gear:
             self._engage(gear)
         if torques is not None:
             self._apply_torques(torques)
-        sane, measurement, motion = native_step.step(
-            self._plan_address,
-            row_address,
-            command.steering_wheel_demand_rad,
-            asked.superposition_demand_rad,
-            asked.rear_steer_demand_rad,
-            command.drive_torque_demand_Nm,
-            command.brake_pedal,
-            asked.drive_torque_change_Nm,
-            *asked.brake_torque_demand_Nm,
-            torques is not None,
-            gear != CLUTCH_OPEN,
-        )
+        sane, measurement, motion = native_step.step(self._plan_address, row_address, torques is not None)
         if not sane:
             self.check()
         return sensed(measurement, motion)
@@ -289,12 +280,16 @@ class Vehicle:
         return sensed(measurement, motion)
 
     def check(self) -> None:
-        """Looks for warnings of the engine and for what is not finite.
+        """Looks for warnings of the engine and for what is not finite, commands first.
 
         Raises:
             SimulationDiverged: there is one.
         """
         data = self.data
+        for name in CARRIED_OUT:
+            value = self._commands[COMMANDS.index(name)]
+            if not math.isfinite(value):
+                raise SimulationDiverged(f"the command {name} is {value:g} at {data.time:.3f} s")
         for kind, warning in enumerate(data.warning):
             if warning.number:
                 text = mujoco.mju_warningText(kind, warning.lastinfo)
@@ -310,7 +305,7 @@ class Vehicle:
         speed = data.sensordata[self._places.velocimeter]
         if not -FASTEST_MPS < speed < FASTEST_MPS:
             raise SimulationDiverged(f"the speed is {speed:g} m/s at {data.time:.3f} s")
-        for name, live in zip(RawRows._fields, self.live_arrays(), strict=True):
+        for name, live in zip(RawRows._fields, self._arrays_of(data), strict=False):
             if not np.isfinite(live).all():
                 raise SimulationDiverged(f"what is recorded of {name} is not finite at {data.time:.3f} s")
 
@@ -321,16 +316,22 @@ class Vehicle:
         block = np.empty((count, ends[-1]))
         return RawRows(*(block[:, end - array.size : end] for array, end in zip(live, ends, strict=True)))
 
-    def present_row(self) -> RawRows:
-        """One row as `step` fills it, of the present instant with the inputs that are in force; nothing is changed."""
-        now = mujoco.MjData(self.model)
+    def present_row(self, command: DriverCommand, asked: ActuatorCommand) -> RawRows:
+        """One row as `step` fills it, of the present instant with the inputs that are in force; nothing is changed.
+
+        Args:
+            command: What the driver last did.
+            asked: What the controller last asked for.
+        """
+        now, commands = mujoco.MjData(self.model), np.empty_like(self._commands)
         mujoco.mj_copyData(now, self.model, self.data)
         mujoco.mj_forward(self.model, now)
-        return RawRows(*(array[np.newaxis] for array in (*self._arrays_of(now), self._asked)))
+        write_commands(commands.data, command, asked)
+        return RawRows(*(array[np.newaxis] for array in (*self._arrays_of(now), commands)))
 
     def live_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """The engine's arrays in the order of `RawRows`."""
-        return (*self._arrays_of(self.data), self._asked)
+        """The engine's arrays and the last commands, in the order of `RawRows`."""
+        return (*self._arrays_of(self.data), self._commands)
 
     @staticmethod
     def _arrays_of(data: mujoco.MjData) -> tuple[NDArray[np.float64], ...]:

@@ -13,6 +13,7 @@ from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError, nearest_names
 from activesteer.signals import Channel
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.command_row import COMMAND_CHANNELS
 from activesteer.vehicle.loading import find
 from activesteer.vehicle.native_channels import (
     Actuator,
@@ -36,7 +37,7 @@ _CORNER_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear lef
 
 
 class RawRows(NamedTuple):
-    """Copies of the engine's arrays, one row a step, all of the same instant."""
+    """Copies of the engine's arrays and the commands, one row a step, all of the same instant."""
 
     sensordata: Array
     userdata: Array
@@ -45,8 +46,8 @@ class RawRows(NamedTuple):
     act: Array
     actuator_force: Array
     ctrl: Array
-    asked: Array
-    """Brake torques that the controller asks for, order of `CORNERS`, and the change of the drive torque."""
+    commands: Array
+    """What driver and controller asked for, as `write_commands` leaves it."""
 
 
 class Column(NamedTuple):
@@ -87,12 +88,13 @@ class ChannelMap:
             # They are read block by block; a missing one is to show now.
             self._sensor(name)
         signals = [
-            *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(), *self._asked(),
+            *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(),
+            *(Signal(channel, Column("commands", place)) for channel, place in COMMAND_CHANNELS.items()),
         ]  # fmt: skip
         signals.append(
             Signal(
                 Channel("active_faults", "", "how many faults of actuators and sensors act", "vehicle"),
-                lambda rows: rows.userdata[:, -1],
+                Column("userdata", model.nuserdata - 1),
             )
         )
         self.channels = tuple(signal.channel for signal in signals)
@@ -319,18 +321,6 @@ class ChannelMap:
                     )
                 )
         return signals
-
-    def _asked(self) -> list[Signal]:
-        """What the controller asks of brakes and drive."""
-        asked = [
-            (f"{corner}_brake_torque_demand_Nm", f"brake torque that the controller adds, {_CORNER_WORDS[corner]}")
-            for corner in CORNERS
-        ]
-        asked.append(("drive_torque_change_Nm", "change of the drive torque that the controller asks for"))
-        return [
-            Signal(Channel(name, "Nm", meaning, "control"), Column("asked", index))
-            for index, (name, meaning) in enumerate(asked)
-        ]
 
     def _limits_of(self, index: int) -> Actuator:
         model = self._model

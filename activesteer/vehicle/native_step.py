@@ -22,17 +22,19 @@ from numpy.typing import NDArray
 from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS
 from activesteer.signals import Measurement, Motion
+from activesteer.vehicle.command_row import BRAKES, COMMAND_ROW
 from activesteer.vehicle.engine_layout import engine_layout
 from activesteer.vehicle.native_memory import f64_pointer, pointer_to
+from activesteer.vehicle.powertrain import CLUTCH_OPEN
 
 FASTEST_MPS: Final = 200.0
 """No car of ours goes faster; a speed beyond it, or none at all, is a run that has diverged [m/s]."""
 
 _N_WHEELS: Final = len(CORNERS)
-_SOURCES: Final = 8
+_ENGINE_ARRAYS: Final = 7
+"""Arrays of the engine that a row is copied from; behind them come the commands."""
+_SOURCES: Final = _ENGINE_ARRAYS + 1
 _WARNINGS: Final = len(mujoco.mjtWarning.__members__) - 1
-DRIVE_CHANGE: Final = _N_WHEELS
-"""Place of the change of the drive torque behind the brake torques of the wheels."""
 _EXPONENT: Final = 0x7FF0000000000000
 """Bits of a float64 that are all set where it is not finite, and only there."""
 
@@ -73,7 +75,7 @@ class Places(NamedTuple):
     """Place of the yaw rate in `qvel`."""
 
 
-_ADDRESSES: Final = ("mj_step", "model", "data", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata", "asked")
+_ADDRESSES: Final = ("mj_step", "model", "data", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata")
 STEP_PLAN: Final = np.dtype(
     (
         np.record,
@@ -88,6 +90,7 @@ STEP_PLAN: Final = np.dtype(
     )
 )
 _plan_pointer: Final = pointer_to(from_dtype(STEP_PLAN))
+_command_pointer: Final = pointer_to(from_dtype(COMMAND_ROW))
 _bits_pointer: Final = pointer_to(types.int64)
 _counter_pointer: Final = pointer_to(types.int32)
 
@@ -99,18 +102,16 @@ def step_plan(
     places: Places,
     wheels: Wheels,
     ratio: float,
-    asked: NDArray[np.float64],
 ) -> NDArray[Any]:
     """Looks up all addresses.
 
     Args:
         model: The car.
         data: Its state; both must outlive the plan.
-        recorded: The engine's arrays that a row is copied from, in its order.
+        recorded: The arrays that a row is copied from, in its order: the engine's, and behind them a `COMMAND_ROW`.
         places: Where the step finds what it needs.
         wheels: How torques come to the wheels.
         ratio: Overall steering ratio.
-        asked: Where the controller's brake torques and change of the drive torque are kept; must outlive the plan.
 
     Returns:
         The plan, shape (1,), at an address that stays.
@@ -126,7 +127,6 @@ def step_plan(
         "n_dofs": model.nv,
         "ctrl": data.ctrl.ctypes.data,
         "sensordata": data.sensordata.ctypes.data,
-        "asked": asked.ctypes.data,
         **places._asdict(),
     }
     for name, value in wheels._asdict().items():
@@ -169,7 +169,7 @@ def _sense(plan):
     yaw_rate = carray(f64_pointer(plan.qvel), (plan.n_dofs,))[plan.yaw_dof]
     speed = s[plan.velocimeter]
     sane = -FASTEST_MPS < speed < FASTEST_MPS and _all_finite(plan.qvel, plan.n_dofs)
-    for index in range(_SOURCES):
+    for index in range(_ENGINE_ARRAYS):
         sane &= _all_finite(plan.sources[index], plan.sizes[index])
     warnings = carray(_counter_pointer(plan.warnings), (2 * _WARNINGS,))
     for index in range(_WARNINGS):
@@ -212,49 +212,37 @@ def sense(plan_address):
     return _sense(carray(_plan_pointer(plan_address), (1,))[0])
 
 
-@compiled_call(_SENSED, types.intp, types.intp, *[types.float64] * 10, types.boolean, types.boolean)
-def step(
-    plan_address, row_address, steering_wheel_rad, superposition_rad, rear_steer_rad, drive_torque_Nm, brake_pedal,
-    drive_change_Nm, brake_fl_Nm, brake_fr_Nm, brake_rl_Nm, brake_rr_Nm, torques_stand, driven,
-):  # fmt: skip
-    """Writes the inputs, makes one step of the engine and reads everything.
+@compiled_call(_SENSED, types.intp, types.intp, types.boolean)
+def step(plan_address, row_address, torques_stand):
+    """Carries out the commands, makes one step of the engine and reads everything.
 
     Args:
-        plan_address: Address of a `STEP_PLAN`.
+        plan_address: Address of a `STEP_PLAN`; the commands stand where the source behind the engine's arrays is.
         row_address: Where the recorded arrays are copied to, one behind the other; 0 for nowhere.
-        steering_wheel_rad: Steering wheel angle demanded [rad].
-        superposition_rad: Angle demanded of the front superposition, at the road wheel [rad].
-        rear_steer_rad: Rear wheel angle demanded [rad].
-        drive_torque_Nm: Torque at the driven wheels together [Nm].
-        brake_pedal: Brake pedal position, 0 to 1.
-        drive_change_Nm: Change of the drive torque that the controller asks for [Nm].
-        brake_fl_Nm: Brake torque that the controller asks for beside the pedal's, front left [Nm].
-        brake_fr_Nm: Front right [Nm].
-        brake_rl_Nm: Rear left [Nm].
-        brake_rr_Nm: Rear right [Nm].
         torques_stand: Whether drive and brakes have their inputs already; what driver and controller want of the drive,
             and the pedal, then do not count.
-        driven: Whether the engine is coupled to the wheels.
 
     Returns:
         Whether all is well, and what `sensed` takes.
     """
     plan = carray(_plan_pointer(plan_address), (1,))[0]
+    commands_address = plan.sources[_ENGINE_ARRAYS]
+    commands = carray(_command_pointer(commands_address), (1,))[0]
+    brake_torques_Nm = carray(f64_pointer(commands_address), (BRAKES + _N_WHEELS,))[BRAKES:]
     ctrl = f64_pointer(plan.ctrl)
-    ctrl[plan.steering_wheel] = steering_wheel_rad
-    ctrl[plan.superposition] = superposition_rad * plan.ratio
-    ctrl[plan.rear_left] = rear_steer_rad
-    ctrl[plan.rear_right] = rear_steer_rad
-    asked = carray(f64_pointer(plan.asked), (_N_WHEELS + 1,))
-    asked[0], asked[1], asked[2], asked[3] = brake_fl_Nm, brake_fr_Nm, brake_rl_Nm, brake_rr_Nm
-    asked[DRIVE_CHANGE] = drive_change_Nm
-    drive_torque_Nm = drive_torque_Nm + drive_change_Nm if driven else 0.0
+    ctrl[plan.steering_wheel] = commands.steering_wheel_demand_rad
+    ctrl[plan.superposition] = commands.superposition_demand_rad * plan.ratio
+    ctrl[plan.rear_left] = commands.rear_steer_demand_rad
+    ctrl[plan.rear_right] = commands.rear_steer_demand_rad
+    drive_torque_Nm = 0.0
+    if commands.gear != CLUTCH_OPEN:
+        drive_torque_Nm = commands.drive_torque_demand_Nm + commands.drive_torque_change_Nm
     for wheel in range(_N_WHEELS):
         if not torques_stand:
             # + 0.0: a wheel that is not driven would get -0.0 while the engine brakes.
             ctrl[plan.drives[wheel]] = plan.drive_shares[wheel] * drive_torque_Nm + 0.0
-            ctrl[plan.brakes[wheel]] = brake_pedal * plan.brake_torques_Nm[wheel]
-        ctrl[plan.brakes[wheel]] += asked[wheel]
+            ctrl[plan.brakes[wheel]] = commands.brake_pedal * plan.brake_torques_Nm[wheel]
+        ctrl[plan.brakes[wheel]] += brake_torques_Nm[wheel]
     _call(plan.mj_step, plan.model, plan.data)  # pyright: ignore[reportCallIssue] - numba adds the context
     if row_address != 0:
         row = f64_pointer(row_address)

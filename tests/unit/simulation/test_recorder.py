@@ -14,7 +14,7 @@ from activesteer.recording import McapWriter, Recording
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.recorder import BLOCK_INTERVAL_S, CONTROL_CHANNELS, POSE_INTERVAL_S, Recorder, channels_of
+from activesteer.simulation.recorder import BLOCK_INTERVAL_S, POSE_INTERVAL_S, Recorder
 from activesteer.simulation.runner import run_scenario
 from activesteer.vehicle.channels import ChannelMap
 
@@ -29,7 +29,7 @@ AT_EACH_WHEEL = """
     tyre_fx_N tyre_fy_N tyre_fz_N tyre_mz_Nm slip_ratio slip_angle_rad inclination_rad wheel_speed_radps travel_m
 """
 COMMAND = DriverCommand(0.3, 150.0, 0.25, saturated=True, front_steer_demand_rad=0.02)
-STEER = ActuatorCommand(-0.01, 0.003, 0.2, 0.004, -0.014, True)
+ASKED = ActuatorCommand(-0.01, 0.003, 0.2, 0.004, -0.014, True, (10.0, 20.0, 30.0, 40.0), -50.0)
 
 
 def simulation(controller: str = "ars", timestep_s: float = 0.001) -> ClosedLoop:
@@ -41,7 +41,7 @@ def column(recorder: Recorder, name: str) -> np.ndarray:
 
 
 def test_every_channel_is_named_once_and_ends_in_its_unit():
-    channels = channels_of(simulation().vehicle)
+    channels = simulation().vehicle.channels.channels
     names = [channel.name for channel in channels]
     assert len(set(names)) == len(names)
     suffixes = {
@@ -54,7 +54,7 @@ def test_every_channel_is_named_once_and_ends_in_its_unit():
 
 
 def test_channels_that_the_interface_promises_are_there():
-    names = {channel.name for channel in channels_of(simulation().vehicle)}
+    names = {channel.name for channel in simulation().vehicle.channels.channels}
     promised = {*PROMISED.split(), *(f"{corner}_{name}" for corner in CORNERS for name in AT_EACH_WHEEL.split())}
     assert not promised - names
 
@@ -62,10 +62,17 @@ def test_channels_that_the_interface_promises_are_there():
 def test_commands_are_recorded_as_they_were_given():
     simulated = simulation()
     recorder = Recorder(simulated.vehicle, 3)
-    simulated.vehicle.step(COMMAND, STEER, recorder.row_address)
-    recorder.record(COMMAND, STEER)
-    values = [column(recorder, channel.name)[0] for channel in CONTROL_CHANNELS]
-    assert values == [0.02, 150.0, 0.25, 1.0, -0.01, 0.003, 0.2, 0.004, -0.014, 1.0]
+    simulated.vehicle.step(COMMAND, ASKED, recorder.row_address)
+    recorder.record()
+    given = {
+        "front_steer_demand_rad": 0.02, "drive_torque_demand_Nm": 150.0, "brake_pedal": 0.25, "driver_saturated": 1.0,
+        "rear_steer_demand_rad": -0.01, "superposition_demand_rad": 0.003, "yaw_rate_desired_radps": 0.2,
+        "prediction_rad": 0.004, "correction_rad": -0.014, "controller_saturated": 1.0,
+        "fl_brake_torque_demand_Nm": 10.0, "fr_brake_torque_demand_Nm": 20.0, "rl_brake_torque_demand_Nm": 30.0,
+        "rr_brake_torque_demand_Nm": 40.0, "drive_torque_change_Nm": -50.0,
+    }  # fmt: skip
+    assert {channel.name for channel in recorder.channels if channel.group == "control"} == set(given)
+    assert {name: column(recorder, name)[0] for name in given} == given
 
 
 def test_first_row_is_the_start_and_rows_are_a_step_apart():
@@ -131,7 +138,7 @@ def test_nothing_recorded_is_nothing():
 def test_whole_blocks_are_in_the_file_while_the_run_goes_on(tmp_path):
     driven, again = simulation(), simulation()
     path = tmp_path / "run.mcap"
-    with McapWriter(path, channels_of(driven.vehicle), driven.vehicle.body_names) as writer:
+    with McapWriter(path, driven.vehicle.channels.channels, driven.vehicle.body_names) as writer:
         driven.advance(3 * BLOCK_ROWS + 10, Recorder(driven.vehicle, 5000, writer))
         # The last block may still be on its way: the writer has a thread of its own.
         so_far = Recording.open(path)
@@ -163,7 +170,9 @@ def test_file_of_a_run_is_the_same_where_only_a_block_stays_in_memory(tmp_path):
     count = 2 * BLOCK_ROWS + 123
     kept, dropped = simulation(), simulation()
     for driven, keep in ((kept, True), (dropped, False)):
-        with McapWriter(tmp_path / f"{keep}.mcap", channels_of(driven.vehicle), driven.vehicle.body_names) as writer:
+        with McapWriter(
+            tmp_path / f"{keep}.mcap", driven.vehicle.channels.channels, driven.vehicle.body_names
+        ) as writer:
             recorder = Recorder(driven.vehicle, 5000, writer, keep=keep)
             driven.advance(count, recorder)
             assert len(recorder._kept.values) == (5000 if keep else BLOCK_ROWS)

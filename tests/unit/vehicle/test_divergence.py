@@ -10,6 +10,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from activesteer.controllers import RearSteer
+from activesteer.driver.standard import StandardDriver
 from activesteer.errors import SimulationDiverged
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
@@ -132,3 +134,37 @@ def test_without_a_fault_nothing_is_reported() -> None:
     simulation = ClosedLoop(resolve("straight_line"))
     simulation.advance(300)
     simulation.vehicle.check()
+
+
+@pytest.mark.parametrize(
+    ("block", "field", "name"),
+    [
+        (RearSteer, "rear_steer_demand_rad", "rear_steer_demand_rad"),
+        (RearSteer, "superposition_demand_rad", "superposition_demand_rad"),
+        (RearSteer, "drive_torque_change_Nm", "drive_torque_change_Nm"),
+        (RearSteer, "brake_torque_demand_Nm", "rl_brake_torque_demand_Nm"),
+        (StandardDriver, "steering_wheel_demand_rad", "steering_wheel_demand_rad"),
+        (StandardDriver, "drive_torque_demand_Nm", "drive_torque_demand_Nm"),
+        (StandardDriver, "brake_pedal", "brake_pedal"),
+    ],
+)
+def test_command_that_is_no_number_ends_the_run_with_its_name(block, field, name, monkeypatch):
+    """Built-in blocks' commands are not looked at one by one: what is carried out has to show it."""
+    step = block.step
+
+    def spoiled(self: Any, *inputs: Any) -> Any:
+        return step(self, *inputs)._replace(
+            **{field: (0.0, 0.0, np.nan, 0.0) if field.startswith("brake_t") else np.nan}
+        )
+
+    loop = ClosedLoop(resolve("straight_line"), "ars")
+    monkeypatch.setattr(block, "step", spoiled)
+    with pytest.raises(SimulationDiverged, match=rf"the command {name} is nan at 0\.001 s"):
+        loop.advance(1)
+
+
+def test_part_of_a_command_that_is_only_recorded_has_to_be_a_number_too(monkeypatch):
+    step = RearSteer.step
+    monkeypatch.setattr(RearSteer, "step", lambda *inputs: step(*inputs)._replace(prediction_rad=np.nan))
+    with pytest.raises(SimulationDiverged, match=r"prediction_rad is nan at 0\.000 s"):
+        run_scenario(resolve("straight_line", overrides={"duration_s": 0.1}), "ars")

@@ -1,0 +1,66 @@
+"""The commands of a step as one row of numbers, which the native step carries out and the recorder keeps."""
+
+from __future__ import annotations
+
+import struct
+from typing import Final
+
+import numpy as np
+
+from activesteer.signals import ActuatorCommand, Channel, DriverCommand
+
+_NUMBERS: Final[dict[str, tuple[str, str] | None]] = {
+    "steering_wheel_demand_rad": None,  # recorded where it arrives, among the inputs of the engine
+    "drive_torque_demand_Nm": ("Nm", "drive torque demanded, all wheels together"),
+    "brake_pedal": ("", "brake pedal position, 0 to 1"),
+    "driver_saturated": ("", "1 where the steering is at its lock or the engine at its limit"),
+    "gear": None,
+    "front_steer_demand_rad": ("rad", "the driver's demand at the road wheel"),
+    "rear_steer_demand_rad": ("rad", "rear angle that the controller demands"),
+    "superposition_demand_rad": ("rad", "angle that the controller adds at the front wheels"),
+    "yaw_rate_desired_radps": ("rad/s", "yaw rate that the controller steers for"),
+    "prediction_rad": ("rad", "feed-forward part of the controller's angle"),
+    "correction_rad": ("rad", "feedback part of the controller's angle"),
+    "controller_saturated": ("", "1 where a limit of the controller is active"),
+    "fl_brake_torque_demand_Nm": ("Nm", "brake torque that the controller adds, front left"),
+    "fr_brake_torque_demand_Nm": ("Nm", "brake torque that the controller adds, front right"),
+    "rl_brake_torque_demand_Nm": ("Nm", "brake torque that the controller adds, rear left"),
+    "rr_brake_torque_demand_Nm": ("Nm", "brake torque that the controller adds, rear right"),
+    "drive_torque_change_Nm": ("Nm", "change of the drive torque that the controller asks for"),
+}
+"""What a row holds, in the order in which `write_commands` fills it, and what the channel means if there is one."""
+
+COMMANDS: Final = tuple(_NUMBERS)
+"""Names of the numbers of a row."""
+COMMAND_ROW: Final = np.dtype([(name, np.float64) for name in COMMANDS])
+"""A row as compiled code reads it."""
+BRAKES: Final = COMMANDS.index("fl_brake_torque_demand_Nm")
+"""Where in a row the brake torques of the wheels begin."""
+COMMAND_CHANNELS: Final = {
+    Channel(name, *about, "control"): place for place, (name, about) in enumerate(_NUMBERS.items()) if about
+}
+"""Channel -> its place in a row."""
+CARRIED_OUT: Final = (
+    "steering_wheel_demand_rad", "drive_torque_demand_Nm", "brake_pedal", "rear_steer_demand_rad",
+    "superposition_demand_rad", *COMMANDS[BRAKES : BRAKES + 4], "drive_torque_change_Nm",
+)  # fmt: skip
+"""What reaches the engine; the rest is for the recording."""
+
+_pack_into = struct.Struct(f"{len(COMMANDS)}d").pack_into
+
+
+def write_commands(row: memoryview, command: DriverCommand, asked: ActuatorCommand) -> None:
+    """Writes a row.
+
+    Args:
+        row: Memory of an array of `len(COMMANDS)` float64.
+        command: What the driver does.
+        asked: What the controller asks for.
+    """
+    # Taken apart by position: by name it takes twice as long, and this happens every step.
+    steering_wheel, drive, pedal, at_limit, _, gear, front = command
+    rear, added, desired, prediction, correction, limited, (fl, fr, rl, rr), change = asked
+    _pack_into(
+        row, 0, steering_wheel, drive, pedal, at_limit, gear, front, rear, added, desired, prediction, correction,
+        limited, fl, fr, rl, rr, change,
+    )  # fmt: skip
