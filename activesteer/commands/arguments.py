@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -77,19 +78,19 @@ def add_scenario(parser: argparse.ArgumentParser) -> None:
     """Adds what `scenario_of` reads: the manoeuvre, `--vehicle`, `--set` and `--fault`."""
     parser.add_argument("maneuver", metavar="MANEUVER", help="a name from `activesteer list`, or a TOML file")
     add_vehicle(parser)
-    parser.add_argument(
-        "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
-        help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
-    )  # fmt: skip
-    add_faults(parser)
-
-
-def add_faults(parser: argparse.ArgumentParser) -> None:
-    """Adds `--fault`, which `scenario_of` reads."""
+    add_overrides(parser)
     parser.add_argument(
         "--fault", action="append", default=[], dest="faults", metavar="PART:KIND[=SIZE]@START[-END]",
         help="let an actuator or a sensor fail, as rear:stuck@2.0 or yaw_rate_sensor:offset=2degps@1-3; "
         "in place of the manoeuvre's own faults",
+    )  # fmt: skip
+
+
+def add_overrides(parser: argparse.ArgumentParser) -> None:
+    """Adds `--set`, which `overrides_of` reads."""
+    parser.add_argument(
+        "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
+        help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
     )  # fmt: skip
 
 
@@ -173,20 +174,38 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
     from activesteer.faults import fault_table
     from activesteer.scenario import resolve
 
-    overrides: dict[str, Any] = {}
-    if options.faults:
-        overrides["fault"] = [fault_table(text) for text in options.faults]
-    for key, value in map(_override, options.overrides):
-        if key in overrides:
+    faults = {"fault": [fault_table(text) for text in options.faults]} if options.faults else {}
+    return resolve(options.maneuver, options.vehicle, pairs(options.overrides, "--set", "road.mu=0.4", faults))
+
+
+def overrides_of(options: argparse.Namespace) -> dict[str, Any]:
+    """What `--set` gives.
+
+    Raises:
+        ParameterError: it is not written so, or a key is given twice.
+    """
+    return pairs(options.overrides, "--set", "road.mu=0.4")
+
+
+def pairs(texts: Sequence[str], option: str, example: str, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Keys and values that an option gives, each value as in TOML; what is no TOML value is a text.
+
+    Args:
+        texts: As `key=value`.
+        option: The option, for error messages.
+        example: What may stand behind it.
+        given: Keys that have values already.
+
+    Raises:
+        ParameterError: one is not written so, or a key is given twice.
+    """
+    values = dict(given or {})
+    for text in texts:
+        key, sign, value = (part.strip() for part in text.partition("="))
+        if not sign or not key:
+            shortened = text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
+            raise ParameterError(f"{option} {shortened}: KEY=VALUE is needed, as in {option} {example}", value=text)
+        if key in values:
             raise ParameterError("is given twice; leave one out", key=key, value=value, overridden=True)
-        overrides[key] = value
-    return resolve(options.maneuver, options.vehicle, overrides)
-
-
-def _override(text: str) -> tuple[str, Any]:
-    """`key=value`, the value as in TOML; what is no TOML value is a text."""
-    key, sign, value = text.partition("=")
-    if not sign or not key:
-        shortened = text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
-        raise ParameterError(f"--set {shortened}: KEY=VALUE is needed, as in --set road.mu=0.4", value=text)
-    return key.strip(), parse_value(value)
+        values[key] = parse_value(value)
+    return values

@@ -1,0 +1,115 @@
+"""`activesteer fault-map`: what each fault does to the car, and how long it may last."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+from activesteer.commands.arguments import (
+    add_controller,
+    add_driver,
+    add_figures_folder,
+    add_jobs,
+    add_json,
+    add_overrides,
+    add_vehicle,
+    overrides_of,
+    pairs,
+)
+from activesteer.commands.output import print_json
+from activesteer.commands.progress import ProgressBar
+from activesteer.config import Source, build
+from activesteer.errors import ParameterError
+
+_ROW: Final = "{:<30}{:<13}{:>7}{:>10}{:>8}{:>9}{:>9}{:>11}"
+_HEADS: Final = (
+    ("fault", "situation", "speed", "yaw rate", "a_y", "off 1 s", "driver", "tolerated"),
+    ("", "", "km/h", "deg/s", "m/s2", "m", "m", "s"),
+)
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("fault-map", help="what faults do to the car, and how long they may last")
+    add_controller(parser, several=False)
+    add_driver(parser)
+    add_vehicle(parser)
+    add_overrides(parser)
+    parser.add_argument(
+        "--fault", action="append", default=[], dest="faults", metavar="PART:KIND[=SIZE]",
+        help="a fault, as rear:stuck or rear:offset=1deg (default: those of the controller's actuators)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--preset", default="usual", metavar="NAME", help="usual, or un_r79: a circle of 100 m, 80 km/h"
+    )
+    parser.add_argument("--speeds-kmh", metavar="V,V", help="speeds, in place of the preset's (usual: 60,100,140)")
+    parser.add_argument(
+        "--situations", metavar="NAME,NAME",
+        help="in place of the preset's: straight, turn, lane_change, circle_100m",
+    )  # fmt: skip
+    parser.add_argument(
+        "--limit", action="append", default=[], dest="limits", metavar="KEY=VALUE",
+        help="what a fault may do: yaw_rate_degps (3), ay_mps2 (1), lateral_offset_m (the lane's), window_s (2)",
+    )  # fmt: skip
+    add_figures_folder(parser)
+    add_jobs(parser)
+    add_json(parser)
+    parser.set_defaults(action=_fault_map)
+
+
+def _fault_map(options: argparse.Namespace) -> int:
+    from activesteer.errors import nearest_names
+    from activesteer.studies.fault_map import PRESETS, Limits, fault_map
+
+    if options.preset not in PRESETS:
+        problem = f"there is no preset {options.preset!r}; {nearest_names(options.preset, PRESETS)}"
+        raise ParameterError(problem, key="--preset", value=options.preset)
+    preset = PRESETS[options.preset]
+    limits = pairs(options.limits, "--limit", "ay_mps2=2")
+    with ProgressBar("fault map", quiet=options.json) as bar:
+        made = fault_map(
+            options.controller,
+            options.vehicle,
+            overrides_of(options),
+            faults=options.faults,
+            speeds_kmh=_speeds(options.speeds_kmh) if options.speeds_kmh else preset.speeds_kmh,
+            situations=options.situations.split(",") if options.situations else preset.situations,
+            limits=build(Limits, limits, Source("--limit")),
+            driver=options.driver,
+            jobs=options.jobs,
+            progress=lambda done, total: bar(done / total, f"{done}/{total}"),
+        )
+    figures = []
+    if options.output is not None:
+        from activesteer.studies.fault_map_figure import draw_fault_map
+
+        figures = draw_fault_map(made, options.output)
+    if options.json:
+        print_json({"faults": made.rows, "figures": [str(path) for path in figures]})
+        return 0
+    for words in _HEADS:
+        print(_ROW.format(*words))
+    for row in made.rows:
+        print(_line(row))
+    for path in figures:
+        print(f"figure: {path}")
+    return 0
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    tolerated = row["fault_tolerant_time_s"]
+    words = "always" if tolerated is None else "failed" if math.isnan(tolerated) else f"{tolerated:.3f}"
+    figures = (math.degrees(row["yaw_rate_change_radps"]), row["ay_change_mps2"])
+    offsets = (row["lateral_offset_1s_m"], row["lateral_offset_1s_driver_m"])
+    numbers = [f"{value:.2f}" for value in (*figures, *offsets)]
+    return _ROW.format(row["fault"], row["situation"], f"{row['speed_kmh']:g}", *numbers, words)
+
+
+def _speeds(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as reason:
+        problem = f"is {text!r}; numbers with commas between are needed, as 60,100"
+        raise ParameterError(problem, key="--speeds-kmh", value=text) from reason
