@@ -15,7 +15,7 @@ from activesteer.scenario import Scenario, describe
 from activesteer.version import __version__
 
 _DECIDING: Final = (
-    "config.py", "conventions.py", "signals.py", "theory", "road", "maneuver", "driver", "controllers", "tyre",
+    "config", "conventions.py", "signals.py", "theory", "road", "maneuver", "driver", "controllers", "tyre",
     "vehicle", "scenario", "simulation", "analysis",
 )  # fmt: skip
 """Parts of the package that a result depends on."""

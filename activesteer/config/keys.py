@@ -1,0 +1,117 @@
+"""The keys that a dataclass has in a file: fields in SI or in a unit of the edge, in tables below tables."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import typing
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from activesteer.config.source import Source
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.errors import ActiveSteerError, nearest_names
+
+_EDGE_UNITS: Final = {
+    "_deg": ("_rad", math.pi / 180.0),
+    "_degps": ("_radps", math.pi / 180.0),
+    "_kmh": ("_mps", 1.0 / 3.6),
+    "_g": ("_mps2", GRAVITY_MPS2),
+}
+"""Suffix of a key in a file -> suffix of the field it fills, and the factor."""
+
+
+def spellings(name: str) -> list[str]:
+    """The keys that fill a field: its own name, and the one in a unit of the edge."""
+    edges = [name[: -len(si)] + edge for edge, (si, _) in _EDGE_UNITS.items() if name.endswith(si)]
+    return [name, *edges]
+
+
+def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, float]:
+    """The field that a key of a file fills.
+
+    Args:
+        key: The key, perhaps in a unit of the edge.
+        fields: Names of the fields, in SI.
+
+    Returns:
+        Name of the field, None where there is none, and the factor from the key's unit to SI.
+    """
+    if not isinstance(key, str):
+        return None, 1.0
+    if key in fields:
+        return key, 1.0
+    for edge, (si, factor) in _EDGE_UNITS.items():
+        if key.endswith(edge) and key[: -len(edge)] + si in fields:
+            return key[: -len(edge)] + si, factor
+    return None, 1.0
+
+
+def fields_of(cls: type) -> dict[str, dataclasses.Field[Any]]:
+    """The fields of a dataclass by their names."""
+    return {field.name: field for field in dataclasses.fields(cls)}
+
+
+def dataclass_in(hint: Any) -> type | None:
+    """The dataclass of a table that a field holds, also of one that may be left out; None for other fields."""
+    for candidate in (hint, *typing.get_args(hint)):
+        if isinstance(candidate, type) and dataclasses.is_dataclass(candidate):
+            return candidate if typing.get_origin(hint) not in (dict, tuple) else None
+    return None
+
+
+def element_of(hint: Any) -> type | None:
+    """The dataclass that the elements of a tuple are made of, or None."""
+    item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
+    return item if isinstance(item, type) and dataclasses.is_dataclass(item) else None
+
+
+def key_paths(cls: type, prefix: str = "") -> list[str]:
+    """All dotted keys that a table for `cls` may have, for messages about keys that do not exist."""
+    paths: list[str] = []
+    hints = typing.get_type_hints(cls)
+    for field in dataclasses.fields(cls):
+        inner = dataclass_in(hints[field.name])
+        if inner is not None:
+            paths += key_paths(inner, f"{prefix}{field.name}.")
+        else:
+            paths += [prefix + spelling for spelling in spellings(field.name)]
+    return paths
+
+
+def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:
+    """Keys with the names of the fields in place of other units: `speed_kmh` becomes `speed_mps`."""
+    if not path:
+        return ()
+    name, _ = field_in_unit(path[0], fields_of(cls))
+    if name is None:
+        return tuple(path)
+    hint, rest = typing.get_type_hints(cls)[name], path[1:]
+    if (inner := dataclass_in(hint)) is not None:
+        return (name, *field_path(inner, rest))
+    if (inner := element_of(hint)) is not None and rest:
+        return (name, rest[0], *field_path(inner, rest[1:]))
+    return (name, *rest)
+
+
+def leaf_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    """The keys of all values of a table, each as the names that lead to it."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from ((str(key), *below) for below in leaf_keys(value))
+        else:
+            yield (str(key),)
+
+
+def key_hint(cls: type, key: str) -> str | None:
+    """What a class, or that of a table in it, says to those who look for a dotted key that it does not have."""
+    first, _, rest = key.partition(".")
+    inner = dataclass_in(typing.get_type_hints(cls).get(first)) if rest else None
+    return getattr(cls, "KEY_HINTS", {}).get(key) if inner is None else key_hint(inner, rest)
+
+
+def no_such_key(cls: type, source: Source, path: Sequence[str]) -> ActiveSteerError:
+    """The error for a key that a class does not have; see `Source.fail`."""
+    names = [spelling for name in fields_of(cls) for spelling in spellings(name)]
+    help_ = key_hint(cls, path[-1]) or nearest_names(path[-1], names)
+    return source.fail(path, f"there is no such key; {help_}", allowed=names)

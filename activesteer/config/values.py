@@ -1,0 +1,164 @@
+"""Tables into dataclasses, each value checked against its field's type, and back."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import types
+import typing
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, TypeVar
+
+from activesteer.config.keys import element_of, field_in_unit, fields_of, no_such_key, spellings
+from activesteer.config.source import MAX_NUMBER, Range, Source
+from activesteer.errors import ActiveSteerError, shown
+
+T = TypeVar("T")
+_MAX_TEXT: Final = 1000
+"""Longest text [characters]."""
+
+
+def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence[str] = ()) -> T:
+    """Makes a dataclass from a table.
+
+    Args:
+        cls: Dataclass to make.
+        table: Keys and values; edge units are converted.
+        source: For error messages.
+        path: Keys that lead to this table.
+
+    Returns:
+        The dataclass.
+
+    Raises:
+        ActiveSteerError: a key is unknown, missing or given twice, or a value is wrong.
+    """
+    hints = typing.get_type_hints(cls, include_extras=True)
+    fields = fields_of(cls)
+    values: dict[str, Any] = {}
+    for key, raw in table.items():
+        where = (*path, str(key))
+        name, factor = field_in_unit(key, fields)
+        if name is None:
+            raise no_such_key(cls, source, where)
+        if name in values:
+            first = next(other for other in table if field_in_unit(other, fields)[0] == name)
+            raise source.fail(where, f"{first} and {key} are the same in two units; give one of them")
+        values[name] = _convert(hints[name], raw, factor, source, where)
+    for name, field in fields.items():
+        if name in values or field.default is not dataclasses.MISSING:
+            continue
+        if field.default_factory is not dataclasses.MISSING:
+            continue
+        raise source.fail((*path, name), f"the key {' or '.join(spellings(name))} is missing")
+    try:
+        return cls(**values)
+    except ActiveSteerError as reason:  # from the class's own checks, which know no file
+        raise source.placed(path, reason) from reason
+
+
+def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[str]) -> Any:
+    """One value, checked against its type hint."""
+    limits = Range()
+    if typing.get_origin(hint) is typing.Annotated:
+        hint, *notes = typing.get_args(hint)
+        limits = next((note for note in notes if isinstance(note, Range)), limits)
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        if raw is None:
+            return None
+        hint = next(option for option in typing.get_args(hint) if option is not type(None))
+        return _convert(typing.Annotated[hint, limits], raw, factor, source, path)
+    origin = typing.get_origin(hint)
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        if not isinstance(raw, Mapping):
+            raise source.fail(path, f"{shown(raw)} is no table; a table [{'.'.join(path)}] is needed", raw)
+        return build(hint, raw, source, path)
+    if origin is dict:
+        if not isinstance(raw, Mapping):
+            raise source.fail(path, f"{shown(raw)} is no table", raw)
+        item = typing.get_args(hint)[1]
+        return {key: _convert(item, value, 1.0, source, (*path, str(key))) for key, value in raw.items()}
+    if origin is tuple:
+        return _elements(hint, raw, factor, limits, source, path)
+    return _scalar(hint, raw, factor, limits, source, path)
+
+
+def _elements(
+    hint: Any, raw: Any, factor: float, limits: Range, source: Source, path: Sequence[str]
+) -> tuple[Any, ...]:
+    """A list of numbers, or of tables."""
+    element = element_of(hint)
+    if not isinstance(raw, (list, tuple)):
+        wanted = "no list of numbers" if element is None else f"no list; tables [[{'.'.join(path)}]] are needed"
+        raise source.fail(path, f"{shown(raw)} is {wanted}", raw)
+    if element is not None:
+        return tuple(_convert(element, value, 1.0, source, (*path, str(number))) for number, value in enumerate(raw))
+    item = typing.Annotated[typing.get_args(hint)[0], limits]
+    return tuple(_convert(item, value, factor, source, path) for value in raw)
+
+
+def _word(words: Sequence[str], raw: Any, source: Source, path: Sequence[str]) -> str:
+    if raw not in list(words):
+        known = ", ".join(repr(word) for word in words[:-1])
+        raise source.fail(path, f"is {shown(raw)}; allowed are {known} and {words[-1]!r}", raw, words)
+    return raw
+
+
+def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, path: Sequence[str]) -> Any:
+    if typing.get_origin(hint) is typing.Literal:
+        return _word(typing.get_args(hint), raw, source, path)
+    wanted = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}[hint]
+    good = isinstance(raw, hint) or (hint is float and isinstance(raw, int))
+    if not good or (isinstance(raw, bool) and hint is not bool):
+        raise source.fail(path, f"{shown(raw)} is not {wanted}", raw, hint)
+    if isinstance(raw, str) and (len(raw) > _MAX_TEXT or not raw.isprintable()):
+        raise source.fail(path, f"{shown(raw)} is not {_MAX_TEXT} characters, at most, that can be printed", raw)
+    if hint in (bool, str):
+        return raw
+    number: Any = raw
+    try:
+        value = number * factor if factor != 1.0 else hint(number)
+        finite = math.isfinite(value)
+    except OverflowError:  # a whole number too large for a float
+        value, finite = math.inf, False
+    if not finite:
+        raise source.fail(path, f"{shown(raw)} is not finite", raw, limits)
+    if abs(value) > MAX_NUMBER:
+        problem = f"{shown(raw)} is larger than anything of a car; allowed is at most {MAX_NUMBER:g}"
+        raise source.fail(path, problem, raw, limits)
+    if not limits.low <= value <= limits.high:
+        allowed = Range(limits.low / factor, limits.high / factor)
+        raise source.fail(path, f"{shown(raw)} is out of range; allowed is {allowed}", raw, allowed)
+    return value
+
+
+def checked_number(key: str, value: object, limits: Range) -> float:
+    """An argument of a Python function, checked as a number of a file is.
+
+    Args:
+        key: Name of the argument.
+        value: What was given.
+        limits: Allowed range.
+
+    Returns:
+        The number.
+
+    Raises:
+        ParameterError: it is no number, or out of range.
+    """
+    return _scalar(float, value, 1.0, limits, Source(""), (key,))
+
+
+def to_table(value: Any) -> Any:
+    """A dataclass as plain tables, ready for JSON; fields that are None are left out, so that `build` takes it back."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {
+            field.name: to_table(getattr(value, field.name))
+            for field in dataclasses.fields(value)
+            if getattr(value, field.name) is not None
+        }
+    if isinstance(value, dict):
+        return {key: to_table(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [to_table(item) for item in value]
+    return value
