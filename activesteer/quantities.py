@@ -123,7 +123,7 @@ def metric_label(name: str) -> tuple[str, str, float]:
     return words, unit.name, unit.factor
 
 
-_COUNTS: Final = frozenset({"cones_hit", "cones_missed", "all_wheels_in_lanes"})
+_COUNTS: Final = frozenset({"cones_hit", "cones_missed", "stays_in_lanes"})
 
 
 def metric_number(name: str, value: float) -> str:

@@ -66,8 +66,8 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
     `<name>_after_gates_rms_<unit>`. `yaw_rate_lag_s`, `ay_lag_s`: by how much they come after the steering wheel, up to
     the last gate. Steering effort: `steering_wheel_peak_abs_rad`, `steering_wheel_rms_rad`, and the same of its rate.
     Track: `track_deviation_max_m`, `track_deviation_rms_m`, distance of the front axle centre from the path over the
-    whole run. Lanes: `lane_overstep_m`, by how much a wheel gets beyond a lane at most (below 0: smallest distance to a
-    side), `all_wheels_in_lanes` (1 or 0); `cones_hit`, `cone_distance_min_m`. Tyres: `tyre_use_max`, `tyre_use_mean`,
+    whole run. Lanes: `lane_overstep_m`, by how much the body gets beyond a lane at most (below 0: smallest distance to
+    a side), `stays_in_lanes` (1 or 0); `cones_hit`, `cone_distance_min_m`. Tyres: `tyre_use_max`, `tyre_use_mean`,
     fraction of the available friction that is used, over all wheels and the whole run. `speed_loss_mps`: speed at the
     beginning less the lowest; `speed_end_mps`.
 
@@ -159,7 +159,7 @@ def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
     car = read_footprint(recording)
     if course.lanes:
         values["lane_overstep_m"] = lanes.lane_overstep(recording, course, car)
-        values["all_wheels_in_lanes"] = float(lanes.all_wheels_in_lanes(recording, course, car))
+        values["stays_in_lanes"] = float(lanes.stays_in_lanes(recording, course, car))
     if len(course.cones_m):
         distances = lanes.cone_distances(recording, course, car)
         values["cones_hit"] = float(np.count_nonzero(distances <= 0.0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from activesteer.analysis.claims import Claim, step_steer_claims
+from activesteer.analysis.claims import SCENARIOS, Claim
 from activesteer.conventions import GRAVITY_MPS2
 from tests.physics.runs import last, run
 
@@ -12,7 +12,7 @@ from tests.physics.runs import last, run
 @pytest.fixture(scope="module")
 def claims() -> dict[str, Claim]:
     recordings = {system: run("step_steer", system) for system in ("none", "ars", "afs")}
-    return {claim.id: claim for claim in step_steer_claims(recordings)}
+    return {claim.id: claim for claim in SCENARIOS["step_steer"](recordings)}
 
 
 @pytest.mark.parametrize("number", ["S1", "S2", "S3", "S4", "S5"])

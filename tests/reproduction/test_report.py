@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from activesteer.analysis.claims.scorecard import CLAIM_IDS
+from activesteer.analysis.claims import STATEMENTS
 from activesteer.cli import main
 from activesteer.studies import reproduction
 from activesteer.studies.reproduction import Reproduction
@@ -21,7 +21,7 @@ def test_reproduce_writes_a_report_of_all_runs(
     assert f"report: {tmp_path / 'report.html'}" in capsys.readouterr().out
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "15 runs of 5 manoeuvres, vehicle compact." in page
-    for number in CLAIM_IDS:
+    for number in STATEMENTS:
         assert f'-{number}"' in page
     assert "not judged" not in page
 

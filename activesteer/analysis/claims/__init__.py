@@ -1,35 +1,22 @@
 """What the paper says about the three systems, as checks on recordings; one file for each manoeuvre.
 
-Every criterion was written down before parameters were chosen. `not_reproduced.toml` lists the claims that are known
-not to come out, with the reason; `scorecard` puts the two together.
+Every criterion comes from the paper's words and from what a driver or a sensor can notice, and was written down before
+anything was tuned. Each statement names the fakes that it must reject. `not_reproduced.toml` lists the claims that are
+known not to come out, with the reason; `scorecard` puts the two together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
-from activesteer.analysis.claims import double_lane_change, sine_with_dwell, slalom, slippery, step_steer
-from activesteer.analysis.claims.claim import SYSTEMS, Claim
+from activesteer.analysis.claims.claim import SYSTEMS, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.scenarios import SCENARIOS, STATEMENTS, Claims
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict, not_reproduced, scorecard
 from activesteer.analysis.source import RecordingLike
 
-Claims = Callable[[Mapping[str, RecordingLike]], list[Claim]]
-"""Recordings by system -> claims."""
-
-SCENARIOS: Final[dict[str, Claims]] = {
-    "step_steer": step_steer.claims,
-    "sine_with_dwell": sine_with_dwell.claims,
-    "double_lane_change": double_lane_change.claims,
-    "slalom": slalom.claims,
-    "double_lane_change_low_mu": slippery.claims,
-}
-"""Name of the manoeuvre -> its claims, in the order of the paper's sections."""
-
 _NO_SETTING: Final = frozenset({"vehicle", "duration_s", "settle_s", "title"})
 """Keys of a manoeuvre's file that may be another than the paper's, and the whole of the car."""
-
-step_steer_claims = step_steer.claims
 
 
 def claims_for(recording: RecordingLike) -> Claims | None:
@@ -63,13 +50,16 @@ def _is_of_maneuver(key: str, vehicle: object) -> bool:
 
 __all__ = [
     "SCENARIOS",
+    "STATEMENTS",
     "SYSTEMS",
     "Claim",
     "Claims",
+    "Fake",
+    "Kind",
     "Scorecard",
+    "Statement",
     "Verdict",
     "claims_for",
     "not_reproduced",
     "scorecard",
-    "step_steer_claims",
 ]

@@ -1,83 +1,111 @@
-"""A claim of the paper with what it was decided on, and what all of them have in common."""
+"""A claim of the paper: what is stated, what must hold for it, and what became of it in three runs.
+
+A statement stands before anything is driven. Its sizes come from what its words mean and from what a driver or a
+sensor can notice (`noticeable`), and it names the fakes that it must not be taken in by.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Final
 
-from activesteer.analysis.source import Evaluable, RecordingLike
-from activesteer.errors import ParameterError, RecordingError
+from activesteer.errors import ParameterError
 
 SYSTEMS: Final = ("none", "ars", "afs")
 """The runs that are compared: no control, active rear steering, active front superposition."""
+SYSTEMS_WITH_CONTROL: Final = SYSTEMS[1:]
 
-Runs = Mapping[str, Mapping[str, float]]
-"""Metrics by system."""
+
+class Kind(StrEnum):
+    """What a statement is about."""
+
+    SYSTEMS = "property of the systems"
+    """The steering wheel follows a table: car, road and system decide."""
+    DRIVER = "depends on the driver"
+    """A driver closes the loop: what he sees and how he acts decide too."""
+
+
+class Fake(StrEnum):
+    """Runs that look like those that a statement is about, and are not."""
+
+    NONE_AS_BOTH = "the run without control given as both systems"
+    NO_EFFECT = "both systems turn their wheels and the car moves as without control"
+    EXCHANGED = "the two systems exchanged"
+    REVERSED = "both systems with their signs turned round"
+    ONE_REVERSED = "one of the systems with its sign turned round"
+    NO_GAIN = "both systems with gains at zero"
+    CUT_SHORT = "runs that end too early"
+
+
+_NO_PROOF: Final = frozenset({Fake.NONE_AS_BOTH, Fake.EXCHANGED, Fake.NO_GAIN, Fake.CUT_SHORT})
+"""What every statement rejects: no claim passes but on whole runs in which each system acts as what it is."""
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
-    """One statement of the paper, checked.
+class Statement:
+    """One statement of the paper, and its criterion.
 
     Attributes:
         id: Its number.
         text: What is claimed.
-        criterion: What must hold for it to pass.
-        passed: Whether it does.
-        values: The numbers it was decided on, named `<system>_<metric>`.
+        criterion: What must hold for it to pass, besides what all of them need (`Trio.obstacle`).
+        kind: What it is about.
+        rejects: Fakes that it must not pass on.
     """
 
     id: str
     text: str
     criterion: str
+    kind: Kind
+    rejects: frozenset[Fake]
+
+    @classmethod
+    def about(cls, kind: Kind, number: str, text: str, criterion: str, *rejects: Fake) -> Statement:
+        """A statement; the fakes are those that it rejects besides the ones that all do."""
+        return cls(number, text, criterion, kind, _NO_PROOF | frozenset(rejects))
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A statement, checked.
+
+    Attributes:
+        statement: What was checked.
+        passed: Whether it holds.
+        values: The numbers it was decided on, named `<system>_<metric>`.
+        obstacle: Why it cannot hold whatever the numbers say; empty where nothing stands against it.
+    """
+
+    statement: Statement
     passed: bool
     values: dict[str, float]
+    obstacle: str = ""
+
+    @property
+    def id(self) -> str:
+        """Number of the statement."""
+        return self.statement.id
+
+    @property
+    def text(self) -> str:
+        """What is claimed."""
+        return self.statement.text
+
+    @property
+    def criterion(self) -> str:
+        """What must hold for it to pass."""
+        return self.statement.criterion
 
 
-def all_metrics(
-    recordings: Mapping[str, RecordingLike],
-    metrics: Callable[[RecordingLike], dict[str, float]],
-    what: str,
-) -> dict[str, dict[str, float]]:
-    """Metrics of the three runs.
-
-    Args:
-        recordings: Runs by system; more than the three are no matter.
-        metrics: What evaluates a run.
-        what: Name of the manoeuvre, for the error.
-
-    Returns:
-        Metrics by system, in the order of `SYSTEMS`.
+def check_systems(runs: Mapping[str, object], what: str) -> None:
+    """All three runs must be there; more are no matter.
 
     Raises:
-        ParameterError: one of the three runs is missing.
-        RecordingError: a run cannot be evaluated.
+        ParameterError: one is missing.
     """
-    missing = [system for system in SYSTEMS if system not in recordings]
-    if missing:
+    if missing := [system for system in SYSTEMS if system not in runs]:
         raise ParameterError(
             f"the claims about the {what} need the runs {', '.join(SYSTEMS)}; missing: {', '.join(missing)}"
         )
-    return {system: _Metrics(metrics(Evaluable(recordings[system]))) for system in SYSTEMS}
-
-
-class _Metrics(dict[str, float]):
-    """Metrics of a run that may be of another kind than the name of its manoeuvre says."""
-
-    def __missing__(self, name: str) -> float:
-        raise RecordingError(f"the run has no metric {name}: is it what its name says?")
-
-
-def pick(runs: Runs, *metrics: str) -> dict[str, float]:
-    """Metrics of all systems, named `<system>_<metric>`."""
-    return {f"{system}_{metric}": runs[system][metric] for metric in metrics for system in SYSTEMS}
-
-
-def lowered(runs: Runs, metric: str, most: float, system: str) -> bool:
-    """Whether a system brings a metric down to at most a part of the value without control.
-
-    Never where one of them is nan, or where there is nothing to bring down.
-    """
-    none = abs(runs["none"][metric])
-    return none > 0.0 and abs(runs[system][metric]) <= most * none

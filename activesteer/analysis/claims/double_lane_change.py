@@ -1,7 +1,5 @@
 """What the paper says about the double lane change on a dry road, as checks on three recordings.
 
-The criteria were written down before any parameter was chosen for this manoeuvre.
-
 Source: V. Dorsch, Mecatronics-REM 2012, section on the double lane change.
 """
 
@@ -13,60 +11,100 @@ from itertools import combinations
 from typing import Final
 
 from activesteer.analysis import path_following, track
-from activesteer.analysis.claims.claim import SYSTEMS, Claim, Runs, all_metrics, lowered, pick
-from activesteer.analysis.claims.path_following import SYSTEMS_WITH_CONTROL, calmed
+from activesteer.analysis.claims.claim import SYSTEMS, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.noticeable import SIDESLIP_RAD, YAW_RATE_RADPS
+from activesteer.analysis.claims.path_following import (
+    AFTER_SIDESLIP,
+    AFTER_YAW_RATE,
+    CALMED,
+    CALMED_WORDS,
+    CONES_HIT,
+    SETTLED_YAW_RATE_RADPS,
+    SIDESLIP_PEAK,
+    calmed,
+    held,
+    held_statement,
+)
+from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.source import RecordingLike, read_course
 
 ALIKE_M: Final = 0.5
-"""Tracks look alike when they are nowhere further apart than this [m]."""
+"""Tracks look alike when they are nowhere further apart than this [m], a seventh of the way to the side lane."""
 PEAK_FRACTION: Final = 0.9
 """A system lowers a peak when it brings it down to this fraction."""
-PEAKS: Final = ("yaw_rate_peak_abs_radps", "sideslip_peak_abs_rad")
+YAW_RATE_PEAK: Final = "yaw_rate_peak_abs_radps"
+AFTER_DRIVER: Final = ("ay_after_gates_rms_mps2", "steering_wheel_after_gates_rms_rad")
+
+L1: Final = Statement.about(
+    Kind.DRIVER,
+    "L1",
+    "The three tracks look alike.",
+    "From the first gate to the last, the tracks of the front axle centre of any two runs are at most "
+    f"{ALIKE_M:g} m apart at the same x. How many cones each body hits is said, and does not decide.",
+)
+L2: Final = Statement.about(
+    Kind.DRIVER,
+    "L2",
+    "Without control the car goes on oscillating after the last gate; each system stops that.",
+    f"The root mean square of the yaw rate of none after the last gate is above "
+    f"{math.degrees(SETTLED_YAW_RATE_RADPS):g} deg/s. Those of yaw rate and sideslip {CALMED_WORDS}; those of lateral "
+    f"acceleration and steering wheel angle are at most {100.0 * CALMED:.0f} % of those of none too.",
+    Fake.NO_EFFECT,
+    Fake.REVERSED,
+)
+L3: Final = Statement.about(
+    Kind.DRIVER,
+    "L3",
+    "Each system lowers the peaks of yaw rate and sideslip.",
+    "The largest magnitudes of yaw rate and of sideslip of ars and of afs are at most "
+    f"{100.0 * PEAK_FRACTION:.0f} % of those of none, and {math.degrees(YAW_RATE_RADPS):g} deg/s and "
+    f"{math.degrees(SIDESLIP_RAD):g} deg less at least.",
+    Fake.NO_EFFECT,
+    Fake.REVERSED,
+)
+L4: Final = held_statement("L4")
+STATEMENTS: Final = (L1, L2, L3, L4)
 
 
 def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
-    """Check claims L1 to L3.
+    """Check claims L1 to L4.
 
     Args:
         recordings: Double lane changes through the same course, by system; the three of `SYSTEMS` are needed.
 
     Returns:
-        Three claims, in order. A value that does not exist (nan) lets its claim fail.
+        Four claims, in order. A value that does not exist (nan) lets its claim fail.
 
     Raises:
         ParameterError: one of the three runs is missing.
         RecordingError: a run has no course, or a channel is missing.
     """
-    runs = all_metrics(recordings, path_following.metrics, "double lane change")
-    text = "Without control the car goes on oscillating after the last gate; each system stops that."
-    return [_alike(recordings), calmed(runs, "L2", text), _peaks(runs)]
+    trio = Trio(recordings, path_following.metrics, "double lane change")
+    oscillates = trio.metrics["none"][AFTER_YAW_RATE] > SETTLED_YAW_RATE_RADPS
+    others = all(trio.both_lower(name, CALMED, 0.0) for name in AFTER_DRIVER)
+    lowered = trio.both_lower(YAW_RATE_PEAK, PEAK_FRACTION, YAW_RATE_RADPS)
+    return [
+        _alike(trio),
+        trio.judge(
+            L2, oscillates and others and calmed(trio), trio.pick(AFTER_YAW_RATE, AFTER_SIDESLIP, *AFTER_DRIVER)
+        ),
+        trio.judge(
+            L3,
+            lowered and trio.both_lower(SIDESLIP_PEAK, PEAK_FRACTION, SIDESLIP_RAD),
+            trio.pick(YAW_RATE_PEAK, SIDESLIP_PEAK),
+        ),
+        held(trio, L4),
+    ]
 
 
-def _alike(recordings: Mapping[str, RecordingLike]) -> Claim:
-    course = read_course(recordings["none"])
+def _alike(trio: Trio) -> Claim:
+    course = read_course(trio.recordings["none"])
     first_m, last_m = course.first_gate_x_m, course.last_gate_x_m
-    values = {
+    differences = {
         f"track_difference_{one}_{other}_m": math.nan
         if last_m is None
-        else track.largest_difference(recordings[one], recordings[other], first_m, last_m)
+        else track.largest_difference(trio.recordings[one], trio.recordings[other], first_m, last_m)
         for one, other in combinations(SYSTEMS, 2)
     }
-    return Claim(
-        "L1",
-        "The three tracks look alike.",
-        "From the first gate to the last, the tracks of the front axle centre of any two runs are at most "
-        f"{ALIKE_M:g} m apart at the same x.",
-        all(value <= ALIKE_M for value in values.values()),
-        values,
-    )
-
-
-def _peaks(runs: Runs) -> Claim:
-    return Claim(
-        "L3",
-        "Each system lowers the peaks of yaw rate and sideslip.",
-        "The largest magnitudes of yaw rate and of sideslip of ars and of afs are at most "
-        f"{100.0 * PEAK_FRACTION:.0f} % of those of none.",
-        all(lowered(runs, metric, PEAK_FRACTION, system) for metric in PEAKS for system in SYSTEMS_WITH_CONTROL),
-        pick(runs, *PEAKS),
-    )
+    cones = {f"{system}_{CONES_HIT}": trio.metrics[system].get(CONES_HIT, math.nan) for system in SYSTEMS}
+    return trio.judge(L1, all(value <= ALIKE_M for value in differences.values()), differences | cones)

@@ -1,25 +1,61 @@
-"""What the claims about lane changes and slalom have in common: oscillation after the last gate, windows in words."""
+"""What the claims about lane changes and slalom have in common: oscillation after the last gate, held sideslip, cones.
+
+Source: A. van Zanten et al., VDC, the vehicle dynamics control system of Bosch, SAE 950759 (1995): drivers know
+sideslip angles up to 2 deg from normal driving.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
-from activesteer.analysis.claims.claim import Claim, Runs, lowered, pick
+from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.noticeable import SIDESLIP_RAD, YAW_RATE_RADPS
+from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.path_following import AFTER_S
 
 CALMED: Final = 0.5
 """A system calms an oscillation when it brings its root mean square down to this fraction."""
-AFTER: Final = ("yaw_rate_after_gates_rms_radps", "sideslip_after_gates_rms_rad")
-SYSTEMS_WITH_CONTROL: Final = ("ars", "afs")
+SETTLED_YAW_RATE_RADPS: Final = math.radians(3.0)
+"""A car whose yaw rate has a smaller root mean square runs straight [rad/s]: at 80 km/h it strays 0.3 m a second."""
+AFTER_YAW_RATE: Final = "yaw_rate_after_gates_rms_radps"
+AFTER_SIDESLIP: Final = "sideslip_after_gates_rms_rad"
+LOW_SIDESLIP_RAD: Final = math.radians(2.0)
+"""A driver knows sideslip angles up to this one from normal driving [rad]."""
+SIDESLIP_PEAK: Final = "sideslip_peak_abs_rad"
+CONES_HIT: Final = "cones_hit"
+LARGE_STEERING_WHEEL_RAD: Final = math.radians(90.0)
+"""Beyond this steering wheel angle a driver must cross his arms or change his grip [rad]."""
+
+CALMED_WORDS: Final = (
+    f"in the {AFTER_S:g} s after the last gate (front axle centre) are, for ars and for afs, at most "
+    f"{100.0 * CALMED:.0f} % of those of none, {math.degrees(YAW_RATE_RADPS):g} deg/s and "
+    f"{math.degrees(SIDESLIP_RAD):g} deg less at least, and what is left of the yaw rate is at most "
+    f"{math.degrees(SETTLED_YAW_RATE_RADPS):g} deg/s"
+)
 
 
-def calmed(runs: Runs, number: str, text: str) -> Claim:
-    """L2 and Z2: each system at least halves yaw rate and sideslip after the last gate."""
-    return Claim(
+def calmed(trio: Trio) -> bool:
+    """Whether both systems calm yaw rate and sideslip after the last gate, and the car then runs straight."""
+    settled = all(trio.metrics[system][AFTER_YAW_RATE] <= SETTLED_YAW_RATE_RADPS for system in SYSTEMS_WITH_CONTROL)
+    lower_yaw_rate = trio.both_lower(AFTER_YAW_RATE, CALMED, YAW_RATE_RADPS)
+    return settled and lower_yaw_rate and trio.both_lower(AFTER_SIDESLIP, CALMED, SIDESLIP_RAD)
+
+
+def held_statement(number: str) -> Statement:
+    """L4, Z5, W4: the paper's conclusion about the rear system, for one of the manoeuvres with a driver."""
+    return Statement.about(
+        Kind.DRIVER,
         number,
-        text,
-        f"The root mean squares of yaw rate and of sideslip in the {AFTER_S:g} s after the last gate (front axle "
-        f"centre) are, for ars and for afs, at most {100.0 * CALMED:.0f} % of those of none.",
-        all(lowered(runs, metric, CALMED, system) for metric in AFTER for system in SYSTEMS_WITH_CONTROL),
-        pick(runs, *AFTER),
+        "Rear steering holds the sideslip low.",
+        f"The peak of the sideslip of ars is at most {math.degrees(LOW_SIDESLIP_RAD):g} deg, and at least "
+        f"{math.degrees(SIDESLIP_RAD):g} deg below those of none and of afs.",
+        Fake.NO_EFFECT,
+        Fake.REVERSED,
     )
+
+
+def held(trio: Trio, statement: Statement) -> Claim:
+    """Whether the statement holds."""
+    low = trio.metrics["ars"][SIDESLIP_PEAK] <= LOW_SIDESLIP_RAD
+    return trio.judge(statement, low and trio.is_smallest("ars", SIDESLIP_PEAK, SIDESLIP_RAD), trio.pick(SIDESLIP_PEAK))

@@ -11,14 +11,9 @@ from importlib.resources import files
 from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims.claim import SYSTEMS, Claim
+from activesteer.analysis.claims.scenarios import STATEMENTS
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.quantities import metric_label
-
-CLAIM_IDS: Final = (
-    "S1", "S2", "S3", "S4", "S5", "D1", "D2", "D3", "D4", "D5",
-    "L1", "L2", "L3", "Z1", "Z2", "Z3", "Z4", "W1", "W2", "W3",
-)  # fmt: skip
-"""The numbers of all claims, in the order of the paper's sections."""
 
 FILE: Final = "not_reproduced.toml"
 
@@ -75,6 +70,8 @@ class Scorecard:
                     "reason": item.reason,
                     "values": {k: v if math.isfinite(v) else None for k, v in item.claim.values.items()},
                     "criterion": item.claim.criterion,
+                    "kind": item.claim.statement.kind.value,
+                    "obstacle": item.claim.obstacle,
                 }
                 for item in self.judged
             ],
@@ -88,6 +85,8 @@ class Scorecard:
             short = {Verdict.FAILED: "FAILED", Verdict.UNEXPECTED: "passed!"}.get(verdict, verdict.value)
             lines.append(f"{claim.id}  {short:<14}  {claim.text}")
             lines += [f"{'':20}{line}" for line in number_lines(claim.values)]
+            if claim.obstacle:
+                lines.append(f"{'':20}nothing is proved: {claim.obstacle}")
             if verdict is Verdict.UNEXPECTED:
                 lines.append(f"{'':20}listed in {FILE}, from where it can be taken out")
             elif reason:
@@ -140,8 +139,8 @@ def not_reproduced(vehicle: str, text: str | None = None) -> dict[str, str]:
         if not isinstance(entries, dict):
             raise ParameterError(f"{FILE}: {name} is {entries!r}, expected a table [<vehicle>] of claims with reasons")
         for number, reason in entries.items():
-            if number not in CLAIM_IDS:
-                raise ParameterError(f"{FILE}: {name}.{number}: no such claim; {nearest_names(number, CLAIM_IDS)}")
+            if number not in STATEMENTS:
+                raise ParameterError(f"{FILE}: {name}.{number}: no such claim; {nearest_names(number, STATEMENTS)}")
             if not isinstance(reason, str) or not reason.strip():
                 raise ParameterError(f"{FILE}: {name}.{number}: is {reason!r}, expected the reason in words")
     return dict(table.get(vehicle, {}))

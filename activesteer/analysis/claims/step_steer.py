@@ -1,7 +1,5 @@
 """What the paper says about the step steer, as checks on three recordings.
 
-The criteria were written down before any parameter of the controllers was chosen.
-
 Source: V. Dorsch, Implementation of active Steering Systems into a Multibody Vehicle Model by Co-Simulation,
 Mecatronics-REM 2012, section on the step steering input.
 """
@@ -13,14 +11,61 @@ from collections.abc import Mapping
 from typing import Final
 
 from activesteer.analysis import step_response
-from activesteer.analysis.claims.claim import Claim, Runs, all_metrics, pick
+from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.noticeable import SETTLED_SIDESLIP_RAD, STEER_RAD, TIME_S, YAW_RATE_RADPS
+from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.source import RecordingLike
 
-DELAY_TOLERANCE_S: Final = 0.005
-"""A response time counts as longer when it is longer by more than this [s]: five steps of the controller."""
+PEAK: Final = "yaw_rate_peak_radps"
+DELAYS: Final = ("yaw_rate_response_time_s", "ay_response_time_s")
+SIDESLIP: Final = "sideslip_steady_state_rad"
+_LOWER: Final = f"at least {math.degrees(YAW_RATE_RADPS):g} deg/s below that of none"
+_HELPS: Final = f"the peak yaw rate of {{}} is {_LOWER}"
+"""What a system must do for its angles and its sideslip to say something about it: one that does harm is another."""
 
-MIN_ANGLE_RAD: Final = math.radians(0.01)
-"""A settled angle smaller than this has no sign [rad]."""
+S1: Final = Statement.about(
+    Kind.SYSTEMS,
+    "S1",
+    "Both systems lower the peak of the yaw rate.",
+    f"The peak yaw rate of ars and that of afs are {_LOWER}.",
+    Fake.NO_EFFECT,
+    Fake.REVERSED,
+)
+S2: Final = Statement.about(
+    Kind.SYSTEMS,
+    "S2",
+    "Neither system makes the car answer later while it lowers the peak.",
+    "Yaw rate and lateral acceleration of ars and of afs reach 90 % of their steady-state values, counted from half "
+    f"the steering angle, at most {1000.0 * TIME_S:.0f} ms after those of none; and their peak yaw rates are {_LOWER}.",
+    Fake.NO_EFFECT,
+    Fake.REVERSED,
+)
+S3: Final = Statement.about(
+    Kind.SYSTEMS,
+    "S3",
+    "The rear wheels settle turned against the front wheels.",
+    "The steady-state rear angle of ars, less that of none (the give of the hinges), has the sign opposite to that of "
+    f"the front wheels, and at least {math.degrees(STEER_RAD):g} deg; {_HELPS.format('ars')}.",
+    Fake.REVERSED,
+)
+S4: Final = Statement.about(
+    Kind.SYSTEMS,
+    "S4",
+    "The superposed angle adds to the driver's.",
+    "The steady-state superposition angle of afs, less that of none (the give of the gear), has the sign of the "
+    f"steering wheel angle, and at least {math.degrees(STEER_RAD):g} deg; {_HELPS.format('afs')}.",
+    Fake.REVERSED,
+)
+S5: Final = Statement.about(
+    Kind.SYSTEMS,
+    "S5",
+    "Rear steering makes the sideslip angle larger.",
+    "The magnitude of the steady-state sideslip angle of ars is above those of none and of afs by at least "
+    f"{math.degrees(SETTLED_SIDESLIP_RAD):g} deg; {_HELPS.format('ars')}.",
+    Fake.NO_EFFECT,
+    Fake.REVERSED,
+)
+STATEMENTS: Final = (S1, S2, S3, S4, S5)
 
 
 def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
@@ -36,72 +81,42 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
         ParameterError: one of the three runs is missing.
         RecordingError: a run is no step steer.
     """
-    runs = all_metrics(recordings, step_response.metrics, "step steer")
-    return [_peak(runs), _delay(runs), _rear_angle(runs), _front_angle(runs), _sideslip(runs)]
-
-
-def _peak(runs: Runs) -> Claim:
-    values = pick(runs, "yaw_rate_peak_radps")
-    none, ars, afs = (abs(value) for value in values.values())
-    return Claim(
-        "S1",
-        "Both systems lower the peak of the yaw rate.",
-        "The peak yaw rate of ars and of afs is below that of none.",
-        ars < none and afs < none,
-        values,
+    trio = Trio(recordings, step_response.metrics, "step steer")
+    helps = {system: trio.lowers(system, PEAK, 1.0, YAW_RATE_RADPS) for system in SYSTEMS_WITH_CONTROL}
+    lowered = all(helps.values())
+    prompt = all(
+        trio.metrics[system][name] <= trio.metrics["none"][name] + TIME_S
+        for system in SYSTEMS_WITH_CONTROL
+        for name in DELAYS
     )
+    rear_rad = _added(trio, "ars", "rear_steer_steady_state_rad")
+    front_rad = trio.metrics["ars"]["front_steer_steady_state_rad"]
+    added_rad = _added(trio, "afs", "superposition_steady_state_rad")
+    wheel_rad = trio.metrics["afs"]["steering_wheel_steady_state_rad"]
+    return [
+        trio.judge(S1, lowered, trio.pick(PEAK)),
+        trio.judge(S2, lowered and prompt, trio.pick(*DELAYS)),
+        trio.judge(
+            S3,
+            helps["ars"] and rear_rad * front_rad < 0.0 and abs(rear_rad) >= STEER_RAD,
+            {"ars_added_rear_steer_steady_state_rad": rear_rad, "ars_front_steer_steady_state_rad": front_rad},
+        ),
+        trio.judge(
+            S4,
+            helps["afs"] and added_rad * wheel_rad > 0.0 and abs(added_rad) >= STEER_RAD,
+            {
+                "afs_added_superposition_steady_state_rad": added_rad,
+                "afs_steering_wheel_steady_state_rad": wheel_rad,
+            },
+        ),
+        trio.judge(
+            S5,
+            helps["ars"] and trio.is_largest("ars", SIDESLIP, SETTLED_SIDESLIP_RAD),
+            trio.pick(SIDESLIP),
+        ),
+    ]
 
 
-def _delay(runs: Runs) -> Claim:
-    values = pick(runs, "yaw_rate_response_time_s")
-    none, ars, afs = values.values()
-    return Claim(
-        "S2",
-        "Neither system makes the car answer later.",
-        "The yaw rate of ars and of afs reaches 90 % of its steady-state value, counted from half the steering angle, "
-        f"at most {1000.0 * DELAY_TOLERANCE_S:.0f} ms after that of none.",
-        ars <= none + DELAY_TOLERANCE_S and afs <= none + DELAY_TOLERANCE_S,
-        values,
-    )
-
-
-def _rear_angle(runs: Runs) -> Claim:
-    rear_rad = _added(runs, "ars", "rear_steer_steady_state_rad")
-    front_rad = runs["ars"]["front_steer_steady_state_rad"]
-    return Claim(
-        "S3",
-        "The rear wheels settle turned against the front wheels.",
-        "The steady-state rear angle of ars, less that of none (the give of the hinges), has the sign opposite to that "
-        "of the front wheels.",
-        rear_rad * front_rad < 0.0 and abs(rear_rad) > MIN_ANGLE_RAD,
-        {"ars_added_rear_steer_steady_state_rad": rear_rad, "ars_front_steer_steady_state_rad": front_rad},
-    )
-
-
-def _front_angle(runs: Runs) -> Claim:
-    added_rad = _added(runs, "afs", "superposition_steady_state_rad")
-    wheel_rad = runs["afs"]["steering_wheel_steady_state_rad"]
-    return Claim(
-        "S4",
-        "The superposed angle adds to the driver's.",
-        "The steady-state superposition angle of afs, less that of none (the give of the gear), has the sign of the "
-        "steering wheel angle.",
-        added_rad * wheel_rad > 0.0 and abs(added_rad) > MIN_ANGLE_RAD,
-        {"afs_added_superposition_steady_state_rad": added_rad, "afs_steering_wheel_steady_state_rad": wheel_rad},
-    )
-
-
-def _sideslip(runs: Runs) -> Claim:
-    values = pick(runs, "sideslip_steady_state_rad")
-    return Claim(
-        "S5",
-        "Rear steering makes the sideslip angle larger.",
-        "The magnitude of the steady-state sideslip angle of ars is above that of none.",
-        abs(values["ars_sideslip_steady_state_rad"]) > abs(values["none_sideslip_steady_state_rad"]),
-        values,
-    )
-
-
-def _added(runs: Runs, system: str, metric: str) -> float:
+def _added(trio: Trio, system: str, metric: str) -> float:
     """What a system adds to an angle that the control-free car has too, since its hinges give under load."""
-    return runs[system][metric] - runs["none"][metric]
+    return trio.metrics[system][metric] - trio.metrics["none"][metric]

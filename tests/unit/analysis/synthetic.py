@@ -34,7 +34,8 @@ class SyntheticRun:
 
     def __init__(self, time_s: np.ndarray, channels: Mapping[str, np.ndarray], kind: str = "step_steer") -> None:
         self.time_s = time_s
-        self.metadata: dict[str, Any] = {"maneuver": {"kind": kind}, "controller": "none", "vehicle": VEHICLE}
+        maneuver = {"kind": kind, "duration_s": float(time_s[-1])}
+        self.metadata: dict[str, Any] = {"maneuver": maneuver, "controller": "none", "vehicle": VEHICLE}
         self.channels = dict(channels)
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -69,6 +70,7 @@ def step_steer(
     sideslip_rad: float = -0.01,
     rear_rad: float = 0.0,
     superposition_rad: float = 0.0,
+    ay_lag_s: float = 0.2,
     duration_s: float = 7.0,
     timestep_s: float = 0.001,
 ) -> SyntheticRun:
@@ -85,7 +87,7 @@ def step_steer(
         "superposition_demand_rad": superposition_rad * (since_s >= 0.0),
         "yaw_rate_radps": yaw_radps * yaw(since_s),
         "yaw_rate_desired_radps": yaw_radps * first_order(since_s, 0.1),
-        "ay_mps2": 4.0 * first_order(since_s),
+        "ay_mps2": 4.0 * first_order(since_s, ay_lag_s),
         "roll_rad": 0.04 * second_order(since_s),
         "sideslip_rad": sideslip_rad * first_order(since_s, 0.3),
     }
@@ -166,7 +168,7 @@ def sine_with_dwell(
 
 SPEED_MPS = 20.0
 WIDTH_M, WHEELBASE_M, TRACK_M, TYRE_M = 1.8, 2.6, 1.5, 0.2
-LANES = (("entry", 30.0, 45.0, -1.2, 1.2), ("offset", 75.0, 100.0, 2.2, 4.8), ("exit", 125.0, 155.0, -1.4, 1.4))
+LANES = (("entry", 30.0, 45.0, -1.6, 1.6), ("offset", 75.0, 100.0, 1.9, 5.1), ("exit", 125.0, 155.0, -1.7, 1.7))
 LANE_KEYS = ("name", "start_x_m", "end_x_m", "right_y_m", "left_y_m")
 LAST_GATE_M = 155.0
 """Course and car of the synthetic runs along a path."""
@@ -194,6 +196,8 @@ def along_path(
     steering_lead_s: float = 0.1,
     friction_use: float = 0.5,
     stops_m: float | None = None,
+    rear_rad: float = 0.0,
+    superposition_rad: float = 0.0,
     duration_s: float = 12.0,
 ) -> SyntheticRun:
     """A run at `SPEED_MPS` whose front axle centre follows a track; yaw rate and sideslip are sines of their own.
@@ -212,6 +216,8 @@ def along_path(
         steering_lead_s: Time by which it is ahead of the yaw rate.
         friction_use: Of the front left tyre; the others use half.
         stops_m: Place beyond which the car does not get.
+        rear_rad: Amplitude of the rear angle demanded.
+        superposition_rad: Amplitude of the superposed angle demanded.
         duration_s: Length of the run.
     """
     time_s = np.arange(round(duration_s * 1000.0)) * 0.001
@@ -228,14 +234,14 @@ def along_path(
         "yaw_rad": heading,
         "yaw_rate_radps": gain * (yaw_rate(time_s) if callable(yaw_rate) else yaw_rate * sine),
         "sideslip_rad": gain * (sideslip(time_s) if callable(sideslip) else sideslip * sine),
-        "ay_mps2": 4.0 * np.sin(2.0 * np.pi * (time_s - 0.05)),
+        "ay_mps2": gain * 4.0 * np.sin(2.0 * np.pi * (time_s - 0.05)),
         "roll_rad": 0.04 * sine,
-        "steering_wheel_rad": steering_rad * np.sin(2.0 * np.pi * (time_s + steering_lead_s)),
+        "steering_wheel_rad": gain * steering_rad * np.sin(2.0 * np.pi * (time_s + steering_lead_s)),
         "speed_mps": np.linspace(SPEED_MPS, SPEED_MPS - 1.0, len(time_s)),
         "rear_steer_rad": np.zeros_like(x),
-        "rear_steer_demand_rad": np.zeros_like(x),
+        "rear_steer_demand_rad": rear_rad * sine,
         "superposition_rad": np.zeros_like(x),
-        "superposition_demand_rad": np.zeros_like(x),
+        "superposition_demand_rad": superposition_rad * sine,
     }
     cos, sin = np.cos(heading), np.sin(heading)
     for corner in ("fl", "fr", "rl", "rr"):

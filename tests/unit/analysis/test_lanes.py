@@ -1,4 +1,4 @@
-"""Lanes and cones, with a car 1.8 m wide on tyres 0.2 m wide, its wheels 1.5 m apart."""
+"""Lanes and cones, with a car whose body is 1.8 m wide and 4.2 m long."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.lanes import all_wheels_in_lanes, cone_distances, lane_overstep
+from activesteer.analysis.lanes import cone_distances, lane_overstep, stays_in_lanes
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.road.course import CONE_RADIUS_M
 from activesteer.road.footprint import FRONT_OVERHANG_M, REAR_OVERHANG_M
 from tests.unit.analysis.synthetic import LANES, WHEELBASE_M, WIDTH_M, SyntheticRun, along_path, offset_track
 
-HALF_M = 0.75 + 0.1
-"""From the middle of the car to the outer side of a tyre [m]."""
+HALF_M = 0.5 * WIDTH_M
+"""From the middle of the car to its side [m]."""
 
 
 def straight(y_m: float, **words) -> SyntheticRun:
@@ -26,7 +26,7 @@ def overstep(run: SyntheticRun) -> float:
 
 
 def kept(run: SyntheticRun) -> bool:
-    return all_wheels_in_lanes(run, read_course(run), read_footprint(run))
+    return stays_in_lanes(run, read_course(run), read_footprint(run))
 
 
 def distances(run: SyntheticRun) -> np.ndarray:
@@ -34,43 +34,50 @@ def distances(run: SyntheticRun) -> np.ndarray:
 
 
 @pytest.mark.parametrize("y_m", [-0.5, 0.0, 0.3])
-def test_overstep_is_the_distance_of_the_outer_tyre_side_from_the_nearer_side_of_the_lane(y_m):
+def test_overstep_is_the_distance_of_the_body_from_the_nearer_side_of_the_lane(y_m):
     run = straight(y_m, lanes=(("lane", 30.0, 45.0, -1.2, 1.2),))
     assert overstep(run) == pytest.approx(abs(y_m) + HALF_M - 1.2)
 
 
 @pytest.mark.parametrize(("margin_m", "inside"), [(0.002, True), (-0.002, False)])
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_wheel_just_inside_is_inside_and_just_outside_is_not(margin_m, inside, side):
+def test_a_body_just_inside_is_inside_and_just_outside_is_not(margin_m, inside, side):
     run = straight(side * (1.2 - HALF_M - margin_m), lanes=(("lane", 30.0, 45.0, -1.2, 1.2),))
     assert overstep(run) == pytest.approx(-margin_m)
     assert kept(run) is inside
 
 
-@pytest.mark.parametrize("corner", ["fl", "fr", "rl", "rr"])
-def test_every_wheel_counts(corner):
-    run = along_path()
-    assert kept(run)
-    run.channels[f"{corner}_contact_y_m"] = run[f"{corner}_contact_y_m"] + (2.0 if corner.endswith("l") else -2.0)
-    assert not kept(run)
-    assert overstep(run) > 1.0
+@pytest.mark.parametrize("yaw_rad", [0.1, -0.1])
+@pytest.mark.parametrize(("end_m", "turns"), [(FRONT_OVERHANG_M, 1.0), (WHEELBASE_M + REAR_OVERHANG_M, -1.0)])
+def test_every_corner_counts(yaw_rad, end_m, turns):
+    """Moved aside until one end fits: the corner of the other end is beyond the lane by what is calculated by hand."""
+    sideways = math.sin(abs(yaw_rad)) * end_m + math.cos(yaw_rad) * HALF_M
+    y_m = turns * math.copysign(0.5, yaw_rad)
+    run = straight(y_m, lanes=(("lane", 30.0, 45.0, -2.0, 2.0),))
+    run.channels["yaw_rad"] = np.full_like(run.time_s, yaw_rad)
+    assert overstep(run) == pytest.approx(0.5 + sideways - 2.0, abs=1e-3)
 
 
-def test_between_the_lanes_a_wheel_may_go_where_it_likes():
+def test_a_body_that_turns_over_the_end_of_a_side_oversteps_there_though_no_corner_is_in_the_lane():
+    run = straight(0.0, lanes=(("entry", 10.0, 12.0, -5.0, 5.0), ("lane", 50.0, 80.0, -3.0, 0.5)), stops_m=49.4)
+    run.channels["yaw_rad"] = np.full_like(run.time_s, 0.25 * math.pi)
+    # The front right corner is at y = -0.04 m, in the lane; the end of the side is this far behind the front end:
+    assert overstep(run) == pytest.approx(FRONT_OVERHANG_M - (0.6 + 0.5) * math.sqrt(0.5), abs=1e-3)
+
+
+def test_between_the_lanes_the_body_may_go_where_it_likes():
     def track(x_m):
         return offset_track(x_m) + 6.0 * np.exp(-((x_m - 60.0) ** 2) / 4.0)
 
     assert kept(along_path(track))
 
 
-def test_a_wheel_that_is_still_in_the_lane_counts_though_the_front_axle_has_left_it():
-    # The front axle moves over 1 m behind the end of the lane, 1.6 m before the rear wheels get there.
+def test_a_rear_corner_that_is_still_in_the_lane_counts_though_the_front_axle_has_left_it():
+    # The front axle moves over half a metre behind the end of the lane, while the rear end is still inside.
     def track(x_m):
         return np.interp(x_m, (45.5, 45.6), (0.0, 3.0))
 
     run = along_path(track, lanes=LANES[:1])
-    x = run["rl_contact_x_m"]
-    assert x[int(np.argmax(run["front_axle_x_m"] > 45.6))] < 45.0
     assert not kept(run)
 
 

@@ -103,7 +103,7 @@ def test_tyre_use_and_speed_loss():
 @pytest.mark.parametrize(("share", "inside"), [(1.0, 1.0), (1.5, 0.0)])
 def test_lanes_are_kept_or_not(share, inside):
     values = metrics(along_path(lambda x: share * offset_track(x), path=offset_track))
-    assert values["all_wheels_in_lanes"] == inside
+    assert values["stays_in_lanes"] == inside
     assert (values["lane_overstep_m"] > 0.0) is (inside == 0.0)
 
 

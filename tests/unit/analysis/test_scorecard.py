@@ -7,12 +7,13 @@ import math
 
 import pytest
 
-from activesteer.analysis.claims import Claim, Verdict, not_reproduced, scorecard
+from activesteer.analysis.claims import Claim, Kind, Statement, Verdict, not_reproduced, scorecard
 from activesteer.errors import ParameterError
 
 
 def claim(number: str, passed: bool, **values: float) -> Claim:
-    return Claim(number, f"text of {number}", f"criterion of {number}", passed, values)
+    statement = Statement.about(Kind.SYSTEMS, number, f"text of {number}", f"criterion of {number}")
+    return Claim(statement, passed, values)
 
 
 def verdicts(known: dict[str, str], *claims: Claim) -> list[Verdict]:
@@ -52,7 +53,8 @@ def test_all_passed():
 def test_json_has_the_keys_and_no_nan():
     table = scorecard([claim("L1", False, none_x_m=math.nan, ars_x_m=1.0)], known={}).to_json()
     entry = table["claims"][0]
-    assert {"id", "text", "passed", "values", "criterion", "verdict", "reason"} == set(entry)
+    keys = {"id", "text", "passed", "values", "criterion", "verdict", "reason", "kind", "obstacle"}
+    assert keys == set(entry)
     assert entry["values"] == {"none_x_m": None, "ars_x_m": 1.0}
     assert table["verdicts"]["failed"] == 1
     json.dumps(table, allow_nan=False)

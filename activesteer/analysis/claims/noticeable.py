@@ -1,0 +1,25 @@
+"""Sizes below which a difference is none: what a driver or a sensor in a test car could not tell.
+
+They were chosen from what is published about sensors and humans, before anything was driven.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+STEER_RAD: Final = math.radians(0.05)
+"""Angle of a road wheel that is turned or added [rad]: workshops set wheel alignment to some 3 minutes of arc."""
+SETTLED_SIDESLIP_RAD: Final = math.radians(0.05)
+"""Difference of a sideslip angle that is the mean over a second [rad]: half of an optical sensor's +-0.1 deg."""
+SIDESLIP_RAD: Final = math.radians(0.1)
+"""Difference of two sideslip angles of an instant or an oscillation [rad]: an optical sensor is good to 0.1 deg."""
+YAW_RATE_RADPS: Final = math.radians(0.5)
+"""Difference of two yaw rates [rad/s]: humans notice 0.6 deg/s of a quick rotation (Grabherr et al. 2008), production
+sensors have 0.1 to 0.2 deg/s of noise."""
+TIME_S: Final = 0.01
+"""Difference of two times [s]: a yaw rate or acceleration sensor on a car's bus reports every 10 ms."""
+TRACK_M: Final = 0.05
+"""Difference of two tracks [m]: each is known to 0.02 m with differential satellite positioning."""
+STEERING_WHEEL_RAD: Final = math.radians(5.0)
+"""Difference of two steering wheel angles [rad]: about what a driver can tell apart while he turns the wheel."""

@@ -1,0 +1,28 @@
+"""Which claims belong to which manoeuvre."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from activesteer.analysis.claims import double_lane_change, sine_with_dwell, slalom, slippery, step_steer
+from activesteer.analysis.claims.claim import Claim, Statement
+from activesteer.analysis.source import RecordingLike
+
+Claims = Callable[[Mapping[str, RecordingLike]], list[Claim]]
+"""Recordings by system -> claims."""
+
+_ROOMS: Final = {
+    "step_steer": step_steer,
+    "sine_with_dwell": sine_with_dwell,
+    "double_lane_change": double_lane_change,
+    "slalom": slalom,
+    "double_lane_change_low_mu": slippery,
+}
+SCENARIOS: Final[dict[str, Claims]] = {name: room.claims for name, room in _ROOMS.items()}
+"""Name of the manoeuvre -> its claims, in the order of the paper's sections."""
+
+STATEMENTS: Final[dict[str, Statement]] = {
+    statement.id: statement for room in _ROOMS.values() for statement in room.STATEMENTS
+}
+"""Number -> statement, in the same order."""
