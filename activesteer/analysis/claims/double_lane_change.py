@@ -102,7 +102,7 @@ def _alike(trio: Trio) -> Claim:
     first_m, last_m = course.first_gate_x_m, course.last_gate_x_m
     differences = {
         f"track_difference_{one}_{other}_m": math.nan
-        if last_m is None
+        if last_m is None or not trio.whole
         else track.largest_difference(trio.recordings[one], trio.recordings[other], first_m, last_m)
         for one, other in combinations(SYSTEMS, 2)
     }

@@ -23,7 +23,6 @@ from activesteer.analysis.claims.noticeable import SIDESLIP_RAD
 from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.sine_with_dwell import INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.source import RecordingLike
-from activesteer.errors import RecordingError
 
 LOST_SIDESLIP_RAD: Final = math.radians(20.0)
 """Beyond this sideslip angle a car is lost [rad]."""
@@ -82,7 +81,7 @@ D5: Final = Statement.about(
     "D5",
     "Rear steering is somewhat more effective than front superposition.",
     f"The peak of the sideslip of ars is at least {math.degrees(SIDESLIP_RAD):g} deg below that of afs, and the "
-    "magnitude of its yaw rate ratio 1.00 s after the completion of steer is not larger; and ars keeps the limits of D2.",
+    "magnitude of its yaw rate ratio 1.00 s after the completion of steer is not larger; ars keeps the limits of D2.",
     Fake.NO_EFFECT,
     Fake.REVERSED,
 )
@@ -129,12 +128,8 @@ def _keeps(trio: Trio, system: str) -> bool:
 
 def _opposite(trio: Trio) -> Claim:
     """D4, from the angles that the controllers demand: what the hinges give under load is nothing that they add."""
-    try:
-        rear, front, step_s = _added_angles(trio.recordings["ars"], trio.recordings["afs"])
-    except RecordingError:
-        if not trio.obstacle:
-            raise
-        rear, front, step_s = np.empty(0), np.empty(0), 0.0
+    nothing = np.empty(0), np.empty(0), 0.0
+    rear, front, step_s = _added_angles(trio.recordings["ars"], trio.recordings["afs"]) if trio.whole else nothing
     both = (np.abs(rear) > MIN_ANGLE_RAD) & (np.abs(front) > MIN_ANGLE_RAD)
     common_s = float(np.count_nonzero(both)) * step_s
     fraction = float(np.mean(rear[both] * front[both] < 0.0)) if both.any() else math.nan

@@ -10,16 +10,25 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
+import numpy as np
+
 from activesteer.analysis import step_response
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
 from activesteer.analysis.claims.noticeable import SETTLED_SIDESLIP_RAD, STEER_RAD, TIME_S, YAW_RATE_RADPS
 from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.source import RecordingLike
 
-PEAK: Final = "yaw_rate_peak_radps"
+PEAK: Final = "yaw_rate_peak_abs_radps"
+"""Over the whole run, to either side: that of a car that swings back counts too."""
 DELAYS: Final = ("yaw_rate_response_time_s", "ay_response_time_s")
 SIDESLIP: Final = "sideslip_steady_state_rad"
-_LOWER: Final = f"at least {math.degrees(YAW_RATE_RADPS):g} deg/s below that of none"
+STEADY: Final = "yaw_rate_steady_state_radps"
+KEPT: Final = 0.8
+"""A system that takes more of the steady-state yaw rate than the rest of this makes the car turn less, not better."""
+_LOWER: Final = (
+    f"at least {math.degrees(YAW_RATE_RADPS):g} deg/s below that of none, with at least {100.0 * KEPT:.0f} % of its "
+    "steady-state value"
+)
 _HELPS: Final = f"the peak yaw rate of {{}} is {_LOWER}"
 """What a system must do for its angles and its sideslip to say something about it: one that does harm is another."""
 
@@ -81,8 +90,13 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
         ParameterError: one of the three runs is missing.
         RecordingError: a run is no step steer.
     """
-    trio = Trio(recordings, step_response.metrics, "step steer")
-    helps = {system: trio.lowers(system, PEAK, 1.0, YAW_RATE_RADPS) for system in SYSTEMS_WITH_CONTROL}
+    trio = Trio(recordings, _metrics, "step steer")
+    steady = trio.metrics["none"][STEADY]
+    helps = {
+        system: trio.lowers(system, PEAK, 1.0, YAW_RATE_RADPS)
+        and trio.metrics[system][STEADY] * steady >= KEPT * steady**2
+        for system in SYSTEMS_WITH_CONTROL
+    }
     lowered = all(helps.values())
     prompt = all(
         trio.metrics[system][name] <= trio.metrics["none"][name] + TIME_S
@@ -94,7 +108,7 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
     added_rad = _added(trio, "afs", "superposition_steady_state_rad")
     wheel_rad = trio.metrics["afs"]["steering_wheel_steady_state_rad"]
     return [
-        trio.judge(S1, lowered, trio.pick(PEAK)),
+        trio.judge(S1, lowered, trio.pick(PEAK, STEADY)),
         trio.judge(S2, lowered and prompt, trio.pick(*DELAYS)),
         trio.judge(
             S3,
@@ -115,6 +129,10 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
             trio.pick(SIDESLIP),
         ),
     ]
+
+
+def _metrics(recording: RecordingLike) -> dict[str, float]:
+    return step_response.metrics(recording) | {PEAK: float(np.abs(recording["yaw_rate_radps"]).max())}
 
 
 def _added(trio: Trio, system: str, metric: str) -> float:

@@ -23,6 +23,7 @@ class Trio:
     Attributes:
         recordings: The runs, by system.
         metrics: Their metrics, by system; nan for one that a run cut short does not have.
+        whole: Whether all three came to the end of their manoeuvre.
         obstacle: Why no claim can pass on these runs, a sentence; empty where nothing stands against it. A run must
             be whole. That of ars must turn the rear wheels and that of afs the superposition gear, each alone and by
             `noticeable.STEER_RAD` at some time, that of none neither: what a system did not do proves nothing about it.
@@ -46,6 +47,7 @@ class Trio:
         self.recordings = {system: recordings[system] for system in SYSTEMS}
         cut = [system for system in SYSTEMS if _is_cut_short(recordings[system])]
         self.metrics = {system: _evaluated(recordings[system], metrics, system in cut) for system in SYSTEMS}
+        self.whole = not cut
         self.obstacle = ", ".join(f"the run {system} ends too early" for system in cut) or _pretence(recordings)
 
     def judge(self, statement: Statement, holds: bool, values: dict[str, float]) -> Claim:

@@ -18,8 +18,8 @@ SCENARIO = "sine_with_dwell"
         (["D1"], "none", {"after_1000ms": 0.3, "after_1750ms": 0.15}),  # the ratios are kept
         (["D1"], "none", {"sideslip_rad": np.radians(19.0)}),  # sideslip is below 20 deg
         (["D2", "D5"], "ars", {"after_1000ms": 0.38}),
-        (["D2"], "ars", {"after_1750ms": 0.22}),
-        (["D2"], "ars", {"after_1750ms": -0.22}),  # swings back: the standard would let it pass
+        (["D2", "D5"], "ars", {"after_1750ms": 0.22}),
+        (["D2", "D5"], "ars", {"after_1750ms": -0.22}),  # swings back: the standard would let it pass
         (["D3"], "afs", {"after_1000ms": 0.38}),
         (["D3"], "afs", {"after_1750ms": 0.22}),
         (["D4"], "ars", {"rear_rad": -0.02}),

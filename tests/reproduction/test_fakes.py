@@ -1,0 +1,79 @@
+"""No claim is taken in by fakes that the car itself has driven: other runs, controllers turned round or idle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from activesteer import ActuatorCommand, simulate
+from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Fake
+from activesteer.controllers import load_controller
+from activesteer.recording import Recording
+
+Runs = Mapping[str, Mapping[str, Recording]]
+IDLE = {
+    "controllers.ars.prediction_gain": 0.0,
+    "controllers.ars.corrector.proportional_gain_s": 0.0,
+    "controllers.afs.corrector.proportional_gain_s": 0.0,
+}
+
+
+class TurnedRound:
+    """A controller whose angles have the other sign."""
+
+    def __init__(self, system: str, setup: Any) -> None:
+        self._inner = load_controller(system, setup)
+
+    def step(self, command: Any, measurement: Any) -> ActuatorCommand:
+        asked = self._inner.step(command, measurement)
+        return asked._replace(
+            rear_steer_demand_rad=-asked.rear_steer_demand_rad,
+            superposition_demand_rad=-asked.superposition_demand_rad,
+        )
+
+
+def turned_round(system: str) -> Any:
+    """What makes one."""
+
+    def make(setup: Any) -> TurnedRound:
+        return TurnedRound(system, setup)
+
+    return make
+
+
+def cut(recording: Recording, end_s: float) -> Recording:
+    """What a run has recorded until it ends too early."""
+    return recording.at(np.flatnonzero(recording.time_s < end_s))
+
+
+def passed(claims: list[Claim], fake: Fake) -> list[Claim]:
+    """Those that ought to have rejected the fake."""
+    return [claim for claim in claims if claim.passed and fake in claim.statement.rejects]
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_other_runs_in_place_of_the_systems_prove_nothing(runs: Runs, scenario: str) -> None:
+    none, ars, afs = (runs[scenario][system] for system in SYSTEMS)
+    check = SCENARIOS[scenario]
+    assert passed(check(dict.fromkeys(SYSTEMS, none)), Fake.NONE_AS_BOTH) == []
+    assert passed(check({"none": none, "ars": afs, "afs": ars}), Fake.EXCHANGED) == []
+    for part in (0.05, 0.5, 0.98):
+        ended = {system: cut(run, part * run.time_s[-1]) for system, run in runs[scenario].items()}
+        assert passed(check(ended), Fake.CUT_SHORT) == []
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_a_system_turned_round_has_none_of_the_effects(runs: Runs, scenario: str) -> None:
+    fakes = {system: simulate(scenario, turned_round(system)) for system in ("ars", "afs")}
+    assert passed(SCENARIOS[scenario]({"none": runs[scenario]["none"], **fakes}), Fake.REVERSED) == []
+
+
+def test_gains_at_zero_are_no_system(runs: Runs) -> None:
+    idle = {system: simulate("step_steer", system, overrides=IDLE) for system in SYSTEMS}
+    assert passed(SCENARIOS["step_steer"](idle), Fake.NO_GAIN) == []
+    none = runs["step_steer"]["none"]
+    for recording in idle.values():  # which is why what is tried with `none` as both systems need not be tried again
+        assert np.abs(recording["yaw_rate_radps"] - none["yaw_rate_radps"]).max() < 1e-6
