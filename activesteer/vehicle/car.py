@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.errors import ModelError, SimulationDiverged
 from activesteer.road.road import Road
+from activesteer.sensors import SensorBlock
+from activesteer.sensors.block import speed_radii
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, WheelTorques
+from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_step
@@ -28,6 +31,8 @@ from activesteer.vehicle.native_step import FASTEST_MPS, Places, Wheels, sensed,
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 
+_CALIBRATED_AT_MPS: Final = 20.0
+"""Speed at which the rolling radii are taken that turn wheel speeds into the speed of the car [m/s]."""
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
@@ -86,9 +91,15 @@ class Vehicle:
             self.data = mujoco.MjData(self.model)
             self._commands = np.zeros(len(COMMANDS))
             self._command_memory = self._commands.data
+            self._sensors = None if parameters.sensors.is_ideal else SensorBlock(parameters.sensors, timestep_s)
+            self._measured = np.empty(0) if self._sensors is None else self._sensors.outputs
             self.channels = ChannelMap(self.model, parameters)
             self._bind()
             self._place()
+            if parameters.sensors.speed_from_wheels:
+                self._plan["wheel_radii_m"] = speed_radii(
+                    parameters.powertrain.front_share, self._effective_radii(tyres)
+                )
         except ModelError as reason:
             raise ModelError(str(reason), file=str(mjcf)) from reason
 
@@ -124,7 +135,7 @@ class Vehicle:
             (front_Nm, front_Nm, rear_Nm, rear_Nm),
         )
         ratio = self.parameters.steering.ratio
-        self._plan = step_plan(model, data, self.live_arrays(), self._places, self._wheels, ratio)
+        self._plan = step_plan(model, data, self.live_arrays(), self._places, self._wheels, ratio, self._sensors)
         self._plan_address = self._plan.ctypes.data
         block = int(model.numeric_data[-fb.TRAILER_SIZE])
         self._areas_felt = model.numeric_data[block + fb.AREAS_FELT : block + fb.AREAS_FELT + 1]
@@ -163,7 +174,18 @@ class Vehicle:
             data.qvel[dof] = speed_mps / self._rolling_radius(index)
         data.time = time_s
         mujoco.mj_forward(self.model, data)
+        if self._sensors is not None:
+            self._sensors.reset(self.truth()[0])
         return self.measure()
+
+    def _effective_radii(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
+        """Rolling radii under the loads of standing still, as whoever fits the sensors has measured them [m]."""
+        loads_N = self.data.userdata[fb.U_FZ :: fb.USERDATA_PER_WHEEL][: len(CORNERS)]
+        axles = (tyres[0], tyres[0], tyres[1], tyres[1])
+        return [
+            float(MagicFormula(tyre).evaluate(load_N, 0.0, 0.0, vx_mps=_CALIBRATED_AT_MPS).effective_radius_m)
+            for tyre, load_N in zip(axles, loads_N, strict=True)
+        ]
 
     @property
     def wheel_radius_m(self) -> float:
@@ -267,13 +289,15 @@ class Vehicle:
         Raises:
             SimulationDiverged: see `check`.
         """
-        return self._sense()[0]
+        truth, _ = self.truth()
+        return truth if self._sensors is None else self._sensors.measurement(truth.time_s)
 
     def motion(self) -> Motion:
         """Where the car is and how it moves, at the instant at which the last step began; the yaw rate at its end."""
-        return self._sense()[1]
+        return self.truth()[1]
 
-    def _sense(self) -> tuple[Measurement, Motion]:
+    def truth(self) -> tuple[Measurement, Motion]:
+        """What ideal sensors would say, and `motion`."""
         sane, measurement, motion = native_step.sense(self._plan_address)
         if not sane:
             self.check()
@@ -327,11 +351,11 @@ class Vehicle:
         mujoco.mj_copyData(now, self.model, self.data)
         mujoco.mj_forward(self.model, now)
         write_commands(commands.data, command, asked)
-        return RawRows(*(array[np.newaxis] for array in (*self._arrays_of(now), commands)))
+        return RawRows(*(array[np.newaxis] for array in (*self._arrays_of(now), commands, self._measured)))
 
     def live_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """The engine's arrays and the last commands, in the order of `RawRows`."""
-        return (*self._arrays_of(self.data), self._commands)
+        """The engine's arrays, the last commands and what the sensors say, in the order of `RawRows`."""
+        return (*self._arrays_of(self.data), self._commands, self._measured)
 
     @staticmethod
     def _arrays_of(data: mujoco.MjData) -> tuple[NDArray[np.float64], ...]:
@@ -341,14 +365,17 @@ class Vehicle:
         )  # fmt: skip
 
     def save_state(self) -> NDArray[np.float64]:
-        """The engine's state, complete: what continues from it is bit-identical."""
+        """The state of engine and sensors, complete: what continues from it is bit-identical."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return state
+        return state if self._sensors is None else np.concatenate((state, self._sensors.memory))
 
     def restore_state(self, state: NDArray[np.float64]) -> None:
         """Puts a saved state back."""
-        mujoco.mj_setState(self.model, self.data, state, _STATE)
+        size = mujoco.mj_stateSize(self.model, _STATE)
+        mujoco.mj_setState(self.model, self.data, state[:size], _STATE)
+        if self._sensors is not None:
+            self._sensors.memory[:] = state[size:]
         # The step engages a gear only where it changes; this one never occurs, so it does so now.
         self._gear = math.nan
 

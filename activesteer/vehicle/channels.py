@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError, nearest_names
+from activesteer.sensors.block import MEASURED
 from activesteer.signals import Channel
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.command_row import COMMAND_CHANNELS
@@ -48,6 +49,8 @@ class RawRows(NamedTuple):
     ctrl: Array
     commands: Array
     """What driver and controller asked for, as `write_commands` leaves it."""
+    measured: Array
+    """What the sensors said when driver and controller decided; empty with ideal sensors."""
 
 
 class Column(NamedTuple):
@@ -90,6 +93,7 @@ class ChannelMap:
         signals = [
             *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(),
             *(Signal(channel, Column("commands", place)) for channel, place in COMMAND_CHANNELS.items()),
+            *self._measured(),
         ]  # fmt: skip
         signals.append(
             Signal(
@@ -321,6 +325,18 @@ class ChannelMap:
                     )
                 )
         return signals
+
+    def _measured(self) -> list[Signal]:
+        """What the sensors say, where that is not the truth."""
+        if self._parameters.sensors.is_ideal:
+            return []
+        return [
+            Signal(
+                Channel(f"measured_{name}", unit, f"{meaning} as the sensors say it", "measured"),
+                Column("measured", index),
+            )
+            for index, (name, unit, meaning) in enumerate(MEASURED)
+        ]
 
     def _limits_of(self, index: int) -> Actuator:
         model = self._model

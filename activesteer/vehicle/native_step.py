@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 
 from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS
+from activesteer.sensors.block import SensorBlock, measured
+from activesteer.sensors.signal_chain import CHAIN
 from activesteer.signals import Measurement, Motion
 from activesteer.vehicle.command_row import BRAKES, COMMAND_ROW
 from activesteer.vehicle.engine_layout import engine_layout
@@ -32,8 +34,8 @@ FASTEST_MPS: Final = 200.0
 
 _N_WHEELS: Final = len(CORNERS)
 _ENGINE_ARRAYS: Final = 7
-"""Arrays of the engine that a row is copied from; behind them come the commands."""
-_SOURCES: Final = _ENGINE_ARRAYS + 1
+"""Arrays of the engine that a row is copied from; behind them come the commands, and what the sensors say."""
+_SOURCES: Final = _ENGINE_ARRAYS + 2
 _WARNINGS: Final = len(mujoco.mjtWarning.__members__) - 1
 _EXPONENT: Final = 0x7FF0000000000000
 """Bits of a float64 that are all set where it is not finite, and only there."""
@@ -84,6 +86,9 @@ STEP_PLAN: Final = np.dtype(
             ("ratio", np.float64),
             *((name, np.intp, (_N_WHEELS,)) for name in ("drives", "brakes")),
             *((name, np.float64, (_N_WHEELS,)) for name in ("drive_shares", "brake_torques_Nm")),
+            *((name, np.intp) for name in ("n_sensors", "sensors", "sensor_memory", "sensor_memory_size")),
+            ("timestep_s", np.float64),
+            ("wheel_radii_m", np.float64, (_N_WHEELS,)),
             ("sources", np.intp, (_SOURCES,)),
             ("sizes", np.intp, (_SOURCES,)),
         ],
@@ -91,6 +96,7 @@ STEP_PLAN: Final = np.dtype(
 )
 _plan_pointer: Final = pointer_to(from_dtype(STEP_PLAN))
 _command_pointer: Final = pointer_to(from_dtype(COMMAND_ROW))
+_chain_pointer: Final = pointer_to(from_dtype(CHAIN))
 _bits_pointer: Final = pointer_to(types.int64)
 _counter_pointer: Final = pointer_to(types.int32)
 
@@ -102,6 +108,7 @@ def step_plan(
     places: Places,
     wheels: Wheels,
     ratio: float,
+    sensors: SensorBlock | None,
 ) -> NDArray[Any]:
     """Looks up all addresses.
 
@@ -112,6 +119,7 @@ def step_plan(
         places: Where the step finds what it needs.
         wheels: How torques come to the wheels.
         ratio: Overall steering ratio.
+        sensors: What is between the truth and the measurement; must outlive the plan. None where nothing is.
 
     Returns:
         The plan, shape (1,), at an address that stays.
@@ -134,6 +142,10 @@ def step_plan(
     for name, value in values.items():
         plan[name] = value
     plan["ratio"] = ratio
+    plan["timestep_s"] = model.opt.timestep
+    if sensors is not None:
+        plan["n_sensors"], plan["sensors"] = len(sensors.chains), sensors.chains.ctypes.data
+        plan["sensor_memory"], plan["sensor_memory_size"] = sensors.memory.ctypes.data, sensors.memory.size
     plan["sources"] = [array.ctypes.data for array in recorded]
     plan["sizes"] = [array.size for array in recorded]
     return plan
@@ -201,7 +213,7 @@ _SENSED: Final = types.Tuple([types.boolean, _MEASUREMENT, types.UniTuple(types.
 
 @compiled_call(_SENSED, types.intp)
 def sense(plan_address):
-    """What the sensors say now.
+    """What ideal sensors say now.
 
     Args:
         plan_address: Address of a `STEP_PLAN`.
@@ -252,7 +264,12 @@ def step(plan_address, row_address, torques_stand):
             for item in range(plan.sizes[index]):
                 row[place + item] = source[item]
             place += plan.sizes[index]
-    return _sense(plan)
+    sane, truth, motion = _sense(plan)
+    if plan.n_sensors == 0:
+        return sane, truth, motion
+    chains = carray(_chain_pointer(plan.sensors), (plan.n_sensors,))
+    memory = carray(f64_pointer(plan.sensor_memory), (plan.sensor_memory_size,))
+    return sane, measured(chains, memory, plan.wheel_radii_m, plan.timestep_s, truth), motion
 
 
 def sensed(measurement: tuple[Any, ...], motion: tuple[float, ...]) -> tuple[Measurement, Motion]:

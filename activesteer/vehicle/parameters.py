@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Final
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
+from activesteer.sensors.parameters import Sensors
 from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.force_block import MAX_CURVE_POINTS
@@ -269,6 +270,8 @@ class VehicleParameters:
     aerodynamics: Aerodynamics
     friction: Friction = Friction()
     """None where not given."""
+    sensors: Sensors = Sensors()
+    """Ideal where not given."""
     load: Load = Load()
     """Nothing where not given."""
     factors: Factors = Factors()

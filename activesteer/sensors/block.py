@@ -1,0 +1,151 @@
+"""The sensors of a car: their constants, their memory, and how the native step reads through them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.compilation import inlined
+from activesteer.conventions import CORNERS
+from activesteer.sensors.parameters import RANDOM, Sensor, Sensors
+from activesteer.sensors.signal_chain import CHAIN, FILTERED, HELD, LINE, PHASE, SPEED, passed_on
+from activesteer.signals import Measurement
+
+_SCALARS: Final = ("yaw_rate", "ay", "ax", "steering_wheel", "rear_steer", "superposition")
+"""Sensors in the order of the members of `Measurement` behind time and speed; those of the wheels follow."""
+_N_SCALARS: Final = len(_SCALARS)
+_N_WHEELS: Final = len(CORNERS)
+MEASURED: Final = (
+    ("speed_mps", "m/s", "longitudinal speed"),
+    ("yaw_rate_radps", "rad/s", "yaw rate"),
+    ("ay_mps2", "m/s2", "lateral acceleration"),
+    ("ax_mps2", "m/s2", "longitudinal acceleration"),
+    ("steering_wheel_rad", "rad", "steering wheel angle"),
+    ("rear_steer_rad", "rad", "position of the rear steering actuators"),
+    ("superposition_rad", "rad", "position of the front superposition, at the road wheels,"),
+    *((f"{corner}_wheel_speed_radps", "rad/s", f"rotational speed of the wheel {corner}") for corner in CORNERS),
+)
+"""Name, unit and meaning of the outputs, in their order: the members of `Measurement` without its time."""
+_MINUTE_S: Final = 60.0
+
+
+class SensorBlock:
+    """The sensors of one car.
+
+    Attributes:
+        chains: What each sensor is, records of `CHAIN`.
+        memory: All that they remember, as one array: what is put back into it continues bit for bit.
+        outputs: What they say: the members of `Measurement` without its time, a view of the memory.
+    """
+
+    def __init__(self, sensors: Sensors, timestep_s: float) -> None:
+        """Draws what is drawn once a run.
+
+        Args:
+            sensors: What the vehicle file says.
+            timestep_s: Step of the simulation [s].
+        """
+        every = [sensors.all()[name] for name in (*_SCALARS, *["wheel_speed"] * _N_WHEELS)]
+        self.chains = np.zeros(len(every), CHAIN)
+        place = len(MEASURED)
+        for index, sensor in enumerate(every):
+            self.chains[index] = _chain(sensor, place, sensors.seed or 0, index, timestep_s)
+            place += LINE + int(self.chains[index]["ring"])
+        self.memory: NDArray[np.float64] = np.zeros(place)
+        self.outputs = self.memory[: len(MEASURED)]
+
+    def reset(self, truth: Measurement) -> None:
+        """Begins anew, as if the truth had been what it is for long.
+
+        Args:
+            truth: What is there.
+        """
+        self.memory[:] = 0.0
+        self.outputs[:] = (*truth[1:-1], *truth[-1])
+        for chain, value in zip(self.chains, self.outputs[1:], strict=True):
+            own = self.memory[chain["memory"] :][: LINE + chain["ring"]]
+            own[[FILTERED, HELD, SPEED]] = value
+            own[PHASE] = 0.5  # as far to the next edge forwards as backwards
+            own[LINE:] = value
+
+    def measurement(self, time_s: float) -> Measurement:
+        """What they now say.
+
+        Args:
+            time_s: Time of the measurement [s].
+        """
+        *values, fl, fr, rl, rr = self.outputs.tolist()
+        return Measurement(time_s, *values, wheel_speed_radps=(fl, fr, rl, rr))
+
+
+def speed_radii(front_share: float, rolling_radii_m: Sequence[float]) -> tuple[float, ...]:
+    """What the rotational speed of each wheel adds to the speed of the car [m].
+
+    Args:
+        front_share: Share of the drive torque at the front axle.
+        rolling_radii_m: Effective rolling radii, order of `CORNERS` [m].
+
+    Returns:
+        The rolling radii over their number where the axle is not driven, else 0; where both are driven, all four count.
+    """
+    counts = [share == 0.0 for share in (front_share, front_share, 1.0 - front_share, 1.0 - front_share)]
+    if not any(counts):
+        counts = [True] * len(counts)
+    return tuple(radius / sum(counts) if count else 0.0 for radius, count in zip(rolling_radii_m, counts, strict=True))
+
+
+def _chain(sensor: Sensor, place: int, seed: int, index: int, timestep_s: float) -> tuple[float, ...]:
+    """A record of `CHAIN`; each sensor draws from its own stream, whatever the others are."""
+    period = max(1, round((sensor.sample_time_s or 0.0) / timestep_s))
+    bandwidth_Hz = sensor.bandwidth_Hz or 0.0
+    share = 1.0 - math.exp(-2.0 * math.pi * bandwidth_Hz * timestep_s) if bandwidth_Hz else 1.0
+    noise, bias, drift = (sensor.amount(word) for word in RANDOM)
+    stream = np.random.SeedSequence((seed, index))
+    return (
+        place,
+        period,
+        round((sensor.delay_s or 0.0) / timestep_s) + 1,
+        share,
+        noise,
+        bias * np.random.default_rng(stream).standard_normal(),
+        drift * math.sqrt(period * timestep_s / _MINUTE_S),
+        sensor.amount("quantum"),
+        sensor.amount("limit"),
+        sensor.amount("teeth"),
+        stream.generate_state(1, np.uint64)[0],
+    )
+
+
+@inlined
+def measured(chains, memory, wheel_radii_m, timestep_s, truth):
+    """What the sensors say after one more step.
+
+    Args:
+        chains: As in `SensorBlock`.
+        memory: Likewise; it is changed.
+        wheel_radii_m: What each wheel's speed adds to the car's, see `speed_radii`; all 0 where that is the true one.
+        timestep_s: Step of the simulation [s].
+        truth: Members of a true `Measurement`.
+
+    Returns:
+        The members of `Measurement`; they stand in the outputs too.
+    """
+    time_s, speed, yaw_rate, ay, ax, steering_wheel, rear_steer, superposition, wheels = truth
+    for index, value in enumerate((yaw_rate, ay, ax, steering_wheel, rear_steer, superposition)):
+        memory[1 + index] = passed_on(chains[index], memory, value, timestep_s)
+    from_wheels, counted = 0.0, 0.0
+    for wheel in range(_N_WHEELS):
+        index = _N_SCALARS + wheel
+        spin = passed_on(chains[index], memory, wheels[wheel], timestep_s)
+        memory[1 + index] = spin
+        from_wheels += wheel_radii_m[wheel] * spin
+        counted += wheel_radii_m[wheel]
+    memory[0] = from_wheels if counted > 0.0 else speed
+    return (
+        time_s, memory[0], memory[1], memory[2], memory[3], memory[4], memory[5], memory[6],
+        (memory[7], memory[8], memory[9], memory[10]),
+    )  # fmt: skip

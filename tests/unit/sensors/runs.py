@@ -1,0 +1,51 @@
+"""Sensors that are shown a given truth, without a car."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from activesteer.config import Source, build
+from activesteer.sensors import SensorBlock, Sensors
+from activesteer.sensors.block import measured
+from activesteer.signals import Measurement
+
+Values = NDArray[np.float64]
+STANDING: Final = Measurement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+PLACES: Final = {"speed": 0, "yaw_rate": 1, "ay": 2, "ax": 3, "steering_wheel": 4, "rear_steer": 5, "wheel_speed": 7}
+"""Columns of what is shown and said; the wheels have the last four."""
+
+
+@njit
+def _shown(chains, memory, wheel_radii_m, timestep_s, truth, said):
+    for row in range(len(truth)):
+        t = truth[row]
+        members = (0.0, t[0], t[1], t[2], t[3], t[4], t[5], t[6], (t[7], t[8], t[9], t[10]))
+        measured(chains, memory, wheel_radii_m, timestep_s, members)
+        said[row] = memory[: said.shape[1]]
+
+
+def block(timestep_s: float = 0.001, **tables: Any) -> SensorBlock:
+    """Sensors as a vehicle file describes them, in a car that stands."""
+    made = SensorBlock(build(Sensors, tables, Source("test")), timestep_s)
+    made.reset(STANDING)
+    return made
+
+
+def shown(sensors: SensorBlock, truth: Values, timestep_s: float = 0.001, radii_m: Values | None = None) -> Values:
+    """What they say of a truth, both of shape (n, 11)."""
+    said = np.empty_like(truth)
+    _shown(sensors.chains, sensors.memory, np.zeros(4) if radii_m is None else radii_m, timestep_s, truth, said)
+    return said
+
+
+def said_of(name: str, truth: Values | float, steps: int = 0, timestep_s: float = 0.001, **table: Any) -> Values:
+    """What one sensor says of what it is shown, shape (n,); all others are ideal."""
+    signal = np.full(steps, truth) if steps else np.asarray(truth)
+    rows = np.zeros((len(signal), 11))
+    rows[:, PLACES[name]] = signal
+    given = {key: table.pop(key) for key in ("preset", "seed") if key in table}
+    return shown(block(timestep_s, **given, **{name: table}), rows, timestep_s)[:, PLACES[name]]

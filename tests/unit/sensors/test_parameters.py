@@ -1,0 +1,64 @@
+"""The table [sensors]: presets, single values, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from activesteer.config import Source, build, to_table
+from activesteer.errors import ParameterError
+from activesteer.scenario import load_car
+from activesteer.sensors import Sensors
+from activesteer.sensors.block import speed_radii
+
+
+def test_ideal_is_the_default_and_production_is_not():
+    assert Sensors().is_ideal
+    assert Sensors(preset="ideal") == Sensors()
+    assert not Sensors(preset="production").is_ideal
+
+
+def test_a_single_value_stands_beside_those_of_the_preset():
+    plain = load_car(overrides={"sensors.preset": "production"}).config.sensors
+    changed = load_car(
+        overrides={"sensors.preset": "production", "sensors.yaw_rate.noise_degps": 0.3, "sensors.wheel_speed.teeth": 96}
+    ).config.sensors
+    assert changed.yaw_rate.noise_radps == pytest.approx(math.radians(0.3))
+    assert changed.yaw_rate.delay_s == plain.yaw_rate.delay_s
+    assert changed.wheel_speed.teeth == 96
+    assert changed.ay == plain.ay
+    alone = load_car(overrides={"sensors.yaw_rate.noise_degps": 0.3}).config.sensors
+    assert (alone.is_ideal, alone.seed, alone.ay) == (False, 0, Sensors().ay)
+
+
+def test_a_recorded_table_gives_the_same_sensors_again():
+    for sensors in (Sensors(), Sensors(preset="production", seed=7)):
+        assert build(Sensors, to_table(sensors), Source("recorded")) == sensors
+    assert to_table(Sensors(preset="production"))["seed"] == 0
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ({"sensors.seed": 7}, "sensors.seed: has no effect: with preset = 'ideal' no sensor has noise"),
+        ({"sensors.seed": -1, "sensors.preset": "production"}, "out of range; allowed is 0 to"),
+        ({"sensors.preset": "perfect"}, "allowed are 'ideal' and 'production'"),
+        ({"sensors.yaw_rate.noise": 0.1}, "did you mean"),
+        ({"sensors.noise": 0.1}, "sensors.yaw_rate.noise_degps"),
+        ({"sensors.yaw_rate.noise_degps": -0.1}, "out of range; allowed is at least 0"),
+        ({"sensors.ay.delay_s": 0.5}, "out of range; allowed is 0 to 0.1"),
+        ({"sensors.wheel_speed.teeth": 1.5}, "not a whole number"),
+        ({"sensors.yaw_rate.teeth": 48}, "there is no such key"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_its_key(overrides, message):
+    with pytest.raises(ParameterError, match=message.replace("?", ".")):
+        load_car(overrides=overrides)
+
+
+def test_speed_comes_from_the_wheels_that_are_not_driven():
+    radii_m = (0.30, 0.30, 0.32, 0.32)
+    assert speed_radii(1.0, radii_m) == (0.0, 0.0, 0.16, 0.16)
+    assert speed_radii(0.0, radii_m) == (0.15, 0.15, 0.0, 0.0)
+    assert speed_radii(0.4, radii_m) == (0.075, 0.075, 0.08, 0.08)
