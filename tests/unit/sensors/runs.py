@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from activesteer.config import Source, build
 from activesteer.sensors import SensorBlock, Sensors
@@ -42,9 +42,9 @@ def shown(sensors: SensorBlock, truth: Values, timestep_s: float = 0.001, radii_
     return said
 
 
-def said_of(name: str, truth: Values | float, steps: int = 0, timestep_s: float = 0.001, **table: Any) -> Values:
+def said_of(name: str, truth: ArrayLike, steps: int = 0, timestep_s: float = 0.001, **table: Any) -> Values:
     """What one sensor says of what it is shown, shape (n,); all others are ideal."""
-    signal = np.full(steps, truth) if steps else np.asarray(truth)
+    signal: Any = np.full(steps, truth) if steps else np.asarray(truth)
     rows = np.zeros((len(signal), 11))
     rows[:, PLACES[name]] = signal
     given = {key: table.pop(key) for key in ("preset", "seed") if key in table}
