@@ -262,7 +262,7 @@ HINTS = dict(tables_with_hints(VehicleConfig))
 def test_hints_name_keys_that_exist():
     known = {*key_paths(VehicleConfig), *key_paths(KINDS["open_loop"])}
     for key, hint in HINTS.items():
-        named = re.findall(r"[a-z_]+\.\w+", hint)
+        named = re.findall(r"[a-z_]+(?:\.\w+)+", hint)
         assert named
         assert set(named) <= known
         assert key not in known
