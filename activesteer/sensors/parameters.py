@@ -107,7 +107,7 @@ class Sensors:
     KEY_HINTS: ClassVar = {
         "noise": "each sensor has its own, as sensors.yaw_rate.noise_degps",
         "bias": "each sensor has its own, as sensors.yaw_rate.bias_degps",
-        "delay_s": "each sensor has its own, as sensors.yaw_rate.delay_s; commands have controllers.bus_delay_s",
+        "delay_s": "each sensor has its own, as sensors.yaw_rate.delay_s",
     }
 
     preset: Literal["ideal", "production"] = "ideal"
