@@ -75,8 +75,10 @@ def maneuver_kind(recording: RecordingLike) -> str:
     kind = maneuver.get("kind") if isinstance(maneuver, Mapping) else None
     if not isinstance(kind, str):
         raise RecordingError(
-            f"the metadata of the recording name no kind of manoeuvre: 'maneuver' is {maneuver!r}, "
-            "expected a table with the key 'kind'"
+            f"is {maneuver!r}; a table with the key 'kind' is needed",
+            file="the metadata",
+            key="maneuver",
+            value=maneuver,
         )
     return kind
 
@@ -89,7 +91,7 @@ def read_course(recording: RecordingLike) -> Course:
     """
     course = course_of(recording.metadata)
     if course is None:
-        raise RecordingError("the metadata of the recording have no table 'course': the manoeuvre has no path")
+        raise RecordingError("is missing: the manoeuvre has no path", file="the metadata", key="course")
     return course
 
 
@@ -101,5 +103,5 @@ def read_footprint(recording: RecordingLike) -> Footprint:
     """
     footprint = footprint_of(recording.metadata)
     if footprint is None:
-        raise RecordingError("the metadata of the recording have no table 'car': its sizes are needed")
+        raise RecordingError("is missing: the sizes of the car are needed", file="the metadata", key="car")
     return footprint

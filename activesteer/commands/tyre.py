@@ -47,5 +47,5 @@ def _find(name: str) -> Path:
             return candidate
     names = [path.name for path in folder.glob("*.tir")]
     raise TyreFileError(
-        f"there is no tyre file {name}, neither as a path nor in models/tyres; {nearest_names(name, names)}"
+        f"there is no tyre file {name}, neither as a path nor in models/tyres; {nearest_names(name, names)}", value=name
     )

@@ -75,7 +75,9 @@ def _table(options: argparse.Namespace) -> int:
         return 0
     file = files.get(options.table.removesuffix(".toml").removesuffix(".csv"))
     if file is None:
-        raise ParameterError(f"no table is named {options.table!r}; {nearest_names(options.table, files)}")
+        raise ParameterError(
+            f"no table is named {options.table!r}; {nearest_names(options.table, files)}", value=options.table
+        )
     print(file.read_text(encoding="utf-8"), end="")
     return 0
 

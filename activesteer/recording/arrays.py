@@ -21,16 +21,17 @@ def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.
     """
     times = np.asarray(time_s, np.float64)
     if times.ndim != 1:
-        raise RecordingError(f"{what} has shape {times.shape} in place of (n,)")
+        raise RecordingError(f"has shape {times.shape} in place of (n,)", key=what)
     usable = (times >= 0.0) & (times < 2.0**35)
     if not usable.all():
-        raise RecordingError(f"{what} is {times[~usable][0]} s: it must be finite and not negative")
+        raise RecordingError(f"is {times[~usable][0]} s: it must be finite and not negative", key=what)
     result = np.rint(times * 1e9).astype(np.int64)
     steps = np.diff(result, prepend=after_ns)
     if (steps <= 0).any():
         row = int(np.argmax(steps <= 0))
         before_s = (result[row] - steps[row]) * 1e-9
-        raise RecordingError(f"{what} must increase: row {row} is at {times[row]} s, the one before it at {before_s} s")
+        problem = f"must increase: row {row} is at {times[row]} s, the one before it at {before_s} s"
+        raise RecordingError(problem, key=what, value=float(times[row]))
     return result.astype(np.uint64)
 
 
@@ -43,9 +44,9 @@ def shaped(array: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.fl
     try:
         numbers = np.asarray(array, np.float64)
     except (TypeError, ValueError) as error:
-        raise RecordingError(f"{what}: {error}") from None
+        raise RecordingError(str(error), key=what) from None
     if numbers.size == 0 and 0 in shape:
         return numbers.reshape(shape)
     if numbers.shape != shape:
-        raise RecordingError(f"{what} has shape {numbers.shape} in place of {shape}")
+        raise RecordingError(f"has shape {numbers.shape} in place of {shape}", key=what)
     return numbers

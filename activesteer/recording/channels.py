@@ -37,7 +37,8 @@ class ChannelTable:
             if not _NAME.fullmatch(channel.name) or channel.name == TIME:
                 raise RecordingError(
                     f"channel name {channel.name!r:.300}: allowed are letters, digits, '_', a letter first, but not "
-                    f"{TIME!r}"
+                    f"{TIME!r}",
+                    value=channel.name,
                 )
             for text in (channel.unit, channel.meaning):
                 if not isinstance(text, str) or len(text) > _MAX_LETTERS or not text.isprintable():
@@ -47,11 +48,14 @@ class ChannelTable:
             if not _GROUP.fullmatch(channel.group):
                 raise RecordingError(
                     f"group {channel.group!r:.300} of channel {channel.name!r}: allowed are a to z, 0 to 9 and '_', "
-                    "a letter first"
+                    "a letter first",
+                    value=channel.group,
                 )
             if self._index[channel.name] != column:
                 other = self._index[channel.name]
-                raise RecordingError(f"channel name {channel.name!r} occurs twice, in columns {column} and {other}")
+                raise RecordingError(
+                    f"channel name {channel.name!r} occurs twice, in columns {column} and {other}", value=channel.name
+                )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -68,7 +72,7 @@ class ChannelTable:
             return self._index[name]
         except (KeyError, TypeError):
             raise RecordingError(
-                f"no channel {name!r} in this recording: {nearest_names(str(name), self._index)}"
+                f"no channel {name!r} in this recording: {nearest_names(str(name), self._index)}", value=name
             ) from None
 
     def groups(self) -> dict[str, list[int]]:

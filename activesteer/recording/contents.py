@@ -183,7 +183,7 @@ def check_metrics(metrics: Mapping[str, Any]) -> None:
         if not isinstance(name, str) or not _NAME.fullmatch(name):
             raise RecordingError(f"metric name {name!r:.{_SHOWN}}: letters, digits and '_', a letter first")
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise RecordingError(f"metric {name!r} is {value!r:.{_SHOWN}}, which is no number")
+            raise RecordingError(f"metric {name!r} is {value!r:.{_SHOWN}}, which is no number", key=name, value=value)
 
 
 def check_names(names: Sequence[Any], what: str, most: int) -> None:

@@ -55,7 +55,9 @@ def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict
     texts: dict[str, str] = {}
     metrics = metadata.get("metrics", {})
     if not isinstance(metrics, Mapping):
-        raise RecordingError(f"metadata 'metrics' is a {type(metrics).__name__} in place of numbers by name")
+        raise RecordingError(
+            f"is a {type(metrics).__name__} in place of numbers by name", file="the metadata", key="metrics"
+        )
     metrics = {name: value.item() if isinstance(value, np.generic) else value for name, value in metrics.items()}
     check_metrics(metrics)
     for key, value in metadata.items():
@@ -64,7 +66,7 @@ def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict
         try:
             texts[str(key)] = json.dumps(value, default=_plain, ensure_ascii=False)
         except (TypeError, ValueError, RecursionError) as error:
-            raise RecordingError(f"metadata {key!r} cannot be kept as JSON: {error}") from None
+            raise RecordingError(f"cannot be kept as JSON: {error}", file="the metadata", key=str(key)) from None
     check_metadata({key: json.loads(text) for key, text in texts.items()})
     return texts, {name: repr(float(value)) for name, value in metrics.items()}
 

@@ -82,7 +82,9 @@ class Recording:
         self.metadata: dict[str, Any] = {"complete": True, **(metadata or {})}
         found = self.metadata.pop("metrics", {})
         if not isinstance(found, Mapping):
-            raise RecordingError(f"metadata 'metrics' is {found!r} in place of numbers by name")
+            raise RecordingError(
+                f"is {found!r} in place of numbers by name", file="the metadata", key="metrics", value=found
+            )
         self.metrics: dict[str, float] = {**found, **(metrics or {})}
         self.attachments: dict[str, bytes] = dict(attachments or {})
         self.scene: tuple[ScenePart, ...] = tuple(scene)

@@ -97,7 +97,9 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
             continue
         if primitive.kind not in _FIELDS:
             raise RecordingError(
-                f"{primitive.body}: primitive of kind {primitive.kind!r}, known are: {', '.join(_FIELDS)}"
+                f"primitive of kind {primitive.kind!r}, known are: {', '.join(_FIELDS)}",
+                key=primitive.body,
+                value=primitive.kind,
             )
         if primitive.body not in entities:
             entity = entities[primitive.body] = update.entities.add(
@@ -120,7 +122,7 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
                     setattr(target, name, float(value))
         except (TypeError, ValueError) as error:
             raise RecordingError(
-                f"{primitive.body}: a number of the {primitive.kind} is missing or wrong: {primitive} ({error})"
+                f"a number of the {primitive.kind} is missing or wrong: {primitive} ({error})", key=primitive.body
             ) from None
     for part in parts:
         if isinstance(part, Link):
@@ -132,13 +134,14 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
 
 def _add_link(update: Any, link: Link) -> None:
     if link.kind not in LINK_KINDS:
-        raise RecordingError(f"{link.name}: link of kind {link.kind!r}, known are: {', '.join(LINK_KINDS)}")
+        problem = f"link of kind {link.kind!r}, known are: {', '.join(LINK_KINDS)}"
+        raise RecordingError(problem, key=link.name, value=link.kind)
     try:
         text = json.dumps(_link_table(link))
         _link_of(json.loads(text))
     except (TypeError, ValueError) as error:
         raise RecordingError(
-            f"{link.name}: a number of the {link.kind} is missing or wrong: {link} ({error})"
+            f"a number of the {link.kind} is missing or wrong: {link} ({error})", key=link.name
         ) from None
     entity = update.entities.add(frame_id=link.points[0][0], id=link.name, frame_locked=True)
     entity.timestamp.SetInParent()

@@ -89,10 +89,12 @@ class TyreRig:
         positive = {"mu": mu, "pressure_Pa": pressure, "low_speed_mps": low_speed_mps, "timestep_s": timestep_s}
         for name, value in positive.items():
             if not 0.0 < value < math.inf:
-                raise ParameterError(f"tyre rig: {name} is {value:g}, must be finite and greater than 0")
+                raise ParameterError(f"is {value:g}, must be finite and greater than 0", key=name, value=value)
         if not 0.0 <= low_speed_damping_Nspm < math.inf:
             raise ParameterError(
-                f"tyre rig: low_speed_damping_Nspm is {low_speed_damping_Nspm:g}, must be finite and not negative"
+                f"is {low_speed_damping_Nspm:g}, must be finite and not negative",
+                key="low_speed_damping_Nspm",
+                value=low_speed_damping_Nspm,
             )
         mounted = tyre.mounted_on(side)
         self.formula = MagicFormula(mounted)
@@ -150,9 +152,11 @@ class TyreRig:
             ParameterError: the load is not positive, the speed is zero, or there is no such steady state.
         """
         if not load_N > 0.0:
-            raise ParameterError(f"tyre rig: load_N is {load_N:g}, must be greater than 0")
+            raise ParameterError(f"is {load_N:g}, must be greater than 0", key="load_N", value=load_N)
         if speed_mps == 0.0:
-            raise ParameterError("tyre rig: speed_mps is 0, steady rolling needs a speed; use advance() at rest")
+            raise ParameterError(
+                "is 0, steady rolling needs a speed; use advance() at rest", key="speed_mps", value=speed_mps
+            )
         expected = self.formula.evaluate(
             load_N, slip_ratio, slip_angle_rad, inclination_rad, self.pressure_Pa, speed_mps, road_friction=self.mu
         )
@@ -261,7 +265,7 @@ class TyreRig:
         """
         time = np.asarray(time_s, dtype=np.float64)
         if time.ndim != 1 or len(time) < 2 or not np.allclose(np.diff(time), self.timestep_s, rtol=1e-6, atol=0.0):
-            raise ParameterError(f"tyre rig: time_s must have one dimension and steps of {self.timestep_s:g} s")
+            raise ParameterError(f"must have one dimension and steps of {self.timestep_s:g} s", key="time_s")
         try:
             velocity = np.broadcast_to(np.asarray(velocity_mps, dtype=np.float64), (len(time), 2))
             spin, height, heading, tilt = (

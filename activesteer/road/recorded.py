@@ -17,7 +17,7 @@ _MAX_ELEMENTS: Final = 1_000_000
 
 def fail(key: str, problem: str) -> RecordingError:
     """An error that says where in the metadata the problem is."""
-    return RecordingError(f"the metadata's '{key}' {problem}")
+    return RecordingError(problem, file="the metadata", key=key)
 
 
 def table_of(value: object, key: str) -> Mapping[str, Any]:

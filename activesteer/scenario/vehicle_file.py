@@ -42,7 +42,9 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
     header = next((number for number, line in enumerate(lines) if _is_header(line, table)), None)
     if header is None:
         raise ParameterError(
-            f"{vehicle_file}: there is no table [{table}] to write to; add such a line where it shall stand"
+            "there is no such table to write to; add its line where it shall stand",
+            file=str(vehicle_file),
+            key=f"[{table}]",
         )
     end = next((number for number in range(header + 1, len(lines)) if _is_header(lines[number])), len(lines))
     # Blank lines and comments above the next header belong to that.
@@ -68,7 +70,9 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
     kept = {key: value for key, value in before[table].items() if key not in {*values, *_SAME}}
     if {**before, table: None} != {**after, table: None} or kept.items() - after[table].items():
         raise ParameterError(
-            f"{vehicle_file}: the table [{table}] is not written as one key a line; write it so, or edit it by hand"
+            "is not written as one key a line; write it so, or edit it by hand",
+            file=str(vehicle_file),
+            key=f"[{table}]",
         )
     write_text(vehicle_file, written, ParameterError)
 

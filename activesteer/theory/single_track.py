@@ -162,7 +162,9 @@ class SingleTrack:
         import control  # noqa: PLC0415 - takes longer to import than a run takes to start
 
         if speed_mps <= 0.0:
-            raise ParameterError(f"speed_mps is {speed_mps:g} m/s; the single-track model needs a speed above 0")
+            raise ParameterError(
+                f"is {speed_mps:g} m/s; the single-track model needs a speed above 0", key="speed_mps", value=speed_mps
+            )
         a, b = self.matrices(speed_mps)
         return control.StateSpace(
             a,

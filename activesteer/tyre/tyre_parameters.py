@@ -110,7 +110,7 @@ class TyreParameters(Mapping[str, float]):
     def mounted_on(self, side: Side) -> TyreParameters:
         """The same tyre on a side of the vehicle: mirrored where its coefficients belong to the other one."""
         if side not in ("LEFT", "RIGHT"):
-            raise ParameterError(f"tyre side is {side!r}, allowed are 'LEFT' and 'RIGHT'")
+            raise ParameterError(f"is {side!r}; allowed are 'LEFT' and 'RIGHT'", key="side", value=side)
         return replace(self, mounted=side)
 
     def with_values(self, **changes: float) -> TyreParameters:
@@ -127,7 +127,9 @@ class TyreParameters(Mapping[str, float]):
         try:
             return values[key]
         except KeyError:
-            raise ParameterError(f"there is no tyre coefficient {key!r}: {nearest_names(key, values)}") from None
+            raise ParameterError(
+                f"there is no tyre coefficient {key!r}: {nearest_names(key, values)}", value=key
+            ) from None
 
     def __iter__(self) -> Iterator[str]:
         """Every key, in the order of the table."""
@@ -146,7 +148,7 @@ def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
     """Every coefficient: the given value, else the default, else what stands in for it."""
     for key, value in given.items():
         if key not in BY_NAME:
-            raise ParameterError(f"no tyre coefficient; {nearest_names(key, BY_NAME)}", file=source, key=key)
+            raise ParameterError(f"no tyre coefficient; {nearest_names(key, BY_NAME)}", file=source, key=key, value=key)
         if not math.isfinite(value):
             raise ParameterError(f"is {value}; must be finite", file=source, key=key, value=value)
     missing = [

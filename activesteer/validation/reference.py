@@ -58,7 +58,7 @@ class ReferenceData:
         folder = home / name
         names = [path.parent.name for path in home.glob("*/reference.toml")]
         if name not in names:
-            raise ParameterError(f"there is no reference named {shown(name)}; {nearest_names(name, names)}")
+            raise ParameterError(f"there is no reference named {shown(name)}; {nearest_names(name, names)}", value=name)
         if more is not None and not is_folder(more):
             raise ParameterError(f"the folder of reference runs {shown_path(more)} does not exist")
         table: dict[str, Any] = tomllib.loads((folder / "reference.toml").read_text(encoding="utf-8"))

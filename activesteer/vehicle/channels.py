@@ -136,7 +136,7 @@ class ChannelMap:
     def _sensor(self, name: str) -> slice:
         index = self._sensors.get(name)
         if index is None:
-            raise ModelError(f"the model has no sensor {name!r}; {nearest_names(name, self._sensors)}")
+            raise ModelError(f"the model has no sensor {name!r}; {nearest_names(name, self._sensors)}", value=name)
         start = int(self._model.sensor_adr[index])
         return slice(start, start + int(self._model.sensor_dim[index]))
 

@@ -165,5 +165,5 @@ def kind_of(axle: str, name: str) -> AxleKind:
     """
     kinds = kinds_for(axle)
     if name not in kinds:
-        raise ParameterError(f"no {axle} suspension is named {name!r}; {nearest_names(name, kinds)}")
+        raise ParameterError(f"no {axle} suspension is named {name!r}; {nearest_names(name, kinds)}", value=name)
     return kinds[name]

@@ -47,7 +47,7 @@ def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
         return View(_top(track), 1.0)
     if name == "wheel":
         return View(_wheel(track, corner), 0.12)
-    raise ParameterError(f"there is no camera {name!r}; {nearest_names(name, CAMERAS)}")
+    raise ParameterError(f"there is no camera {name!r}; {nearest_names(name, CAMERAS)}", value=name)
 
 
 def _chase(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
@@ -75,7 +75,7 @@ def _top(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
 def _wheel(track: Track, corner: str) -> Callable[[mujoco.MjvCamera, float], None]:
     """At a wheel from inside, where its links are; it follows the chassis, but neither rolls nor heaves with it."""
     if corner not in CORNERS:
-        raise ParameterError(f"there is no corner {corner!r}; {nearest_names(corner, CORNERS)}")
+        raise ParameterError(f"there is no corner {corner!r}; {nearest_names(corner, CORNERS)}", value=corner)
     place = track.wheel_place(corner)
     side, end = (1.0 if corner[1] == "l" else -1.0), (1.0 if corner[0] == "f" else -1.0)
     # From the end of the car towards its middle, and outwards by 28 degrees.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import pytest
@@ -26,9 +25,7 @@ def test_reproduce_writes_a_report_of_all_runs(
     assert "not judged" not in page
 
 
-def test_report_of_all_runs_is_small_and_quickly_made(folder: Path, tmp_path: Path) -> None:
+def test_report_of_all_runs_is_small(folder: Path, tmp_path: Path) -> None:
     files = [str(path) for path in sorted(folder.glob("*.mcap"))]
-    start = time.perf_counter()
     assert main(["report", *files, "-o", str(tmp_path / "report.html")]) == 0
-    assert time.perf_counter() - start < 20.0
     assert (tmp_path / "report.html").stat().st_size < 5e6

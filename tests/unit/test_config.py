@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -174,16 +175,16 @@ def test_unknown_key_is_answered_with_the_nearest_its_file_and_line(read):
 @pytest.mark.parametrize(
     ("text", "line", "key"),
     [
-        (TEXT.replace("0.31", "31"), 6, r"wheels\.front\.radius_m"),
-        (TEXT.replace("0.3\n", "30\n"), 3, r"spare\.radius_m"),
+        (TEXT.replace("0.31", "31"), 6, "wheels.front.radius_m"),
+        (TEXT.replace("0.3\n", "30\n"), 3, "spare.radius_m"),
         (TEXT.replace("90", "900"), 2, "speed_kmh"),
-        (TEXT + "[wheels.rear]\nradius_m = 9\n", 9, r"wheels\.rear\.radius_m"),
-        (TEXT + "[wheels.rear]\nname = 'x'\n", 8, r"wheels\.rear\.radius_m"),
+        (TEXT + "[wheels.rear]\nradius_m = 9\n", 9, "wheels.rear.radius_m"),
+        (TEXT + "[wheels.rear]\nname = 'x'\n", 8, "wheels.rear.radius_m"),
         (TEXT.replace("spare", "curve = [\n  [1],\n]\nspare"), 3, "curve"),
     ],
 )
 def test_error_names_the_line(read, text, line, key):
-    with pytest.raises(ParameterError, match=rf"^car\.toml, line {line}: {key}: "):
+    with raises(ParameterError, file="car.toml", line=line, key=key):
         read(text)
 
 
@@ -214,16 +215,16 @@ def test_tables_in_a_list_become_a_tuple_of_dataclasses(read):
 @pytest.mark.parametrize(
     ("old", "new", "line", "key"),
     [
-        ("1.5", "15", 4, r"axles\.0\.track_m"),
-        ("steer_deg", "stear_deg", 5, r"axles\.0\.stear_deg"),
-        ("1.4", "14", 8, r"axles\.1\.track_m"),
-        ("0.3\n", "30\n", 11, r"axles\.1\.hubs\.0\.radius_m"),
-        ("0.32", "32", 14, r"axles\.1\.hubs\.1\.radius_m"),
-        ("track_m = 1.4\n", "\n", 7, r"axles\.1\.track_m"),
+        ("1.5", "15", 4, "axles.0.track_m"),
+        ("steer_deg", "stear_deg", 5, "axles.0.stear_deg"),
+        ("1.4", "14", 8, "axles.1.track_m"),
+        ("0.3\n", "30\n", 11, "axles.1.hubs.0.radius_m"),
+        ("0.32", "32", 14, "axles.1.hubs.1.radius_m"),
+        ("track_m = 1.4\n", "\n", 7, "axles.1.track_m"),
     ],
 )
 def test_error_in_a_list_names_the_element_and_the_line(read, old, new, line, key):
-    with pytest.raises(ParameterError, match=rf"^car\.toml, line {line}: {key}: "):
+    with raises(ParameterError, file="car.toml", line=line, key=key):
         read(AXLES.replace(old, new))
 
 
@@ -267,7 +268,7 @@ def test_overridden_value_is_not_blamed_on_the_file():
 def test_file_that_is_no_toml_is_answered_with_path_and_line(tmp_path):
     path = tmp_path / "bad.toml"
     path.write_text("speed_kmh = 80\nroad = = 1\n")
-    with pytest.raises(ManeuverError, match=r"bad\.toml: no valid TOML: .*line 2"):
+    with raises(ManeuverError, cause=tomllib.TOMLDecodeError, file="bad.toml"):
         read_toml(path, ManeuverError)
 
 

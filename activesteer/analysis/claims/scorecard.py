@@ -134,15 +134,17 @@ def not_reproduced(vehicle: str, text: str | None = None) -> dict[str, str]:
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ParameterError(f"{FILE}: {error}") from error
+        raise ParameterError(str(error), file=FILE) from error
     for name, entries in table.items():
         if not isinstance(entries, dict):
-            raise ParameterError(f"{FILE}: {name} is {entries!r}, expected a table [<vehicle>] of claims with reasons")
+            raise ParameterError(f"is {entries!r}; claims and reasons are needed", file=FILE, key=name, value=entries)
         for number, reason in entries.items():
             if number not in STATEMENTS:
-                raise ParameterError(f"{FILE}: {name}.{number}: no such claim; {nearest_names(number, STATEMENTS)}")
+                problem = f"no such claim; {nearest_names(number, STATEMENTS)}"
+                raise ParameterError(problem, file=FILE, key=f"{name}.{number}", allowed=tuple(STATEMENTS))
             if not isinstance(reason, str) or not reason.strip():
-                raise ParameterError(f"{FILE}: {name}.{number}: is {reason!r}, expected the reason in words")
+                problem = f"is {reason!r}; the reason in words is needed"
+                raise ParameterError(problem, file=FILE, key=f"{name}.{number}", value=reason)
     return dict(table.get(vehicle, {}))
 
 

@@ -66,7 +66,9 @@ class KcResult:
             if (entry.axle, entry.name) == key:
                 return entry.value
         known = [f"{entry.axle}.{entry.name}" for entry in self.metrics]
-        raise ParameterError(f"no metric is named {'.'.join(key)!r}; {nearest_names('.'.join(key), known)}")
+        raise ParameterError(
+            f"no metric is named {'.'.join(key)!r}; {nearest_names('.'.join(key), known)}", value=".".join(key)
+        )
 
     @property
     def outside(self) -> tuple[KcMetric, ...]:

@@ -12,6 +12,7 @@ from activesteer.analysis.figures import BY_SCENARIO, draw_all, figure_for, theo
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 from activesteer.theory.tolerance import tolerance
+from tests.raising import raises
 from tests.unit.analysis.synthetic import (
     COMPLETION_S,
     LANES,
@@ -73,7 +74,7 @@ def test_nothing_to_draw_is_an_error(recordings, tmp_path):
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(ParameterError, match="cannot make the folder"):
+    with raises(ParameterError, cause=FileExistsError):
         draw_all({"step_steer": {"none": step_steer()}}, tmp_path / "file")
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from activesteer.analysis.handling import CarGeometry, car_of, evaluate, metrics
 from activesteer.errors import RecordingError
+from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun
 
 CAR = CarGeometry(1.1, 1.5, 16.0)
@@ -83,7 +84,7 @@ def test_car_comes_from_the_metadata_or_the_caller():
     recording = run()
     assert car_of(recording) == CAR
     recording.metadata["vehicle"] = {}
-    with pytest.raises(RecordingError, match="do not describe the car"):
+    with raises(RecordingError, cause=KeyError):
         evaluate(recording)
     assert evaluate(recording, CAR).understeer_gradient_radpmps2 == pytest.approx(EG, rel=1e-6)
 

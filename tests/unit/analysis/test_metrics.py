@@ -11,6 +11,7 @@ from activesteer.analysis import general, step_response
 from activesteer.analysis.metrics import metrics
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
+from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun, step_steer
 
 TIME_S = np.arange(2001) * 0.001
@@ -63,5 +64,5 @@ def test_friction_used_is_the_largest_force_ratio_of_a_loaded_tyre():
 def test_a_recording_without_kind_is_refused():
     run = wave()
     run.metadata["maneuver"] = "step_steer"
-    with pytest.raises(RecordingError, match="key 'kind'"):
+    with raises(RecordingError, file="the metadata", key="maneuver", value="step_steer"):
         metrics(run)

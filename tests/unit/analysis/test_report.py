@@ -18,6 +18,7 @@ from activesteer.analysis.report.runs import groups_of
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
 from activesteer.signals import Channel
+from tests.raising import raises
 from tests.unit.analysis.synthetic import step_steer
 from tests.unit.analysis.synthetic_files import lane_changes, recording_of, sines, step_steers
 
@@ -275,7 +276,7 @@ def test_wrong_input_is_answered(tmp_path: Path):
     empty = Recording([Channel("ay_mps2", "m/s2", "", "vehicle")], [], np.empty((0, 1)))
     with pytest.raises(RecordingError, match=r"a\.mcap has no rows"):
         report_page({"a.mcap": empty})
-    with pytest.raises(ParameterError, match=r"cannot write .*nowhere.*: No such file"):
+    with raises(ParameterError, cause=FileNotFoundError):
         write_report(sines(), tmp_path / "nowhere" / "report.html")
     next(iter(sines().values())).save(tmp_path / "a.mcap")
     with pytest.raises(ParameterError, match=r"a\.mcap is named twice"):

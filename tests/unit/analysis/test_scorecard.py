@@ -9,6 +9,7 @@ import pytest
 
 from activesteer.analysis.claims import Claim, Kind, Statement, Verdict, not_reproduced, scorecard
 from activesteer.errors import ParameterError
+from tests.raising import raises
 
 
 def claim(number: str, passed: bool, **values: float) -> Claim:
@@ -81,15 +82,15 @@ def test_the_list_of_the_vehicle_is_looked_up_by_its_name():
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "key"),
     [
-        ('[compact]\nD6 = "why"', r"compact\.D6: no such claim; did you mean"),
-        ('[compact]\nD5 = ""', r"compact\.D5: is ''"),
-        ("[compact]\nD5 = true", r"compact\.D5: is True"),
-        ('D5 = "why"', "expected a table"),
-        ("[compact\n", "not_reproduced.toml"),
+        ('[compact]\nD6 = "why"', "compact.D6"),
+        ('[compact]\nD5 = ""', "compact.D5"),
+        ("[compact]\nD5 = true", "compact.D5"),
+        ('D5 = "why"', "D5"),
+        ("[compact\n", None),
     ],
 )
-def test_a_wrong_list_is_refused(text, message):
-    with pytest.raises(ParameterError, match=message):
+def test_a_wrong_list_is_refused(text, key):
+    with raises(ParameterError, file="not_reproduced.toml", key=key):
         not_reproduced("compact", text)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
-
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.errors import RecordingError
+from tests.raising import raises
 from tests.unit.analysis.synthetic import LANES, SLALOM_CONES, along_path, slalom, step_steer
 
 
@@ -20,7 +19,7 @@ def test_course_and_car_are_read():
 
 
 def test_a_run_without_a_course_is_refused():
-    with pytest.raises(RecordingError, match="no table 'course'"):
+    with raises(RecordingError, file="the metadata", key="course"):
         read_course(step_steer())
-    with pytest.raises(RecordingError, match="no table 'car'"):
+    with raises(RecordingError, file="the metadata", key="car"):
         read_footprint(step_steer())

@@ -8,6 +8,7 @@ import pytest
 from activesteer.errors import RecordingError
 from activesteer.recording import Link, McapWriter, Poses, Primitive, Recording
 from activesteer.signals import Channel
+from tests.raising import raises
 from tests.unit.recording.conftest import assert_same
 
 
@@ -78,7 +79,7 @@ def test_a_channel_is_a_read_only_float64_array(mcap_file: Path) -> None:
 
 
 def test_an_unknown_channel_names_the_nearest(recording: Recording) -> None:
-    with pytest.raises(RecordingError, match=r"no channel 'yaw_rate'.*'yaw_rate_radps'"):
+    with raises(RecordingError, value="yaw_rate"):
         recording["yaw_rate"]
 
 
@@ -100,44 +101,41 @@ def test_metadata_that_json_cannot_hold_is_refused_before_the_file_is_touched(
     recording: Recording, tmp_path: Path
 ) -> None:
     recording.metadata["file"] = {"vehicle": PurePath("compact.toml")}
-    with pytest.raises(RecordingError, match=r"metadata 'file' cannot be kept as JSON: a PurePosixPath"):
+    with raises(RecordingError, file="the metadata", key="file"):
         recording.save(tmp_path / "run.mcap")
     assert not (tmp_path / "run.mcap").exists()
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "key"),
     [
-        ({"time_s": [0.0, 0.1]}, r"values has shape \(3, 1\) in place of \(2, 1\)"),
-        ({"time_s": [0.0, 0.2, 0.2]}, r"time_s must increase: row 2 is at 0\.2 s"),
-        ({"time_s": [-0.1, 0.2, 0.3]}, r"time_s is -0\.1 s: it must be finite and not negative"),
-        ({"time_s": [0.0, np.nan, 0.3]}, r"time_s is nan s"),
-        ({"time_s": [[0.0, 0.1, 0.3]]}, r"time_s has shape \(1, 3\)"),
-        ({"values": [["a"], ["b"], ["c"]]}, "values: could not convert"),
-        ({"metadata": {"metrics": 3}}, "metadata 'metrics' is 3"),
-        (
-            {"poses": Poses(np.zeros(1), ("chassis",), np.zeros((1, 1, 2)), np.zeros((1, 1, 4)))},
-            r"poses.positions_m has shape \(1, 1, 2\) in place of \(1, 1, 3\)",
-        ),
+        ({"time_s": [0.0, 0.1]}, "values"),
+        ({"time_s": [0.0, 0.2, 0.2]}, "time_s"),
+        ({"time_s": [-0.1, 0.2, 0.3]}, "time_s"),
+        ({"time_s": [0.0, np.nan, 0.3]}, "time_s"),
+        ({"time_s": [[0.0, 0.1, 0.3]]}, "time_s"),
+        ({"values": [["a"], ["b"], ["c"]]}, "values"),
+        ({"metadata": {"metrics": 3}}, "metrics"),
+        ({"poses": Poses(np.zeros(1), ("chassis",), np.zeros((1, 1, 2)), np.zeros((1, 1, 4)))}, "poses.positions_m"),
     ],
 )
-def test_arrays_that_do_not_fit_are_refused(change: dict, words: str) -> None:
+def test_arrays_that_do_not_fit_are_refused(change: dict, key: str) -> None:
     arguments = {"time_s": [0.0, 0.1, 0.2], "values": [[1.0], [2.0], [3.0]], **change}
-    with pytest.raises(RecordingError, match=words):
+    with raises(RecordingError, key=key):
         Recording([Channel("v_mps", "m/s", "Speed", "vehicle")], **arguments)
 
 
 def test_unusable_primitives_and_bodies_are_refused(channels: list[Channel], tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    with pytest.raises(RecordingError, match="kind 'cone', known are: box, cylinder, sphere"):
+    with raises(RecordingError, key="chassis", value="cone"):
         McapWriter(path, channels, scene=[Primitive("chassis", "cone", (1.0, 1.0, 1.0))])
-    with pytest.raises(RecordingError, match="a number of the box is missing"):
+    with raises(RecordingError, key="chassis"):
         McapWriter(path, channels, scene=[Primitive("chassis", "box", (1.0, 1.0))])  # type: ignore[arg-type]
     ends = (("chassis", (0.0, 0.0, 0.0)), ("fl_wheel", (0.0, 0.0, 1.0)))
-    with pytest.raises(RecordingError, match="kind 'rope', known are: link, spring, damper"):
+    with raises(RecordingError, key="arm", value="rope"):
         McapWriter(path, channels, scene=[Link("arm", "rope", ends)])
     for points in (ends[:1], (ends[0], ("fl_wheel", (0.0, 1.0))), (ends[0], ("fl_wheel", "abc"))):
-        with pytest.raises(RecordingError, match="arm: a number of the link is missing"):
+        with raises(RecordingError, key="arm"):
             McapWriter(path, channels, scene=[Link("arm", "link", points)])  # type: ignore[arg-type]
     for names in (("chassis", "chassis"), ("world", "chassis")):
         with pytest.raises(RecordingError, match="body names must differ"):

@@ -14,6 +14,7 @@ from mcap.writer import Writer
 from activesteer.errors import RecordingError
 from activesteer.recording import McapWriter, Recording, check_target
 from activesteer.signals import Channel
+from tests.raising import raises
 
 SPEED = [Channel("v_mps", "m/s", "Speed", "vehicle", single=False)]
 
@@ -94,7 +95,7 @@ def test_an_exception_in_the_run_keeps_what_was_written(tmp_path: Path) -> None:
 def test_a_wrong_result_leaves_the_file_open_for_another_try(tmp_path: Path) -> None:
     writer = McapWriter(tmp_path / "run.mcap", SPEED)
     writer.write([0.0], [[1.0]])
-    with pytest.raises(RecordingError, match="metric 'a_s' is 'soon'"):
+    with raises(RecordingError, key="a_s", value="soon"):
         writer.close({"metrics": {"a_s": "soon"}})
     writer.close({"metrics": {"a_s": 1}, "status": "done"})
     opened = Recording.open(tmp_path / "run.mcap")
@@ -105,9 +106,9 @@ def test_a_wrong_result_leaves_the_file_open_for_another_try(tmp_path: Path) -> 
 def test_times_must_increase_across_blocks(tmp_path: Path) -> None:
     with McapWriter(tmp_path / "run.mcap", SPEED, ["chassis"]) as writer:
         writer.write([0.0, 1.0], [[1.0], [2.0]])
-        with pytest.raises(RecordingError, match=r"time_s must increase: row 0 is at 1\.0 s, the one before it at 1"):
+        with raises(RecordingError, key="time_s", value=1.0):
             writer.write([1.0], [[1.0]])
-        with pytest.raises(RecordingError, match=r"quaternions has shape \(1, 1, 3\) in place of \(1, 1, 4\)"):
+        with raises(RecordingError, key="quaternions"):
             writer.write([2.0], [[1.0]], [2.0], np.zeros((1, 1, 3)), np.zeros((1, 1, 3)))
         writer.write([2.0], [[3.0]])
     assert Recording.open(tmp_path / "run.mcap")["v_mps"].tolist() == [1.0, 2.0, 3.0]
@@ -229,26 +230,3 @@ def test_a_disk_that_fills_up_ends_the_recording_with_what_was_saved(
     assert len(opened) >= 1000
     assert len(opened) % 1000 == 0
     assert opened.metadata["complete"] is False
-
-
-@pytest.mark.slow
-def test_twenty_seconds_are_written_and_read_fast(tmp_path: Path, rng: np.random.Generator) -> None:
-    """At most 15 us a row on the calling thread and 1 s to open; best of three, for other load on the machine."""
-    table = [Channel(f"signal_{column}", "m", "", "vehicle", single=column >= 20) for column in range(170)]
-    values = rng.normal(size=(1000, 170))
-    names = [f"body_{body}" for body in range(17)]
-    positions, turns = rng.normal(size=(100, 17, 3)), rng.normal(size=(100, 17, 4))
-    write_s, open_s = [], []
-    for attempt in range(3):
-        path = tmp_path / f"{attempt}.mcap"
-        start = time.perf_counter()
-        with McapWriter(path, table, names) as writer:
-            for second in range(20):
-                time_s = (1000 * second + np.arange(1000)) / 1000
-                writer.write(time_s, values, time_s[::10], positions, turns)
-        write_s.append(time.perf_counter() - start)
-        start = time.perf_counter()
-        assert len(Recording.open(path)) == 20_000
-        open_s.append(time.perf_counter() - start)
-    assert min(write_s) < 20_000 * 15e-6
-    assert min(open_s) < 1.0

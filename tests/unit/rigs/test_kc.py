@@ -79,7 +79,7 @@ def test_table_names_every_metric_and_counts_the_bands() -> None:
 
 
 def test_an_unknown_metric_is_explained() -> None:
-    with pytest.raises(ParameterError, match=r"'front\.wheelrate'.*did you mean 'front\.wheel_rate'"):
+    with raises(ParameterError, value="front.wheelrate"):
         _ = compact()["front", "wheelrate"]
 
 
@@ -103,24 +103,25 @@ def test_a_car_without_targets_has_no_bands() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "line", "key"),
     [
         (
             '[front.wheelrate]\nband = [1, 2]\nsource = "x"',
-            r"line 1.*front\.wheelrate.*did you mean.*front\.wheel_rate",
+            1,
+            "front.wheelrate",
         ),
-        ('[front.wheel_rate]\nband = [3, 2]\nsource = "x"', r"line 2.*lowest and a highest"),
-        ('[front.wheel_rate]\nband = [1, 2, 3]\nsource = "x"', r"line 2.*lowest and a highest"),
-        ("[front.wheel_rate]\nband = [1, 2]", r"source"),
-        ('[front.wheel_rate]\nband = [1, 2]\nsource = "x"\ncolour = 1', r"colour"),
-        ("front = 1", r"a table"),
-        ("[front]\nwheel_rate = 1", r"a table"),
+        ('[front.wheel_rate]\nband = [3, 2]\nsource = "x"', 2, "front.wheel_rate.band"),
+        ('[front.wheel_rate]\nband = [1, 2, 3]\nsource = "x"', 2, "front.wheel_rate.band"),
+        ("[front.wheel_rate]\nband = [1, 2]", 1, "front.wheel_rate.source"),
+        ('[front.wheel_rate]\nband = [1, 2]\nsource = "x"\ncolour = 1', 4, "front.wheel_rate.colour"),
+        ("front = 1", 1, "front"),
+        ("[front]\nwheel_rate = 1", 2, "front.wheel_rate"),
     ],
 )
-def test_a_wrong_target_file_is_explained(tmp_path: Path, text: str, message: str) -> None:
+def test_a_wrong_target_file_is_explained(tmp_path: Path, text: str, line: int, key: str) -> None:
     file = tmp_path / "targets.toml"
     file.write_text(text, encoding="utf-8")
-    with pytest.raises(ParameterError, match=message):
+    with raises(ParameterError, file="targets.toml", line=line, key=key):
         load_targets("compact", file)
 
 
@@ -164,7 +165,7 @@ def test_pictures_are_drawn(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     (tmp_path / "file").write_text("")
-    with pytest.raises(ParameterError, match="cannot make the folder"):
+    with raises(ParameterError, cause=FileExistsError):
         draw(compact(), tmp_path / "file")
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from activesteer.errors import ModelError, ParameterError
 from activesteer.rigs.tyre_rig import Motion, TyreRig
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
+from tests.raising import raises
 from tests.unit.tyre.tyres import tyre
 
 AT = {"slip_angle_rad": 0.05, "slip_ratio": 0.02, "inclination_rad": 0.03, "load_N": 4000.0, "speed_mps": 20.0}
@@ -80,45 +82,45 @@ def test_inclination_and_heading_rates_move_the_contact_point() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("key", "value"),
     [
-        ({"mu": 0.0}, "mu is 0, must be finite and greater than 0"),
-        ({"mu": math.nan}, "mu is nan"),
-        ({"pressure_Pa": -1.0}, "pressure_Pa is -1"),
-        ({"timestep_s": math.inf}, "timestep_s is inf"),
-        ({"low_speed_damping_Nspm": -1.0}, "low_speed_damping_Nspm is -1, must be finite and not negative"),
-        ({"side": "left"}, "'LEFT' and 'RIGHT'"),
+        ("mu", 0.0),
+        ("mu", math.nan),
+        ("pressure_Pa", -1.0),
+        ("timestep_s", math.inf),
+        ("low_speed_damping_Nspm", -1.0),
+        ("side", "left"),
     ],
 )
-def test_a_rig_that_cannot_be_is_an_error(changes, message: str) -> None:
-    with pytest.raises(ParameterError, match=message):
-        TyreRig(tyre(), **changes)
+def test_a_rig_that_cannot_be_is_an_error(key: str, value: Any) -> None:
+    with raises(ParameterError, key=key, value=value):
+        TyreRig(tyre(), **{key: value})
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("changes", "key"),
     [
-        ({"load_N": 0.0}, "load_N is 0, must be greater than 0"),
-        ({"speed_mps": 0.0}, "speed_mps is 0"),
-        ({"load_N": math.nan}, "load_N is nan"),
-        ({"slip_angle_rad": math.nan}, "must be finite"),
-        ({"load_N": 1e9}, r"no steady state at load 1e\+09 N"),
+        ({"load_N": 0.0}, "load_N"),
+        ({"speed_mps": 0.0}, "speed_mps"),
+        ({"load_N": math.nan}, "load_N"),
+        ({"slip_angle_rad": math.nan}, "alpha_rad"),
+        ({"load_N": 1e9}, None),
     ],
 )
-def test_an_operating_point_that_cannot_be_is_an_error(changes, message: str) -> None:
-    with pytest.raises(ParameterError, match=message):
+def test_an_operating_point_that_cannot_be_is_an_error(changes, key: str | None) -> None:
+    with raises(ParameterError, key=key):
         TyreRig(tyre()).steady(**(AT | changes))
 
 
 def test_shapes_that_do_not_fit_are_errors() -> None:
     rig = TyreRig(tyre())
-    with pytest.raises(ParameterError, match="broadcast"):
+    with raises(ParameterError, cause=ValueError):
         rig.sweep(np.zeros(2), np.zeros(3), 0.0, 4000.0, 20.0)
     with pytest.raises(ParameterError, match="2 dimensions"):
         rig.sweep(np.zeros((2, 2)), 0.0, 0.0, 4000.0, 20.0)
-    with pytest.raises(ParameterError, match=r"steps of 0\.001 s"):
+    with raises(ParameterError, key="time_s"):
         rig.transient(np.linspace(0.0, 1.0, 11), (1.0, 0.0), 0.0, 0.29)
-    with pytest.raises(ParameterError, match="broadcast"):
+    with raises(ParameterError, cause=ValueError):
         rig.transient(np.arange(10) * 0.001, np.zeros((9, 2)), 0.0, 0.29)
 
 

@@ -17,6 +17,7 @@ from activesteer.resources import find_maneuver
 from activesteer.road.course import Course, course_of
 from activesteer.road.footprint import Footprint, footprint_of
 from activesteer.road.road import Road, road_of
+from tests.raising import raises
 
 TABLE: dict[str, Any] = {
     "path": {"x_m": [0.0, 50.0, 100.0], "y_m": [0.0, 0.0, 20.0]},
@@ -94,9 +95,8 @@ def test_what_was_not_recorded_is_none_or_plain():
     ],
 )
 def test_a_damaged_course_is_refused_with_the_key(change: Mapping[str, Any], key: str):
-    with pytest.raises(RecordingError) as caught:
+    with raises(RecordingError, key=key) as caught:
         course_of({"course": {**TABLE, **change}})
-    assert f"'{key}'" in str(caught.value)
     assert len(str(caught.value)) < 350  # at most 200 characters of a value
 
 
@@ -118,7 +118,7 @@ def test_the_footprint_reaches_beyond_both_axles():
     [{"tyre_width_m": [0.2]}, {"width_m": None}, {"wheelbase_m": "long"}, {"width_m": -1.8}, {"wheelbase_m": math.inf}],
 )
 def test_a_damaged_car_is_refused_with_the_key(change: dict[str, Any]):
-    with pytest.raises(RecordingError, match=f"'car.{next(iter(change))}'"):
+    with raises(RecordingError, key=f"car.{next(iter(change))}"):
         footprint_of({"car": {**CAR, **change}})
 
 

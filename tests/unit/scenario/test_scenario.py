@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shutil
+import tomllib
 from collections.abc import Iterator
 from dataclasses import is_dataclass
 from pathlib import Path
@@ -142,20 +143,11 @@ def test_table_that_an_override_made_a_value_is_answered():
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "told"),
-    [
-        ("road.mu", "wet", r"^override road\.mu: 'wet' is not a number"),
-        ("speed_kmh", 500, r"^override speed_kmh: 500 is out of range; allowed is -72 to 360"),
-        (
-            "controllers.ars.limit_deg",
-            20,
-            r"^override controllers\.ars\.limit_deg: 20 is out of range; allowed is 0 to 10",
-        ),
-        ("tyres.front", "none.tir", r"^override tyres\.front: there is no file 'none\.tir' in models/tyres"),
-    ],
+    ("key", "value"),
+    [("road.mu", "wet"), ("speed_kmh", 500), ("controllers.ars.limit_deg", 20), ("tyres.front", "none.tir")],
 )
-def test_wrong_value_of_an_override_is_not_blamed_on_the_file(key, value, told):
-    with pytest.raises(ActiveSteerError, match=told):
+def test_wrong_value_of_an_override_is_not_blamed_on_the_file(key, value):
+    with raises(ActiveSteerError, key=key, value=value, overridden=True):
         resolve("step_steer", overrides={key: value})
 
 
@@ -200,7 +192,7 @@ def test_bad_model_is_answered_with_its_file(vehicle, tmp_path, old, new, told):
 def test_bad_vehicle_file_is_answered_with_file_key_and_line(vehicle):
     with raises(ParameterError, file="mine.toml", key="steering.ratoi"):
         resolve("standstill", vehicle(("ratio =", "ratoi =")))
-    with pytest.raises(ParameterError, match=r"mine\.toml: no valid TOML"):
+    with raises(ParameterError, cause=tomllib.TOMLDecodeError, file="mine.toml"):
         resolve("standstill", vehicle(("[tyres]", "[tyres")))
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.scenario.vehicle_file import write_values
+from tests.raising import raises
 
 TEXT = """# A car.
 mjcf = "a.xml"
@@ -58,21 +59,21 @@ def test_table_at_the_end_of_the_file_is_found(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "key"),
     [
-        ("a = 1\n", r"no table \[single_track\]"),
-        ("[single_track\n", "no valid TOML"),
-        ('[single_track]\nnote = """\nmass_kg = 1\n"""\n', "one key a line"),
+        ("a = 1\n", "[single_track]"),
+        ("[single_track\n", None),
+        ('[single_track]\nnote = """\nmass_kg = 1\n"""\n', "[single_track]"),
     ],
 )
-def test_file_that_cannot_be_edited_is_left_alone(tmp_path, text, words):
+def test_file_that_cannot_be_edited_is_left_alone(tmp_path, text, key):
     path = tmp_path / "car.toml"
     path.write_text(text)
-    with pytest.raises(ParameterError, match=words):
+    with raises(ParameterError, key=key):
         write_values(path, "single_track", VALUES, "x", "2026-01-01")
     assert path.read_text() == text
 
 
 def test_missing_file_is_named(tmp_path):
-    with pytest.raises(ParameterError, match=r"nowhere\.toml"):
+    with raises(ParameterError, cause=FileNotFoundError):
         write_values(tmp_path / "nowhere.toml", "single_track", VALUES, "x", "2026-01-01")

@@ -12,6 +12,7 @@ from activesteer.errors import ParameterError
 from activesteer.tyre import MagicFormula, load_tir
 from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.tyre_parameters import TyreParameters
+from tests.raising import raises
 from tests.unit.tyre.tyres import TYRES, differing
 
 LOAD_N, ALPHA_RAD, KAPPA = 4000.0, np.radians(2.0), 0.03
@@ -90,13 +91,9 @@ def test_the_trail_is_related_to_the_scaled_load(tyre: TyreParameters) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "word"),
-    [
-        ("combined_slip", "ellipse", "friction_ellipse"),
-        ("speed_offset_mps", -0.1, "0 to 1"),
-        ("reference_friction", 0.0, "0.1"),
-    ],
+    ("key", "value"),
+    [("combined_slip", "ellipse"), ("speed_offset_mps", -0.1), ("reference_friction", 0.0)],
 )
-def test_what_does_not_exist_is_refused(key: str, value: object, word: str) -> None:
-    with pytest.raises(ParameterError, match=word):
+def test_what_does_not_exist_is_refused(key: str, value: object) -> None:
+    with raises(ParameterError, key=key, value=value):
         TyreConventions(**{key: value})  # type: ignore[arg-type]

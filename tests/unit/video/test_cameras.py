@@ -9,6 +9,7 @@ import pytest
 from activesteer.errors import ParameterError
 from activesteer.video.cameras import view
 from activesteer.video.track import Track
+from tests.raising import raises
 from tests.unit.playback.synthetic import RADIUS_M, SPEED_MPS, circle
 
 
@@ -58,7 +59,7 @@ def test_wheel_camera_sees_the_inner_side_of_its_wheel(corner):
 
 def test_unknown_names_are_told_with_those_that_exist():
     track = Track(circle(), "circle")
-    with pytest.raises(ParameterError, match="no camera 'chse'; did you mean 'chase'"):
+    with raises(ParameterError, value="chse"):
         view("chse", track)
-    with pytest.raises(ParameterError, match="no corner 'lf'"):
+    with raises(ParameterError, value="lf"):
         view("wheel", track, "lf")

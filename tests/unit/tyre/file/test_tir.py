@@ -121,7 +121,7 @@ def test_errors_say_where_and_what(change: tuple[str, str], line: int | None, ke
 
 
 def test_a_file_that_is_not_there_or_too_long_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(TyreFileError, match="cannot read"):
+    with raises(TyreFileError, cause=FileNotFoundError):
         load_tir(tmp_path / "none.tir")
     with pytest.raises(TyreFileError, match="cannot read"):
         load_tir(tmp_path)
@@ -132,7 +132,7 @@ def test_a_file_that_is_not_there_or_too_long_is_an_error(tmp_path: Path) -> Non
 
 
 def test_a_misspelt_coefficient_is_named_with_its_neighbours() -> None:
-    with pytest.raises(ParameterError, match="did you mean 'PKY"):
+    with raises(ParameterError, value="PKYI"):
         tyre()["PKYI"]
     with raises(ParameterError, key="LMUXX"):
         tyre().with_values(LMUXX=0.9)
