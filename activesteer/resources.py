@@ -10,6 +10,8 @@ from pathlib import Path
 
 from activesteer.errors import (
     ActiveSteerError,
+    ControllerError,
+    DriverError,
     ManeuverError,
     ModelError,
     ParameterError,
@@ -31,7 +33,7 @@ def _data_dir(name: str, error: type[ActiveSteerError]) -> Path:
 
 
 def models_dir() -> Path:
-    """The directory with `mjcf/`, `vehicles/` and `tyres/`.
+    """The directory with `mjcf/`, `vehicles/`, `tyres/`, `drivers/` and `controllers/`.
 
     Returns:
         Absolute path of an existing directory.
@@ -74,6 +76,46 @@ def list_maneuvers() -> list[str]:
 def list_vehicles() -> list[str]:
     """Names of the vehicles that come with the package, sorted."""
     return _names(models_dir() / "vehicles")
+
+
+def list_drivers() -> list[str]:
+    """Names of the drivers that come with the package, sorted."""
+    return _names(models_dir() / "drivers")
+
+
+def list_controller_variants() -> list[str]:
+    """Names of the controller variants that come with the package, sorted."""
+    return _names(models_dir() / "controllers")
+
+
+def find_driver_file(name_or_path: str | os.PathLike[str]) -> Path:
+    """The file of a driver.
+
+    Args:
+        name_or_path: A name from `list_drivers`, or the path of a .toml file; see `find_maneuver`.
+
+    Returns:
+        Path of an existing file.
+
+    Raises:
+        DriverError: there is no such driver or file; the message names the nearest ones.
+    """
+    return _find(name_or_path, models_dir() / "drivers", "driver", DriverError)
+
+
+def find_controller_variant(name_or_path: str | os.PathLike[str]) -> Path:
+    """The file of a controller variant.
+
+    Args:
+        name_or_path: A name from `list_controller_variants`, or the path of a .toml file; see `find_maneuver`.
+
+    Returns:
+        Path of an existing file.
+
+    Raises:
+        ControllerError: there is no such variant or file; the message names the nearest ones.
+    """
+    return _find(name_or_path, models_dir() / "controllers", "controller", ControllerError)
 
 
 def find_maneuver(name_or_path: str | os.PathLike[str]) -> Path:

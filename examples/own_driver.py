@@ -41,8 +41,8 @@ class PurePursuit:
 
 
 def compare(speed_kmh=60.0):
-    """The double lane change with the standard driver and with this one."""
-    drivers = {"standard": "standard", "pure pursuit": PurePursuit}
+    """The double lane change with the typical driver and with this one."""
+    drivers = {"typical": "typical", "pure pursuit": PurePursuit}
     overrides = {"speed_kmh": speed_kmh, "duration_s": 13.0}
     return {
         name: activesteer.simulate("double_lane_change", driver=driver, overrides=overrides)

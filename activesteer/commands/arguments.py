@@ -75,9 +75,10 @@ def add_vehicle(parser: argparse.ArgumentParser) -> None:
 
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
-    """Adds what `scenario_of` reads: the manoeuvre, `--vehicle`, `--set` and `--fault`."""
+    """Adds what `scenario_of` reads: the manoeuvre, `--vehicle`, `--driver`, `--set` and `--fault`."""
     parser.add_argument("maneuver", metavar="MANEUVER", help="a name from `activesteer list`, or a TOML file")
     add_vehicle(parser)
+    add_driver(parser)
     add_overrides(parser)
     parser.add_argument(
         "--fault", action="append", default=[], dest="faults", metavar="PART:KIND[=SIZE]@START[-END]",
@@ -96,7 +97,7 @@ def add_overrides(parser: argparse.ArgumentParser) -> None:
 
 def add_controller(parser: argparse.ArgumentParser, *, several: bool) -> None:
     """Adds `-c`; where there may be several, `options.controller` is a list, or None."""
-    words = "none, ars, afs, or my_file.py:MyController?gain=2"
+    words = "none, ars, afs, a variant or its file, or my_file.py:MyController?gain=2"
     parser.add_argument(
         "-c", "--controller", metavar="CONTROLLER",
         action="append" if several else "store", default=None if several else "none",
@@ -107,8 +108,9 @@ def add_controller(parser: argparse.ArgumentParser, *, several: bool) -> None:
 def add_driver(parser: argparse.ArgumentParser) -> None:
     """Adds `--driver`."""
     parser.add_argument(
-        "--driver", default="standard", metavar="DRIVER", help="standard, or my_file.py:MyDriver (default: standard)"
-    )
+        "--driver", default="typical", metavar="DRIVER",
+        help="novice, typical, expert, a driver file, or my_file.py:MyDriver (default: typical)",
+    )  # fmt: skip
 
 
 def add_recording(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
@@ -175,7 +177,8 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
     from activesteer.scenario import resolve
 
     faults = {"fault": [fault_table(text) for text in options.faults]} if options.faults else {}
-    return resolve(options.maneuver, options.vehicle, pairs(options.overrides, "--set", "road.mu=0.4", faults))
+    overrides = pairs(options.overrides, "--set", "road.mu=0.4", faults)
+    return resolve(options.maneuver, options.vehicle, overrides, options.driver)
 
 
 def overrides_of(options: argparse.Namespace) -> dict[str, Any]:

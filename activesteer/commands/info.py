@@ -7,6 +7,7 @@ from typing import Any
 
 from activesteer.commands.arguments import add_recording
 from activesteer.commands.output import print_entry
+from activesteer.errors import shown
 from activesteer.files import shown_path
 
 
@@ -30,6 +31,7 @@ def _info(options: argparse.Namespace) -> int:
         table = metadata.get(key, {})
         print_entry(f"{key}: ", f"{table.get('name', '?')} {table.get('title', '')}")
     print_entry("controller: ", str(metadata.get("controller", "?")))
+    print_entry("driver: ", _driver(metadata.get("driver", "?")))
     for key in ("overrides", "versions"):
         if metadata.get(key):
             print_entry(f"{key}: ", ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
@@ -44,3 +46,12 @@ def _info(options: argparse.Namespace) -> int:
         print_entry(head, channel.meaning, len(head))
     print_entry("attachments: ", ", ".join(recording.attachments))
     return 0
+
+
+def _driver(recorded: Any) -> str:
+    """Who drove, and with which numbers; recordings of earlier versions have the name alone."""
+    if not isinstance(recorded, dict):
+        return str(recorded)
+    numbers = recorded.get("parameters", recorded)
+    said = ", ".join(f"{key} {shown(value)}" for key, value in numbers.items() if key not in ("name", "title"))
+    return f"{recorded.get('name', '?')} {recorded.get('title', '')}".rstrip() + (f" ({said})" if said else "")

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import (
     add_controller,
-    add_driver,
     add_json,
     add_output,
     add_scenario,
@@ -31,7 +30,6 @@ def add_to(commands: Any) -> None:
     run = commands.add_parser("run", help="drive a manoeuvre and record it")
     add_scenario(run)
     add_controller(run, several=True)
-    add_driver(run)
     add_output(run, "FILE_OR_DIR", "a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap", "runs")
     run.add_argument("--replace", action="store_true", help="replace recordings that were made with other settings")
     run.add_argument("--plot", action="store_true", help="also draw the runs")
@@ -43,13 +41,11 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.analysis.tables import comparison
     from activesteer.controllers import find_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
-    from activesteer.driver import find_driver
     from activesteer.scenario import describe
     from activesteer.simulation.preparation import prepared
     from activesteer.simulation.runner import run_scenario
 
     controllers = [find_controller(name) for name in options.controller or ["none"]]
-    driver = find_driver(options.driver)
     scenario = scenario_of(options)
     # What is wrong with the last controller or the plot is said before the first run, not after it.
     for controller in controllers:
@@ -58,12 +54,12 @@ def _run(options: argparse.Namespace) -> int:
     scenario = prepared(scenario)
     if not options.replace:
         for controller, path in zip(controllers, paths, strict=True):
-            _check_settings(path, describe(scenario) | {"controller": controller.name, "driver": driver.name})
+            _check_settings(path, describe(scenario) | {"controller": controller.name})
     recordings = {}
     for controller, path in zip(controllers, paths, strict=True):
         label = controller.label
         with ProgressBar(f"{scenario.maneuver.name} {label}", quiet=options.json) as progress:
-            recordings[label] = run_scenario(scenario, controller, driver=driver, path=path, progress=progress)
+            recordings[label] = run_scenario(scenario, controller, path=path, progress=progress)
         if not options.json:
             print(f"{scenario.maneuver.name} {label}: {path}", file=sys.stderr)
         if problem := recordings[label].metadata.get("metrics_error"):

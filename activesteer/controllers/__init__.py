@@ -1,10 +1,19 @@
 """Active steering controllers: DriverCommand, Measurement -> ActuatorCommand."""
 
 from activesteer.controllers.front_superposition import FrontSuperposition
-from activesteer.controllers.loading import BUILT_IN, CONTROLLER, Controller, find_controller, load_controller
+from activesteer.controllers.loading import (
+    BUILT_IN,
+    CONTROLLER,
+    Controller,
+    find_controller,
+    is_variant,
+    load_controller,
+    system_of,
+)
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
+from activesteer.controllers.variant import read_variant
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
 __all__ = [
@@ -19,5 +28,8 @@ __all__ = [
     "SingleTrack",
     "SingleTrackParameters",
     "find_controller",
+    "is_variant",
     "load_controller",
+    "read_variant",
+    "system_of",
 ]

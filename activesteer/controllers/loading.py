@@ -10,8 +10,10 @@ from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
+from activesteer.controllers.variant import read_variant
 from activesteer.errors import ControllerError, shown
 from activesteer.plugins import Kind, Plugin, find
+from activesteer.resources import list_controller_variants
 from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Measurement
 
 
@@ -38,7 +40,7 @@ class Controller(Protocol):
 
 
 BUILT_IN: Final = {"none": NoControl, "ars": RearSteer, "afs": FrontSuperposition}
-"""Name -> class."""
+"""Name -> class; variants of them are data, see `variant`."""
 
 _MAX_ANGLE_RAD: Final = 1.0
 """No road wheel is steered further by a controller; more is taken for a mistake, such as degrees [rad]."""
@@ -82,6 +84,7 @@ CONTROLLER: Final = _ControllerKind(
     },
     error=ControllerError,
     unchecked=("brake_torque_demand_Nm",),
+    data=list_controller_variants,
 )
 """What controllers have in common."""
 
@@ -90,12 +93,26 @@ def find_controller(given: Any) -> Plugin:
     """Finds a controller; see `activesteer.plugins.find`.
 
     Args:
-        given: `none`, `ars`, `afs`, or a user's own: `path/to/file.py:ClassName`, a class, an object, a factory.
+        given: `none`, `ars`, `afs`; the name of a variant, or its file; or a user's own code:
+            `path/to/file.py:ClassName`, a class, an object, a factory.
 
     Raises:
         ControllerError: there is no such controller.
     """
+    if is_variant(given):
+        variant = read_variant(given)
+        return Plugin(CONTROLLER, variant.name, variant.name, variant, variant.gains, variant.files, ours=True)
     return find(given, CONTROLLER)
+
+
+def is_variant(given: Any) -> bool:
+    """Whether a controller is given as data, by the name of a variant or by its file."""
+    return CONTROLLER.is_data(given)
+
+
+def system_of(given: str) -> str:
+    """The system that a controller is or is a variant of; a user's own code is its own."""
+    return read_variant(given).system if is_variant(given) else given
 
 
 def load_controller(given: Any, setup: ControllerSetup) -> Controller:

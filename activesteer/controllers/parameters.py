@@ -84,9 +84,11 @@ class ControllerSetup:
         gains: Gains and limits from the vehicle file.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
         timestep_s: Time between two calls [s].
+        overridden: Dotted keys of the gains that were replaced for this run.
     """
 
     single_track: SingleTrackParameters
     gains: ControllerParameters
     steering_ratio: float
     timestep_s: float
+    overridden: frozenset[str] = frozenset()

@@ -2,23 +2,24 @@
 
 from activesteer.driver.base import Driver, DriverSetup
 from activesteer.driver.constant_radius import ConstantRadiusDriver
-from activesteer.driver.loading import BUILT_IN, DRIVER, find_driver
+from activesteer.driver.human import HumanDriver
+from activesteer.driver.loading import DEFAULT_DRIVER, DRIVER, find_driver, is_driver_file
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
 from activesteer.driver.path_preview import PathPreviewDriver
 from activesteer.driver.speed_hold import SpeedHold
-from activesteer.driver.standard import StandardDriver
 
 __all__ = [
-    "BUILT_IN",
+    "DEFAULT_DRIVER",
     "DRIVER",
     "ConstantRadiusDriver",
     "Driver",
     "DriverParameters",
     "DriverSetup",
+    "HumanDriver",
     "OpenLoopDriver",
     "PathPreviewDriver",
     "SpeedHold",
-    "StandardDriver",
     "find_driver",
+    "is_driver_file",
 ]

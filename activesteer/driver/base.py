@@ -58,7 +58,7 @@ class DriverSetup:
 
     Attributes:
         single_track: The car as a single-track model sees it, without control.
-        parameters: Gains and limits from the vehicle file.
+        parameters: The driver file: who drives; for a driver of one's own it is that of the default driver.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
         steering_wheel_limit_rad: Lock angle of the steering wheel [rad].
         rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None where there is no rack.

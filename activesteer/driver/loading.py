@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 from activesteer.config import Range
 from activesteer.driver.base import DriverSetup
-from activesteer.driver.standard import StandardDriver
+from activesteer.driver.human import HumanDriver
 from activesteer.errors import DriverError, shown
 from activesteer.plugins import Kind, Plugin, find
+from activesteer.resources import list_drivers
 from activesteer.signals import DriverCommand, WheelTorques
 
-BUILT_IN: Final = {"standard": StandardDriver}
-"""Name -> class."""
+DEFAULT_DRIVER: Final = "typical"
+"""Who drives where nobody is named."""
 
 _MAX_ANGLE_RAD: Final = 50.0
 """No steering wheel turns so far; more is taken for a mistake, such as degrees [rad]."""
@@ -46,7 +49,7 @@ DRIVER: Final = _DriverKind(
     word="driver",
     example="my_file.py:MyDriver",
     inputs="reference, measurement, motion",
-    built_in=BUILT_IN,
+    built_in={},
     result=DriverCommand,
     ranges={
         "steering_wheel_demand_rad": Range(-_MAX_ANGLE_RAD, _MAX_ANGLE_RAD),
@@ -56,6 +59,7 @@ DRIVER: Final = _DriverKind(
     },
     error=DriverError,
     unchecked=("wheel_torques",),
+    data=list_drivers,
 )
 """What drivers have in common."""
 
@@ -64,12 +68,21 @@ def find_driver(given: Any) -> Plugin:
     """Finds a driver; see `activesteer.plugins.find`.
 
     Args:
-        given: `standard`, or a user's own: `path/to/file.py:ClassName`, a class, an object, a factory.
+        given: A name from `list_drivers`, a driver file or its table; or a user's own code:
+            `path/to/file.py:ClassName`, a class, an object, a factory.
 
     Raises:
         DriverError: there is no such driver.
     """
-    return find(given, DRIVER)
+    if not is_driver_file(given):
+        return find(given, DRIVER)
+    name = str(given.get("name", "driver")) if isinstance(given, Mapping) else Path(given).stem
+    return Plugin(DRIVER, name, name, HumanDriver, {}, {}, ours=True)
+
+
+def is_driver_file(given: Any) -> bool:
+    """Whether a driver is given as data, by name, file or table, and not as code."""
+    return isinstance(given, Mapping) or DRIVER.is_data(given)
 
 
 def _are_torques(torques: Any) -> bool:

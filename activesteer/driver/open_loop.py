@@ -39,7 +39,8 @@ class OpenLoopDriver:
     @classmethod
     def from_vehicle(cls, setup: DriverSetup) -> OpenLoopDriver:
         """Makes the driver for a car."""
-        speed_hold = SpeedHold(setup.parameters, setup.drive, setup.wheel_radius_m, setup.timestep_s)
+        mass_kg = setup.single_track.mass_kg
+        speed_hold = SpeedHold(setup.parameters, setup.drive, mass_kg, setup.wheel_radius_m, setup.timestep_s)
         return cls(speed_hold, setup.steering_ratio, setup.steering_wheel_limit_rad, setup.rack_per_steering_wheel_m)
 
     def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:

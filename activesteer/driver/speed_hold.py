@@ -24,17 +24,20 @@ class SpeedHold:
         saturated: Whether the engine's limit was reached, or the foot taken back, in the last step.
     """
 
-    def __init__(self, parameters: DriverParameters, drive: Drive, wheel_radius_m: float, timestep_s: float) -> None:
+    def __init__(
+        self, parameters: DriverParameters, drive: Drive, mass_kg: float, wheel_radius_m: float, timestep_s: float
+    ) -> None:
         """Takes gains and limits.
 
         Args:
             parameters: Gains.
             drive: What the engine can give.
+            mass_kg: Mass of the car, as the driver knows it [kg].
             wheel_radius_m: Radius by which the driver relates the engine's speed to the car's [m].
             timestep_s: Time between two steps [s].
         """
-        self._gain = parameters.speed_gain_Nmspm
-        self._integral_gain = parameters.speed_integral_gain_Nmpm
+        self._gain_Nmspm = parameters.speed_gain_1ps * mass_kg * wheel_radius_m
+        self._integral_gain_Nmpm = parameters.speed_integral_gain_1ps2 * mass_kg * wheel_radius_m
         self._drive = drive
         self._wheel_radius_m = wheel_radius_m
         self._spin_mps = parameters.spin_mps
@@ -61,7 +64,7 @@ class SpeedHold:
             self.reset()
             return 0.0
         error = wanted_mps - speed
-        torque = self._gain * error + self._integral_Nm
+        torque = self._gain_Nmspm * error + self._integral_Nm
         low, high = self._limits(speed, measurement.wheel_speed_radps, torque, 1 if wanted_mps >= 0.0 else -1)
         if torque > high:
             self.saturated = True
@@ -70,7 +73,7 @@ class SpeedHold:
             self.saturated = True
             return low
         self.saturated = False
-        self._integral_Nm += self._integral_gain * error * self._timestep_s
+        self._integral_Nm += self._integral_gain_Nmpm * error * self._timestep_s
         return torque
 
     def _limits(

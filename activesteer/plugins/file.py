@@ -50,9 +50,9 @@ def from_file(text: str, kind: Kind) -> FromFile:
 
     form = _FORM.fullmatch(text)
     if form is None:
-        hint = nearest_names(text, kind.built_in)
+        hint = nearest_names(text, kind.names())
         problem = f"there is no {kind.word} {shown(text)}; {hint} Your own is given as {kind.example}"
-        raise kind.error(problem, value=text, allowed=tuple(kind.built_in))
+        raise kind.error(problem, value=text, allowed=tuple(kind.names()))
     if not form["name"].isidentifier():
         raise fail(f"{shown(form['name'])} cannot be the name of a class; your own is given as {kind.example}")
     path = user_path(form["path"], kind.error)

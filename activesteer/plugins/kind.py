@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -30,6 +31,7 @@ class Kind:
         ranges: Field of the result -> what it may be.
         error: Raised where something is wrong.
         unchecked: Fields of the result that are no plain numbers.
+        data: Gives the names of those that come with it as data files.
     """
 
     word: str
@@ -40,12 +42,21 @@ class Kind:
     ranges: Mapping[str, Range]
     error: type[ActiveSteerError]
     unchecked: tuple[str, ...] = ()
+    data: Callable[[], list[str]] = list
     _places: tuple[tuple[int, float, float], ...] = field(init=False)
 
     def __post_init__(self) -> None:
         """Looks up where the fields stand: they are checked in every step."""
         fields = self.result._fields
         object.__setattr__(self, "_places", tuple((fields.index(key), *limits) for key, limits in self.ranges.items()))
+
+    def names(self) -> list[str]:
+        """Names of all that come with the package."""
+        return [*self.built_in, *self.data()]
+
+    def is_data(self, given: Any) -> bool:
+        """Whether one is given as data: by the name of such a file, or by its path."""
+        return isinstance(given, (str, os.PathLike)) and (os.fspath(given).endswith(".toml") or given in self.data())
 
     def fail(self, name: str, problem: str, value: Any = None, allowed: Any = None) -> ActiveSteerError:
         """The error that says what is wrong with a block.

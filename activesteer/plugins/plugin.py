@@ -31,7 +31,8 @@ class Plugin:
         label: How it is called in tables and names of files, as `MyController-gain=2`.
         origin: What it is made from: a class, a function, or an object that is copied.
         parameters: What it is made with, by name.
-        files: The user's file, to be kept with the recording.
+        files: The file that it is in, to be kept with the recording.
+        ours: Whether its code is the package's own, which needs no watching.
     """
 
     kind: Kind
@@ -40,6 +41,7 @@ class Plugin:
     origin: Any
     parameters: Mapping[str, Any]
     files: Mapping[str, bytes]
+    ours: bool = False
 
     def make(self, setup: Any) -> Any:
         """Makes the block, always in the state in which it was given: nothing is carried over from one run to the next.
@@ -54,7 +56,7 @@ class Plugin:
             ActiveSteerError: of the kind's type: it cannot be made.
         """
         kind, origin = self.kind, self.origin
-        if origin is kind.built_in.get(self.name):
+        if self.ours:
             return origin.from_vehicle(setup)
         try:
             made = self._made(setup)
@@ -133,16 +135,16 @@ def find(given: Any, kind: Kind) -> Plugin:
         given = os.fspath(given)
     if isinstance(given, str):
         if given in kind.built_in:
-            return Plugin(kind, given, given, kind.built_in[given], {}, {})
+            return Plugin(kind, given, given, kind.built_in[given], {}, {}, ours=True)
         path, content, origin, parameters = from_file(given, kind)
         _check_parameters(origin, parameters, given, kind)
         label = "-".join([given.partition("?")[0].rpartition(":")[2], *(f"{k}={v}" for k, v in parameters.items())])
         return Plugin(kind, given, re.sub(r"[^\w=.+-]+", "_", label), origin, parameters, {path.name: content})
     if not is_instance(given) and not callable(given):
-        names = ", ".join(kind.built_in)
+        names = ", ".join(kind.names())
         needed = f"a name ({names}), a file ({kind.example}), a class, an object with the method step({kind.inputs})"
         problem = f"is {shown(given)}; {needed}, or a function that makes one is needed"
-        raise kind.fail("", problem, given, tuple(kind.built_in))
+        raise kind.fail("", problem, given, tuple(kind.names()))
     return _from_object(given, kind)
 
 

@@ -6,12 +6,11 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from activesteer.config import Range, Source, build, checked_number, read_toml
 from activesteer.controllers import ControllerParameters, SingleTrackParameters
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.driver import DriverParameters
 from activesteer.errors import ActiveSteerError, ModelError, ParameterError, TyreFileError, nearest_names, shown
 from activesteer.files import is_file, read_bytes, user_path
 from activesteer.resources import find_vehicle, models_dir
@@ -28,16 +27,18 @@ TIMESTEP_RANGE_S: Final = Range(1e-4, 5e-3)
 FileOrTable = str | os.PathLike[str] | Mapping[str, Any]
 
 
+_DRIVER_HINT: Final = "who drives is no matter of the car: see models/drivers, --driver and --set driver.preview_s=1.2"
+
+
 @dataclass(frozen=True, kw_only=True)
 class VehicleConfig(VehicleParameters):
-    """A whole vehicle file: the car, what the controllers know of it, and who drives it."""
+    """A whole vehicle file: the car, and what the controllers know of it."""
 
     single_track: SingleTrackParameters
     """The car as the controllers see it."""
     controllers: ControllerParameters = ControllerParameters()
     """Gains and limits."""
-    driver: DriverParameters = DriverParameters()
-    """Gains and limits."""
+    KEY_HINTS: ClassVar = VehicleParameters.KEY_HINTS | {"driver": _DRIVER_HINT}
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ def read_table(
 
     Args:
         given: Name, path, or the table itself.
-        part: `maneuver` or `vehicle`.
+        part: `maneuver`, `vehicle` or `driver`.
         find: Name or path -> file.
         error: Class of the errors to raise.
 

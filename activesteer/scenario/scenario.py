@@ -1,4 +1,4 @@
-"""What is driven, by which car: a manoeuvre and a car with their overrides, checked before anything runs."""
+"""What is driven, by which car and driver: all three with their overrides, checked before anything runs."""
 
 from __future__ import annotations
 
@@ -6,37 +6,44 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Final
 
-from activesteer.config import check_overruled, field_in_unit, key_hint, key_paths, leaf_keys, to_table
-from activesteer.controllers import ControllerSetup
-from activesteer.driver import DriverSetup
+from activesteer.config import check_overruled, field_in_unit, field_path, key_hint, key_paths, leaf_keys, to_table
+from activesteer.controllers import ControllerParameters, ControllerSetup
+from activesteer.driver import DEFAULT_DRIVER, DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, nearest_names
 from activesteer.maneuver import Maneuver, build_maneuver, filled_from_csv, maneuver_class
 from activesteer.resources import find_maneuver
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
+from activesteer.scenario.driver import ChosenDriver, driver_with
 from activesteer.scenario.overrides import Override, applied, plain
 from activesteer.vehicle.powertrain import Drive
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A manoeuvre and a car, ready to run.
+    """A manoeuvre, a car and a driver, ready to run.
 
     Attributes:
         maneuver: The manoeuvre.
         car: The car.
-        overrides: What was changed against the files of both.
+        driver: Who drives it.
+        overrides: What was changed against their files.
         files: What it was made from, by name, to be kept with the recording.
     """
 
     maneuver: Maneuver
     car: Car
+    driver: ChosenDriver
     overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
 
     def controller_setup(self, timestep_s: float) -> ControllerSetup:
         """What controllers may know."""
-        car = self.car.config
-        return ControllerSetup(car.single_track, car.controllers, car.steering.ratio, timestep_s)
+        car, replaced = self.car.config, set()
+        for key in self.overrides:
+            first, *rest = key.removeprefix("vehicle.").split(".")
+            if first == "controllers":
+                replaced |= {".".join(field_path(ControllerParameters, rest))}
+        return ControllerSetup(car.single_track, car.controllers, car.steering.ratio, timestep_s, frozenset(replaced))
 
     def driver_setup(
         self, timestep_s: float, rack_per_steering_wheel_m: float | None, wheel_radius_m: float
@@ -44,16 +51,19 @@ class Scenario:
         """What drivers may know."""
         car = self.car.config
         return DriverSetup(
-            car.single_track, car.driver, car.steering.ratio, car.steering.steering_wheel_limit_rad,
+            car.single_track, self.driver.parameters, car.steering.ratio, car.steering.steering_wheel_limit_rad,
             rack_per_steering_wheel_m, Drive(car.powertrain), wheel_radius_m, timestep_s,
         )  # fmt: skip
 
 
-_PARTS: Final = ("maneuver", "vehicle")
+_PARTS: Final = ("maneuver", "vehicle", "driver")
 
 
 def resolve(
-    maneuver: FileOrTable, vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | None = None
+    maneuver: FileOrTable,
+    vehicle: FileOrTable = "compact",
+    overrides: Mapping[str, Any] | None = None,
+    driver: Any = DEFAULT_DRIVER,
 ) -> Scenario:
     """Reads and checks everything that a run needs.
 
@@ -61,13 +71,15 @@ def resolve(
         maneuver: Name, path, or table of a manoeuvre.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value: `speed_kmh`, `road.mu`, `controllers.ars.limit_deg`; with `maneuver.` or
-            `vehicle.` in front where both have such a key.
+            `vehicle.` in front where both have such a key, and `driver.` in front of keys of the driver.
+        driver: Name, path or table of a driver, or a user's own code; see `find_driver`.
 
     Returns:
         The scenario.
 
     Raises:
         ManeuverError: the manoeuvre is not found or wrong.
+        DriverError: the driver is not found or wrong.
         ParameterError: the vehicle is not found or wrong, or an override names a key that does not exist.
         ModelError: the model file is not found.
         TyreFileError: a tyre file is not found or wrong.
@@ -95,11 +107,13 @@ def resolve(
     if any(field.name == "vehicle_width_m" for field in fields(kind)):
         table = {"vehicle_width_m": car.config.width_m, **table}
     table, csv_files = filled_from_csv(table, folder, source)
-    return Scenario(build_maneuver(table, source), car, changes, files | csv_files | car.files)
+    who = driver_with(driver, sorted_out["driver"])
+    made_from = {**files, **csv_files, **car.files, **who.files}
+    return Scenario(build_maneuver(table, source), car, who, changes, made_from)
 
 
 def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
-    """Whether an override is meant for the manoeuvre or for the vehicle, and the key inside it."""
+    """Whether an override is meant for the manoeuvre, the vehicle or the driver, and the key inside it."""
     first, *rest = key.split(".")
     if first in _PARTS and rest:
         return first, rest
@@ -108,7 +122,7 @@ def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
     dotted = key + "."
     holders = [
         part
-        for part in _PARTS
+        for part in paths
         if any(f"{path}.".startswith(dotted) or dotted.startswith(f"{path}.") for path in paths[part])
     ]
     if len(holders) == 1:
@@ -116,14 +130,15 @@ def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
     if holders:
         problem = f"both manoeuvre and vehicle have this key; say maneuver.{key} or vehicle.{key}"
         raise ParameterError(problem, key=key, overridden=True)
-    known = [f"{part}.{path}" for part in _PARTS for path in paths[part]] + paths["maneuver"] + paths["vehicle"]
+    known = [f"{part}.{path}" for part in paths for path in paths[part]] + paths["maneuver"] + paths["vehicle"]
+    known += [f"driver.{path}" for path in key_paths(DriverParameters)]
     help_ = key_hint(kind, key) or key_hint(VehicleConfig, key) or nearest_names(key, known)
-    problem = f"neither manoeuvre nor vehicle has such a key; {help_}"
+    problem = f"neither manoeuvre nor vehicle nor driver has such a key; {help_}"
     raise ParameterError(problem, key=key, allowed=known, overridden=True)
 
 
 def value_of(scenario: Scenario, key: str) -> Any:
-    """What a key of the manoeuvre or of the vehicle is in a scenario.
+    """What a key of the manoeuvre, the vehicle or the driver is in a scenario.
 
     Args:
         scenario: The scenario.
@@ -136,7 +151,9 @@ def value_of(scenario: Scenario, key: str) -> Any:
         ParameterError: there is no such key, or there is nothing behind it.
     """
     part, path = _which_part(key, type(scenario.maneuver))
-    value: Any = scenario.maneuver if part == "maneuver" else scenario.car.config
+    value: Any = {"maneuver": scenario.maneuver, "vehicle": scenario.car.config, "driver": scenario.driver.parameters}[
+        part
+    ]
     factor = 1.0
     for name in path:
         if isinstance(value, tuple) and name.isdigit() and int(name) < len(value):
@@ -155,5 +172,6 @@ def describe(scenario: Scenario) -> dict[str, Any]:
     return {
         "maneuver": to_table(scenario.maneuver),
         "vehicle": to_table(scenario.car.config),
+        "driver": scenario.driver.to_table(),
         "overrides": dict(scenario.overrides),
     }

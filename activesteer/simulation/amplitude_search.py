@@ -57,7 +57,7 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
     Raises:
         ManeuverError: no angle gives what is asked for.
     """
-    probed = replace(scenario, maneuver=search.probe)
+    probed = replace(scenario, maneuver=search.probe, driver=scenario.driver.for_searches())
     key = _key(probed, search, timestep_s)
     angle = amplitude_store.recall(key)
     if angle is None:
@@ -82,6 +82,7 @@ def _key(scenario: Scenario, search: Search, timestep_s: float) -> str:
     parts = {
         "model": hashlib.sha256(compiled_model.tobytes()).hexdigest(),
         "car": to_table(scenario.car.config) | {"controllers": None},
+        "driver": to_table(scenario.driver.parameters) | {"name": "", "title": ""},
         "search": [type(search).__name__, to_table(search.probe), search.lateral_acceleration_mps2, timestep_s],
         "code": [__version__, content_key(Path(__file__)), platform.platform(), processor()],
     }

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from activesteer.controllers import Controller, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.driver import Driver, find_driver
+from activesteer.driver import Driver
 from activesteer.faults import Fault
 from activesteer.scenario import Scenario
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
@@ -55,16 +55,13 @@ class ClosedLoop:
         scenario: Scenario,
         controller: Any = "none",
         timestep_s: float = DEFAULT_TIMESTEP_S,
-        *,
-        driver: Any = "standard",
     ) -> None:
         """Builds the blocks and lets the car settle at the speed of the manoeuvre, at the origin of the road.
 
         Args:
-            scenario: Manoeuvre and car.
+            scenario: Manoeuvre, car and driver.
             controller: The controller; see `activesteer.plugins.find`.
             timestep_s: Step of engine, driver and controller [s].
-            driver: The driver, likewise.
 
         Raises:
             ModelError: the car cannot be built.
@@ -76,7 +73,7 @@ class ClosedLoop:
         self.vehicle = vehicle = scenario.car.on(maneuver.road, timestep_s)
         self.driver_setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
         self.controller_setup = scenario.controller_setup(timestep_s)
-        self.driver: Driver = find_driver(driver).make(self.driver_setup)
+        self.driver: Driver = scenario.driver.plugin.make(self.driver_setup)
         self.controller: Controller = find_controller(controller).make(self.controller_setup)
         settling, steps = maneuver.settling_reference(), round(maneuver.settle_s / timestep_s)
         self.measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)

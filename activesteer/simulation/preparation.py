@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from activesteer.controllers import find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.recording import Recording
 from activesteer.scenario import Scenario
@@ -42,4 +43,4 @@ def _test_drive(scenario: Scenario) -> Recording:
     loop = ClosedLoop(scenario)
     recorder = Recorder(loop.vehicle, loop.steps)
     loop.run(recorder)
-    return RunContext.of(scenario, loop.vehicle).recording(recorder)
+    return RunContext.of(scenario, loop.vehicle, find_controller("none")).recording(recorder)

@@ -36,11 +36,11 @@ class RunContext(NamedTuple):
     scene: tuple[ScenePart, ...]
 
     @classmethod
-    def of(cls, scenario: Scenario, vehicle: Vehicle, *plugins: Plugin) -> RunContext:
+    def of(cls, scenario: Scenario, vehicle: Vehicle, controller: Plugin) -> RunContext:
         """Collects it."""
         metadata = {
-            **{plugin.kind.word: plugin.name for plugin in plugins},
-            **{f"{plugin.kind.word}_parameters": dict(plugin.parameters) for plugin in plugins if plugin.parameters},
+            "controller": controller.name,
+            **({"controller_parameters": dict(controller.parameters)} if controller.parameters else {}),
             **describe(scenario),
             "car": vehicle.dimensions(),
             "timestep_s": vehicle.timestep_s,
@@ -48,7 +48,7 @@ class RunContext(NamedTuple):
         }
         if (course := scenario.maneuver.course) is not None:
             metadata["course"] = course.to_table()
-        files = scenario.files | {name: text for plugin in plugins for name, text in plugin.files.items()}
+        files = {**scenario.files, **controller.files}
         return cls(vehicle.channels.channels, vehicle.body_names, metadata, files, scene_of(vehicle.model))
 
     def recording(self, recorder: Recorder) -> Recording:

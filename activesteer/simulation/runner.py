@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.driver import DEFAULT_DRIVER
 from activesteer.errors import ActiveSteerError
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, Scenario
@@ -20,7 +21,7 @@ def simulate(
     vehicle: FileOrTable = "compact",
     overrides: Mapping[str, Any] | None = None,
     *,
-    driver: Any = "standard",
+    driver: Any = DEFAULT_DRIVER,
     timestep_s: float = DEFAULT_TIMESTEP_S,
 ) -> Recording:
     """Drives a manoeuvre and returns what happened.
@@ -31,7 +32,7 @@ def simulate(
             works on a copy of it), or a function that makes one; see `activesteer.plugins.find`.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value, as `{"speed_kmh": 100, "road.mu": 0.4, "controllers.ars.limit_deg": 2}`.
-        driver: `standard`, or a user's own in the same forms as a controller.
+        driver: Name, path or table of a driver, or a user's own code in the same forms as a controller.
         timestep_s: Step of engine, driver and controller [s].
 
     Returns:
@@ -58,7 +59,6 @@ def run_scenario(
     scenario: Scenario,
     controller: Any = "none",
     *,
-    driver: Any = "standard",
     path: Path | None = None,
     timestep_s: float = DEFAULT_TIMESTEP_S,
     progress: Callable[[float], None] | None = None,
@@ -68,7 +68,6 @@ def run_scenario(
     Args:
         scenario: What to run; see `activesteer.simulation.preparation`.
         controller: The controller, as in `simulate`.
-        driver: The driver, likewise.
         path: MCAP file to write.
         timestep_s: Step of the simulation [s].
         progress: Called about every simulated second with the share that is done, 0 to 1.
@@ -81,7 +80,7 @@ def run_scenario(
     Raises:
         ActiveSteerError: the run failed. What was recorded until then is in the file, and in the error's `recording`.
     """
-    return _driven(Simulation(scenario, controller, driver=driver, timestep_s=timestep_s), path, progress)
+    return _driven(Simulation(scenario, controller, timestep_s=timestep_s), path, progress)
 
 
 def _driven(

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 from activesteer.analysis.metrics import metrics
 from activesteer.controllers import CONTROLLER, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.driver import DRIVER, find_driver
+from activesteer.driver import DEFAULT_DRIVER, DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
 from activesteer.recording import McapWriter, Recording
 from activesteer.scenario import FileOrTable, Scenario, resolve
@@ -50,7 +50,7 @@ class Simulation:
     """A manoeuvre that is driven as far as one asks: `simulate`, step by step.
 
     Attributes:
-        scenario: Manoeuvre and car.
+        scenario: Manoeuvre, car and driver.
         loop: The blocks: `loop.driver`, `loop.controller`, `loop.vehicle`, and what they may know of the car.
         context: What its recording holds beside the rows.
 
@@ -70,31 +70,33 @@ class Simulation:
         vehicle: FileOrTable = "compact",
         overrides: Mapping[str, Any] | None = None,
         *,
-        driver: Any = "standard",
+        driver: Any = DEFAULT_DRIVER,
         timestep_s: float = DEFAULT_TIMESTEP_S,
     ) -> None:
         """Builds the car and lets it settle, as `simulate` does; the arguments are the same.
 
         Args:
-            maneuver: Name, path, or table of a manoeuvre; or a prepared `Scenario`, which holds vehicle and
-                overrides already; see `activesteer.simulation.preparation.prepared`.
+            maneuver: Name, path, or table of a manoeuvre; or a prepared `Scenario`, which holds vehicle,
+                driver and overrides already; see `activesteer.simulation.preparation.prepared`.
             controller: Name of a controller, or a user's own.
             vehicle: Name, path, or table of a vehicle.
             overrides: Dotted key -> value.
-            driver: `standard`, or a user's own.
+            driver: Name, path or table of a driver, or a user's own code.
             timestep_s: Step of engine, driver and controller [s].
 
         Raises:
             ActiveSteerError: an input is wrong, or the car does not settle.
         """
-        controller, driver = find_controller(controller), find_driver(driver)
+        controller = find_controller(controller)
         if not isinstance(maneuver, Scenario):
-            maneuver = prepared(resolve(maneuver, vehicle, overrides), timestep_s)
-        elif overrides or vehicle != "compact":
-            raise ParameterError("a Scenario has its vehicle and overrides already", key="vehicle, overrides")
+            maneuver = prepared(resolve(maneuver, vehicle, overrides, driver), timestep_s)
+        elif overrides or vehicle != "compact" or driver != DEFAULT_DRIVER:
+            raise ParameterError(
+                "a Scenario has its vehicle, driver and overrides already", key="vehicle, driver, overrides"
+            )
         self.scenario = maneuver
-        self.loop = ClosedLoop(self.scenario, controller, timestep_s, driver=driver)
-        self.context = RunContext.of(self.scenario, self.loop.vehicle, controller, driver)
+        self.loop = ClosedLoop(self.scenario, controller, timestep_s)
+        self.context = RunContext.of(self.scenario, self.loop.vehicle, controller)
         self._given: dict[str, int] = {}
         self._failure: BaseException | None = None
         self._writer: McapWriter | None = None

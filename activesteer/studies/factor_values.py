@@ -80,7 +80,7 @@ class FactorValues:
         if place not in self._nominal:
             study = self.study
             label = label_of(study.maneuvers[maneuver])
-            scenario = resolve(study.maneuvers[maneuver], study.vehicles[vehicle], study.overrides)
+            scenario = resolve(study.maneuvers[maneuver], study.vehicles[vehicle], study.overrides, study.driver)
             relative = {
                 key: value_of(scenario, key)
                 for key, factor in self._factors.items()

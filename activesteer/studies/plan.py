@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.claims import SYSTEMS
-from activesteer.controllers import load_controller
+from activesteer.controllers import load_controller, system_of
 from activesteer.errors import ActiveSteerError, nearest_names, shown
 from activesteer.scenario import Scenario, describe, resolve
 from activesteer.studies.design import Samples
@@ -54,6 +54,7 @@ class Plan:
         }
         self.settings = Settings(
             **labelled,
+            driver=study.driver,
             overrides=study.overrides,
             seed=study.seed,
             timestep_s=study.timestep_s,
@@ -143,7 +144,7 @@ def _resolved(
     study, (maneuver, vehicle) = factor_values.study, place
     items = study.maneuvers[maneuver], study.vehicles[vehicle]
     try:
-        return resolve(*items, study.overrides | factor_values.overrides(*place, sample))
+        return resolve(*items, study.overrides | factor_values.overrides(*place, sample), study.driver)
     except ActiveSteerError as error:
         error.add_note(f"in {label_of(items[0])} with {label_of(items[1])}" + (f", factor {key}" if key else ""))
         raise
@@ -204,14 +205,14 @@ def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
         return True
     if first in _LABELS:
         return False
-    others = [name for name in controllers if name != "none"]
+    others = [system_of(name) for name in controllers if name != "none"]
     own = any(":" in name for name in controllers)  # a user's controller may look at everything
     if part == "vehicle" and first == "controllers":
         return own or rest[0] in others or (rest[0] == "desired_yaw_rate" and bool(others))
-    if part == "vehicle" and first == "single_track":
+    if part == "vehicle" and first == "single_track" and rest[0] != "mass_kg":  # which the speed hold knows too
         return bool(others) or follows_path or scenario.maneuver.settling_reference().curvature_demand_1pm is not None
-    if part == "vehicle" and first == "driver":
-        return follows_path or rest[0].startswith("speed_")
+    if part == "driver":
+        return not scenario.driver.plugin.ours or follows_path or first.startswith("speed_")
     return True
 
 

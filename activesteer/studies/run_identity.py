@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
 
+from activesteer.controllers import is_variant, read_variant
 from activesteer.plugins.file import source_of
 from activesteer.scenario import Scenario, describe
 from activesteer.version import __version__
@@ -68,7 +69,8 @@ def files_digest(scenario: Scenario) -> str:
 def controller_digest(controller: str) -> str:
     """Hash of a controller: its name and parameters, and the source where it is a user's own."""
     path, _, name = controller.partition(":")
-    return digest({"name": f"{Path(path).name}:{name}", "source": source_of(controller)})
+    source = read_variant(controller).files if is_variant(controller) else source_of(controller)
+    return digest({"name": f"{Path(path).name}:{name}", "source": source})
 
 
 def run_id(scenario: Scenario, controller: str, seed: int, timestep_s: float) -> str:

@@ -55,6 +55,7 @@ class Settings:
         maneuvers: Label and name, path or table of each manoeuvre.
         vehicles: The same of each vehicle.
         controllers: Label and name or file of each controller.
+        driver: Name, path or table of who drives, or his code.
         overrides: What is the same in all runs.
         seed: Of the study.
         timestep_s: Step of the simulation [s].
@@ -70,6 +71,7 @@ class Settings:
     maneuvers: tuple[tuple[str, FileOrTable], ...]
     vehicles: tuple[tuple[str, FileOrTable], ...]
     controllers: tuple[tuple[str, str], ...]
+    driver: FileOrTable
     overrides: dict[str, Any]
     seed: int
     timestep_s: float
@@ -115,7 +117,7 @@ def present_inputs(settings: Settings) -> dict[str, str]:
     found = {f"version of {key}": value for key, value in deciding_versions().items()}
     for maneuver, maneuver_file in settings.maneuvers:
         for vehicle, vehicle_file in settings.vehicles:
-            scenario = resolve(maneuver_file, vehicle_file, settings.overrides)
+            scenario = resolve(maneuver_file, vehicle_file, settings.overrides, settings.driver)
             found[f"files of {maneuver} and {vehicle}"] = files_digest(scenario)
     for label, controller in settings.controllers:
         found[f"controller {label}"] = controller_digest(controller)
@@ -173,7 +175,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
     first = requests[0]
     maneuver, vehicle = settings.maneuvers[first.maneuver], settings.vehicles[first.vehicle]
     try:
-        scenario = resolve(maneuver[1], vehicle[1], first.overrides)
+        scenario = resolve(maneuver[1], vehicle[1], first.overrides, settings.driver)
         if not any(isinstance(value, str) for value in first.factors.values()):
             key = f"files of {maneuver[0]} and {vehicle[0]}"
             if files_digest(scenario) != settings.expected[key]:

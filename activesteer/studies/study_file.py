@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from activesteer.config import Source, build, read_toml
 from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.driver import DEFAULT_DRIVER
 from activesteer.errors import StudyError, nearest_names, shown
 from activesteer.files import user_path
 from activesteer.resources import find_study
@@ -20,8 +21,8 @@ from activesteer.studies.design import DesignTable, Samples, cases, choose_desig
 from activesteer.studies.factors import Factor, read_factor
 
 _KEYS: Final = (
-    "title", "maneuvers", "controllers", "vehicles", "overrides", "factors", "design", "seed", "metrics", "recordings",
-    "curves", "claims", "timestep_s", "tune",
+    "title", "maneuvers", "controllers", "vehicles", "driver", "overrides", "factors", "design", "seed", "metrics",
+    "recordings", "curves", "claims", "timestep_s", "tune",
 )  # fmt: skip
 _KEPT: Final = ("none", "failed", "all")
 
@@ -34,6 +35,7 @@ class StudyFile:
         maneuvers: Names, paths or tables of manoeuvres.
         controllers: Names or files of controllers.
         vehicles: Names, paths or tables of vehicles.
+        driver: Name, path or table of who drives, or his code.
         overrides: What is the same in all runs: dotted key -> value.
         factors: What is varied.
         design: In which combinations.
@@ -52,6 +54,7 @@ class StudyFile:
     maneuvers: tuple[FileOrTable, ...]
     controllers: tuple[str, ...] = ("none",)
     vehicles: tuple[FileOrTable, ...] = ("compact",)
+    driver: FileOrTable = DEFAULT_DRIVER
     overrides: dict[str, Any] = field(default_factory=dict)
     factors: tuple[Factor, ...] = ()
     design: DesignTable = DesignTable()
@@ -87,6 +90,7 @@ class StudyFile:
             "maneuvers": list(self.maneuvers),
             "controllers": list(self.controllers),
             "vehicles": list(self.vehicles),
+            "driver": self.driver,
             "seed": self.seed,
             "timestep_s": self.timestep_s,
             "recordings": {"every": self.recordings} if isinstance(self.recordings, int) else self.recordings,
@@ -146,7 +150,8 @@ def read_study(given: FileOrTable | StudyFile) -> StudyFile:
     read = {
         "maneuvers": lambda value: tuple(_located(item, folder) for item in _items(value, (str, Mapping))),
         "vehicles": lambda value: tuple(_located(item, folder) for item in _items(value, (str, Mapping))),
-        "controllers": lambda value: tuple(_located_controller(item, folder) for item in _items(value, (str,))),
+        "driver": lambda value: _located_code(_typed(value, (str, Mapping), "a name, a file or a table"), folder),
+        "controllers": lambda value: tuple(_located_code(item, folder) for item in _items(value, (str,))),
         "metrics": lambda value: tuple(_items(value, (str,))),
         "curves": lambda value: tuple(_items(value, (str,))),
         "overrides": lambda value: dict(_typed(value, Mapping, "a table")),
@@ -250,10 +255,13 @@ def _located(item: FileOrTable, folder: Path) -> FileOrTable:
     return str((folder / user_path(text, StudyError)).resolve()) if is_path else text
 
 
-def _located_controller(item: str, folder: Path) -> str:
-    name, mark, parameters = item.partition("?")
+def _located_code(item: Any, folder: Path) -> Any:
+    """The same of what may be `my_file.py:MyController?gain=2` too."""
+    name, mark, parameters = ("", "", "") if isinstance(item, Mapping) else item.partition("?")
     path, colon, class_name = name.rpartition(":")
-    return f"{(folder / user_path(path, StudyError)).resolve()}:{class_name}{mark}{parameters}" if colon else item
+    if not colon:
+        return _located(item, folder)
+    return f"{(folder / user_path(path, StudyError)).resolve()}:{class_name}{mark}{parameters}"
 
 
 def _toml(value: Any) -> str:

@@ -72,10 +72,10 @@ def test_own_controller_keeps_the_car_from_spinning() -> None:
 
 def test_own_driver_keeps_the_lane_change_but_cuts_it() -> None:
     runs = example("own_driver")["compare"]()
-    standard, own = (runs[name].metrics for name in ("standard", "pure pursuit"))
+    typical, own = (runs[name].metrics for name in ("typical", "pure pursuit"))
     assert own["speed_end_mps"] > 15.0
-    # A single point ahead: the corners of the path are cut, more than by the standard driver and by less than a lane.
-    assert standard["track_deviation_max_m"] < own["track_deviation_max_m"] < 2.0
+    # A single point ahead: the corners of the path are cut, more than by the typical driver and by less than a lane.
+    assert typical["track_deviation_max_m"] < own["track_deviation_max_m"] < 2.0
 
 
 def test_own_loop_drives_the_car_into_its_turn() -> None:

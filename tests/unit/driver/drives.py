@@ -1,7 +1,14 @@
 """An engine for drivers without a car."""
 
+from activesteer.driver import DriverParameters
 from activesteer.vehicle.parameters import Powertrain
 from activesteer.vehicle.powertrain import Drive
 
 ENGINE = Powertrain(front_share=1.0, max_torque_Nm=1900.0, max_power_W=100e3, engine_brake_torque_Nm=350.0)
 DRIVE = Drive(ENGINE)
+
+
+def parameters(**changed: float) -> DriverParameters:
+    """A driver of round numbers."""
+    known = {"preview_s": 1.3, "reaction_delay_s": 0.2, "neuromuscular_lag_s": 0.1, "steering_rate_limit_radps": 15.0}
+    return DriverParameters(**{**known, **changed})

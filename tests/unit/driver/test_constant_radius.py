@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from activesteer.driver import ConstantRadiusDriver, DriverParameters, OpenLoopDriver, SpeedHold
+from activesteer.driver import ConstantRadiusDriver, OpenLoopDriver, SpeedHold
 from activesteer.signals import Measurement, Motion, Reference
-from tests.unit.driver.drives import DRIVE
+from tests.unit.driver.drives import DRIVE, parameters
 
 RATIO, WHEELBASE_M, LOCK_RAD, SPEED_MPS, STEP_S = 16.0, 2.6, 8.0, 15.0, 0.001
 MOTION = Motion(0.0, 0.0, 0.0, SPEED_MPS, 0.0, 0.0)
@@ -15,7 +15,7 @@ UNDERSTEER = 1.4
 
 
 def driver() -> ConstantRadiusDriver:
-    hold = SpeedHold(DriverParameters(), DRIVE, 0.31, STEP_S)
+    hold = SpeedHold(parameters(), DRIVE, 1430.0, 0.31, STEP_S)
     return ConstantRadiusDriver(OpenLoopDriver(hold, RATIO, LOCK_RAD), WHEELBASE_M, STEP_S)
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from activesteer.driver import DriverParameters, OpenLoopDriver, SpeedHold
+from activesteer.driver import OpenLoopDriver, SpeedHold
 from activesteer.signals import Measurement, Motion, Reference
-from tests.unit.driver.drives import DRIVE
+from tests.unit.driver.drives import DRIVE, parameters
 
 MASS_KG, RADIUS_M = 1400.0, 0.31
 MOTION = Motion(0.0, 0.0, 0.0, 20.0, 0.0, 0.0)
 
 
 def speed_hold(timestep_s: float = 0.001) -> SpeedHold:
-    return SpeedHold(DriverParameters(), DRIVE, RADIUS_M, timestep_s)
+    return SpeedHold(parameters(), DRIVE, MASS_KG, RADIUS_M, timestep_s)
 
 
 def driver() -> OpenLoopDriver:
@@ -43,7 +43,8 @@ def test_speed_is_held_against_drag_without_an_error_that_stays():
 
 
 def test_speed_error_is_answered_in_proportion():
-    assert speed_hold().step(20.0, at(19.9)) == pytest.approx(0.1 * DriverParameters().speed_gain_Nmspm)
+    accelerated_mps2 = speed_hold().step(20.0, at(19.9)) / RADIUS_M / MASS_KG
+    assert accelerated_mps2 == pytest.approx(0.1 * parameters().speed_gain_1ps)
 
 
 @pytest.mark.parametrize(
@@ -122,7 +123,7 @@ def test_reversing_car_is_driven_backwards_and_braked_forwards_by_the_engine():
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_foot_goes_back_while_wheels_spin_and_returns_slowly_when_they_roll(side):
-    block, known = speed_hold(), DriverParameters()
+    block, known = speed_hold(), parameters()
     asked = block.step(side * 20.0, at(side * 10.0))
     spinning = [block.step(side * 20.0, at(side * 10.0, side * 8.0)) for _ in range(round(1e3 * known.foot_lag_s))]
     assert block.saturated

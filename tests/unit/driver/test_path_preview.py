@@ -11,6 +11,7 @@ from activesteer.driver import DriverParameters, OpenLoopDriver, PathPreviewDriv
 from activesteer.road.path import Path
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 from tests.unit.driver.drives import DRIVE
+from tests.unit.driver.drives import parameters as somebody
 
 RATIO, LOCK_RAD, TIMESTEP_S = 16.0, 8.0, 0.001
 STRAIGHT = Path.through([0.0, 300.0], [0.0, 0.0])
@@ -26,8 +27,8 @@ def matrices(speed_mps: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def driver(parameters: DriverParameters | None = None) -> PathPreviewDriver:
-    known = parameters or DriverParameters()
-    robot = OpenLoopDriver(SpeedHold(known, DRIVE, 0.31, TIMESTEP_S), RATIO, LOCK_RAD)
+    known = parameters or somebody()
+    robot = OpenLoopDriver(SpeedHold(known, DRIVE, 1430.0, 0.31, TIMESTEP_S), RATIO, LOCK_RAD)
     return PathPreviewDriver(robot, matrices, known, TIMESTEP_S)
 
 
@@ -77,7 +78,7 @@ def test_he_is_the_same_to_both_sides() -> None:
 
 
 def test_nothing_happens_within_the_reaction_delay() -> None:
-    known = DriverParameters(reaction_delay_s=0.2, neuromuscular_lag_s=0.1)
+    known = somebody(reaction_delay_s=0.2, neuromuscular_lag_s=0.1)
     angles = np.array(answer_to(driver(parameters=known), seen(y_m=1.0), 0.6))
     assert not angles[:200].any()
     assert angles[200] != 0.0
@@ -86,7 +87,7 @@ def test_nothing_happens_within_the_reaction_delay() -> None:
 
 
 def test_the_rate_limit_is_kept_and_told() -> None:
-    known = DriverParameters(steering_rate_limit_radps=2.0)
+    known = somebody(steering_rate_limit_radps=2.0)
     block = driver(parameters=known)
     angles = answer_to(block, seen(y_m=5.0), 0.5)
     assert np.abs(np.diff(angles)).max() == pytest.approx(2.0 * TIMESTEP_S)

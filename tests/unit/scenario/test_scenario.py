@@ -17,6 +17,7 @@ import pytest
 
 import activesteer
 from activesteer.config import key_paths
+from activesteer.driver import DriverParameters
 from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError, TyreFileError
 from activesteer.maneuver import KINDS, StepSteer
 from activesteer.resources import find_vehicle, list_maneuvers, list_vehicles, models_dir
@@ -69,7 +70,7 @@ def test_overrides_reach_manoeuvre_and_vehicle_in_any_unit():
             "road.mu": 0.4,
             "maneuver.title": "slow",
             "controllers.ars.limit_deg": 2,
-            "vehicle.driver.speed_gain_Nmspm": 1000.0,
+            "driver.speed_gain_1ps": 3.0,
             "factors.mass": 1.1,
         },
     )
@@ -77,7 +78,7 @@ def test_overrides_reach_manoeuvre_and_vehicle_in_any_unit():
     assert scenario.maneuver.road.mu == 0.4
     assert scenario.maneuver.title == "slow"
     assert scenario.car.config.controllers.ars.limit_rad == pytest.approx(math.radians(2.0))
-    assert scenario.car.config.driver.speed_gain_Nmspm == 1000.0
+    assert scenario.driver.parameters.speed_gain_1ps == 3.0
     assert scenario.car.config.factors.mass == 1.1
 
 
@@ -234,7 +235,11 @@ def test_run_made_again_from_its_recording_is_bit_identical(controller, tmp_path
     first.save(tmp_path / "run.mcap")
     known = activesteer.Recording.open(tmp_path / "run.mcap").metadata
     again = activesteer.simulate(
-        known["maneuver"], known["controller"], known["vehicle"], timestep_s=known["timestep_s"]
+        known["maneuver"],
+        known["controller"],
+        known["vehicle"],
+        driver=known["driver"],
+        timestep_s=known["timestep_s"],
     )
     assert len(again) == 200
     assert np.array_equal(again.values, first.values)
@@ -252,7 +257,7 @@ HINTS = dict(tables_with_hints(VehicleConfig))
 
 
 def test_hints_name_keys_that_exist():
-    known = {*key_paths(VehicleConfig), *key_paths(KINDS["open_loop"])}
+    known = {*key_paths(VehicleConfig), *key_paths(KINDS["open_loop"]), *key_paths(DriverParameters, "driver.")}
     for key, hint in HINTS.items():
         named = re.findall(r"[a-z_]+(?:\.\w+)+", hint)
         assert named

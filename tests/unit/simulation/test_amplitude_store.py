@@ -115,7 +115,7 @@ def test_angle_of_a_ramp_is_kept_too(searches, monkeypatch):
         {"overrides": {"factors.mass": 1.01}},
         {"overrides": {"load.payload_kg": 20.0}},
         {"overrides": {"single_track.mass_kg": 1501.0}},
-        {"overrides": {"driver.speed_gain_Nmspm": 500.0}},
+        {"overrides": {"driver.speed_gain_1ps": 1.0}},
         {"overrides": {"road.mu": 0.99}},
         {"overrides": {"speed_kmh": 80.001}},
         {"overrides": {"settle_s": 0.25}},

@@ -81,6 +81,8 @@ def test_a_wrong_factor_is_told_with_its_line(tmp_path):
         {"maneuvers": ["step_stear"]},
         {"vehicles": ["compcat"]},
         {"controllers": ["arse"]},
+        {"driver": "novise"},
+        {"driver": 5},
         {"controllers": ["nowhere.py:Mine"]},
         {"maneuvers": ["step_steer", "step_steer"]},
         {"claims": True},
@@ -88,7 +90,7 @@ def test_a_wrong_factor_is_told_with_its_line(tmp_path):
         {"factors": {"controllers.ars.limit_deg": {"grid": [2.0, 3.0]}}},
         {"factors": {"controllers.afs.limit_deg": {"grid": [2.0, 3.0]}}, "controllers": ["none", "ars"]},
         {"factors": {"controllers.desired_yaw_rate.delay_s": {"grid": [0.05, 0.06]}}},
-        {"factors": {"single_track.mass_kg": {"grid": [1400.0, 1500.0]}}},
+        {"factors": {"single_track.yaw_inertia_kgm2": {"grid": [2000.0, 2100.0]}}},
         {"factors": {"driver.preview_s": {"grid": [1.0, 1.5]}}},
         {"factors": {"maneuver.title": {"grid": ["a", "b"]}}},
         {"factors": {"speed_kmh": {"grid": [70.0, 80.0]}, "speed_mps": {"grid": [20.0, 22.0]}}},
@@ -104,7 +106,7 @@ def test_a_key_that_one_of_the_runs_reads_is_taken():
     for change in (
         {"factors": {"controllers.ars.limit_deg": {"grid": [2.0, 3.0]}}, "controllers": ["none", "ars"]},
         {"factors": {"driver.preview_s": {"grid": [1.0, 1.5]}}, "maneuvers": ["step_steer", "slalom"]},
-        {"factors": {"driver.speed_gain_Nmspm": {"grid": [1000.0, 1500.0]}}},
+        {"factors": {"driver.speed_gain_1ps": {"grid": [2.0, 3.0]}}},
     ):
         assert len(Plan(read_study({**STEP, **change}))) >= 2
 
@@ -123,9 +125,15 @@ def test_everything_that_decides_the_result_is_in_the_digest(tmp_path):
     (tmp_path / "mine.py").write_text("from activesteer.controllers import NoControl as Mine\n")
     table = {**STEP, "controllers": [f"{tmp_path}/mine.py:Mine"]}
     found = {Plan(read_study(table)).digest}
-    for change in ({"seed": 3}, {"timestep_s": 0.0005}, {"vehicles": ["sedan"]}, {"overrides": {"speed_kmh": 70}}):
+    for change in (
+        {"seed": 3},
+        {"timestep_s": 0.0005},
+        {"vehicles": ["sedan"]},
+        {"overrides": {"speed_kmh": 70}},
+        {"driver": "expert"},
+    ):
         found.add(Plan(read_study({**table, **change})).digest)
     (tmp_path / "mine.py").write_text("from activesteer.controllers import NoControl as Mine  # changed\n")
     found.add(Plan(read_study(table)).digest)
-    assert len(found) == 6
+    assert len(found) == 7
     assert Plan(read_study({**table, "title": "another"})).digest in found

@@ -10,8 +10,11 @@ from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 from activesteer.theory.single_track import SingleTrack
 
 
-class StandardDriver:
-    """Follows a path, keeps a curvature, or turns the steering wheel as asked; holds the speed in all of it."""
+class HumanDriver:
+    """Follows a path, keeps a curvature, or turns the steering wheel as asked; holds the speed in all of it.
+
+    How well is a matter of the driver file; see `DriverParameters`.
+    """
 
     def __init__(
         self, open_loop: OpenLoopDriver, constant_radius: ConstantRadiusDriver, path: PathPreviewDriver
@@ -28,7 +31,7 @@ class StandardDriver:
         self._path = path
 
     @classmethod
-    def from_vehicle(cls, setup: DriverSetup) -> StandardDriver:
+    def from_vehicle(cls, setup: DriverSetup) -> HumanDriver:
         """Makes the driver for a car."""
         robot, single_track = OpenLoopDriver.from_vehicle(setup), SingleTrack(setup.single_track)
         return cls(

@@ -1,0 +1,59 @@
+"""Who drives: a driver file with overrides, or code of a user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from activesteer.config import build, to_table
+from activesteer.driver import DEFAULT_DRIVER, DriverParameters, find_driver, is_driver_file
+from activesteer.errors import DriverError
+from activesteer.plugins import Plugin
+from activesteer.resources import find_driver_file
+from activesteer.scenario.car import read_table
+from activesteer.scenario.overrides import Override, applied
+
+
+@dataclass(frozen=True)
+class ChosenDriver:
+    """Who drives.
+
+    Attributes:
+        plugin: What makes him.
+        parameters: The driver file; for code of a user's own that of the default driver, which the code may look at.
+        files: What he was made from, by name, to be kept with a recording.
+    """
+
+    plugin: Plugin
+    parameters: DriverParameters
+    files: Mapping[str, bytes]
+
+    def to_table(self) -> dict[str, Any]:
+        """The driver as he is recorded: his file's table, or what a user's own code was given."""
+        table = to_table(self.parameters)
+        if self.plugin.ours:
+            return table
+        return {"name": self.plugin.name, "parameters": dict(self.plugin.parameters), "setup": table}
+
+    def for_searches(self) -> ChosenDriver:
+        """Who drives where something must be found before a run: the package's own code, which does as asked."""
+        table = {"name": self.parameters.name}
+        return replace(self, plugin=find_driver(table))
+
+
+def driver_with(given: Any, overrides: list[Override]) -> ChosenDriver:
+    """The driver with overrides that are known to be meant for him.
+
+    Args:
+        given: Name, path or table of a driver, or a user's own code; see `find_driver`.
+        overrides: Keys of the driver file to replace.
+
+    Raises:
+        DriverError: there is no such driver, or his file is wrong.
+        ParameterError: an override names a key that does not exist.
+    """
+    plugin, is_file = find_driver(given), is_driver_file(given)
+    table, source, _, files = read_table(given if is_file else DEFAULT_DRIVER, "driver", find_driver_file, DriverError)
+    table, source = applied(DriverParameters, table, source, overrides)
+    return ChosenDriver(plugin, build(DriverParameters, table, source), files if is_file else {**files, **plugin.files})

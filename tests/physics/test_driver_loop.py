@@ -1,0 +1,33 @@
+"""Driver and car as one loop: whether they come to rest on a path."""
+
+from __future__ import annotations
+
+import pytest
+
+from activesteer.studies.driver_loop import damping_of, small_step
+
+ALWAYS_ACTIVE = {
+    f"controllers.{system}.corrector.{key}": value
+    for system in ("ars", "afs")
+    for key, value in (("off_degps", 0.0), ("full_degps", 0.001))
+}
+"""Correctors without a tolerance band."""
+
+
+@pytest.mark.parametrize("speed_kmh", [80.0, 100.0])
+@pytest.mark.parametrize(
+    ("controller", "overrides"),
+    [("none", {}), ("ars", {}), ("afs", {}), ("ars", ALWAYS_ACTIVE), ("afs", ALWAYS_ACTIVE)],
+    ids=["none", "ars", "afs", "ars_active", "afs_active"],
+)
+def test_typical_driver_and_car_are_damped_by_a_quarter(speed_kmh, controller, overrides):
+    assert damping_of(small_step(speed_kmh / 3.6, controller, overrides=overrides))[0] >= 0.25
+
+
+def test_drivers_differ_as_their_names_say():
+    novice, typical, expert = (
+        damping_of(small_step(100.0 / 3.6, driver=driver)) for driver in ("novice", "typical", "expert")
+    )
+    assert 0.0 < novice[0] < typical[0] < expert[0]
+    # Who looks further ahead corrects more slowly.
+    assert novice[1] > typical[1] > expert[1]
