@@ -12,7 +12,7 @@ from activesteer import study
 STUDY = {
     "title": "Step steer: payload and grip",
     "maneuvers": ["step_steer"],
-    "controllers": ["none", "ars"],
+    "controllers": ["none", "ars_tuned"],
     "seed": 1,
     "factors": {  # keys as for --set
         "road.mu": {"grid": [0.7, 1.0]},
@@ -33,4 +33,4 @@ def overshoots(table):
 
 if __name__ == "__main__":  # the runs are spread over processes, which read this file again
     for (controller, mu), overshoot in overshoots(study(STUDY)).items():
-        print(f"{controller:5}  mu {mu:.1f}  yaw rate overshoots by {overshoot:.1%}")
+        print(f"{controller:9}  mu {mu:.1f}  yaw rate overshoots by {overshoot:.1%}")

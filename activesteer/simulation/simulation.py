@@ -92,7 +92,7 @@ class Simulation:
             maneuver = prepared(resolve(maneuver, vehicle, overrides, driver), timestep_s)
         elif overrides or vehicle != "compact" or driver != DEFAULT_DRIVER:
             raise ParameterError(
-                "a Scenario has its vehicle, driver and overrides already", key="vehicle, driver, overrides"
+                "a Scenario has its vehicle, driver and overrides already", key="vehicle, overrides, driver"
             )
         self.scenario = maneuver
         self.loop = ClosedLoop(self.scenario, controller, timestep_s)

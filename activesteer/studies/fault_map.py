@@ -16,7 +16,9 @@ from typing import Annotated, Any, Final, NamedTuple
 import numpy as np
 
 from activesteer.config import Range, Source, build
+from activesteer.controllers import system_of
 from activesteer.conventions import Array
+from activesteer.driver import DEFAULT_DRIVER
 from activesteer.errors import ParameterError, SimulationDiverged, nearest_names
 from activesteer.faults import Fault, fault_table
 from activesteer.scenario import FileOrTable, resolve
@@ -121,7 +123,7 @@ _TOLD: Final = ("yaw_rate_sensor:stuck", "yaw_rate_sensor:offset=2degps", "yaw_r
 def usual_faults(controller: str) -> tuple[str, ...]:
     """The faults of a map where none are given: of what a controller moves, and of what it hears."""
     known = {"ars": (*_REAR, *_TOLD), "afs": (*_FRONT, *_TOLD)}
-    return known.get(controller, (*_REAR, *_FRONT, *_TOLD))
+    return known.get(system_of(controller), (*_REAR, *_FRONT, *_TOLD))
 
 
 @dataclass(frozen=True)
@@ -149,7 +151,7 @@ def fault_map(
     speeds_kmh: Sequence[float] = PRESETS["usual"].speeds_kmh,
     situations: Sequence[str] = PRESETS["usual"].situations,
     limits: Limits | None = None,
-    driver: Any = "standard",
+    driver: Any = DEFAULT_DRIVER,
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> FaultMap:
@@ -209,12 +211,12 @@ def _cell(
     """All faults at one speed in one situation."""
     begin_s = SITUATIONS[situation].fault_s(speed_kmh / 3.6)
     table = _maneuver(situation, speed_kmh / 3.6, begin_s + limits.window_s)
-    scenario = resolve(table, vehicle, overrides)
+    scenario = resolve(table, vehicle, overrides, driver)
     width_m = scenario.car.config.width_m
     if limits.lateral_offset_m is None:
         limits = replace(limits, lateral_offset_m=0.5 * (_LANE_M - width_m))
     longest_delay_s = max(fault.delay_s or 0.0 for fault in faults.values())
-    runs = _Runs(ClosedLoop(scenario, controller, driver=driver), begin_s, longest_delay_s)
+    runs = _Runs(ClosedLoop(scenario, controller), begin_s, longest_delay_s)
     return [
         {"fault": text, "speed_kmh": speed_kmh, "situation": situation, **_judged(runs, fault, limits)}
         for text, fault in faults.items()

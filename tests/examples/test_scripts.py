@@ -118,5 +118,5 @@ def test_own_cars_roll_as_their_changes_say(tmp_path: Path) -> None:
 def test_own_study_shows_that_rear_steering_takes_the_overshoot_out() -> None:
     scope = example("own_study")
     found = scope["overshoots"](activesteer.study(scope["STUDY"], jobs=1))
-    assert set(found) == {(controller, mu) for controller in ("none", "ars") for mu in (0.7, 1.0)}
-    assert all(found["ars", mu] < 0.6 * found["none", mu] for mu in (0.7, 1.0))
+    assert set(found) == {(controller, mu) for controller in ("none", "ars_tuned") for mu in (0.7, 1.0)}
+    assert all(found["ars_tuned", mu] < 0.6 * found["none", mu] for mu in (0.7, 1.0))

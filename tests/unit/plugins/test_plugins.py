@@ -278,5 +278,5 @@ def test_torques_of_the_wheels_are_checked():
 
 
 def test_unknown_driver_is_answered():
-    with raises(DriverError, value="typicle", allowed=["expert", "novice", "typical"]):
+    with raises(DriverError, value="typicle", allowed=("expert", "novice", "typical")):
         find_driver("typicle")

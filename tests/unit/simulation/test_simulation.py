@@ -73,7 +73,7 @@ def test_an_amplitude_is_searched_as_for_simulate(monkeypatch: pytest.MonkeyPatc
 def test_a_scenario_has_its_vehicle_already() -> None:
     scenario = resolve("step_steer", overrides=STEP_STEER)
     assert Simulation(scenario, "ars").context.metadata == made().context.metadata
-    with raises(ParameterError, key="vehicle, overrides"):
+    with raises(ParameterError, key="vehicle, overrides, driver"):
         Simulation(scenario, overrides=STEP_STEER)
 
 

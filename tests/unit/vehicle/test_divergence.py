@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from activesteer.controllers import RearSteer
-from activesteer.driver.standard import StandardDriver
+from activesteer.driver import HumanDriver
 from activesteer.errors import SimulationDiverged
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
@@ -143,9 +143,9 @@ def test_without_a_fault_nothing_is_reported() -> None:
         (RearSteer, "superposition_demand_rad", "superposition_demand_rad"),
         (RearSteer, "drive_torque_change_Nm", "drive_torque_change_Nm"),
         (RearSteer, "brake_torque_demand_Nm", "rl_brake_torque_demand_Nm"),
-        (StandardDriver, "steering_wheel_demand_rad", "steering_wheel_demand_rad"),
-        (StandardDriver, "drive_torque_demand_Nm", "drive_torque_demand_Nm"),
-        (StandardDriver, "brake_pedal", "brake_pedal"),
+        (HumanDriver, "steering_wheel_demand_rad", "steering_wheel_demand_rad"),
+        (HumanDriver, "drive_torque_demand_Nm", "drive_torque_demand_Nm"),
+        (HumanDriver, "brake_pedal", "brake_pedal"),
     ],
 )
 def test_command_that_is_no_number_ends_the_run_with_its_name(block, field, name, monkeypatch):
