@@ -1,5 +1,7 @@
 """An engine for drivers without a car."""
 
+from dataclasses import replace
+
 from activesteer.driver import DriverParameters
 from activesteer.vehicle.parameters import Powertrain
 from activesteer.vehicle.powertrain import Drive
@@ -10,5 +12,7 @@ DRIVE = Drive(ENGINE)
 
 def parameters(**changed: float) -> DriverParameters:
     """A driver of round numbers."""
-    known = {"preview_s": 1.3, "reaction_delay_s": 0.2, "neuromuscular_lag_s": 0.1, "steering_rate_limit_radps": 15.0}
-    return DriverParameters(**{**known, **changed})
+    round_numbers = DriverParameters(
+        preview_s=1.3, reaction_delay_s=0.2, neuromuscular_lag_s=0.1, steering_rate_limit_radps=15.0
+    )
+    return replace(round_numbers, **changed)
