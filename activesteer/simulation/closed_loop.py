@@ -133,15 +133,16 @@ class ClosedLoop:
     ) -> None:
         vehicle, (command, steer) = self.vehicle, self.commands
         timestep_s, measurement, motion = vehicle.timestep_s, self.measurement, self.motion
+        tape_address = 0 if recorder is None else recorder.tape_address
         with engine_warnings_held():
             for first, last, step_car in self.faults.stretches(self.step_count, self.step_count + steps):
-                for step in range(first, last):
-                    reference = reference_at(step * timestep_s)
-                    command = driver.step(reference, measurement, motion)
-                    steer = controller.step(command, measurement)
-                    measurement, motion = step_car(command, steer, recorder.row_address if recorder else 0)
-                    if recorder is not None:
-                        recorder.record()
+                stretch = range(first, last)
+                for block in (stretch,) if recorder is None else recorder.blocks(stretch):
+                    for step in block:
+                        reference = reference_at(step * timestep_s)
+                        command = driver.step(reference, measurement, motion)
+                        steer = controller.step(command, measurement)
+                        measurement, motion = step_car(command, steer, tape_address)
         self.step_count, self.commands = self.step_count + steps, (command, steer)
         self.measurement, self.motion = measurement, motion
 

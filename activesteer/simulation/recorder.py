@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple, Self
 
@@ -11,13 +12,15 @@ from numpy.typing import NDArray
 from activesteer.errors import RecordingError, SimulationDiverged
 from activesteer.recording import McapWriter, Poses
 from activesteer.signals import ActuatorCommand, DriverCommand
-from activesteer.vehicle import Vehicle
+from activesteer.vehicle import TAPE, Vehicle
 
 BLOCK_INTERVAL_S: Final = 0.5
 """How much of a run is turned into channels and written at once [s].
 
 A killed process loses less than two blocks, a second: the one that it fills, and the one that is being written.
 """
+MEMORY_BLOCK_INTERVAL_S: Final = 2.0
+"""The same where nothing is written [s]: longer, because every block begins with cold caches, some 0.2 ms."""
 POSE_INTERVAL_S: Final = 0.01
 """Time between two recorded poses of all bodies [s]."""
 MAX_VALUE: Final = float(np.finfo(np.float32).max)
@@ -59,8 +62,7 @@ class Recorder:
 
     Attributes:
         channels: The table of channels.
-        row_address: Where the vehicle leaves the row of the next step.
-        rows: How many were taken.
+        tape_address: Where the vehicle records its steps.
         keeps_all: Whether all rows stay in memory.
     """
 
@@ -78,35 +80,49 @@ class Recorder:
         self._writer = writer
         self._timestep_s = vehicle.timestep_s
         self.keeps_all = keep
-        self._block_rows = max(1, round(BLOCK_INTERVAL_S / vehicle.timestep_s))
+        interval_s = MEMORY_BLOCK_INTERVAL_S if writer is None else BLOCK_INTERVAL_S
+        self._block_rows = min(max(1, round(interval_s / vehicle.timestep_s)), max(steps, 1))
         capacity = steps if keep else min(self._block_rows, steps)
         self._yaw_column = [channel.name for channel in self.channels].index("yaw_rad")
         self._yaw_rad = 0.0
         self._raw = vehicle.raw_rows(self._block_rows)
-        self.row_address = self._block_address = self._raw.sensordata.ctypes.data
-        self._row_bytes = self._raw.sensordata.strides[0]
         self._pose_every = max(1, round(POSE_INTERVAL_S / vehicle.timestep_s))
-        data, bodies = vehicle.data, len(vehicle.body_names)
+        bodies = len(vehicle.body_names)
         self._kept = _Kept.empty(capacity, self._poses_before(capacity) + 1, len(self.channels), bodies)
-        # Without the world, which is the engine's body 0.
-        self._xpos, self._xquat = data.xpos[1:], data.xquat[1:]
-        # Rows so far, those of them that are channels already, and the first one in memory.
-        self.rows = self._flushed = self._first = 0
+        self._tape = np.zeros(1, TAPE)
+        self._tape["row_bytes"], self._tape["pose_every"] = self._raw.sensordata.strides[0], self._pose_every
+        self.tape_address = self._tape.ctypes.data
+        # Rows that are channels already, and the first one in memory.
+        self._flushed = self._first = 0
+        self._rewind()
 
-    def record(self) -> None:
-        """Takes the row of the step that was just made, which the vehicle has left at `row_address`.
+    @property
+    def rows(self) -> int:
+        """How many were taken. Their values are those of the instants at which the steps began."""
+        return int(self._tape["rows"][0])
 
-        Its values are those of the instant at which the step began.
+    def blocks(self, steps: range) -> Iterator[range]:
+        """The steps, divided where a block is full; it is flushed then.
+
+        Args:
+            steps: Steps that the vehicle is going to record.
         """
-        count = self.rows
-        if count % self._pose_every == 0:
-            pose = count // self._pose_every - self._poses_before(self._first)
-            self._kept.positions_m[pose] = self._xpos
-            self._kept.quaternions[pose] = self._xquat
-        self.rows = count + 1
-        self.row_address += self._row_bytes
-        if self.rows - self._flushed == self._block_rows:
-            self.flush()
+        while steps:
+            part = steps[: int(self._tape["room"][0])]
+            assert part, "more steps than were announced"
+            yield part
+            steps = steps[len(part) :]
+            if self.rows - self._flushed == self._block_rows:
+                self.flush()
+
+    def _rewind(self) -> None:
+        """Lets the next row go to the start of the block, and poses behind those that are kept."""
+        tape, kept, here = self._tape, self._kept, self._flushed - self._first
+        pose = self._poses_before(self._flushed) - self._poses_before(self._first)
+        tape["room"] = min(self._block_rows, len(kept.values) - here)
+        tape["row"] = self._raw.sensordata.ctypes.data
+        tape["position"] = kept.positions_m.ctypes.data + pose * kept.positions_m.strides[0]
+        tape["quaternion"] = kept.quaternions.ctypes.data + pose * kept.quaternions.strides[0]
 
     def flush(self, *, checked: bool = True) -> None:
         """Turns the rows since the last flush into channels, and writes them.
@@ -126,11 +142,11 @@ class Recorder:
         self._yaw_rad = float(values[-1, self._yaw_column])
         poses = self._poses_between(first, last)
         self._flushed = last
-        self.row_address = self._block_address
         if self._writer is not None:
             self._writer.write(self._times(first, last), values, poses.time_s, poses.positions_m, poses.quaternions)
         if not self.keeps_all:
             self._first = last
+        self._rewind()
         if checked:
             self._check(first, values, poses)
 
@@ -173,9 +189,9 @@ class Recorder:
         if state.kept is not self._kept or state.kept.referred_rows > state.rows:
             self._kept = state.kept.copied(state.rows, self._poses_before(state.rows))
             self._kept.referred_rows = state.rows
-        self.rows = self._flushed = state.rows
+        self._tape["rows"] = self._flushed = state.rows
         self._yaw_rad = state.yaw_rad
-        self.row_address = self._block_address
+        self._rewind()
 
     def _evaluate(self, count: int, values: NDArray[np.float64]) -> None:
         """Channels of the first raw rows."""

@@ -2,6 +2,7 @@
 
 from activesteer.vehicle.car import Vehicle, engine_warnings_held
 from activesteer.vehicle.channels import ChannelMap, RawRows
+from activesteer.vehicle.native_step import TAPE
 from activesteer.vehicle.parameters import VehicleParameters
 
-__all__ = ["ChannelMap", "RawRows", "Vehicle", "VehicleParameters", "engine_warnings_held"]
+__all__ = ["TAPE", "ChannelMap", "RawRows", "Vehicle", "VehicleParameters", "engine_warnings_held"]

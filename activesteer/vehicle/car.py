@@ -228,13 +228,13 @@ class Vehicle:
         site = self.data.site_xpos[self.model.site("cg").id]
         return float(site[0]), float(site[1])
 
-    def step(self, command: DriverCommand, asked: ActuatorCommand, row_address: int = 0) -> tuple[Measurement, Motion]:
+    def step(self, command: DriverCommand, asked: ActuatorCommand, tape_address: int = 0) -> tuple[Measurement, Motion]:
         """Applies the commands and advances the engine by one step.
 
         Args:
             command: What the driver does.
             asked: What the controller asks for.
-            row_address: Where the row of this step goes, in a block of `raw_rows`; 0 where none is wanted.
+            tape_address: Address of the `TAPE` that the step is recorded on; 0 where none is wanted.
 
         Returns:
             What the sensors then say, and where the car is; see `measure` and `motion`.
@@ -249,7 +249,7 @@ class Vehicle:
             self._engage(gear)
         if torques is not None:
             self._apply_torques(torques)
-        sane, measurement, motion = native_step.step(self._plan_address, row_address, torques is not None)
+        sane, measurement, motion = native_step.step(self._plan_address, tape_address, torques is not None)
         if not sane:
             self.check()
         return sensed(measurement, motion)

@@ -107,10 +107,10 @@ class Faults:
         delays = [acting for acting in watching if isinstance(acting, _ActuatorFault)]
         sensors = [(acting, acting.begins <= begin) for acting in watching if isinstance(acting, _SensorFault)]
 
-        def step(command: DriverCommand, steer: ActuatorCommand, row_address: int = 0) -> tuple[Measurement, Motion]:
+        def step(command: DriverCommand, steer: ActuatorCommand, tape_address: int = 0) -> tuple[Measurement, Motion]:
             for delay in delays:
                 delay.before_step()
-            measurement, motion = vehicle.step(command, steer, row_address)
+            measurement, motion = vehicle.step(command, steer, tape_address)
             for delay in delays:
                 delay.after_step()
             for sensor, active in sensors:

@@ -77,7 +77,20 @@ class Places(NamedTuple):
     """Place of the yaw rate in `qvel`."""
 
 
-_ADDRESSES: Final = ("mj_step", "model", "data", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata")
+_ADDRESSES: Final = (
+    "mj_step",
+    "model",
+    "data",
+    "time",
+    "warnings",
+    "qvel",
+    "n_dofs",
+    "ctrl",
+    "sensordata",
+    "positions",
+    "quaternions",
+    "n_bodies",
+)
 STEP_PLAN: Final = np.dtype(
     (
         np.record,
@@ -94,6 +107,15 @@ STEP_PLAN: Final = np.dtype(
         ],
     )
 )
+TAPE: Final = np.dtype(
+    (
+        np.record,
+        [(name, np.intp) for name in ("room", "row", "row_bytes", "rows", "pose_every", "position", "quaternion")],
+    )
+)
+"""Where steps are recorded: for how many rows there is room, the address of the next row and how far it is to the one
+behind it, how many rows were taken, after how many the bodies' poses are taken too, and where the next ones go."""
+_tape_pointer: Final = pointer_to(from_dtype(TAPE))
 _plan_pointer: Final = pointer_to(from_dtype(STEP_PLAN))
 _command_pointer: Final = pointer_to(from_dtype(COMMAND_ROW))
 _chain_pointer: Final = pointer_to(from_dtype(CHAIN))
@@ -135,6 +157,10 @@ def step_plan(
         "n_dofs": model.nv,
         "ctrl": data.ctrl.ctypes.data,
         "sensordata": data.sensordata.ctypes.data,
+        # Without the world, which is the engine's body 0.
+        "positions": data.xpos[1:].ctypes.data,
+        "quaternions": data.xquat[1:].ctypes.data,
+        "n_bodies": model.nbody - 1,
         **places._asdict(),
     }
     for name, value in wheels._asdict().items():
@@ -207,6 +233,32 @@ def _sense(plan):
     )
 
 
+@inlined
+def _copy(source_address, target_address, size):
+    source, target = f64_pointer(source_address), f64_pointer(target_address)
+    for item in range(size):
+        target[item] = source[item]
+
+
+@inlined
+def _record(plan, tape):
+    """Copies the recorded arrays onto a tape, one behind the other, and the poses of the bodies where they are due."""
+    if tape.room == 0:
+        return
+    place = tape.row
+    for index in range(_SOURCES):
+        _copy(plan.sources[index], place, plan.sizes[index])
+        place += 8 * plan.sizes[index]
+    if tape.rows % tape.pose_every == 0:
+        _copy(plan.positions, tape.position, 3 * plan.n_bodies)
+        _copy(plan.quaternions, tape.quaternion, 4 * plan.n_bodies)
+        tape.position += 24 * plan.n_bodies
+        tape.quaternion += 32 * plan.n_bodies
+    tape.row += tape.row_bytes
+    tape.rows += 1
+    tape.room -= 1
+
+
 _MEASUREMENT: Final = types.Tuple([types.float64] * 8 + [types.UniTuple(types.float64, 4)])
 _SENSED: Final = types.Tuple([types.boolean, _MEASUREMENT, types.UniTuple(types.float64, 6)])
 
@@ -225,12 +277,12 @@ def sense(plan_address):
 
 
 @compiled_call(_SENSED, types.intp, types.intp, types.boolean)
-def step(plan_address, row_address, torques_stand):
+def step(plan_address, tape_address, torques_stand):
     """Carries out the commands, makes one step of the engine and reads everything.
 
     Args:
         plan_address: Address of a `STEP_PLAN`; the commands stand where the source behind the engine's arrays is.
-        row_address: Where the recorded arrays are copied to, one behind the other; 0 for nowhere.
+        tape_address: Address of a `TAPE` that the step is recorded on, unless something is wrong with it; 0 for none.
         torques_stand: Whether drive and brakes have their inputs already; what driver and controller want of the drive,
             and the pedal, then do not count.
 
@@ -256,15 +308,9 @@ def step(plan_address, row_address, torques_stand):
             ctrl[plan.brakes[wheel]] = commands.brake_pedal * plan.brake_torques_Nm[wheel]
         ctrl[plan.brakes[wheel]] += brake_torques_Nm[wheel]
     _call(plan.mj_step, plan.model, plan.data)  # pyright: ignore[reportCallIssue] - numba adds the context
-    if row_address != 0:
-        row = f64_pointer(row_address)
-        place = 0
-        for index in range(_SOURCES):
-            source = f64_pointer(plan.sources[index])
-            for item in range(plan.sizes[index]):
-                row[place + item] = source[item]
-            place += plan.sizes[index]
     sane, truth, motion = _sense(plan)
+    if tape_address != 0 and sane:
+        _record(plan, carray(_tape_pointer(tape_address), (1,))[0])
     if plan.n_sensors == 0:
         return sane, truth, motion
     chains = carray(_chain_pointer(plan.sensors), (plan.n_sensors,))

@@ -62,8 +62,7 @@ def test_channels_that_the_interface_promises_are_there():
 def test_commands_are_recorded_as_they_were_given():
     simulated = simulation()
     recorder = Recorder(simulated.vehicle, 3)
-    simulated.vehicle.step(COMMAND, ASKED, recorder.row_address)
-    recorder.record()
+    simulated.vehicle.step(COMMAND, ASKED, recorder.tape_address)
     given = {
         "front_steer_demand_rad": 0.02, "drive_torque_demand_Nm": 150.0, "brake_pedal": 0.25, "driver_saturated": 1.0,
         "rear_steer_demand_rad": -0.01, "superposition_demand_rad": 0.003, "yaw_rate_desired_radps": 0.2,

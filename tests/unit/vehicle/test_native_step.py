@@ -12,7 +12,7 @@ import pytest
 from activesteer.conventions import CORNERS
 from activesteer.errors import SimulationDiverged
 from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
-from activesteer.vehicle import Vehicle
+from activesteer.vehicle import TAPE, Vehicle
 from activesteer.vehicle.channels import RawRows
 from tests.unit.vehicle.cars import standing
 
@@ -40,11 +40,21 @@ def test_a_step_is_the_engine_s_own() -> None:
 
 def test_a_row_is_a_copy_of_the_engine_s_arrays() -> None:
     vehicle = _rolling()
-    rows = vehicle.raw_rows(3)
+    rows, bodies = vehicle.raw_rows(3), vehicle.model.nbody - 1
+    positions_m, quaternions = np.zeros((2, bodies, 3)), np.zeros((2, bodies, 4))
+    tape = np.zeros(1, TAPE)
+    tape["row"], tape["row_bytes"], tape["room"] = rows.sensordata.ctypes.data, rows.sensordata.strides[0], 3
+    tape["pose_every"], tape["position"], tape["quaternion"] = 2, positions_m.ctypes.data, quaternions.ctypes.data
     for row in range(3):
-        vehicle.step(COMMAND, STEER, rows.sensordata[row].ctypes.data)
+        vehicle.step(COMMAND, STEER, tape.ctypes.data)
+        assert (tape["rows"][0], tape["room"][0]) == (row + 1, 2 - row)
+        if row % 2 == 0:
+            np.testing.assert_array_equal(positions_m[row // 2], vehicle.data.xpos[1:])
+            np.testing.assert_array_equal(quaternions[row // 2], vehicle.data.xquat[1:])
         for name, live in zip(RawRows._fields, vehicle.live_arrays(), strict=True):
             np.testing.assert_array_equal(getattr(rows, name)[row], live, err_msg=name)
+    vehicle.step(COMMAND, STEER, tape.ctypes.data)
+    assert tape["rows"][0] == 3, "where there is no room, nothing is written"
 
 
 def test_what_a_step_returns_is_what_the_sensors_say() -> None:
