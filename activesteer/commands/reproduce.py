@@ -8,9 +8,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from activesteer.commands.arguments import add_jobs, add_json, add_output, add_vehicle
+from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler, add_vehicle
 from activesteer.commands.output import coloured, print_json
-from activesteer.commands.progress import ProgressBar
+from activesteer.commands.progress import ProgressBar, RunCounter
+from activesteer.errors import ParameterError
 
 if TYPE_CHECKING:
     from activesteer.studies.reproduction import Reproduction
@@ -19,21 +20,31 @@ if TYPE_CHECKING:
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("reproduce", help="drive the paper's scenarios and check what it claims")
-    add_output(parser, "DIR", "folder for recordings, report and figures", "runs")
+    words = (
+        "folder for recordings, report and figures (default: runs), or for a population's study (default: population)"
+    )
+    add_output(parser, "DIR", words)
     add_vehicle(parser)
     add_jobs(parser)
     parser.add_argument("--figures", action="store_true", help="also draw the paper's figures")
     parser.add_argument(
-        "--robustness", action="store_true",
-        help="instead: check the claims with another mass, centre of gravity, friction and speed; no files",
+        "--population", type=int, metavar="N",
+        help="instead: in which share of N cars, roads and drivers each claim holds, and what each system does there; "
+        "15 N runs",
     )  # fmt: skip
+    parser.add_argument("--seed", type=int, metavar="S", help="of the population's sample (default: the stored one's)")
+    add_scheduler(parser)
     add_json(parser)
     parser.set_defaults(action=_reproduce)
 
 
 def _reproduce(options: argparse.Namespace) -> int:
-    if options.robustness:
-        return _robustness(options)
+    if options.population is not None:
+        return _population(options)
+    for name in ("seed", "scheduler"):
+        if getattr(options, name) is not None:
+            raise ParameterError(f"--{name} belongs to --population")
+    folder = options.output or Path("runs")
     from activesteer.studies.reproduction import reproduce
 
     with ProgressBar("reproduce", quiet=options.json) as bar:
@@ -43,16 +54,16 @@ def _reproduce(options: argparse.Namespace) -> int:
             if not options.json and not sys.stderr.isatty():
                 print(f"{done}/{total} {what}", file=sys.stderr)
 
-        result = reproduce(options.output, options.vehicle, jobs=options.jobs, progress=tell)
+        result = reproduce(folder, options.vehicle, jobs=options.jobs, progress=tell)
     for (scenario, system), problem in result.failures.items():
         print(f"{scenario} {system} failed: {problem}", file=sys.stderr)
     files = [str(path) for systems in result.paths.values() for path in systems.values()]
-    report = _report(result, options.output)
+    report = _report(result, folder)
     figures: list[Path] = []
     if options.figures:
         from activesteer.commands.figures import draw_all
 
-        figures = draw_all(result.recordings(), options.output / "figures", options.vehicle)
+        figures = draw_all(result.recordings(), folder / "figures", options.vehicle)
     if options.json:
         failures = {f"{scenario} {system}": problem for (scenario, system), problem in result.failures.items()}
         table = {**result.scorecard.to_json(), "files": files, "figures": [str(path) for path in figures]}
@@ -60,7 +71,7 @@ def _reproduce(options: argparse.Namespace) -> int:
         print_json({**table, "failures": failures, "exit_status": result.exit_status})
         return result.exit_status
     print(coloured(result.scorecard.to_text()))
-    print(f"recordings: {len(files)} MCAP files in {options.output}")
+    print(f"recordings: {len(files)} MCAP files in {folder}")
     if report is not None:
         print(f"report: {report}")
     if figures:
@@ -85,18 +96,23 @@ def _report(result: Reproduction, folder: Path) -> Path | None:
     return write_report(recordings, folder / "report.html") if recordings else None
 
 
-def _robustness(options: argparse.Namespace) -> int:
-    from activesteer.studies.reproduction import robustness
+def _population(options: argparse.Namespace) -> int:
+    from activesteer.studies.population import population
 
-    with ProgressBar("robustness", quiet=options.json) as bar:
-        table = robustness(
-            options.vehicle, jobs=options.jobs, progress=lambda what, done, total: bar(done / total, what)
+    if options.figures:
+        raise ParameterError("--figures draws the nominal runs; leave --population out")
+    with RunCounter("population", quiet=options.json) as counter:
+        found = population(
+            options.population,
+            seed=options.seed,
+            vehicle=options.vehicle,
+            output=options.output or Path("population"),
+            jobs=options.jobs,
+            scheduler=options.scheduler,
+            progress=counter,
         )
     if options.json:
-        print_json({"robustness": table})
-        return 0
-    labels = list(next(iter(table.values())))
-    print("     " + "  ".join(labels))
-    for claim, held in table.items():
-        print(f"{claim:4} " + "  ".join(("holds" if held[label] else "-").ljust(len(label)) for label in labels))
+        print_json(found.to_json())
+    else:
+        print(found.to_text())
     return 0

@@ -10,13 +10,13 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Scorecard, scorecard
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.files import make_folder
 from activesteer.recording import Recording, check_target
-from activesteer.scenario import FileOrTable, Scenario, load_car, resolve
+from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.workers import TaskQueue, in_parallel, workers_for
@@ -157,56 +157,23 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
     return ""
 
 
-_VARIATIONS: Final[dict[str, Callable[[float, Scenario], dict[str, Any]]]] = {
-    "as is": lambda height_m, scenario: {},
-    "mass -10 %": lambda height_m, scenario: {"vehicle.factors.mass": 0.9},
-    "mass +10 %": lambda height_m, scenario: {"vehicle.factors.mass": 1.1},
-    "CG height -5 %": lambda height_m, scenario: {"vehicle.load.cg_height_change_m": -0.05 * height_m},
-    "CG height +5 %": lambda height_m, scenario: {"vehicle.load.cg_height_change_m": 0.05 * height_m},
-    "mu -0.05": lambda height_m, scenario: {"maneuver.road.mu": scenario.maneuver.road.mu - 0.05},
-    "mu +0.05": lambda height_m, scenario: {"maneuver.road.mu": scenario.maneuver.road.mu + 0.05},
-    "speed -3 km/h": lambda height_m, scenario: {"maneuver.speed_mps": scenario.maneuver.speed_mps - 3.0 / 3.6},
-    "speed +3 km/h": lambda height_m, scenario: {"maneuver.speed_mps": scenario.maneuver.speed_mps + 3.0 / 3.6},
-}
-"""What is varied, one at a time: what it is called -> height of the centre of gravity [m], scenario -> overrides."""
-
-
-def robustness(
-    vehicle: FileOrTable = "compact", *, jobs: int | None = None, progress: Progress | None = None
-) -> dict[str, dict[str, bool]]:
-    """Checks every claim again with another mass, centre of gravity, friction and speed, one changed at a time.
+def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None) -> list[Claim]:
+    """The claims as they come out of the scenarios as they are, without files.
 
     Args:
         vehicle: Name, path, or table of a vehicle.
         jobs: Number of processes; that of the processors where not given.
-        progress: Called after every scenario of every variation.
 
     Returns:
-        Claim -> variation -> whether it holds; `as is` is the car unchanged.
+        All claims, in the order of the paper.
 
     Raises:
         ActiveSteerError: an input is wrong, or a run failed.
     """
-    scenarios = {name: resolve(name, vehicle) for name in SCENARIOS}
-    height_m = float(load_car(vehicle).on().data.site("cg").xpos[2])
-    tasks = [
-        (label, name, vary(height_m, scenario))
-        for label, vary in _VARIATIONS.items()
-        for name, scenario in scenarios.items()
-    ]
-
-    def tell(place: int, done: int) -> None:
-        if progress is not None:
-            progress(f"{tasks[place][0]}: {tasks[place][1]}", done, len(tasks))
-
-    found = in_parallel(_claims_of, [(name, vehicle, changes) for _, name, changes in tasks], jobs, tell)
-    table: dict[str, dict[str, bool]] = {}
-    for (label, *_), claims in zip(tasks, found, strict=True):
-        for claim in claims:
-            table.setdefault(claim.id, {})[label] = claim.passed
-    return dict(sorted(table.items()))
+    found = in_parallel(_claims_of, [(name, vehicle) for name in SCENARIOS], jobs)
+    return [claim for claims in found for claim in claims]
 
 
-def _claims_of(name: str, vehicle: FileOrTable, changes: Mapping[str, Any]) -> list[Claim]:
-    scenario = prepared(resolve(name, vehicle, changes))
+def _claims_of(name: str, vehicle: FileOrTable) -> list[Claim]:
+    scenario = prepared(resolve(name, vehicle))
     return SCENARIOS[name]({system: run_scenario(scenario, system) for system in SYSTEMS})

@@ -27,6 +27,8 @@ from activesteer.vehicle.native_forces import install_native_forces
 
 _ERROR_CHARACTERS: Final = 500
 """What a row keeps of an error's text."""
+CLAIM: Final = "claim_"
+"""What the name of a column begins with that says whether a claim holds for the sample."""
 CURVE: Final = "curve_"
 """What the name of a column begins with that holds a channel over time."""
 CURVE_STEP_S: Final = 0.02
@@ -252,7 +254,7 @@ def _claims(maneuver: str, recordings: Mapping[str, Recording]) -> dict[str, flo
     except (KeyError, ActiveSteerError):
         return {}
     failed = sum(not claim.passed for claim in claims)
-    return {f"claim_{claim.id}": float(claim.passed) for claim in claims} | {"claims_failed": float(failed)}
+    return {f"{CLAIM}{claim.id}": float(claim.passed) for claim in claims} | {"claims_failed": float(failed)}
 
 
 def failed_row(settings: Settings, request: Request, status: Status, problem: str) -> Row:

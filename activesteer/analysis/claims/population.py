@@ -1,0 +1,220 @@
+"""How often the claims hold in a population of cars, roads and drivers, and what the systems do there.
+
+`studies.population` drives it. What came of the one that belongs to the package is stored with it, so that a nominal
+verdict can be read beside its share.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+from activesteer.errors import StudyError
+from activesteer.files import reading
+from activesteer.quantities import metric_label
+from activesteer.resources import studies_dir
+from activesteer.theory.shares import ShareVerdict, share_verdict
+
+NONE: Final = "none"
+"""In place of a factor where none is significant."""
+
+
+@dataclass(frozen=True)
+class ClaimShare:
+    """How often a claim holds.
+
+    Attributes:
+        id: Its number.
+        passed: Whether it holds with the nominal car, road and driver.
+        number: Samples in which it could be judged.
+        share: Of these, in which it holds; nan where there are none.
+        low: Lower end of the 95 % interval.
+        high: Upper end.
+        depends_on: Key of the factor that it depends on most; `none` where no factor is significant.
+        explained: Share of the variance that this factor explains.
+        direction: 1 where the claim holds more often with more of it, -1 with less, 0 in the middle or at the ends.
+    """
+
+    id: str
+    passed: bool
+    number: int
+    share: float
+    low: float
+    high: float
+    depends_on: str = NONE
+    explained: float = 0.0
+    direction: int = 0
+
+    @property
+    def verdict(self) -> ShareVerdict:
+        """What the interval says of the claim."""
+        return share_verdict(self.low, self.high)
+
+    @property
+    def words(self) -> str:
+        """The factor in words; empty where there is none."""
+        if self.depends_on == NONE:
+            return ""
+        return f"{('in the middle or at the ends of', 'with more', 'with less')[self.direction]} {self.depends_on}"
+
+
+@dataclass(frozen=True)
+class Change:
+    """By how much a system changes the magnitude of a metric, against the same sample without control.
+
+    Attributes:
+        metric: The metric.
+        number: Samples in which both runs have it.
+        low: 5 % of them are below.
+        median: Half of them are.
+        high: 95 % of them are.
+    """
+
+    metric: str
+    number: int
+    low: float
+    median: float
+    high: float
+
+
+@dataclass(frozen=True)
+class SystemEffect:
+    """What a system does in a scenario.
+
+    Attributes:
+        controller: The system.
+        scenario: The manoeuvre.
+        lost_without: Samples in which the car without control is lost; see `loss.is_lost`.
+        saved: Of these, in which the car with the system is not.
+        fine_without: Samples in which the car without control is not lost.
+        spoiled: Of these, in which the car with the system is.
+        spun_without: Samples in which the car without control spins; the rest of the lost ones leaves the course.
+        spun: In which the car with the system does.
+        changes: Peak of the sideslip, oscillation that is left, steering effort, as far as the manoeuvre has them.
+    """
+
+    controller: str
+    scenario: str
+    lost_without: int
+    saved: int
+    fine_without: int
+    spoiled: int
+    spun_without: int
+    spun: int
+    changes: tuple[Change, ...]
+
+
+@dataclass(frozen=True)
+class Population:
+    """What came of a population.
+
+    Attributes:
+        samples: Number of samples.
+        seed: Of the sample.
+        vehicle: The car that the samples are variations of.
+        versions: What it was driven with.
+        claims: In the order of the paper.
+        systems: Scenario by scenario.
+    """
+
+    samples: int
+    seed: int
+    vehicle: str
+    versions: Mapping[str, str]
+    claims: tuple[ClaimShare, ...]
+    systems: tuple[SystemEffect, ...]
+
+    def of(self, claim: str) -> ClaimShare | None:
+        """The share of a claim; None where there is none."""
+        return next((share for share in self.claims if share.id == claim), None)
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values."""
+        claims = [{**asdict(claim), "verdict": claim.verdict.value} for claim in self.claims]
+        return {**asdict(self), "claims": claims}
+
+    @classmethod
+    def from_json(cls, table: Mapping[str, Any]) -> Population:
+        """The population that `to_json` was made of.
+
+        Raises:
+            StudyError: it was not.
+        """
+        try:
+            claims = [ClaimShare(**{key: claim[key] for key in claim if key != "verdict"}) for claim in table["claims"]]
+            systems = [
+                SystemEffect(**{**effect, "changes": tuple(Change(**change) for change in effect["changes"])})
+                for effect in table["systems"]
+            ]
+            return cls(**{**table, "claims": tuple(claims), "systems": tuple(systems)})
+        except (KeyError, TypeError) as reason:
+            raise StudyError(f"the stored population is damaged: {reason}") from reason
+
+    def to_text(self) -> str:
+        """Shares and effects for a terminal, in degrees."""
+        return "\n".join(
+            [f"{self.samples} samples of {self.vehicle}, seed {self.seed}", "", *self._claim_lines(), "",
+             *self._system_lines()]
+        )  # fmt: skip
+
+    def _claim_lines(self) -> list[str]:
+        lines = ["     nominal  holds in  95 % interval  verdict         most"]
+        for claim in self.claims:
+            interval = f"{percent(claim.low)} to {percent(claim.high)} %"
+            lines.append(
+                f"{claim.id:4} {'passed' if claim.passed else 'fails':<8} {percent(claim.share):>6} %  {interval:<13}  "
+                f"{claim.verdict.value:<14}  {claim.words}".rstrip()
+            )
+        return lines
+
+    def _system_lines(self) -> list[str]:
+        lines = []
+        for effect in self.systems:
+            lines.append(
+                f"{effect.scenario}, {effect.controller}: saves {effect.saved} of the {effect.lost_without} that are "
+                f"lost without it ({effect.spun_without} spin, with it {effect.spun}), spoils {effect.spoiled} of the "
+                f"{effect.fine_without} that are not"
+            )
+            for change in effect.changes:
+                words, unit, factor = metric_label(change.metric)
+                low, median, high = (f"{factor * value:+.3g}" for value in (change.low, change.median, change.high))
+                lines.append(f"    {words}: {median}{'' if unit == '-' else f' {unit}'} ({low} to {high})")
+        return lines
+
+
+def percent(share: float) -> str:
+    """A share in whole percent, 0 and 100 only where it is exactly that."""
+    if share in (0.0, 1.0) or math.isnan(share):
+        return f"{100.0 * share:.0f}"
+    return f"{min(99.0, max(1.0, round(100.0 * share))):.0f}"
+
+
+@functools.cache
+def stored_population(vehicle: str) -> Population | None:
+    """The population that belongs to the package.
+
+    Args:
+        vehicle: Name of a car.
+
+    Returns:
+        What came of it; None where none of this car is stored.
+
+    Raises:
+        StudyError: the file cannot be read.
+    """
+    path = studies_dir() / "population" / "summary.json"
+    if not path.is_file():
+        return None
+    with reading(path, StudyError):
+        text = path.read_text(encoding="utf-8")
+    found = Population.from_json(json.loads(text))
+    return found if found.vehicle == vehicle else None
+
+
+def sorted_out(population: Population) -> dict[ShareVerdict, Sequence[ClaimShare]]:
+    """Its claims by verdict."""
+    return {verdict: [claim for claim in population.claims if claim.verdict is verdict] for verdict in ShareVerdict}

@@ -1,0 +1,59 @@
+"""In which share of a population something holds, how sure that is, and what it is called."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from typing import Final
+
+from activesteer.errors import ParameterError
+
+CONFIDENCE_QUANTILE: Final = 1.959963984540054
+"""Of the normal distribution, for 95 %."""
+HOLDS_FROM: Final = 0.8
+"""A claim holds whose share is at least this with 97.5 % confidence."""
+FAILS_UP_TO: Final = 0.2
+"""A claim does not hold whose share is at most this with 97.5 % confidence."""
+
+
+class ShareVerdict(StrEnum):
+    """What a share says of a claim."""
+
+    HOLDS = "holds"
+    DEPENDS = "depends"
+    DOES_NOT_HOLD = "does not hold"
+
+
+def wilson_interval(passed: int, number: int) -> tuple[float, float]:
+    """The 95 % confidence interval of a share.
+
+    Args:
+        passed: How many passed.
+        number: Of how many.
+
+    Returns:
+        Lower and upper end; 0 and 1 where there are none.
+
+    Raises:
+        ParameterError: more passed than there are, or one is below 0.
+
+    Source: E. B. Wilson, Journal of the American Statistical Association 22 (1927), 209-212.
+    """
+    if not 0 <= passed <= number:
+        raise ParameterError(f"{passed} of {number} is no share")
+    if number == 0:
+        return 0.0, 1.0
+    share, z2 = passed / number, CONFIDENCE_QUANTILE**2 / number
+    middle = share + 0.5 * z2
+    half = math.sqrt(z2 * (share * (1.0 - share) + 0.25 * z2))
+    # At 0 and at 1 an end is exactly that; rounding must not move it.
+    low = 0.0 if passed == 0 else (middle - half) / (1.0 + z2)
+    high = 1.0 if passed == number else (middle + half) / (1.0 + z2)
+    return low, high
+
+
+def share_verdict(low: float, high: float) -> ShareVerdict:
+    """The verdict that an interval allows."""
+    if low >= HOLDS_FROM:
+        return ShareVerdict.HOLDS
+    return ShareVerdict.DOES_NOT_HOLD if high <= FAILS_UP_TO else ShareVerdict.DEPENDS

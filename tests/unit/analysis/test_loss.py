@@ -1,0 +1,38 @@
+"""When a car counts as lost."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from activesteer.analysis.loss import CONES_MISSED, IN_LANES, has_spun, is_lost
+
+PEAK = "sideslip_peak_abs_rad"
+SMALL, LARGE = math.radians(5.0), math.radians(25.0)
+
+
+@pytest.mark.parametrize(
+    ("metrics", "lost"),
+    [
+        ({PEAK: SMALL}, False),
+        ({PEAK: LARGE}, True),
+        ({"sideslip_peak_rad": -LARGE}, True),
+        ({"sideslip_peak_rad": -SMALL}, False),
+        ({PEAK: SMALL, IN_LANES: 1.0}, False),
+        ({PEAK: SMALL, IN_LANES: 0.0}, True),
+        ({PEAK: SMALL, CONES_MISSED: 0.0, "cones_hit": 3.0}, False),
+        ({PEAK: SMALL, CONES_MISSED: 1.0}, True),
+    ],
+)
+def test_a_car_is_lost_that_spins_or_leaves_its_course(metrics: dict[str, float], lost: bool) -> None:
+    assert is_lost(metrics) is lost
+
+
+@pytest.mark.parametrize("missing", [None, math.nan])
+def test_a_run_that_ended_before_it_could_be_said_is_lost(missing: float | None) -> None:
+    assert is_lost({PEAK: missing})
+    assert has_spun({PEAK: missing})
+    assert is_lost({PEAK: SMALL, IN_LANES: missing})
+    assert is_lost({PEAK: SMALL, CONES_MISSED: missing})
+    assert is_lost({})
