@@ -10,7 +10,7 @@ from activesteer.analysis.claims.sine_with_dwell import LOST_SIDESLIP_RAD
 
 SIDESLIP_PEAKS: Final = ("sideslip_peak_abs_rad", "sideslip_peak_rad")
 """Metrics of the largest sideslip; a manoeuvre has one of them."""
-IN_LANES: Final = "all_wheels_in_lanes"
+IN_LANES: Final = "stays_in_lanes"
 CONES_MISSED: Final = "cones_missed"
 
 Metrics = Mapping[str, float | None]

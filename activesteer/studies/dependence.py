@@ -37,7 +37,7 @@ class Dependence(NamedTuple):
 
 
 def strongest(
-    factors: Mapping[str, Sequence[float] | NDArray[np.float64]], outcome: Sequence[bool]
+    factors: Mapping[str, Sequence[float] | NDArray[np.float64]], outcome: Sequence[bool] | NDArray[np.bool_]
 ) -> Dependence | None:
     """The factor that an outcome depends on most.
 
@@ -77,5 +77,5 @@ def strongest(
 def _fit(columns: Sequence[NDArray[np.float64]], outcome: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     """Sum of squares that is left, and the coefficients: constant, then each column and its square."""
     design = np.column_stack([np.ones_like(outcome), *(part for x in columns for part in (x, x * x))])
-    coefficients = np.linalg.lstsq(design, outcome, rcond=None)[0]
+    coefficients = np.asarray(np.linalg.lstsq(design, outcome, rcond=None)[0], dtype=np.float64)
     return float(np.sum((outcome - design @ coefficients) ** 2)), coefficients

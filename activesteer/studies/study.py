@@ -14,7 +14,7 @@ from activesteer.scenario import FileOrTable
 from activesteer.studies.plan import Plan, task_size
 from activesteer.studies.run_task import Request, Status, drive, failed_row, prepare_worker
 from activesteer.studies.store import Store
-from activesteer.studies.study_file import read_study
+from activesteer.studies.study_file import StudyFile, read_study
 from activesteer.studies.workers import TaskQueue, WorkerDied, Workers, workers_for
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class StudyProgress(NamedTuple):
 
 
 def study(
-    study_file: FileOrTable,
+    study_file: FileOrTable | StudyFile,
     *,
     output: str | os.PathLike[str] | None = None,
     jobs: int | None = None,
@@ -55,7 +55,7 @@ def study(
     the usual `if __name__ == "__main__":`.
 
     Args:
-        study_file: Name or path of a study file, or its table.
+        study_file: Name or path of a study file, its table, or what was read of it.
         output: Folder of the study; it is gone on with where it is there. Without one nothing is kept.
         jobs: Number of processes; that of the processors where not given. With 1 all runs are made in this process.
         client: A `distributed.Client` whose cluster makes the runs.
