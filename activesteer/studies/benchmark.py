@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import mujoco
+import numpy as np
 
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS
 from activesteer.scenario import Scenario, resolve
@@ -34,27 +35,33 @@ _RUNS_PER_PROCESS: Final = 4
 
 
 def bench(rounds: int = _ROUNDS) -> dict[str, float]:
-    """Measures one step at five stages, and the blocks of the loop one by one.
+    """Measures one step at several stages, and the blocks of the loop one by one.
 
     Args:
         rounds: How often everything is measured; the best counts.
 
     Returns:
         Microseconds per step: `bare_step_us` (the engine with the same model, without tyres and without motion, so that
-        its solver has little to do: the least that a step can cost), `plant_step_us` (with tyres, dampers, actuators),
-        `closed_loop_step_us` (and manoeuvre, driver, controller, every channel recorded in memory),
+        its solver has little to do: the least that a step can cost), `plant_step_us` (with tyres, dampers, actuators,
+        standing), `engine_step_us` (the engine with tyres, dampers and actuators in the step steer that the closed loop
+        drives: its inputs played back in one native call), `path_engine_step_us` (the same in the slalom),
+        `closed_loop_step_us` (the step steer with manoeuvre, driver, controller, every channel recorded in memory),
         `path_following_step_us` (the same in a slalom, with a driver who looks at a path), `with_file_step_us`
         (the step steer written as MCAP), `sedan_step_us` (the second car, in memory); the ratios of the closed loops to
-        the first; real-time factors; `threads_2_speedup` (how much faster two simulations come to their ends in two
-        threads of one process than one after the other); `step_steers_per_min` (whole runs, building the car included,
-        by as many processes as there are processors); and `*_us` for each block of the loop.
+        `bare_step_us`, and to the engine alone on the same drive; real-time factors; `threads_2_speedup` (how much
+        faster two simulations come to their ends in two threads of one process than one after the other);
+        `step_steers_per_min` (whole runs, building the car included, by as many processes as there are processors); and
+        `*_us` for each block of the loop.
     """
     scenario, along_path = prepared(resolve("step_steer")), resolve("slalom")
     sedan = prepared(resolve("step_steer", "sedan"))
+    driven, along_path_driven = _Driven(scenario), _Driven(along_path)
     with tempfile.TemporaryDirectory() as folder:
         stages: dict[str, Callable[[], float]] = {
             "bare_step_us": lambda: _bare(scenario),
             "plant_step_us": lambda: _plant(scenario),
+            "engine_step_us": driven.replay_us,
+            "path_engine_step_us": along_path_driven.replay_us,
             "closed_loop_step_us": lambda: _closed_loop(scenario),
             "path_following_step_us": lambda: _closed_loop(along_path),
             "with_file_step_us": lambda: _with_file(scenario, Path(folder) / "bench.mcap"),
@@ -62,10 +69,11 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
             "two_threads_step_us": lambda: _in_threads(scenario, 2),
         }
         best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
-    step_us = 1e6 * ClosedLoop(scenario).vehicle.timestep_s
-    best["closed_loop_to_bare_ratio"] = best["closed_loop_step_us"] / best["bare_step_us"]
-    best["path_following_to_bare_ratio"] = best["path_following_step_us"] / best["bare_step_us"]
-    best["with_file_to_bare_ratio"] = best["with_file_step_us"] / best["bare_step_us"]
+    step_us = 1e6 * driven.vehicle.timestep_s
+    for stage in ("closed_loop", "path_following", "with_file"):
+        engine = "path_engine" if stage == "path_following" else "engine"
+        best[f"{stage}_to_bare_ratio"] = best[f"{stage}_step_us"] / best["bare_step_us"]
+        best[f"{stage}_to_engine_ratio"] = best[f"{stage}_step_us"] / best[f"{engine}_step_us"]
     best["real_time_factor"] = step_us / best["closed_loop_step_us"]
     best["real_time_factor_with_file"] = step_us / best["with_file_step_us"]
     best["sedan_real_time_factor"] = step_us / best["sedan_step_us"]
@@ -139,6 +147,24 @@ def _plant(scenario: Scenario) -> float:
     simulation = ClosedLoop(scenario, _CONTROLLER)
     model, data, steps = simulation.vehicle.model, simulation.vehicle.data, simulation.steps
     return _per_step_us(lambda: _repeat(mujoco.mj_step, model, data, steps), steps)
+
+
+class _Driven:
+    """A run whose inputs of the engine are kept."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        simulation = ClosedLoop(scenario, _CONTROLLER)
+        self.vehicle = simulation.vehicle
+        self._start = self.vehicle.save_state()
+        self._inputs = np.empty((simulation.steps, self.vehicle.model.nu))
+        for inputs in self._inputs:
+            simulation.advance(1)
+            inputs[:] = self.vehicle.data.ctrl
+
+    def replay_us(self) -> float:
+        """Microseconds of the engine alone in each step of the same drive, all in one native call."""
+        self.vehicle.restore_state(self._start)
+        return _per_step_us(lambda: self.vehicle.replay(self._inputs), len(self._inputs))
 
 
 def _repeat(step: Callable[..., object], model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> None:
@@ -227,7 +253,7 @@ def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
 
 
 def _blocks(scenario: Scenario) -> dict[str, float]:
-    """Each block of the loop on its own, in the order of the data."""
+    """Each block of the loop on its own, in the order of the data; rows are written by the vehicle."""
     simulation = ClosedLoop(scenario, _CONTROLLER)
     maneuver, driver, controller, vehicle = (
         simulation.maneuver,
@@ -239,22 +265,22 @@ def _blocks(scenario: Scenario) -> dict[str, float]:
     reference = maneuver.reference(0.6)
     command = driver.step(reference, measurement, motion)
     steer = controller.step(command, measurement)
-
-    def recorded() -> None:
-        recorder = Recorder(vehicle, _CALLS)
-        for block in recorder.blocks(range(_CALLS)):
-            for _ in block:
-                vehicle.step(command, steer, recorder.tape_address)
-        recorder.flush()
-
     blocks: dict[str, Callable[[], object]] = {
         "maneuver_us": lambda: maneuver.reference(0.6),
         "driver_us": lambda: driver.step(reference, measurement, motion),
         "controller_us": lambda: controller.step(command, measurement),
-        "vehicle_us": lambda: vehicle.step(command, steer),
     }
     found = {name: _per_step_us(lambda block=block: _call(block, _CALLS), _CALLS) for name, block in blocks.items()}
-    return found | {"recorder_us": _per_step_us(recorded, _CALLS) - found["vehicle_us"]}
+    recorder = Recorder(vehicle, _CALLS)
+
+    def step() -> None:
+        vehicle.step(command, steer, recorder.tape_address)
+
+    found |= {"vehicle_us": 0.0, "recorder_us": 0.0}
+    for block in recorder.blocks(range(_CALLS)):
+        found["vehicle_us"] += _per_step_us(lambda block=block: _call(step, len(block)), _CALLS)
+        found["recorder_us"] += _per_step_us(recorder.flush, _CALLS)
+    return found
 
 
 def _call(block: Callable[[], object], count: int) -> None:

@@ -254,6 +254,14 @@ class Vehicle:
             self.check()
         return sensed(measurement, motion)
 
+    def replay(self, inputs: NDArray[np.float64]) -> None:
+        """Makes steps of the engine alone, in one native call: nothing is looked at, asked or recorded.
+
+        Args:
+            inputs: Inputs of all actuators in each step, as a run left them in `data.ctrl`; shape (steps, actuators).
+        """
+        native_step.replay(self._plan_address, inputs)
+
     def _engage(self, gear: int) -> None:
         """Couples the engine to the driven wheels, each of which then carries its share of the inertia, or frees it."""
         self._gear = self._block_gear[0] = gear

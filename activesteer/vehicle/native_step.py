@@ -318,6 +318,22 @@ def step(plan_address, tape_address, torques_stand):
     return sane, measured(chains, memory, plan.wheel_radii_m, plan.timestep_s, truth), motion
 
 
+@compiled_call(types.void, types.intp, types.Array(types.float64, 2, "C"))
+def replay(plan_address, inputs):
+    """Makes a step of the engine for each row of inputs, and nothing else.
+
+    Args:
+        plan_address: Address of a `STEP_PLAN`.
+        inputs: Inputs of all actuators, shape (steps, number of actuators).
+    """
+    plan = carray(_plan_pointer(plan_address), (1,))[0]
+    ctrl = f64_pointer(plan.ctrl)
+    for step in range(len(inputs)):
+        for actuator in range(inputs.shape[1]):
+            ctrl[actuator] = inputs[step, actuator]
+        _call(plan.mj_step, plan.model, plan.data)  # pyright: ignore[reportCallIssue] - numba adds the context
+
+
 def sensed(measurement: tuple[Any, ...], motion: tuple[float, ...]) -> tuple[Measurement, Motion]:
     """Measurement and motion from what `sense` and `step` return behind the first member."""
     # Made without the class's own `__new__`, which costs as much as the engine's sensors: this happens every step.

@@ -117,6 +117,10 @@ def test_bench_has_the_promised_keys(call):
     assert found["closed_loop_to_bare_ratio"] == pytest.approx(found["closed_loop_step_us"] / found["bare_step_us"])
     assert found["with_file_to_bare_ratio"] == pytest.approx(found["with_file_step_us"] / found["bare_step_us"])
     assert found["sedan_real_time_factor"] == pytest.approx(1000.0 / found["sedan_step_us"])
+    engine = found["closed_loop_step_us"] / found["engine_step_us"]
+    assert found["closed_loop_to_engine_ratio"] == pytest.approx(engine)
+    engine = found["path_following_step_us"] / found["path_engine_step_us"]
+    assert found["path_following_to_engine_ratio"] == pytest.approx(engine)
     assert {"threads_2_speedup", "step_steers_per_min", "path_following_to_bare_ratio"} <= set(found)
     assert found["real_time_factor"] == pytest.approx(1000.0 / found["closed_loop_step_us"])
     assert found["real_time_factor_with_file"] == pytest.approx(1000.0 / found["with_file_step_us"])
