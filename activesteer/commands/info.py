@@ -30,7 +30,11 @@ def _info(options: argparse.Namespace) -> int:
     for key in ("maneuver", "vehicle"):
         table = metadata.get(key, {})
         print_entry(f"{key}: ", f"{table.get('name', '?')} {table.get('title', '')}")
-    print_entry("controller: ", str(metadata.get("controller", "?")))
+    uses_truth = ", which uses the truth" if metadata.get("controller_uses_truth") else ""
+    print_entry("controller: ", f"{metadata.get('controller', '?')}{uses_truth}")
+    sensors = metadata.get("vehicle", {}).get("sensors", {})
+    if "seed" in sensors or sensors.get("preset", "ideal") != "ideal":
+        print_entry("sensors: ", f"{sensors.get('preset', '?')}, seed {sensors.get('seed', 'none')}")
     print_entry("driver: ", _driver(metadata.get("driver", "?")))
     for key in ("overrides", "versions"):
         if metadata.get(key):

@@ -28,7 +28,7 @@ class Plugin:
     Attributes:
         kind: Which of the two.
         name: How it is called in messages and in recordings, as `my_file.py:MyController?gain=2`.
-        label: How it is called in tables and names of files, as `MyController-gain=2`.
+        label: How it is called in tables and names of files, as `MyController-gain=2`; `+truth` where it uses that.
         origin: What it is made from: a class, a function, or an object that is copied.
         parameters: What it is made with, by name.
         files: The file that it is in, to be kept with the recording.
@@ -42,6 +42,16 @@ class Plugin:
     parameters: Mapping[str, Any]
     files: Mapping[str, bytes]
     ours: bool = False
+
+    def __post_init__(self) -> None:
+        """Whoever uses the truth is called so wherever his results are shown."""
+        if self.uses_truth:
+            object.__setattr__(self, "label", f"{self.label}+truth")
+
+    @property
+    def uses_truth(self) -> bool:
+        """Whether it asks, by an attribute of this name, for what no sensor of a car says."""
+        return bool(getattr(self.origin, "uses_truth", False))
 
     def make(self, setup: Any) -> Any:
         """Makes the block, always in the state in which it was given: nothing is carried over from one run to the next.

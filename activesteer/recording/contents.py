@@ -87,11 +87,19 @@ def _single_track(value: Any, key: str) -> None:
         (_name if name == "source" else _number(1e-9, 1e12))(entry, f"{key}.{name}")
 
 
+def _controllers(value: Any, key: str) -> None:
+    """Tables of gains, and numbers that all have in common."""
+    for name, entry in table_of(value, key).items():
+        (_number(0.0, 1.0) if name in ("interval_s", "bus_delay_s") else table_of)(entry, f"{key}.{name}")
+
+
 SCHEMA: Final[Mapping[str, Check]] = {
     "complete": _flag,
     "error": text,
     "metrics_error": text,
     "controller": _name,
+    "controller_uses_truth": _flag,
+    "controller_interval_s": _number(1e-9, 1e3),
     "timestep_s": _number(1e-9, 1e3),
     "overrides": table_of,
     "versions": _all(_name),
@@ -102,7 +110,11 @@ SCHEMA: Final[Mapping[str, Check]] = {
     "vehicle": table_of,
     "vehicle.name": _name,
     "vehicle.single_track": _single_track,
-    "vehicle.controllers": _all(table_of),
+    "vehicle.controllers": _controllers,
+    "vehicle.sensors": table_of,
+    "vehicle.sensors.preset": _name,
+    "vehicle.sensors.seed": _number(0, 2**32 - 1),
+    "vehicle.sensors.yaw_rate": _all(_number(0.0, 1e12)),
     "vehicle.controllers.ars.corrector": _all(_number(-1e12, 1e12)),
     "vehicle.controllers.afs.corrector": _all(_number(-1e12, 1e12)),
     "car": _all(lambda value, key: None if isinstance(value, list) else _number(1e-3, 100.0)(value, key)),

@@ -17,6 +17,7 @@ from activesteer.resources import find_vehicle, models_dir
 from activesteer.road.road import Road
 from activesteer.scenario.model_files import model_files
 from activesteer.scenario.overrides import Override, applied, plain
+from activesteer.sensors import Sensors
 from activesteer.theory.single_track import IDENTIFY
 from activesteer.tyre.file.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
@@ -63,6 +64,10 @@ class Car:
     def name(self) -> str:
         """Name of the vehicle."""
         return self.config.name
+
+    def with_ideal_sensors(self) -> Car:
+        """The car as measuring equipment sees it."""
+        return replace(self, config=replace(self.config, sensors=Sensors()))
 
     def on(self, road: Road | None = None, timestep_s: float = DEFAULT_TIMESTEP_S) -> Vehicle:
         """The car in the engine, at rest in static equilibrium.

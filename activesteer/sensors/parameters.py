@@ -35,6 +35,11 @@ class Sensor:
     delay_s: _Delay | None = None
     """From the sample to when it comes out, in whole steps of the simulation [s]."""
 
+    @property
+    def is_ideal(self) -> bool:
+        """Whether what comes out is the truth."""
+        return not any(getattr(self, field.name) for field in fields(self))
+
     def amount(self, word: str) -> float:
         """The value of the key that begins with a word and ends in the unit; 0 where it is not given."""
         return next((getattr(self, field.name) for field in fields(self) if field.name.startswith(word)), None) or 0.0
@@ -107,7 +112,7 @@ class Sensors:
     KEY_HINTS: ClassVar = {
         "noise": "each sensor has its own, as sensors.yaw_rate.noise_degps",
         "bias": "each sensor has its own, as sensors.yaw_rate.bias_degps",
-        "delay_s": "each sensor has its own, as sensors.yaw_rate.delay_s",
+        "delay_s": "each sensor has its own, as sensors.yaw_rate.delay_s; commands have controllers.bus_delay_s",
     }
 
     preset: Literal["ideal", "production"] = "ideal"
@@ -157,9 +162,7 @@ class Sensors:
     @property
     def is_ideal(self) -> bool:
         """Whether what comes out is the truth."""
-        return not self.speed_from_wheels and not any(
-            getattr(sensor, field.name) for sensor in self.all().values() for field in fields(sensor)
-        )
+        return not self.speed_from_wheels and all(sensor.is_ideal for sensor in self.all().values())
 
 
 def _filled(given: Any, preset: Any) -> Any:

@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.controllers import Controller, find_controller
+from activesteer.controllers import Controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import Driver
 from activesteer.faults import Fault
 from activesteer.scenario import Scenario
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
+from activesteer.simulation.control_unit import control_unit
 from activesteer.simulation.recorder import Recorder
 from activesteer.vehicle import engine_warnings_held
 from activesteer.vehicle.faults import Faults
@@ -72,9 +73,8 @@ class ClosedLoop:
         self.maneuver = maneuver = scenario.maneuver
         self.vehicle = vehicle = scenario.car.on(maneuver.road, timestep_s)
         self.driver_setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
-        self.controller_setup = scenario.controller_setup(timestep_s)
         self.driver: Driver = scenario.driver.plugin.make(self.driver_setup)
-        self.controller: Controller = find_controller(controller).make(self.controller_setup)
+        self.controller_setup, self.controller = control_unit(controller, scenario, vehicle)
         settling, steps = maneuver.settling_reference(), round(maneuver.settle_s / timestep_s)
         self.measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
         self.motion, self.step_count = vehicle.motion(), 0

@@ -31,16 +31,16 @@ def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scen
     """
     if scenario.car.config.single_track.source == IDENTIFY:
         scenario = with_identified_single_track(scenario, _test_drive)
-    # The search drives the car in order.
+    # The search drives the car in order, with ideal sensors: the input is the same whatever those of the car are.
     search = replace(scenario.maneuver, fault=()).search
     if search is None:
         return scenario
-    found = search.accept(amplitude(scenario, search, timestep_s))
+    found = search.accept(amplitude(replace(scenario, car=scenario.car.with_ideal_sensors()), search, timestep_s))
     return replace(scenario, maneuver=replace(found, fault=scenario.maneuver.fault))
 
 
 def _test_drive(scenario: Scenario) -> Recording:
-    loop = ClosedLoop(scenario)
+    loop = ClosedLoop(replace(scenario, car=scenario.car.with_ideal_sensors()))
     recorder = Recorder(loop.vehicle, loop.steps)
     loop.run(recorder)
     return RunContext.of(scenario, loop.vehicle, find_controller("none")).recording(recorder)

@@ -8,11 +8,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from activesteer.controllers import CONTROLLER
 from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Recording, ScenePart
 from activesteer.scenario import Scenario, describe
 from activesteer.signals import Channel
 from activesteer.simulation.appearance import scene_of
+from activesteer.simulation.control_unit import about
 from activesteer.simulation.recorder import Recorder
 from activesteer.vehicle import Vehicle
 from activesteer.version import __version__
@@ -42,6 +44,12 @@ class RunContext(NamedTuple):
             "controller": controller.name,
             **({"controller_parameters": dict(controller.parameters)} if controller.parameters else {}),
             **describe(scenario),
+            **{
+                key: value
+                for plugin in plugins
+                if plugin.kind is CONTROLLER
+                for key, value in about(plugin, scenario.car.config.controllers, vehicle.timestep_s).items()
+            },
             "car": vehicle.dimensions(),
             "timestep_s": vehicle.timestep_s,
             "versions": _versions(),

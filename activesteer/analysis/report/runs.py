@@ -118,7 +118,11 @@ def _group(name: str, recordings: Mapping[str, Recording]) -> Group:
 def _names(recordings: Mapping[str, Recording]) -> Sequence[str]:
     """A name for each run: its controller, where that tells them apart, else its file, else all of its source."""
     # A user's controller is given as file and class; the class is enough.
-    controllers = [str(run.metadata.get("controller", "run")).rpartition(":")[2] for run in recordings.values()]
+    controllers = [
+        str(run.metadata.get("controller", "run")).rpartition(":")[2]
+        + ("+truth" if run.metadata.get("controller_uses_truth") else "")
+        for run in recordings.values()
+    ]
     stems = [Path(source).name.removesuffix(".mcap") for source in recordings]
     return next(
         (names for names in (controllers, stems) if max(Counter(names).values()) == 1),

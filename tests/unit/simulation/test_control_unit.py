@@ -1,0 +1,145 @@
+"""The control unit: rate, bus, what a controller is told."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+import activesteer
+from activesteer.errors import ParameterError
+from activesteer.recording import Recording
+from activesteer.scenario import resolve
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
+from activesteer.simulation.closed_loop import ClosedLoop
+from activesteer.simulation.control_unit import ControlUnit
+from tests.physics.runs import STEP_DEG, go_on
+
+SENSED = Measurement(0.0, 20.0, 0.1, 2.0, 0.0, 0.32, 0.0, 0.0, (60.0, 60.0, 60.0, 60.0))
+STEP = {"steer.steering_wheel_deg": STEP_DEG}
+
+
+class Counting:
+    """Asks for the number of its calls, in tenths of a thousandth of a radian."""
+
+    def __init__(self, setup: Any = None) -> None:
+        self.calls = 0
+        self.setup = setup
+        self.seen: list[Any] = []
+
+    def step(self, *seen: Any) -> ActuatorCommand:
+        self.calls += 1
+        self.seen = [*seen]
+        return ActuatorCommand(rear_steer_demand_rad=1e-4 * self.calls)
+
+
+def _asked(unit: ControlUnit, steps: int) -> list[int]:
+    return [round(1e4 * unit.step(DriverCommand(), SENSED).rear_steer_demand_rad) for _ in range(steps)]
+
+
+@pytest.mark.parametrize(
+    ("every", "delay", "asked"),
+    [
+        (1, 0, [1, 2, 3, 4, 5, 6, 7]),
+        (3, 0, [1, 1, 1, 2, 2, 2, 3]),
+        (1, 2, [0, 0, 1, 2, 3, 4, 5]),
+        (3, 2, [0, 0, 1, 1, 1, 2, 2]),
+    ],
+)
+def test_command_is_held_between_calls_and_comes_out_behind_the_bus(every: int, delay: int, asked: list[int]) -> None:
+    assert _asked(ControlUnit(Counting(), every, delay), 7) == asked
+
+
+def test_a_copy_goes_on_by_itself_as_the_original_does() -> None:
+    unit = ControlUnit(Counting(), 2, 3)
+    _asked(unit, 5)
+    other = copy.deepcopy(unit)
+    assert _asked(unit, 6) == _asked(other, 6)
+    assert unit.inner is not other.inner
+
+
+def test_driver_s_demand_is_known_through_the_steering_angle_sensor() -> None:
+    unit = ControlUnit(Counting(), 1, 0, steering_ratio=16.0)
+    unit.step(DriverCommand(0.5, brake_pedal=0.2, front_steer_demand_rad=0.03), SENSED)
+    command, measurement = unit.inner.seen
+    assert (command.steering_wheel_demand_rad, command.front_steer_demand_rad) == (0.32, 0.02)
+    assert (command.brake_pedal, measurement) == (0.2, SENSED)
+
+
+def test_a_controller_that_asks_for_it_gets_the_truth() -> None:
+    truth = SENSED._replace(yaw_rate_radps=0.2), Motion(0.0, 0.0, 0.0, 20.0, 0.5, 0.2)
+    unit = ControlUnit(Counting(), 1, 0, truth=lambda: truth)
+    unit.step(DriverCommand(), SENSED)
+    assert tuple(unit.inner.seen[1:]) == truth
+
+
+class SlowCounting(Counting):
+    interval_s = 0.005
+
+
+def _rear(recording: Recording) -> np.ndarray:
+    return np.flatnonzero(np.diff(recording["rear_steer_demand_rad"]))
+
+
+def test_rate_is_the_class_s_own_or_the_vehicle_file_s_and_the_controller_knows_it() -> None:
+    own = activesteer.simulate("step_steer", SlowCounting, overrides=STEP)
+    assert set(np.diff(_rear(own))) == {5}
+    assert own.metadata["controller_interval_s"] == pytest.approx(0.005)
+    given = activesteer.simulate("step_steer", SlowCounting, overrides=STEP | {"controllers.interval_s": 0.01})
+    assert set(np.diff(_rear(given))) == {10}
+    loop = ClosedLoop(resolve("step_steer", overrides=STEP | {"controllers.interval_s": 0.01}), "ars")
+    assert loop.controller_setup.timestep_s == pytest.approx(0.01)
+
+
+def test_bus_delays_the_same_commands() -> None:
+    # Of the open loop's driver, whom the commands do not reach: these are the same, only later.
+    at_once, later = (
+        activesteer.simulate("step_steer", SlowCounting, overrides=STEP | {"controllers.bus_delay_s": delay_s})
+        for delay_s in (0.0, 0.003)
+    )
+    np.testing.assert_array_equal(later["rear_steer_demand_rad"][3:], at_once["rear_steer_demand_rad"][:-3])
+
+
+def test_state_is_restored_bit_identically() -> None:
+    overrides = STEP | {"controllers.interval_s": 0.005, "controllers.bus_delay_s": 0.003}
+    simulation = ClosedLoop(resolve("step_steer", overrides=overrides), "ars")
+    simulation.advance(903)
+    state = simulation.save_state()
+    uninterrupted = go_on(simulation, 300)
+    simulation.restore_state(state)
+    np.testing.assert_array_equal(go_on(simulation, 300), uninterrupted)
+
+
+def test_a_slower_controller_behind_a_bus_still_steers_but_later() -> None:
+    quick = activesteer.simulate("step_steer", "ars", overrides=STEP)
+    slow = activesteer.simulate(
+        "step_steer", "ars", overrides=STEP | {"controllers.interval_s": 0.01, "controllers.bus_delay_s": 0.01}
+    )
+    assert slow.metrics["yaw_rate_overshoot"] > quick.metrics["yaw_rate_overshoot"]
+    np.testing.assert_allclose(
+        slow.metrics["yaw_rate_steady_state_radps"], quick.metrics["yaw_rate_steady_state_radps"], rtol=0.01
+    )
+
+
+@pytest.mark.parametrize(("key", "value"), [("controllers.interval_s", 0.0015), ("controllers.bus_delay_s", 0.0005)])
+def test_what_is_no_whole_number_of_steps_is_refused(key: str, value: float) -> None:
+    with pytest.raises(ParameterError, match=f"{key}.*whole steps of the simulation"):
+        activesteer.simulate("step_steer", "ars", overrides=STEP | {key: value})
+
+
+class Omniscient:
+    uses_truth = True
+
+    def step(self, command: DriverCommand, measurement: Measurement, motion: Motion) -> ActuatorCommand:
+        assert measurement.yaw_rate_radps == motion.yaw_rate_radps
+        return ActuatorCommand(rear_steer_demand_rad=-0.2 * motion.lateral_speed_mps / max(motion.speed_mps, 3.0))
+
+
+def test_use_of_the_truth_is_said_wherever_results_are_shown() -> None:
+    recording = activesteer.simulate("step_steer", Omniscient, overrides=STEP | {"sensors.preset": "production"})
+    assert recording.metadata["controller_uses_truth"] is True
+    assert activesteer.controllers.find_controller(Omniscient).label == "Omniscient+truth"
+    assert np.abs(recording["rear_steer_demand_rad"]).max() > 1e-4
+    assert "controller_uses_truth" not in activesteer.simulate("step_steer", "ars", overrides=STEP).metadata
