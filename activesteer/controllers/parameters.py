@@ -74,7 +74,7 @@ class ControllerParameters:
     afs: FrontSuperpositionParameters = FrontSuperpositionParameters()
     """Active front steering."""
     interval_s: Annotated[float, Range(1e-4, 0.1)] | None = None
-    """Time between two calls of the controller, whole steps; its own `interval_s`, else every step, if not given [s]."""
+    """Time between two calls of a controller, whole steps; its own `interval_s`, else every step, if not given [s]."""
     bus_delay_s: Annotated[float, Range(0.0, 0.1)] = 0.0
     """How long a command takes to the actuators, whole steps [s]."""
 
