@@ -105,8 +105,8 @@ def control_unit(controller: Any, scenario: Scenario, vehicle: Vehicle) -> tuple
         vehicle: The car in the engine.
 
     Returns:
-        What the controller may know of the car; and the controller, inside a control unit where it does not work in every
-        step, at once, and on the driver's own demand.
+        What the controller may know of the car; and the controller, inside a control unit where it does not work in
+        every step, at once, and on the driver's own demand.
 
     Raises:
         ParameterError: its interval or the delay of the bus is no whole number of steps.

@@ -8,7 +8,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from activesteer.controllers import CONTROLLER
 from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Recording, ScenePart
 from activesteer.scenario import Scenario, describe
@@ -44,12 +43,7 @@ class RunContext(NamedTuple):
             "controller": controller.name,
             **({"controller_parameters": dict(controller.parameters)} if controller.parameters else {}),
             **describe(scenario),
-            **{
-                key: value
-                for plugin in plugins
-                if plugin.kind is CONTROLLER
-                for key, value in about(plugin, scenario.car.config.controllers, vehicle.timestep_s).items()
-            },
+            **about(controller, scenario.car.config.controllers, vehicle.timestep_s),
             "car": vehicle.dimensions(),
             "timestep_s": vehicle.timestep_s,
             "versions": _versions(),
