@@ -7,14 +7,16 @@ and why.
 from __future__ import annotations
 
 import csv
+import json
+import math
 import os
 import re
 import secrets
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from activesteer.errors import ActiveSteerError, shown
 
@@ -30,34 +32,14 @@ def shown_path(path: str | os.PathLike[str]) -> str:
     return shown(Path(os.fsdecode(path)))
 
 
-@contextmanager
-def writing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[None]:
-    """Stands around what writes a file.
-
-    Args:
-        path: The file.
-        error: Class of the error that an OSError becomes.
-
-    Raises:
-        ActiveSteerError: the body raised an OSError; of class `error`.
-    """
-    with _refused("write", path, error):
-        yield
+def writing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> AbstractContextManager[None]:
+    """Stands around what writes a file: an OSError of the body becomes an error of class `error`."""
+    return _refused("write", path, error)
 
 
-@contextmanager
-def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[None]:
-    """Stands around what reads a file.
-
-    Args:
-        path: The file.
-        error: Class of the error that an OSError becomes.
-
-    Raises:
-        ActiveSteerError: the body raised an OSError; of class `error`.
-    """
-    with _refused("read", path, error):
-        yield
+def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> AbstractContextManager[None]:
+    """Stands around what reads a file: an OSError of the body becomes an error of class `error`."""
+    return _refused("read", path, error)
 
 
 @contextmanager
@@ -111,6 +93,20 @@ def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerE
     with replacing(path, error) as part:
         part.write_text(text, encoding="utf-8")
     return Path(path)
+
+
+def json_text(value: Any) -> str:
+    """A value as indented JSON that any reader takes: JSON has no nan, so a number that is not finite becomes null."""
+    return json.dumps(finite(value), indent=2, allow_nan=False)
+
+
+def finite(value: Any) -> Any:
+    """JSON values in which None stands for every number that is not finite."""
+    if isinstance(value, Mapping):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def user_path(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:

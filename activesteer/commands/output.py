@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import logging
-import math
 import os
 import re
 import sys
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
+
+from activesteer.files import json_text
 
 _COLOURS: Final = {"passed": 32, "FAILED": 31, "not reproduced": 33}
 """Verdict -> what makes a terminal write green, red or yellow."""
@@ -21,8 +21,8 @@ _COLUMNS: Final = 80
 
 
 def print_json(value: Any) -> None:
-    """Prints a value as JSON and nothing else; JSON has no nan, so what is not defined becomes null."""
-    print(json.dumps(_finite(value), indent=2))
+    """Prints a value as JSON and nothing else; see `json_text`."""
+    print(json_text(value))
 
 
 def coloured(text: str) -> str:
@@ -46,14 +46,6 @@ def print_entry(head: str, text: str, hanging: int = 2) -> None:
         break_long_words=False,
     )  # fmt: skip
     print("\n".join(lines) or head.rstrip())
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @contextmanager

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -39,13 +38,14 @@ def _replay(options: argparse.Namespace) -> int:
     except ImportError as error:
         raise PlaybackError("replay needs the viewer rerun: pip install rerun-sdk") from error
     from activesteer.recording import Recording
+    from activesteer.recording.run_names import run_names
 
     if options.compare and len(options.files) < 2:
         raise ParameterError(f"--compare needs at least two files, and {options.files[0]} is one")
     if len(set(options.files)) != len(options.files):
         raise ParameterError(f"a file is named twice: {', '.join(str(file) for file in options.files)}")
     recordings = [Recording.open(file, recover=True) for file in options.files]
-    names = _names(options.files, recordings)
+    names = run_names(options.files, recordings)
     runs = runs_of(dict(zip(names, recordings, strict=True)))
     if options.output is not None:
         save(runs, options.output, compare=options.compare)
@@ -55,15 +55,6 @@ def _replay(options: argparse.Namespace) -> int:
     elif options.output is None:
         show(runs, compare=options.compare)
     return 0
-
-
-def _names(files: list[Path], recordings: list[Any]) -> list[str]:
-    """The controllers where they tell the recordings apart, else the files."""
-    controllers = [str(recording.metadata.get("controller", "run")).rpartition(":")[2] for recording in recordings]
-    if len(set(controllers)) == len(controllers):
-        return controllers
-    stems = Counter(file.stem for file in files)
-    return [file.stem if stems[file.stem] == 1 else str(file.with_suffix("")) for file in files]
 
 
 def _announce(url: str) -> None:

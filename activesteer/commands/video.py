@@ -49,6 +49,7 @@ def _size(text: str) -> tuple[int, int]:
 
 def _video(options: argparse.Namespace) -> int:
     from activesteer.recording import Recording
+    from activesteer.recording.run_names import run_names
     from activesteer.video import Settings, make_film
 
     files = [options.file, *([options.compare] if options.compare is not None else [])]
@@ -60,7 +61,7 @@ def _video(options: argparse.Namespace) -> int:
     settings = Settings(options.camera, options.corner, options.size, rate, options.speed)
     started = time.monotonic()
     with ProgressBar(f"{output}", quiet=False) as progress:
-        made = make_film(dict(zip(_names(files, recordings), recordings, strict=True)), output, settings, progress)
+        made = make_film(dict(zip(run_names(files, recordings), recordings, strict=True)), output, settings, progress)
     took = time.monotonic() - started
     print(
         f"{output}: {made.pictures} pictures, {made.pictures / made.rate_hz:.1f} s at {made.rate_hz:g} a second, "
@@ -68,12 +69,3 @@ def _video(options: argparse.Namespace) -> int:
         file=sys.stderr,
     )
     return 0
-
-
-def _names(files: list[Path], recordings: list[Any]) -> list[str]:
-    """The controllers where they tell the recordings apart, else the files."""
-    controllers = [str(recording.metadata.get("controller", "run")).rpartition(":")[2] for recording in recordings]
-    if len(set(controllers)) == len(controllers):
-        return controllers
-    stems = [file.stem for file in files]
-    return stems if len(set(stems)) == len(stems) else [str(file.with_suffix("")) for file in files]

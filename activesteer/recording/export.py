@@ -7,7 +7,6 @@ needs to write files (pyarrow) comes with rerun-sdk anyway. CSV and Parquet are 
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +16,7 @@ import numpy as np
 
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
-from activesteer.files import replacing
+from activesteer.files import finite, replacing
 from activesteer.recording.channels import TIME, ChannelTable
 from activesteer.recording.format import metadata_texts
 
@@ -154,8 +153,7 @@ def _table(recording: Exportable) -> pa.Table:
         columns.append(pa.array(recording[channel.name].astype(kind)))
         notes = {"unit": channel.unit, "meaning": channel.meaning}
         fields.append(pa.field(channel.name, pa.from_numpy_dtype(kind), metadata=notes))
-    metrics = {name: value if math.isfinite(value) else None for name, value in recording.metrics.items()}
-    about = {"metadata": _metadata(recording), "metrics": json.dumps(metrics)}
+    about = {"metadata": _metadata(recording), "metrics": json.dumps(finite(recording.metrics))}
     return pa.table(columns, schema=pa.schema(fields, metadata=about))
 
 

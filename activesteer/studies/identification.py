@@ -8,7 +8,6 @@ compliance and the column. They are those of the range from 0.5 to 2 m/s2.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.tables import comparison
 from activesteer.controllers import SingleTrackParameters
 from activesteer.errors import RecordingError
+from activesteer.files import json_text
 from activesteer.quantities import metric_label
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.scenario.vehicle_file import write_values
@@ -87,7 +87,7 @@ class Identification:
                     }
                 )  # fmt: skip
         known = {key: value for key, value in vars(self.single_track).items() if value is not None}
-        return json.dumps({"vehicle": self.vehicle, "metrics": metrics, "single_track": known}, indent=2)
+        return json_text({"vehicle": self.vehicle, "metrics": metrics, "single_track": known})
 
 
 def identify(

@@ -23,7 +23,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from activesteer.errors import StudyError
-from activesteer.files import make_folder, reading, replacing, write_text
+from activesteer.files import make_folder, reading, replacing, write_text, writing
 from activesteer.studies.column_units import unit_of
 from activesteer.studies.run_identity import versions
 from activesteer.studies.run_task import CURVE, Row
@@ -309,10 +309,8 @@ def _batched(tables: Iterable[pa.Table], rows: int) -> Iterator[pa.Table]:
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
     """Holds the folder; where the file system knows no locks, nobody is kept out."""
-    try:
+    with writing(path, StudyError):
         file = path.open("w")
-    except OSError as reason:
-        raise StudyError(f"cannot write {path}: {reason.strerror}") from reason
     with file:
         if fcntl is not None:
             try:

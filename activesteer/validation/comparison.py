@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from activesteer.files import finite
+
 Kind = Literal["relative", "absolute"]
 
 
@@ -47,9 +49,9 @@ class Comparison:
             "run": self.run,
             "quantity": self.quantity,
             "unit": self.unit,
-            "ours": _number(self.ours),
-            "reference": _number(self.reference),
-            "error": _number(self.error),
+            "ours": self.ours,
+            "reference": self.reference,
+            "error": self.error,
             "tolerance": self.tolerance,
             "kind": self.kind,
             "inside": self.inside,
@@ -79,10 +81,5 @@ def absolute(run: str, quantity: str, unit: str, ours: float, reference: float, 
 
 
 def to_json(comparisons: Iterable[Comparison]) -> dict[str, list[dict[str, Any]]]:
-    """The comparisons as they are written to JSON."""
-    return {"comparisons": [comparison.row() for comparison in comparisons]}
-
-
-def _number(value: float) -> float | None:
-    """JSON has no word for what is not finite."""
-    return value if math.isfinite(value) else None
+    """The comparisons as JSON values; a number that is not finite is None."""
+    return finite({"comparisons": [comparison.row() for comparison in comparisons]})

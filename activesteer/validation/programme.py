@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
-from activesteer.files import make_folder, replacing, write_text
+from activesteer.files import json_text, make_folder, replacing, write_text
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.simulation.runner import simulate
@@ -129,7 +128,7 @@ def write_json(result: Validation, path: Path) -> Path:
         ParameterError: it cannot be written.
     """
     make_folder(path.parent, ParameterError)
-    text = json.dumps(to_json(result.comparisons), indent=2, allow_nan=False)
+    text = json_text(to_json(result.comparisons))
     return write_text(path, text + "\n", ParameterError)
 
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.conventions import CORNERS, Array, yaw_of
 from activesteer.errors import ModelError, nearest_names
 from activesteer.sensors.block import MEASURED
 from activesteer.signals import Channel
@@ -363,7 +363,7 @@ class _Frame:
         self.front_axle_x_m, self.front_axle_y_m, _ = columns("front_axle_position")
         w, x, y, z = columns("chassis_orientation")
         # Body axes in the world: yaw, pitch, roll in this order (ISO 8855).
-        yaw = np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+        yaw = yaw_of(rows.sensordata[:, sensor("chassis_orientation")])
         turned = np.diff(yaw, prepend=last_yaw_rad)
         # Unwrapping takes longer than all the rest; where no jump is to be taken out, it adds 0.
         jumps = not np.abs(turned).max() < np.pi

@@ -13,7 +13,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.conventions import CORNERS, Array, yaw_of
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.loading import find
 
@@ -114,9 +114,8 @@ class LocalState:
     def _turn_home(self) -> None:
         """Puts the car at the origin of the road with heading 0 and unturned wheels; its motion stays."""
         data, first = self.vehicle.data, self._chassis_dof
-        w, x, y, z = data.qpos[3:7]
         # Heading of the chassis' x axis (ISO 8855): a rotation about that axis leaves it alone.
-        yaw = math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+        yaw = float(yaw_of(data.qpos[3:7]))
         turned = np.empty(4)
         mujoco.mju_mulQuat(turned, np.array([math.cos(yaw / 2), 0.0, 0.0, -math.sin(yaw / 2)]), data.qpos[3:7])
         data.qpos[:2] = 0.0

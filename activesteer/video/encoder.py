@@ -147,9 +147,8 @@ class _Mp4:
             if kind is None and status != 0:
                 raise PlaybackError(self._complaint())
             if kind is None:
-                self._part.replace(self._path)
-        except OSError as reason:
-            raise PlaybackError(f"cannot write {self._path}: {reason.strerror or reason}") from None
+                with writing(self._path, PlaybackError):
+                    self._part.replace(self._path)
         finally:
             self._log.close()
             self._part.unlink(missing_ok=True)
@@ -182,17 +181,11 @@ class _Gif:
         try:
             if kind is None and self._pictures:
                 first, *others = self._pictures
-                first.save(
-                    self._part,
-                    "GIF",
-                    save_all=True,
-                    append_images=others,
-                    duration=self._duration_ms,
-                    loop=0,
-                    optimize=False,
-                )
-                self._part.replace(self._path)
-        except OSError as reason:
-            raise PlaybackError(f"cannot write {self._path}: {reason.strerror or reason}") from None
+                with writing(self._path, PlaybackError):
+                    first.save(
+                        self._part, "GIF", save_all=True, append_images=others, duration=self._duration_ms, loop=0,
+                        optimize=False,
+                    )  # fmt: skip
+                    self._part.replace(self._path)
         finally:
             self._part.unlink(missing_ok=True)

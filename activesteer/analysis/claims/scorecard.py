@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 from activesteer.analysis.claims.claim import SYSTEMS, Claim
 from activesteer.analysis.claims.scenarios import STATEMENTS
 from activesteer.errors import ParameterError, nearest_names
+from activesteer.files import finite
 from activesteer.quantities import metric_label
 
 FILE: Final = "not_reproduced.toml"
@@ -68,7 +69,7 @@ class Scorecard:
                     "passed": item.claim.passed,
                     "verdict": item.verdict.value,
                     "reason": item.reason,
-                    "values": {k: v if math.isfinite(v) else None for k, v in item.claim.values.items()},
+                    "values": finite(item.claim.values),
                     "criterion": item.claim.criterion,
                     "kind": item.claim.statement.kind.value,
                     "obstacle": item.claim.obstacle,

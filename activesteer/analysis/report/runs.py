@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -12,6 +11,7 @@ from activesteer.analysis.claims import SCENARIOS
 from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
+from activesteer.recording.run_names import run_names
 
 MAX_RUNS: Final = 60
 """More runs than this make a page that nobody can read, and that a browser is slow to open."""
@@ -103,7 +103,7 @@ def entry(recording: Recording, table: str, key: str) -> str:
 
 
 def _group(name: str, recordings: Mapping[str, Recording]) -> Group:
-    named = dict(zip(_names(recordings), recordings.items(), strict=True))
+    named = dict(zip(run_names(list(recordings), recordings.values()), recordings.items(), strict=True))
     ordered = [system for system in SYSTEM_LABELS if system in named]
     ordered += [other for other in named if other not in SYSTEM_LABELS]
     colours = dict(zip(SYSTEM_LABELS, RUN_COLOURS, strict=False))
@@ -113,18 +113,3 @@ def _group(name: str, recordings: Mapping[str, Recording]) -> Group:
     colours |= {run: spare[number % len(spare)] for number, run in enumerate(others)}
     runs = tuple(Run(*named[run], run, SYSTEM_LABELS.get(run, run), colours[run]) for run in ordered)
     return Group(name, entry(runs[0].recording, "maneuver", "title") or name, runs)
-
-
-def _names(recordings: Mapping[str, Recording]) -> Sequence[str]:
-    """A name for each run: its controller, where that tells them apart, else its file, else all of its source."""
-    # A user's controller is given as file and class; the class is enough.
-    controllers = [
-        str(run.metadata.get("controller", "run")).rpartition(":")[2]
-        + ("+truth" if run.metadata.get("controller_uses_truth") else "")
-        for run in recordings.values()
-    ]
-    stems = [Path(source).name.removesuffix(".mcap") for source in recordings]
-    return next(
-        (names for names in (controllers, stems) if max(Counter(names).values()) == 1),
-        [str(name) for name in recordings],
-    )

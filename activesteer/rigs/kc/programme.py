@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from activesteer.conventions import CORNERS, Array
+from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
 from activesteer.rigs.kc.modes import Modes, modes
 from activesteer.rigs.kc.steering_axis import SteeringAxis, steering_axis
@@ -163,21 +164,14 @@ def _steering_angles(vehicle: Vehicle) -> Array:
     """Denser around straight ahead; to the lock of the steering wheel or of the rack, whichever comes first."""
     model = vehicle.model
     rack = float(model.jnt_range[model.joint("rack").id, 1])
-    lock = min(vehicle.parameters.steering.steering_wheel_limit_rad, rack / _rack_per_angle(vehicle))
+    per_angle = vehicle.rack_per_steering_wheel_m
+    if per_angle is None:
+        raise ModelError("no tendon 'steering_column' couples rack and steering wheel")
+    lock = min(vehicle.parameters.steering.steering_wheel_limit_rad, rack / abs(per_angle))
     small = np.radians([2.5, 5.0, 10.0, 15.0, 20.0])
     half = np.concatenate([small[small < lock], np.linspace(0.0, lock, _STEERING_POINTS)[2:]])
     half = np.unique(half)
     return np.concatenate([-half[::-1], [0.0], half])
-
-
-def _rack_per_angle(vehicle: Vehicle) -> float:
-    """Rack travel per steering wheel angle [m/rad], from the coupling tendon."""
-    model = vehicle.model
-    tendon = model.tendon("steering_column").id
-    first = int(model.tendon_adr[tendon])
-    items = range(first, first + int(model.tendon_num[tendon]))
-    share = {int(model.wrap_objid[item]): float(model.wrap_prm[item]) for item in items}
-    return abs(share[model.joint("steering_wheel").id] / share[model.joint("rack").id])
 
 
 def _rear_range(vehicle: Vehicle) -> float:

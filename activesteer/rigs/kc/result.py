@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 
 from activesteer.errors import ParameterError, nearest_names
+from activesteer.files import json_text
 from activesteer.rigs.kc.definitions import DEFINITIONS, Axle
 from activesteer.rigs.kc.programme import Measured
 from activesteer.rigs.kc.sweep import Sweep
@@ -81,7 +81,7 @@ class KcResult:
             {
                 "name": entry.name,
                 "axle": entry.axle,
-                "value": entry.value if math.isfinite(entry.value) else None,
+                "value": entry.value,
                 "unit": entry.unit,
                 "band": list(entry.band) if entry.band else None,
                 "inside": entry.inside,
@@ -89,7 +89,7 @@ class KcResult:
             }
             for entry in self.metrics
         ]
-        return json.dumps({"metrics": rows}, indent=2)
+        return json_text({"metrics": rows})
 
     def table(self) -> str:
         """The metrics as text, one a line, with what the bands ask."""

@@ -146,7 +146,7 @@ def test_runs_of_one_controller_are_called_by_their_files():
     assert [run.name for run in group.runs] == ["a", "b"]
     assert group.runs[0].colour != group.runs[1].colour
     again = {f"{folder}/a.mcap": run for folder, run in zip("xy", runs.values(), strict=True)}
-    assert [run.name for run in groups_of(again)[0].runs] == ["x/a.mcap", "y/a.mcap"]
+    assert [run.name for run in groups_of(again)[0].runs] == ["x/a", "y/a"]
 
 
 def test_users_controller_is_called_by_its_class():

@@ -1,0 +1,32 @@
+"""What runs are called that are shown beside each other."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from activesteer.recording.recording import Recording
+
+
+def run_names(sources: Sequence[str | Path], recordings: Iterable[Recording]) -> list[str]:
+    """A name for each run: its controller where that tells all of them apart, else its file, with its folder if needed.
+
+    Args:
+        sources: File of each run, or what else it is called.
+        recordings: The runs.
+
+    Returns:
+        The names, in the same order.
+    """
+    # A user's controller is given as file and class; the class is enough.
+    controllers = [
+        str(run.metadata.get("controller", "run")).rpartition(":")[2]
+        + ("+truth" if run.metadata.get("controller_uses_truth") else "")
+        for run in recordings
+    ]
+    if len(set(controllers)) == len(controllers):
+        return controllers
+    paths = [str(source).removesuffix(".mcap") for source in sources]
+    stems = Counter(Path(path).name for path in paths)
+    return [Path(path).name if stems[Path(path).name] == 1 else path for path in paths]
