@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from activesteer.compilation import inlined
 from activesteer.conventions import CORNERS
-from activesteer.sensors.parameters import RANDOM, Sensor, Sensors
+from activesteer.sensors.parameters import RANDOM, Sensors
+from activesteer.sensors.sensor_kinds import Sensor
 from activesteer.sensors.signal_chain import CHAIN, FILTERED, HELD, LINE, PHASE, SPEED, passed_on
 from activesteer.signals import Measurement
 

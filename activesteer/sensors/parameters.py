@@ -10,99 +10,11 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
-
-_Amount = Annotated[float, Range(0.0)]
-_Delay = Annotated[float, Range(0.0, 0.1)]
-_SampleTime = Annotated[float, Range(1e-4, 0.1)]
-_Bandwidth = Annotated[float, Range(0.1, 1e4)]
+from activesteer.sensors.presets import PRESETS
+from activesteer.sensors.sensor_kinds import AccelerationSensor, AngleSensor, RateSensor, Sensor, WheelSpeedSensor
 
 RANDOM: Final = ("noise", "bias", "drift")
 """How the keys begin whose values are drawn from the seed."""
-
-
-@dataclass(frozen=True)
-class Sensor:
-    """What all sensors have; the rest has the unit of what is measured.
-
-    In this order: bias and drift are added, the sum goes through the bandwidth, is sampled, gets its noise, is limited,
-    quantised, and comes out after the delay.
-    """
-
-    bandwidth_Hz: _Bandwidth | None = None
-    """Corner frequency (-3 dB) of a first-order low-pass before sampling [Hz]."""
-    sample_time_s: _SampleTime | None = None
-    """Time between two samples, in whole steps of the simulation; the output is held between [s]."""
-    delay_s: _Delay | None = None
-    """From the sample to when it comes out, in whole steps of the simulation [s]."""
-
-    @property
-    def is_ideal(self) -> bool:
-        """Whether what comes out is the truth."""
-        return not any(getattr(self, field.name) for field in fields(self))
-
-    def amount(self, word: str) -> float:
-        """The value of the key that begins with a word and ends in the unit; 0 where it is not given."""
-        return next((getattr(self, field.name) for field in fields(self) if field.name.startswith(word)), None) or 0.0
-
-
-@dataclass(frozen=True)
-class RateSensor(Sensor):
-    """A sensor of an angular rate."""
-
-    noise_radps: _Amount | None = None
-    """White noise of the samples, rms [rad/s]."""
-    bias_radps: _Amount | None = None
-    """Offset of a run, drawn from the seed: rms over seeds [rad/s]."""
-    drift_radps: _Amount | None = None
-    """Random walk of the offset: rms of its change within a minute [rad/s]."""
-    quantum_radps: _Amount | None = None
-    """Step of quantisation [rad/s]."""
-    limit_radps: _Amount | None = None
-    """Where it saturates, to either side [rad/s]."""
-
-
-@dataclass(frozen=True)
-class WheelSpeedSensor(RateSensor):
-    """A sensor of the rotational speed of a wheel; all four are alike.
-
-    With teeth, the edges of a pulse wheel that pass between two samples are counted and their time is measured; where
-    none passes, the wheel is not faster than the time since the last one allows. The sign of rotation is known.
-    """
-
-    teeth: Annotated[int, Range(0, 1000)] | None = None
-    """Edges that pass in a turn; 0 for a sensor without a pulse wheel."""
-
-
-@dataclass(frozen=True)
-class AccelerationSensor(Sensor):
-    """A sensor of an acceleration."""
-
-    noise_mps2: _Amount | None = None
-    """White noise of the samples, rms [m/s2]."""
-    bias_mps2: _Amount | None = None
-    """Offset of a run, drawn from the seed: rms over seeds [m/s2]."""
-    drift_mps2: _Amount | None = None
-    """Random walk of the offset: rms of its change within a minute [m/s2]."""
-    quantum_mps2: _Amount | None = None
-    """Step of quantisation [m/s2]."""
-    limit_mps2: _Amount | None = None
-    """Where it saturates, to either side [m/s2]."""
-
-
-@dataclass(frozen=True)
-class AngleSensor(Sensor):
-    """A sensor of an angle."""
-
-    noise_rad: _Amount | None = None
-    """White noise of the samples, rms [rad]."""
-    bias_rad: _Amount | None = None
-    """Offset of a run, drawn from the seed: rms over seeds [rad]."""
-    drift_rad: _Amount | None = None
-    """Random walk of the offset: rms of its change within a minute [rad]."""
-    quantum_rad: _Amount | None = None
-    """Step of quantisation [rad]."""
-    limit_rad: _Amount | None = None
-    """Where it saturates, to either side [rad]."""
 
 
 @dataclass(frozen=True)
@@ -143,9 +55,6 @@ class Sensors:
         Raises:
             ParameterError: there is a seed and nothing to draw from it.
         """
-        # Here, because the presets are made of these classes.
-        from activesteer.sensors.presets import PRESETS  # noqa: PLC0415
-
         for name, preset in PRESETS[self.preset].items():
             object.__setattr__(self, name, _filled(getattr(self, name), preset))
         random = any(sensor.amount(word) for sensor in self.all().values() for word in RANDOM)

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from activesteer.conventions import GRAVITY_MPS2
-from activesteer.sensors.parameters import AccelerationSensor, AngleSensor, RateSensor, WheelSpeedSensor
+from activesteer.sensors.sensor_kinds import AccelerationSensor, AngleSensor, RateSensor, WheelSpeedSensor
 
 _DEG: Final = math.radians(1.0)
 
