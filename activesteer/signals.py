@@ -56,6 +56,7 @@ class Reference(NamedTuple):
             angle.
         wheel_torques: Torques of the wheels; where given, they stand for drive and brake.
         path: Path of the centre of gravity to follow; where given, the driver finds the steering wheel angle.
+        parking_brake: Parking brake, 0 released to 1 fully applied.
     """
 
     steering_wheel_demand_rad: float
@@ -66,6 +67,7 @@ class Reference(NamedTuple):
     rack_demand_m: float | None = None
     wheel_torques: WheelTorques | None = None
     path: Path | None = None
+    parking_brake: float = 0.0
 
 
 class DriverCommand(NamedTuple):
@@ -81,6 +83,7 @@ class DriverCommand(NamedTuple):
             whatever torque is demanded.
         front_steer_demand_rad: Steering wheel angle demanded, divided by the overall steering ratio: the angle at the
             road wheel [rad]. A driver of one's own leaves it out; the simulation fills it in.
+        parking_brake: Parking brake, 0 released to 1 fully applied.
     """
 
     steering_wheel_demand_rad: float = 0.0
@@ -90,6 +93,7 @@ class DriverCommand(NamedTuple):
     wheel_torques: WheelTorques | None = None
     gear: int = 1
     front_steer_demand_rad: float = math.nan
+    parking_brake: float = 0.0
 
 
 class Measurement(NamedTuple):

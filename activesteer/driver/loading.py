@@ -55,6 +55,7 @@ DRIVER: Final = _DriverKind(
         "steering_wheel_demand_rad": Range(-_MAX_ANGLE_RAD, _MAX_ANGLE_RAD),
         "drive_torque_demand_Nm": Range(-_MAX_TORQUE_NM, _MAX_TORQUE_NM),
         "brake_pedal": Range(0.0, 1.0),
+        "parking_brake": Range(0.0, 1.0),
         "gear": Range(-1, 1),
     },
     error=DriverError,

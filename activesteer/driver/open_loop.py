@@ -90,5 +90,5 @@ class OpenLoopDriver:
             torque, gear = 0.0, 0
         return DriverCommand(
             angle, torque, reference.brake_pedal, saturated, reference.wheel_torques, gear,
-            angle / self.steering_ratio,
+            angle / self.steering_ratio, reference.parking_brake,
         )  # fmt: skip

@@ -31,6 +31,9 @@ MEASURED: Final = (
     *((f"{corner}_wheel_speed_radps", "rad/s", f"rotational speed of the wheel {corner}") for corner in CORNERS),
 )
 """Name, unit and meaning of the outputs, in their order: the members of `Measurement` without its time."""
+_NAMES: Final = [name for name, _, _ in MEASURED]
+AX, WHEEL_SPEEDS = _NAMES.index("ax_mps2"), _NAMES.index("fl_wheel_speed_radps")
+"""Places of the longitudinal acceleration and of the first wheel's speed among the outputs."""
 _MINUTE_S: Final = 60.0
 
 

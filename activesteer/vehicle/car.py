@@ -6,12 +6,13 @@ import contextlib
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE, brake_setup, reset
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.errors import ModelError, SimulationDiverged
 from activesteer.road.road import Road
@@ -93,13 +94,16 @@ class Vehicle:
             self._command_memory = self._commands.data
             self._sensors = None if parameters.sensors.is_ideal else SensorBlock(parameters.sensors, timestep_s)
             self._measured = np.empty(0) if self._sensors is None else self._sensors.outputs
+            self._brake_setup, self._brake_state = np.zeros(1, BRAKE_SETUP), np.zeros(1, BRAKE_STATE)
+            self._brake_row = self._brake_state.view(np.float64)
             self.channels = ChannelMap(self.model, parameters)
             self._bind()
             self._place()
+            radii_m = self._effective_radii(tyres)
+            self._brake_setup[:] = self._brakes_of(radii_m)
+            reset(self._brake_state, self._brake_setup, 0.0)
             if parameters.sensors.speed_from_wheels:
-                self._plan["wheel_radii_m"] = speed_radii(
-                    parameters.powertrain.front_share, self._effective_radii(tyres)
-                )
+                self._plan["wheel_radii_m"] = speed_radii(parameters.powertrain.front_share, radii_m)
         except ModelError as reason:
             raise ModelError(str(reason), file=str(mjcf)) from reason
 
@@ -126,16 +130,15 @@ class Vehicle:
             ),
             yaw_dof=int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")]) + 5,
         )  # fmt: skip
-        powertrain, brakes = self.parameters.powertrain, self.parameters.brakes
-        front_Nm, rear_Nm = brakes.front_torque_Nm, brakes.rear_torque_Nm
         self._wheels = Wheels(
             [actuator(f"{corner}_drive") for corner in CORNERS],
             [actuator(f"{corner}_brake") for corner in CORNERS],
-            powertrain.wheel_shares,
-            (front_Nm, front_Nm, rear_Nm, rear_Nm),
+            self.parameters.powertrain.wheel_shares,
         )
-        ratio = self.parameters.steering.ratio
-        self._plan = step_plan(model, data, self.live_arrays(), self._places, self._wheels, ratio, self._sensors)
+        ratio, brakes = self.parameters.steering.ratio, (self._brake_setup, self._brake_state)
+        self._plan = step_plan(
+            model, data, self.live_arrays(), self._places, self._wheels, ratio, self._sensors, brakes
+        )
         self._plan_address = self._plan.ctypes.data
         block = int(model.numeric_data[-fb.TRAILER_SIZE])
         self._areas_felt = model.numeric_data[block + fb.AREAS_FELT : block + fb.AREAS_FELT + 1]
@@ -156,6 +159,18 @@ class Vehicle:
         held = [self._root_dof, self._root_dof + 1, self._root_dof + 5, *self._spins]
         static_ride(self.model, self.data, np.asarray(held))
 
+    def _brakes_of(self, rolling_radii_m: list[float]) -> NDArray[Any]:
+        """What the brakes' control unit knows of the car: rolling radii [m] and inertias of its wheels."""
+        inertias_kgm2 = []
+        unit, product = np.zeros(self.model.nv), np.zeros(self.model.nv)
+        for spin in self._spins:
+            unit[:] = 0.0
+            unit[spin] = 1.0
+            mujoco.mj_mulM(self.model, self.data, product, unit)
+            inertias_kgm2.append(float(product[spin]))
+        shares = self.parameters.powertrain.wheel_shares
+        return brake_setup(self.parameters.brakes, self.timestep_s, rolling_radii_m, shares, inertias_kgm2)
+
     def start(self, speed_mps: float, time_s: float = 0.0) -> Measurement:
         """Sets the car rolling straight ahead at a speed, from static ride.
 
@@ -173,6 +188,7 @@ class Vehicle:
         for index, dof in enumerate(self._spins):
             data.qvel[dof] = speed_mps / self._rolling_radius(index)
         data.time = time_s
+        reset(self._brake_state, self._brake_setup, speed_mps)
         mujoco.mj_forward(self.model, data)
         if self._sensors is not None:
             self._sensors.reset(self.truth()[0])
@@ -359,11 +375,13 @@ class Vehicle:
         mujoco.mj_copyData(now, self.model, self.data)
         mujoco.mj_forward(self.model, now)
         write_commands(commands.data, command, asked)
-        return RawRows(*(array[np.newaxis] for array in (*self._arrays_of(now), commands, self._measured)))
+        return RawRows(
+            *(array[np.newaxis] for array in (*self._arrays_of(now), commands, self._measured, self._brake_row))
+        )
 
     def live_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """The engine's arrays, the last commands and what the sensors say, in the order of `RawRows`."""
-        return (*self._arrays_of(self.data), self._commands, self._measured)
+        """The engine's arrays, the last commands, what the sensors say, the brakes, in the order of `RawRows`."""
+        return (*self._arrays_of(self.data), self._commands, self._measured, self._brake_row)
 
     @staticmethod
     def _arrays_of(data: mujoco.MjData) -> tuple[NDArray[np.float64], ...]:
@@ -373,17 +391,20 @@ class Vehicle:
         )  # fmt: skip
 
     def save_state(self) -> NDArray[np.float64]:
-        """The state of engine and sensors, complete: what continues from it is bit-identical."""
+        """The state of engine, brakes and sensors, complete: what continues from it is bit-identical."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return state if self._sensors is None else np.concatenate((state, self._sensors.memory))
+        sensors = () if self._sensors is None else (self._sensors.memory,)
+        return np.concatenate((state, self._brake_row, *sensors))
 
     def restore_state(self, state: NDArray[np.float64]) -> None:
         """Puts a saved state back."""
         size = mujoco.mj_stateSize(self.model, _STATE)
+        brakes = size + len(self._brake_row)
         mujoco.mj_setState(self.model, self.data, state[:size], _STATE)
+        self._brake_row[:] = state[size:brakes]
         if self._sensors is not None:
-            self._sensors.memory[:] = state[size:]
+            self._sensors.memory[:] = state[brakes:]
         # The step engages a gear only where it changes; this one never occurs, so it does so now.
         self._gear = math.nan
 

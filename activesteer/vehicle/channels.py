@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.brakes.records import PER_WHEEL, PLACES
 from activesteer.conventions import CORNERS, Array, yaw_of
 from activesteer.errors import ModelError, nearest_names
 from activesteer.sensors.block import MEASURED
@@ -36,6 +37,15 @@ _MOTION_SENSORS: Final = (
 
 _CORNER_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 
+_BRAKES: Final = (
+    ("demand_Pa", "brake_pressure_demand_Pa", "Pa", "brake pressure that driver and controller ask for", "corners"),
+    ("pressure_Pa", "brake_pressure_Pa", "Pa", "pressure in the wheel brake", "corners"),
+    ("phase", "abs_phase", "", "anti-lock control: 0 off, 1 releases, 2 recovers, 3 builds up pressure", "corners"),
+    ("reference_mps", "abs_speed_mps", "m/s", "speed of the car as the brakes' control unit estimates it", "vehicle"),
+    ("tcs_active", "tcs_active", "", "1 while traction control limits the drive", "vehicle"),
+)
+"""Field of `BRAKE_STATE` -> its channels: name, unit, meaning, group."""
+
 
 class RawRows(NamedTuple):
     """Copies of the engine's arrays and the commands, one row a step, all of the same instant."""
@@ -51,6 +61,8 @@ class RawRows(NamedTuple):
     """What driver and controller asked for, as `write_commands` leaves it."""
     measured: Array
     """What the sensors said when driver and controller decided; empty with ideal sensors."""
+    brakes: Array
+    """A `BRAKE_STATE`."""
 
 
 class Column(NamedTuple):
@@ -93,7 +105,7 @@ class ChannelMap:
         signals = [
             *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(),
             *(Signal(channel, Column("commands", place)) for channel, place in COMMAND_CHANNELS.items()),
-            *self._measured(),
+            *self._measured(), *self._brakes(),
         ]  # fmt: skip
         signals.append(
             Signal(
@@ -337,6 +349,22 @@ class ChannelMap:
             )
             for index, (name, unit, meaning) in enumerate(MEASURED)
         ]
+
+    def _brakes(self) -> list[Signal]:
+        """Pressures, and what the control unit of the brakes knows and does."""
+        signals = []
+        for field, name, unit, meaning, group in _BRAKES:
+            first = PLACES[field]
+            if field in PER_WHEEL:
+                signals += [
+                    Signal(
+                        Channel(f"{corner}_{name}", unit, f"{meaning}, {words}", group), Column("brakes", first + index)
+                    )
+                    for index, (corner, words) in enumerate(_CORNER_WORDS.items())
+                ]
+            else:
+                signals.append(Signal(Channel(name, unit, meaning, group), Column("brakes", first)))
+        return signals
 
     def _limits_of(self, index: int) -> Actuator:
         model = self._model

@@ -13,6 +13,7 @@ _NUMBERS: Final[dict[str, tuple[str, str] | None]] = {
     "steering_wheel_demand_rad": None,  # recorded where it arrives, among the inputs of the engine
     "drive_torque_demand_Nm": ("Nm", "drive torque demanded, all wheels together"),
     "brake_pedal": ("", "brake pedal position, 0 to 1"),
+    "parking_brake": ("", "parking brake, 0 to 1"),
     "driver_saturated": ("", "1 where the steering is at its lock or the engine at its limit"),
     "gear": None,
     "front_steer_demand_rad": ("rad", "the driver's demand at the road wheel"),
@@ -41,7 +42,7 @@ COMMAND_CHANNELS: Final = {
 }
 """Channel -> its place in a row."""
 CARRIED_OUT: Final = (
-    "steering_wheel_demand_rad", "drive_torque_demand_Nm", "brake_pedal", "rear_steer_demand_rad",
+    "steering_wheel_demand_rad", "drive_torque_demand_Nm", "brake_pedal", "parking_brake", "rear_steer_demand_rad",
     "superposition_demand_rad", *COMMANDS[BRAKES : BRAKES + 4], "drive_torque_change_Nm",
 )  # fmt: skip
 """What reaches the engine; the rest is for the recording."""
@@ -58,9 +59,9 @@ def write_commands(row: memoryview, command: DriverCommand, asked: ActuatorComma
         asked: What the controller asks for.
     """
     # Taken apart by position: by name it takes twice as long, and this happens every step.
-    steering_wheel, drive, pedal, at_limit, _, gear, front = command
+    steering_wheel, drive, pedal, at_limit, _, gear, front, parking = command
     rear, added, desired, prediction, correction, limited, (fl, fr, rl, rr), change = asked
     _pack_into(
-        row, 0, steering_wheel, drive, pedal, at_limit, gear, front, rear, added, desired, prediction, correction,
-        limited, fl, fr, rl, rr, change,
+        row, 0, steering_wheel, drive, pedal, parking, at_limit, gear, front, rear, added, desired, prediction,
+        correction, limited, fl, fr, rl, rr, change,
     )  # fmt: skip

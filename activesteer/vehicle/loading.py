@@ -224,7 +224,9 @@ def _actuator(
         return (fb.KIND_DRIVE, address, share, parameters.powertrain.lag_s, 0.0, 0.0)
     if name.endswith("_brake"):
         brakes = parameters.brakes
-        most = brakes.front_torque_Nm if name.startswith("f") else brakes.rear_torque_Nm
+        most = (
+            brakes.front_torque_Nm if corner.startswith("f") else max(brakes.rear_torque_Nm, brakes.parking_torque_Nm)
+        )
         spin = float(model.jnt_dofadr[int(model.actuator_trnid[index, 0])])
         return (fb.KIND_BRAKE, address, brakes.stiffness_Nmprad, spin, brakes.drag_torque_Nm, most)
     if name.endswith("_friction"):

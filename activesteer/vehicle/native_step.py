@@ -19,9 +19,11 @@ from numba import carray, from_dtype, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from activesteer.brakes.control_unit import step_brakes
+from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE
 from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS
-from activesteer.sensors.block import SensorBlock, measured
+from activesteer.sensors.block import AX, WHEEL_SPEEDS, SensorBlock, measured
 from activesteer.sensors.signal_chain import CHAIN
 from activesteer.signals import Measurement, Motion
 from activesteer.vehicle.command_row import BRAKES, COMMAND_ROW
@@ -34,8 +36,8 @@ FASTEST_MPS: Final = 200.0
 
 _N_WHEELS: Final = len(CORNERS)
 _ENGINE_ARRAYS: Final = 7
-"""Arrays of the engine that a row is copied from; behind them come the commands, and what the sensors say."""
-_SOURCES: Final = _ENGINE_ARRAYS + 2
+"""Arrays of the engine that a row is copied from; behind them come the commands, what the sensors say, the brakes."""
+_SOURCES: Final = _ENGINE_ARRAYS + 3
 _WARNINGS: Final = len(mujoco.mjtWarning.__members__) - 1
 _EXPONENT: Final = 0x7FF0000000000000
 """Bits of a float64 that are all set where it is not finite, and only there."""
@@ -50,8 +52,6 @@ class Wheels(NamedTuple):
     """Controls of the brakes."""
     drive_shares: Sequence[float]
     """What each gets of the drive torque."""
-    brake_torques_Nm: Sequence[float]
-    """Brake torques at a pedal pressed to the end [Nm]."""
 
 
 class Places(NamedTuple):
@@ -78,19 +78,9 @@ class Places(NamedTuple):
 
 
 _ADDRESSES: Final = (
-    "mj_step",
-    "model",
-    "data",
-    "time",
-    "warnings",
-    "qvel",
-    "n_dofs",
-    "ctrl",
-    "sensordata",
-    "positions",
-    "quaternions",
-    "n_bodies",
-)
+    "mj_step", "model", "data", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata", "positions", "quaternions",
+    "n_bodies", "brake_setup", "brake_state",
+)  # fmt: skip
 STEP_PLAN: Final = np.dtype(
     (
         np.record,
@@ -98,7 +88,7 @@ STEP_PLAN: Final = np.dtype(
             *((name, np.intp) for name in (*_ADDRESSES, *Places._fields)),
             ("ratio", np.float64),
             *((name, np.intp, (_N_WHEELS,)) for name in ("drives", "brakes")),
-            *((name, np.float64, (_N_WHEELS,)) for name in ("drive_shares", "brake_torques_Nm")),
+            ("drive_shares", np.float64, (_N_WHEELS,)),
             *((name, np.intp) for name in ("n_sensors", "sensors", "sensor_memory", "sensor_memory_size")),
             ("timestep_s", np.float64),
             ("wheel_radii_m", np.float64, (_N_WHEELS,)),
@@ -119,6 +109,8 @@ _tape_pointer: Final = pointer_to(from_dtype(TAPE))
 _plan_pointer: Final = pointer_to(from_dtype(STEP_PLAN))
 _command_pointer: Final = pointer_to(from_dtype(COMMAND_ROW))
 _chain_pointer: Final = pointer_to(from_dtype(CHAIN))
+_setup_pointer: Final = pointer_to(from_dtype(BRAKE_SETUP))
+_state_pointer: Final = pointer_to(from_dtype(BRAKE_STATE))
 _bits_pointer: Final = pointer_to(types.int64)
 _counter_pointer: Final = pointer_to(types.int32)
 
@@ -131,6 +123,7 @@ def step_plan(
     wheels: Wheels,
     ratio: float,
     sensors: SensorBlock | None,
+    brakes: tuple[NDArray[Any], NDArray[Any]],
 ) -> NDArray[Any]:
     """Looks up all addresses.
 
@@ -142,6 +135,7 @@ def step_plan(
         wheels: How torques come to the wheels.
         ratio: Overall steering ratio.
         sensors: What is between the truth and the measurement; must outlive the plan. None where nothing is.
+        brakes: `BRAKE_SETUP` and `BRAKE_STATE`; must outlive the plan too.
 
     Returns:
         The plan, shape (1,), at an address that stays.
@@ -161,6 +155,8 @@ def step_plan(
         "positions": data.xpos[1:].ctypes.data,
         "quaternions": data.xquat[1:].ctypes.data,
         "n_bodies": model.nbody - 1,
+        "brake_setup": brakes[0].ctypes.data,
+        "brake_state": brakes[1].ctypes.data,
         **places._asdict(),
     }
     for name, value in wheels._asdict().items():
@@ -301,12 +297,21 @@ def step(plan_address, tape_address, torques_stand):
     drive_torque_Nm = 0.0
     if commands.gear != CLUTCH_OPEN:
         drive_torque_Nm = commands.drive_torque_demand_Nm + commands.drive_torque_change_Nm
+    setup = carray(_setup_pointer(plan.brake_setup), (1,))[0]
+    state = carray(_state_pointer(plan.brake_state), (1,))[0]
+    sensors = carray(f64_pointer(plan.sensordata), (plan.sizes[0],))
+    wheel_speeds, ax = sensors[plan.wheel_speed : plan.wheel_speed + _N_WHEELS], sensors[plan.accelerometer]
+    if plan.n_sensors != 0:
+        said = carray(f64_pointer(plan.sensor_memory), (plan.sensor_memory_size,))
+        wheel_speeds, ax = said[WHEEL_SPEEDS : WHEEL_SPEEDS + _N_WHEELS], said[AX]
+    pedal = 0.0 if torques_stand else commands.brake_pedal
+    drive_torque_Nm = step_brakes(setup, state, wheel_speeds, ax, pedal, drive_torque_Nm, brake_torques_Nm)
     for wheel in range(_N_WHEELS):
         if not torques_stand:
             # + 0.0: a wheel that is not driven would get -0.0 while the engine brakes.
             ctrl[plan.drives[wheel]] = plan.drive_shares[wheel] * drive_torque_Nm + 0.0
-            ctrl[plan.brakes[wheel]] = commands.brake_pedal * plan.brake_torques_Nm[wheel]
-        ctrl[plan.brakes[wheel]] += brake_torques_Nm[wheel]
+            ctrl[plan.brakes[wheel]] = commands.parking_brake * setup.parking_torque_Nm[wheel]
+        ctrl[plan.brakes[wheel]] += setup.torque_per_pressure_NmpPa[wheel] * state.pressure_Pa[wheel]
     _call(plan.mj_step, plan.model, plan.data)  # pyright: ignore[reportCallIssue] - numba adds the context
     sane, truth, motion = _sense(plan)
     if tape_address != 0 and sane:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, ClassVar, Final
 
+from activesteer.brakes.parameters import Brakes
 from activesteer.config import Range
 from activesteer.errors import ParameterError
 from activesteer.sensors.parameters import Sensors
@@ -107,18 +108,6 @@ class Friction:
     """RMS of the damper speed that a road's roughness causes at 80 km/h [m/s]; it grows with the root of the speed."""
     rack_stiffness_Npm: Annotated[float, Range(1.0, 1e7)] = 2e6
     """The same of the rack [N/m]."""
-
-
-@dataclass(frozen=True)
-class Brakes:
-    """Friction brakes: torque per wheel at full pedal, and the stiffness of pads and caliper in their holder."""
-
-    front_torque_Nm: NotNegative
-    rear_torque_Nm: NotNegative
-    drag_torque_Nm: NotNegative = 0.0
-    """Dry friction of released pads, bearings and seals, per wheel [N m]."""
-    stiffness_Nmprad: Positive = 1e5
-    """Torque per angle of wind-up while the brake holds [N m/rad]."""
 
 
 @dataclass(frozen=True)

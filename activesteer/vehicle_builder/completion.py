@@ -7,10 +7,11 @@ from typing import Final
 
 import numpy as np
 
+from activesteer.brakes.parameters import Brakes
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.tyre.tyre_parameters import TyreParameters
-from activesteer.vehicle.parameters import Aerodynamics, Brakes, Powertrain
+from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind
 from activesteer.vehicle_builder.design import Axle, Car, Link, Log, Solid
 from activesteer.vehicle_builder.levers import mount

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from activesteer.brakes.parameters import Brakes
 from activesteer.conventions import Array
 from activesteer.tyre.tyre_parameters import TyreParameters
-from activesteer.vehicle.parameters import Aerodynamics, Brakes, Powertrain
+from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind
 from activesteer.vehicle_builder.levers import Mount
 from activesteer.vehicle_builder.table import AxleTable, CarTable

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final
 
+from activesteer.brakes.parameters import Brakes
 from activesteer.config import Range, Source, build, read_toml
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.files import read_csv
-from activesteer.vehicle.parameters import Aerodynamics, Brakes, Powertrain
+from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import DEFAULTS, AxleKind, kind_of
 
 Positive = Annotated[float, Range(1e-9)]

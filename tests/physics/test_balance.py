@@ -22,9 +22,9 @@ DRAG_NS2PM2 = 0.5 * PARAMETERS.aerodynamics.air_density_kgpm3 * PARAMETERS.aerod
 
 @functools.cache
 def rolling(mu: float = 1.0, pedal: float = 0.0) -> Recording:
-    """Coasting at 80 km/h, or braking from there."""
+    """Coasting at 80 km/h, or braking from there without anti-lock system."""
     table = COAST_OR_BRAKE | {"road": {"mu": mu}, "brake": {"time_s": [0.1, 0.3], "pedal": [0.0, pedal]}}
-    return activesteer.simulate(table)
+    return activesteer.simulate(table, overrides={"vehicle.brakes.abs": False})
 
 
 def forces_in_car_axes(recording: Recording) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Full braking from 80 km/h on a road of mu 0.8: the front wheels lock first, so the car stays straight (UN R13-H)."""
+"""Full braking from 80 km/h on mu 0.8 without anti-lock system: the front wheels lock first (UN R13-H)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FULL_BRAKING = {
 
 @pytest.fixture(scope="module")
 def braking():
-    return simulate(FULL_BRAKING)
+    return simulate(FULL_BRAKING, overrides={"vehicle.brakes.abs": False})
 
 
 def locked_at_s(recording, corner):

@@ -64,8 +64,9 @@ def test_commands_are_recorded_as_they_were_given():
     recorder = Recorder(simulated.vehicle, 3)
     simulated.vehicle.step(COMMAND, ASKED, recorder.tape_address)
     given = {
-        "front_steer_demand_rad": 0.02, "drive_torque_demand_Nm": 150.0, "brake_pedal": 0.25, "driver_saturated": 1.0,
-        "rear_steer_demand_rad": -0.01, "superposition_demand_rad": 0.003, "yaw_rate_desired_radps": 0.2,
+        "front_steer_demand_rad": 0.02, "drive_torque_demand_Nm": 150.0, "brake_pedal": 0.25, "parking_brake": 0.0,
+        "driver_saturated": 1.0, "rear_steer_demand_rad": -0.01, "superposition_demand_rad": 0.003,
+        "yaw_rate_desired_radps": 0.2,
         "prediction_rad": 0.004, "correction_rad": -0.014, "controller_saturated": 1.0,
         "fl_brake_torque_demand_Nm": 10.0, "fr_brake_torque_demand_Nm": 20.0, "rl_brake_torque_demand_Nm": 30.0,
         "rr_brake_torque_demand_Nm": 40.0, "drive_torque_change_Nm": -50.0,

@@ -25,7 +25,17 @@ from tests.raising import raises
 STEP_STEER = {"steer.steering_wheel_deg": 36.5, "duration_s": 1.7, "settle_s": 0.5}
 SLALOM = {"settle_s": 0.5}
 RUNS = [("step_steer", "ars", STEP_STEER | {"duration_s": 3.0}), ("slalom", "afs", SLALOM)]
-OF_THE_COMMANDS = ("ax_mps2", "ay_mps2", "az_mps2", "drive_torque", "demand", "desired", "prediction", "correction")
+OF_THE_COMMANDS = (
+    "ax_mps2",
+    "ay_mps2",
+    "az_mps2",
+    "drive_torque",
+    "demand",
+    "desired",
+    "prediction",
+    "correction",
+    "abs_",
+)
 
 
 def made(maneuver: str = "step_steer", controller: Any = "ars", overrides: Any = STEP_STEER, **more: Any) -> Simulation:

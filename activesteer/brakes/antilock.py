@@ -1,0 +1,127 @@
+"""Anti-lock control of the four wheels: pressure in cycles about what the road bears.
+
+A wheel that is braked harder than the road bears loses speed quickly, since its inertia is small beside the car's: that
+shows by its deceleration before its slip is large, on any road, without knowing where the friction has its peak. So
+each wheel goes round
+
+    OFF -> RELEASE -> RECOVER -> BUILD -> RELEASE ...
+
+RELEASE takes the pressure down to a share of what the friction bore (`friction_Nm`, from pressure and deceleration of
+the wheel), and further if the wheel does not gain speed; RECOVER waits until it rolls with the car again; BUILD begins
+just below what was borne and rises slowly, the faster the longer it lasts, as on a road that has become better. A wheel
+whose limit comes above what the driver asks for is OFF.
+
+Source of the cycle by wheel deceleration: Bosch, Automotive Handbook, chapter on ABS; Pasillas-Lepine (2006), Hybrid
+modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms. Shares, thresholds and rates are
+chosen.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from activesteer.compilation import compiled
+
+OFF, RELEASE, RECOVER, BUILD = 0.0, 1.0, 2.0, 3.0
+
+_REGAINS_mps2: Final = 3.0
+"""A wheel that gains speed on the car by more than this is recovering, and rolls with it once it no longer does
+[m/s2]."""
+_PATIENCE_S: Final = 0.03
+"""Time that a released wheel gets to gain speed before its pressure is taken down further [s]."""
+_SETTLES_S: Final = 0.08
+"""Time in which the wheel follows the first pressure of building up, as the tyre's carcass winds up [s]."""
+_KEPT: Final = 0.9
+"""What a wheel that is released again so soon is still trusted to bear, as a share of what it bore before."""
+_IMPATIENCE_S: Final = 0.25
+"""Time after which building up becomes faster by its own amount [s]."""
+
+
+@compiled
+def _begin(state, wheel, phase):
+    state.phase[wheel] = phase
+    state.phase_s[wheel] = 0.0
+
+
+@compiled
+def _release(setup, state, wheel):
+    borne = max(state.friction_Nm[wheel], 0.0)
+    if state.phase[wheel] == BUILD and state.phase_s[wheel] < _SETTLES_S:
+        borne = max(borne, _KEPT * state.borne_Nm[wheel])
+    state.borne_Nm[wheel] = borne
+    state.limit_Pa[wheel] = setup.release_share * state.borne_Nm[wheel] / setup.torque_per_pressure_NmpPa[wheel]
+    _begin(state, wheel, RELEASE)
+
+
+@compiled
+def _wheel(setup, state, wheel, car_mps2):
+    """One interval of one wheel."""
+    per_pressure = setup.torque_per_pressure_NmpPa[wheel]
+    slip = (state.reference_mps - state.wheel_mps[wheel]) / state.reference_mps
+    gain = state.wheel_mps2[wheel] - car_mps2
+    phase = state.phase[wheel]
+    state.phase_s[wheel] += setup.interval_s
+    if phase in (OFF, BUILD):
+        threshold = setup.first_deceleration_mps2 if phase == OFF else setup.deceleration_mps2
+        least = setup.first_slip if phase == OFF else setup.least_slip - setup.least_slip_gain_s2pm * car_mps2
+        if phase == BUILD and state.phase_s[wheel] < _SETTLES_S:
+            least *= 2.0
+        if (gain < -threshold and slip > least) or (slip > setup.largest_slip and gain < _REGAINS_mps2):
+            _release(setup, state, wheel)
+        elif phase == BUILD:
+            faster = 1.0 + state.phase_s[wheel] / _IMPATIENCE_S
+            rate = setup.build_per_s * faster * state.borne_Nm[wheel] / per_pressure
+            state.limit_Pa[wheel] += rate * setup.interval_s
+            if state.limit_Pa[wheel] >= setup.full_pedal_pressure_Pa:
+                state.limit_Pa[wheel] = setup.full_pedal_pressure_Pa
+                _begin(state, wheel, OFF)
+    elif phase == RELEASE:
+        if gain > _REGAINS_mps2:
+            _begin(state, wheel, RECOVER)
+        elif state.phase_s[wheel] > _PATIENCE_S:
+            lower = state.limit_Pa[wheel] - setup.fall_Paps * setup.interval_s
+            state.limit_Pa[wheel] = max(lower, 0.0)
+    else:
+        state.borne_Nm[wheel] = max(state.borne_Nm[wheel], state.friction_Nm[wheel])
+        if gain < _REGAINS_mps2:
+            state.limit_Pa[wheel] = setup.resume_share * state.borne_Nm[wheel] / per_pressure
+            _begin(state, wheel, BUILD)
+
+
+@compiled
+def antilock(setup, state, ax_mps2):
+    """One decision for all wheels.
+
+    Args:
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`; `limit_Pa`, the phases and `side_Pa` are advanced.
+        ax_mps2: Longitudinal acceleration as measured [m/s2].
+    """
+    highest = setup.full_pedal_pressure_Pa
+    for wheel in range(4):
+        slow = state.reference_mps < setup.lowest_speed_mps
+        if slow or state.demand_Pa[wheel] == 0.0 or setup.torque_per_pressure_NmpPa[wheel] == 0.0:
+            if state.phase[wheel] != OFF:
+                _begin(state, wheel, OFF)
+            state.limit_Pa[wheel] = highest
+        else:
+            _wheel(setup, state, wheel, ax_mps2 - state.offset_mps2)
+        state.allowed_Pa[wheel] = state.limit_Pa[wheel]
+    _hold_sides_together(setup, state)
+    if setup.select_low != 0.0:
+        lower = min(state.limit_Pa[2], state.limit_Pa[3])
+        state.allowed_Pa[2] = state.allowed_Pa[3] = lower
+
+
+@compiled
+def _hold_sides_together(setup, state):
+    """The front wheel with more grip is let off the other's pressure only as fast as a driver can steer against it."""
+    if state.phase[0] == OFF and state.phase[1] == OFF:
+        state.side_Pa = setup.side_difference_Pa
+        return
+    state.side_Pa += setup.side_difference_rise_Paps * setup.interval_s
+    for wheel in range(2):
+        other = 1 - wheel
+        if state.phase[other] != OFF:
+            most = state.borne_Nm[other] / setup.torque_per_pressure_NmpPa[other] + state.side_Pa
+            state.allowed_Pa[wheel] = min(state.allowed_Pa[wheel], most)

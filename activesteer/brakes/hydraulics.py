@@ -1,0 +1,44 @@
+"""Pressures of the wheel brakes: behind what is asked of them by a lag, no faster than booster, valves and pump."""
+
+from __future__ import annotations
+
+from activesteer.compilation import compiled
+
+
+@compiled
+def ask(setup, state, pedal, asked_Nm):
+    """Pressures that driver and controller ask for together: at least none, at most the highest.
+
+    Args:
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`; `demand_Pa` is written.
+        pedal: Brake pedal position, 0 to 1.
+        asked_Nm: Brake torques that the controller asks for [Nm], order of `CORNERS`.
+    """
+    highest = setup.full_pedal_pressure_Pa
+    for wheel in range(4):
+        pressure = pedal * highest
+        if asked_Nm[wheel] != 0.0:
+            pressure += asked_Nm[wheel] / setup.torque_per_pressure_NmpPa[wheel]
+        state.demand_Pa[wheel] = min(max(pressure, 0.0), highest)
+
+
+@compiled
+def flow(setup, state, pedal):
+    """One step of the pressures.
+
+    The torque of a brake is its torque per pressure, 2 mu_pad A_piston r_effective, times the pressure.
+
+    Args:
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`; `pressure_Pa` is advanced.
+        pedal: Brake pedal position, 0 to 1: up to its pressure the pedal feeds a brake, beyond it the pump does.
+    """
+    fed = pedal * setup.full_pedal_pressure_Pa
+    for wheel in range(4):
+        pressure = state.pressure_Pa[wheel]
+        wanted = max(min(state.demand_Pa[wheel], state.allowed_Pa[wheel]), state.traction_Pa[wheel])
+        rise = setup.rise_Paps if pressure < fed else setup.pump_rise_Paps
+        change = (wanted - pressure) * setup.follow
+        change = min(max(change, -setup.fall_Paps * setup.timestep_s), rise * setup.timestep_s)
+        state.pressure_Pa[wheel] = pressure + change

@@ -1,0 +1,117 @@
+"""What the native brakes know and remember: records of float64, at addresses that stay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.brakes.parameters import Antilock, Brakes, Hydraulics, TractionControl
+from activesteer.conventions import CORNERS
+
+_FOUR: Final = (len(CORNERS),)
+_HYDRAULICS: Final = ("full_pedal_pressure_Pa", "rise_Paps", "fall_Paps", "pump_rise_Paps")
+_ANTILOCK: Final = tuple(Antilock.__dataclass_fields__)
+_OF_WHEELS: Final = (
+    "rolling_radius_m", "torque_per_pressure_NmpPa", "parking_torque_Nm", "drive_share", "inertia_kgm2",
+)  # fmt: skip
+_TRACTION: Final = tuple(TractionControl.__dataclass_fields__)
+
+BRAKE_SETUP: Final = np.dtype(
+    (
+        np.record,
+        [
+            *((name, np.float64) for name in (*_HYDRAULICS, *_ANTILOCK, *_TRACTION)),
+            *((name, np.float64) for name in ("timestep_s", "follow", "abs", "tcs", "interval_steps", "interval_s")),
+            *((name, np.float64, _FOUR) for name in _OF_WHEELS),
+        ],
+    )
+)
+"""What stays as it is during a run; names as in the vehicle file, `follow` is the share of a pressure's way to its
+demand that it goes in a step."""
+
+PER_WHEEL: Final = (
+    "demand_Pa", "pressure_Pa", "limit_Pa", "allowed_Pa", "traction_Pa", "phase", "phase_s", "friction_Nm",
+    "borne_Nm", "wheel_mps", "wheel_mps2",
+)  # fmt: skip
+ALONE: Final = (
+    "drive_limit_Nm", "traction_Nm", "reference_mps", "offset_mps2", "side_Pa", "steps_left",
+    "tcs_active",
+)  # fmt: skip
+BRAKE_STATE: Final = np.dtype(
+    (np.record, [*((name, np.float64, _FOUR) for name in PER_WHEEL), *((name, np.float64) for name in ALONE)])
+)
+"""What changes, saved and restored with the engine's state:
+
+demand_Pa: pressure that driver and controller ask for;
+pressure_Pa: pressure in the wheel brake; limit_Pa: what the anti-lock system allows the wheel by itself, allowed_Pa:
+with regard to the others; traction_Pa: what traction control wants; phase, phase_s: phase of the anti-lock control, see
+`antilock`, and time in it; friction_Nm: torque of the road by the wheel's motion; borne_Nm: the one that the wheel bore
+last; wheel_mps, wheel_mps2: speed and acceleration of its circumference.
+
+drive_limit_Nm: what traction control leaves of the drive torque, traction_Nm:
+its integral, tcs_active: whether it acts; reference_mps: estimated speed of the car; offset_mps2: estimated error of
+the acceleration; side_Pa: how much the pressures of the front wheels may differ; steps_left: steps until the next
+decision.
+"""
+
+PLACES: Final = {name: len(CORNERS) * index for index, name in enumerate(PER_WHEEL)} | {
+    name: len(CORNERS) * len(PER_WHEEL) + index for index, name in enumerate(ALONE)
+}
+"""Field of a `BRAKE_STATE` -> its (first) place among the numbers."""
+
+NO_LIMIT_NM: Final = 1e9
+"""Drive torque limit that is none [N m]."""
+
+
+def brake_setup(
+    brakes: Brakes,
+    timestep_s: float,
+    rolling_radius_m: Sequence[float],
+    drive_share: Sequence[float],
+    inertia_kgm2: Sequence[float],
+) -> NDArray[Any]:
+    """The brakes of a car.
+
+    Args:
+        brakes: The table of the vehicle file.
+        timestep_s: Step of the engine [s].
+        rolling_radius_m: Radius of each wheel by which its rotation is taken for a speed [m].
+        drive_share: Share of the drive torque of each wheel.
+        inertia_kgm2: Inertia of each wheel about its axis [kg m2].
+
+    Returns:
+        A `BRAKE_SETUP`, shape (1,).
+    """
+    setup = np.zeros(1, BRAKE_SETUP)
+    for part, names in ((brakes.hydraulics, _HYDRAULICS), (brakes.antilock, _ANTILOCK), (brakes.traction, _TRACTION)):
+        for name in names:
+            setup[name] = getattr(part, name)
+    hydraulics: Hydraulics = brakes.hydraulics
+    steps = max(1, round(brakes.control_interval_s / timestep_s))
+    setup["timestep_s"], setup["interval_steps"], setup["interval_s"] = timestep_s, steps, steps * timestep_s
+    setup["follow"] = -math.expm1(-timestep_s / hydraulics.lag_s)
+    setup["abs"], setup["tcs"] = brakes.abs, brakes.tcs
+    setup["rolling_radius_m"] = rolling_radius_m
+    setup["torque_per_pressure_NmpPa"] = np.array(brakes.torques_Nm) / hydraulics.full_pedal_pressure_Pa
+    setup["parking_torque_Nm"] = (0.0, 0.0, brakes.parking_torque_Nm, brakes.parking_torque_Nm)
+    setup["drive_share"], setup["inertia_kgm2"] = drive_share, inertia_kgm2
+    return setup
+
+
+def reset(state: NDArray[Any], setup: NDArray[Any], speed_mps: float) -> None:
+    """Released brakes on a car that rolls at a speed.
+
+    Args:
+        state: A `BRAKE_STATE`, shape (1,).
+        setup: Its `BRAKE_SETUP`.
+        speed_mps: Speed of car and wheels [m/s].
+    """
+    state[:] = 0
+    state["limit_Pa"] = state["allowed_Pa"] = setup["full_pedal_pressure_Pa"]
+    state["drive_limit_Nm"] = NO_LIMIT_NM
+    state["wheel_mps"] = state["reference_mps"] = speed_mps
+    state["steps_left"] = setup["interval_steps"]

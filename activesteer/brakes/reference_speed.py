@@ -1,0 +1,75 @@
+"""The speed of the car as a control unit estimates it, from the wheels and the longitudinal acceleration.
+
+While no brake works, the wheels that are not driven roll. While one does, the fastest wheel is nearest to the car's
+speed; from the last such instant on the acceleration is integrated. It is the specific force along the inclined body:
+what it has of gravity on a slope is learned while the car rolls.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from activesteer.compilation import compiled
+
+_SLACK_mps2: Final = 0.2
+"""What the estimate loses beside the measured deceleration, so that the fastest wheel takes it up again [m/s2]."""
+_CATCH_UP_mps2: Final = 2.0
+"""How fast it does: a wheel that swings on its suspension is for an instant faster than the car [m/s2]."""
+_LEARN_S: Final = 0.5
+"""Time constant with which the offset of the acceleration is learned [s]."""
+_LARGEST_OFFSET_mps2: Final = 3.0
+"""No road is steeper than this [m/s2]."""
+_SMOOTH_S: Final = 0.005
+"""Time constant of the wheel accelerations [s]."""
+
+
+@compiled
+def follow_wheels(setup, state, speeds_radps):
+    """Speeds and accelerations of the wheels' circumferences, and what the road bears, after an interval.
+
+    Args:
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`; `wheel_mps`, `wheel_mps2` and `friction_Nm` are written.
+        speeds_radps: Rotational speeds of the wheels [rad/s], order of `CORNERS`.
+    """
+    share = setup.interval_s / (setup.interval_s + _SMOOTH_S)
+    for wheel in range(4):
+        speed = setup.rolling_radius_m[wheel] * speeds_radps[wheel]
+        rate = (speed - state.wheel_mps[wheel]) / setup.interval_s
+        state.wheel_mps2[wheel] += share * (rate - state.wheel_mps2[wheel])
+        state.wheel_mps[wheel] = speed
+        # J d omega/dt = r F_x - T_brake
+        borne = setup.torque_per_pressure_NmpPa[wheel] * state.pressure_Pa[wheel]
+        borne += setup.inertia_kgm2[wheel] / setup.rolling_radius_m[wheel] * state.wheel_mps2[wheel]
+        state.friction_Nm[wheel] += share * (borne - state.friction_Nm[wheel])
+
+
+@compiled
+def follow_car(setup, state, ax_mps2, braked):
+    """The reference speed, after an interval.
+
+    Args:
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`; `reference_mps` and `offset_mps2` are advanced.
+        ax_mps2: Longitudinal acceleration as measured [m/s2].
+        braked: Whether a brake works or is asked to.
+    """
+    fastest, slowest, rolling, free = -1e9, 1e9, 0.0, 0.0
+    for wheel in range(4):
+        fastest = max(fastest, state.wheel_mps[wheel])
+        slowest = min(slowest, state.wheel_mps[wheel])
+        if setup.drive_share[wheel] == 0.0:
+            rolling += state.wheel_mps[wheel]
+            free += 1.0
+    if braked:
+        # Brakes do not make a car faster; where a slope does, its wheels show it.
+        rate_mps2 = min(ax_mps2 - state.offset_mps2, 0.0) - _SLACK_mps2
+        integrated = state.reference_mps + rate_mps2 * setup.interval_s
+        caught_up = min(fastest, integrated + _CATCH_UP_mps2 * setup.interval_s)
+        state.reference_mps = max(integrated, caught_up, 0.0)
+        return
+    before = state.reference_mps
+    state.reference_mps = rolling / free if free > 0.0 else slowest
+    error = ax_mps2 - (state.reference_mps - before) / setup.interval_s
+    offset = state.offset_mps2 + setup.interval_s / _LEARN_S * (error - state.offset_mps2)
+    state.offset_mps2 = min(max(offset, -_LARGEST_OFFSET_mps2), _LARGEST_OFFSET_mps2)
