@@ -31,6 +31,7 @@ from activesteer.vehicle.native_forces import install_native_forces
 from activesteer.vehicle.native_step import FASTEST_MPS, Places, Wheels, sensed, step_plan
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
+from activesteer.vehicle.toe_link_screws import SCREW
 
 _CALIBRATED_AT_MPS: Final = 20.0
 """Speed at which the rolling radii are taken that turn wheel speeds into the speed of the car [m/s]."""
@@ -157,7 +158,13 @@ class Vehicle:
         """Static equilibrium at the origin of the world, heading along x."""
         mujoco.mj_resetData(self.model, self.data)
         held = [self._root_dof, self._root_dof + 1, self._root_dof + 5, *self._spins]
+        plays = [link[fb.L_BACKLASH_m : fb.L_BACKLASH_m + 1] for link, _ in self._screws()]
+        given = [play.copy() for play in plays]
+        for play in plays:
+            play[:] = 0.0  # the search finds its way by slopes, and within a play there is none
         static_ride(self.model, self.data, np.asarray(held))
+        for play, value in zip(plays, given, strict=True):
+            play[:] = value
 
     def _brakes_of(self, rolling_radii_m: list[float]) -> NDArray[Any]:
         """What the brakes' control unit knows of the car: rolling radii [m] and inertias of its wheels."""
@@ -413,6 +420,43 @@ class Vehicle:
         block = self.model.numeric_data[int(self.model.numeric_data[-fb.TRAILER_SIZE]) :]
         start = int(block[fb.ACTUATORS_START]) + index * fb.ACTUATOR_SIZE
         return block[start : start + fb.ACTUATOR_SIZE]
+
+    def rear_states_at(self, angle_rad: float) -> dict[int, float]:
+        """Activations of the rear steering actuators that have arrived at an angle [rad], by their addresses."""
+        states: dict[int, float] = {}
+        for index in (self._places.rear_left, self._places.rear_right):
+            address = int(self.model.actuator_actadr[index])
+            if records := self.screw_records(index):
+                link, screw = records
+                powers = angle_rad ** np.arange(1, fb.POWERS + 1)
+                travel = float(screw[fb.S_TRAVEL : fb.S_TRAVEL + fb.POWERS] @ powers)
+                states[int(screw[fb.S_ACT])] = travel
+                states[address] = float(link[fb.L_SIGN]) * travel
+            else:
+                states[address] = angle_rad
+        return states
+
+    def _screws(self) -> Iterator[tuple[NDArray[np.float64], ...]]:
+        """Records of link and screw of every rear wheel that has a screw."""
+        for index in (self._places.rear_left, self._places.rear_right):
+            if records := self.screw_records(index):
+                yield records
+
+    def screw_records(self, index: int) -> tuple[NDArray[np.float64], ...]:
+        """The records of link and screw of an actuator that has a screw (see `force_block`); nothing of any other."""
+        record = self.actuator_record(index)
+        if record[fb.A_KIND] != fb.KIND_LINK:
+            return ()
+        block = self.model.numeric_data[int(self.model.numeric_data[-fb.TRAILER_SIZE]) :]
+        first = int(block[fb.SCREWS_START])
+        link = block[first + int(record[fb.A_FIRST]) :][: fb.LINK_SIZE]
+        part = self.model.actuator(index).name[:2]
+        screw_actuator = part + SCREW if part + SCREW in self._actuator_names() else f"rear{SCREW}"
+        start = int(self.actuator_record(self.model.actuator(screw_actuator).id)[fb.A_FIRST])
+        return link, block[first + start :][: fb.SCREW_SIZE]
+
+    def _actuator_names(self) -> set[str]:
+        return {self.model.actuator(index).name for index in range(self.model.nu)}
 
     def note_faults(self, count: int) -> None:
         """Has it recorded from now on how many faults act."""

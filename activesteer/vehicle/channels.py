@@ -26,6 +26,7 @@ from activesteer.vehicle.native_channels import (
     saturations,
 )
 from activesteer.vehicle.parameters import VehicleParameters
+from activesteer.vehicle.toe_link_screws import MOTOR, SCREW
 
 _STANDSTILL_MPS: Final = 0.2
 """Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""
@@ -103,7 +104,7 @@ class ChannelMap:
             # They are read block by block; a missing one is to show now.
             self._sensor(name)
         signals = [
-            *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(),
+            *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(), *self._screws(),
             *(Signal(channel, Column("commands", place)) for channel, place in COMMAND_CHANNELS.items()),
             *self._measured(), *self._brakes(),
         ]  # fmt: skip
@@ -207,7 +208,7 @@ class ChannelMap:
                 lambda rows: rows.sensordata[:, added] / ratio,
             ),
             Signal(
-                channel("rear_steer_rad", "rad", "mean angle of the rear steering hinges"),
+                channel("rear_steer_rad", "rad", "mean angle of the rear steering actuators"),
                 lambda rows: 0.5 * (rows.sensordata[:, rear[0]] + rows.sensordata[:, rear[1]]),
             ),
             Signal(channel("rack_m", "m", "rack travel, positive steers left"), Column("sensordata", rack)),
@@ -297,9 +298,47 @@ class ChannelMap:
             name = model.tendon(index).name.replace("_damper", "_stop")
             stiffness = model.tendon_stiffness[index], *model.tendon_stiffnesspoly[index]
             law = AxialForce._make((index, *stiffness, model.tendon_damping[index], *model.tendon_lengthspring[index]))
-            signals.append(
-                Signal(Channel(f"{name}_force_N", "N", f"axial force of {name}, tension positive", "links"), law)
-            )
+            channel = Channel(f"{name}_force_N", "N", f"axial force of {name}, tension positive", "links")
+            signals.append(Signal(channel, self._screwed(index, law) or law))
+        return signals
+
+    def _screwed(self, tendon: int, law: AxialForce) -> Callable[[RawRows], Array] | None:
+        """The force of a link whose length a screw changes; None of any other."""
+        model = self._model
+        along = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
+        found = np.flatnonzero(along & (model.actuator_trnid[:, 0] == tendon) & (model.actuator_gainprm[:, 0] > 0.0))
+        if not found.size:
+            return None
+        actuator = int(found[0])
+
+        def force(rows: RawRows) -> Array:
+            stretch = rows.ten_length[:, tendon] - law.low_m
+            passive = law.stiffness_Npm * stretch + law.damping_Nspm * rows.ten_velocity[:, tendon]
+            return passive - rows.actuator_force[:, actuator]
+
+        return force
+
+    def _screws(self) -> list[Signal]:
+        """What the motors of screws in the toe links do."""
+        model, signals = self._model, []
+        for name, words in (("rl", "of the left link"), ("rr", "of the right link"), ("rear", "of both links")):
+            if name + MOTOR not in self._sensors:
+                continue
+            place = self._sensor(name + MOTOR).start
+            position, speed = (int(model.actuator_actadr[model.actuator(name + state).id]) for state in (SCREW, MOTOR))
+
+            def channel(what: str, unit: str, meaning: str, *, name: str = name, words: str = words) -> Channel:
+                return Channel(f"{name}_{what}", unit, f"{meaning} {words}", "vehicle")
+
+            signals += [
+                Signal(channel("screw_m", "m", "travel of the screw"), Column("act", position)),
+                Signal(channel("motor_speed_radps", "rad/s", "speed of the motor"), Column("act", speed)),
+                Signal(channel("motor_torque_Nm", "Nm", "torque of the motor"), Column("sensordata", place)),
+                Signal(
+                    channel("steer_saturated", "", "1 at a limit of angle, speed, torque or supply of the motor"),
+                    Column("sensordata", place + 1),
+                ),
+            ]
         return signals
 
     def _actuators(self) -> list[Signal]:
@@ -324,7 +363,11 @@ class ChannelMap:
                         Column("actuator_force", index),
                     )
                 )
-            elif model.actuator_actadr[index] >= 0 and model.actuator_gainprm[index, 0] > 0.0:
+            elif (
+                model.actuator_actadr[index] >= 0
+                and model.actuator_gainprm[index, 0] > 0.0
+                and model.actuator_trntype[index] != int(mujoco.mjtTrn.mjTRN_TENDON)
+            ):
                 signals.append(
                     Signal(
                         Channel(

@@ -36,6 +36,8 @@ _DATA_ARRAYS: Final = (
     "ten_velocity",
     "cvel",
     "qfrc_passive",
+    "ten_length",
+    "sensordata",
 )
 
 
@@ -57,6 +59,8 @@ class EngineLayout(NamedTuple):
     d_ten_velocity: int
     d_cvel: int
     d_qfrc_passive: int
+    d_ten_length: int
+    d_sensordata: int
     d_time: int
 
 
@@ -73,6 +77,7 @@ def _probe(numbers: int, timestep_s: float) -> tuple[mujoco.MjModel, mujoco.MjDa
       </worldbody>
       <tendon><spatial><site site="a"/><site site="b"/></spatial></tendon>
       <actuator><general joint="j" dyntype="user"/></actuator>
+      <sensor><jointpos joint="j"/></sensor>
     </mujoco>"""
     model = mujoco.MjModel.from_xml_string(xml)
     return model, mujoco.MjData(model)

@@ -141,6 +141,8 @@ class _ActuatorFault:
             model.actuator_gainprm[self._index].copy(),
             (model.actuator_biasprm[self._index].copy()),
         )
+        self._screw = vehicle.screw_records(self._index)
+        self._healthy_screw = tuple(part.copy() for part in self._screw)
         self._ctrl = vehicle.data.ctrl
         ratio = vehicle.parameters.steering.ratio if ACTUATORS[fault.part].by_ratio else 1.0
         self._offset = fault.size * ratio
@@ -153,7 +155,14 @@ class _ActuatorFault:
     def engage(self) -> None:
         """Lets the fault act."""
         record, kind = self._record, self.fault.kind
-        if kind == "stuck":
+        if self._screw and kind in ("stuck", "float"):
+            link, screw = self._screw
+            if kind == "stuck":
+                screw[fb.S_SEIZED] = 1.0
+            else:
+                # The nut is off its thread, and plays as far as the end stops let it.
+                link[fb.L_BACKLASH_m] = 4.0 * screw[fb.S_STOP_m]
+        elif kind == "stuck":
             # No rate: the servo holds the angle that it has reached, with its stiffness and its strength.
             record[fb.A_SECOND] = 0.0
         elif kind == "float":
@@ -170,6 +179,8 @@ class _ActuatorFault:
         """The actuator works as built."""
         index = self._index
         self._record[:], self._model.actuator_gainprm[index], self._model.actuator_biasprm[index] = self._healthy
+        for part, healthy in zip(self._screw, self._healthy_screw, strict=True):
+            part[:] = healthy
 
     def before_step(self) -> None:
         """Gives the actuator the demand of a while ago."""

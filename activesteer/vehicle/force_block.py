@@ -25,8 +25,9 @@ TRAILER_SIZE: Final = 2
     N_WHEELS, N_DAMPERS, N_DOFS, N_BODIES, N_USERDATA, N_ACTIVATIONS, N_CONTROLS, N_TENDONS, N_TENDON_JACOBIAN,
     CHASSIS_BODY, CHASSIS_ROOT, CHASSIS_N_DOFS, DRAG_Ns2pm2, AERO_X_m, AERO_Y_m, AERO_Z_m,
     WHEELS_START, DAMPERS_START, ACTUATORS_START, N_AREAS, AREAS_START, AREAS_FELT,
-    ENGINE_TORQUE_Nm, ENGINE_POWER_W, ENGINE_LIMIT_radps, ENGINE_DRAG_Nm, GEAR, CHASSIS_DOFS, HEADER_SIZE,
-) = range(29)  # fmt: skip
+    ENGINE_TORQUE_Nm, ENGINE_POWER_W, ENGINE_LIMIT_radps, ENGINE_DRAG_Nm, GEAR, CHASSIS_DOFS, SCREWS_START,
+    SCREW_SENSORS, N_SCREW_SENSORS, HEADER_SIZE,
+) = range(32)  # fmt: skip
 
 MAX_CHAIN: Final = 32
 """Most degrees of freedom between the world and a wheel."""
@@ -53,6 +54,7 @@ ACTUATOR_SIZE: Final = 8
 IN_ORDER: Final = (1.0, -0.0)
 """A_SCALE and A_OFFSET of an actuator without a fault; adding -0.0 changes nothing, not even the sign of a zero."""
 KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE, KIND_FRICTION, KIND_DRIVE = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
+KIND_LINK, KIND_SCREW, KIND_MOTOR = 6.0, 7.0, 8.0
 ALONG_JOINT, ALONG_TENDON = 0.0, 1.0
 
 # One record per area of the road with a friction of its own: a rectangle in world axes [m]. They count while
@@ -60,8 +62,22 @@ ALONG_JOINT, ALONG_TENDON = 0.0, 1.0
 R_START_m, R_END_m, R_RIGHT_m, R_LEFT_m, R_MU = range(5)
 AREA_SIZE: Final = 5
 
-# What the callback writes into mjData.userdata: one record per wheel, then the force of each damper. Behind that stands
-# what it does not write: how many faults act.
+# Screws in the toe links (`toe_link_screws`): a record for each link, with the coefficients of angle over travel ...
+(
+    L_TENDON, L_REST_m, L_STIFFNESS_Npm, L_BACKLASH_m, L_ACT, L_SCREW_ACT, L_SIGN, L_OUT, L_ANGLE,
+) = range(9)  # fmt: skip
+POWERS: Final = 5
+LINK_SIZE: Final = L_ANGLE + POWERS
+# ... and one for each screw: with the starts of its links' records, and the coefficients of travel over angle.
+(
+    S_ACT, S_MOTOR_ACT, S_COMMAND, S_LEAD_mprad, S_INERTIA_kgm2, S_POSITION_GAIN_1ps, S_SPEED_GAIN_1ps,
+    S_SPEED_LIMIT_radps, S_PEAK_Nm, S_STALL_Nm, S_SLOPE_Nmsprad, S_POWER_W, S_FRICTION_Nm, S_LOAD_FRICTION, S_STOP_m,
+    S_TOLERANCE_m, S_SEIZED, S_OUT, S_N_LINKS, S_LINK, S_SECOND_LINK, S_TRAVEL,
+) = range(22)  # fmt: skip
+SCREW_SIZE: Final = S_TRAVEL + POWERS
+
+# What the callback writes into mjData.userdata: one record per wheel, then the force of each damper, then what the
+# sensors of screws say (L_OUT, S_OUT). Behind that stands what it does not write: how many faults act.
 (
     U_FX, U_FY, U_FZ, U_MX, U_MY, U_MZ, U_SLIP_RATIO, U_SLIP_ANGLE, U_INCLINATION, U_RATE_X, U_RATE_Y,
     U_RATE_Z, U_LOADED_RADIUS, U_LIMITED, U_FRICTION_USE, U_MU, U_CONTACT_X, U_CONTACT_Y,
@@ -114,6 +130,8 @@ class ForceBlock:
         dampers: The dampers.
         actuators: One record per actuator, in the model's order.
         areas: Areas of the road, as in their records; the later one counts where they overlap.
+        screws: Records of screws, one behind the other.
+        screw_sensors: Where in `sensordata` their sensors begin, and how many numbers these have.
     """
 
     model: mujoco.MjModel
@@ -126,6 +144,8 @@ class ForceBlock:
     dampers: list[DamperEntry] = field(default_factory=list)
     actuators: list[tuple[float, float, float, float, float, float]] = field(default_factory=list)
     areas: list[tuple[float, float, float, float, float]] = field(default_factory=list)
+    screws: list[float] = field(default_factory=list)
+    screw_sensors: tuple[int, int] = (0, 0)
 
     def wheel_start(self, index: int) -> int:
         """Where the record of a wheel begins, counted from the start of the block."""
@@ -137,7 +157,8 @@ class ForceBlock:
         dampers_start = self.wheel_start(len(self.wheels))
         actuators_start = dampers_start + len(self.dampers) * DAMPER_SIZE
         areas_start = actuators_start + len(self.actuators) * ACTUATOR_SIZE
-        tyres_start = areas_start + len(self.areas) * AREA_SIZE
+        screws_start = areas_start + len(self.areas) * AREA_SIZE
+        tyres_start = screws_start + len(self.screws)
         tyres = [np.atleast_1d(wheel.tyre).view(np.float64) for wheel in self.wheels]
         block = np.zeros(tyres_start + sum(tyre.size for tyre in tyres))
         model = self.model
@@ -147,7 +168,7 @@ class ForceBlock:
             len(self.chassis_chain), self.drag_Ns2pm2, *self.aero_point_m, wheels_start, dampers_start, actuators_start,
             len(self.areas), areas_start, 0.0, *self.engine,
         )  # fmt: skip
-        block[CHASSIS_DOFS] = HEADER_SIZE
+        block[CHASSIS_DOFS:HEADER_SIZE] = HEADER_SIZE, screws_start, *self.screw_sensors
         block[HEADER_SIZE : HEADER_SIZE + len(self.chassis_chain)] = self.chassis_chain
         tyre_start = tyres_start
         for index, wheel in enumerate(self.wheels):
@@ -172,7 +193,8 @@ class ForceBlock:
             records = [(*record, *IN_ORDER) for record in self.actuators]
             block[actuators_start:areas_start] = np.asarray(records, float).ravel()
         if self.areas:
-            block[areas_start:tyres_start] = np.asarray(self.areas, float).ravel()
+            block[areas_start:screws_start] = np.asarray(self.areas, float).ravel()
+        block[screws_start:tyres_start] = self.screws
         return block
 
 

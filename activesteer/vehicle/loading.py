@@ -16,6 +16,7 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.load import apply_load
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, DamperCurve, VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
+from activesteer.vehicle.toe_link_screws import fit_screws, flattened, screw_records
 
 _USER_DYNAMICS: Final = int(mujoco.mjtDyn.mjDYN_USER)
 _RATES: Final = {"slip_x": fb.U_RATE_X, "slip_y": fb.U_RATE_Y, "slip_z": fb.U_RATE_Z}
@@ -52,6 +53,8 @@ def load_model(
         # A state that is not finite must end the run; the engine would start again from its reference position.
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         spec.nuserdata = len(CORNERS) * (fb.USERDATA_PER_WHEEL + 1) + 1
+        if parameters.rear_actuator.is_screw:
+            fit_screws(spec, parameters.rear_actuator.resolved())
         _fit_actuators(spec, parameters)
         apply_load(spec, parameters)
         block = _force_block(spec.compile(), parameters, tyres, road).to_array()
@@ -151,7 +154,17 @@ def _force_block(
             # Friction in the vehicle file is not to be lost because the model has no place for it.
             find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
     block.areas.extend(road.areas())
-    block.actuators.extend(_actuator(model, index, parameters) for index in range(model.nu))
+    places: dict[str, tuple[float, int]] = {}
+    if parameters.rear_actuator.is_screw:
+        screws = screw_records(model, parameters.rear_actuator.resolved())
+        block.screws.extend(flattened(screws.records))
+        block.screw_sensors, places = screws.sensors, screws.places
+    for index in range(model.nu):
+        if (place := places.get(model.actuator(index).name)) is None:
+            block.actuators.append(_actuator(model, index, parameters))
+        else:
+            low, high = (float(value) for value in model.actuator_ctrlrange[index])
+            block.actuators.append((place[0], float(model.actuator_actadr[index]), float(place[1]), 0.0, low, high))
     return block
 
 

@@ -221,14 +221,116 @@ def _brake_rate(entry, qvel, command, state, timestep_s):
     return (wound - state) / timestep_s
 
 
-def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any]:
-    """Compiles the two callbacks, or loads them from numba's cache.
+@inlined
+def _friction_rate(entry, qvel, ten_velocity, state, timestep_s):
+    """Dry friction of a damper, which the road shakes, or of the rack."""
+    index = int(entry[fb.A_SECOND])
+    speed = ten_velocity[index] if entry[fb.A_HIGH] == fb.ALONG_TENDON else qvel[index]
+    # The free joint of the chassis is the first (`Vehicle` sees to it): its velocity in the world.
+    vibration = entry[fb.A_FIRST] * (qvel[0] * qvel[0] + qvel[1] * qvel[1]) ** 0.25
+    return friction_rate(state, speed, vibration, entry[fb.A_LOW], timestep_s)
+
+
+@inlined
+def _polynomial(coefficients, x):
+    """Without a constant term."""
+    value = 0.0
+    for power in range(fb.POWERS - 1, -1, -1):
+        value = (value + coefficients[power]) * x
+    return value
+
+
+@inlined
+def _played(link, screw_m, longer_m):
+    """By how much a link is longer where its screw stands, within the play, as the length asks that it has."""
+    half = 0.5 * link[fb.L_BACKLASH_m]
+    return min(max(longer_m, screw_m - half), screw_m + half)
+
+
+@inlined
+def _link_rate(link, state, act, ten_length, userdata, timestep_s):
+    screw_m = link[fb.L_SIGN] * act[int(link[fb.L_SCREW_ACT])]
+    userdata[int(link[fb.L_OUT])] = _polynomial(link[fb.L_ANGLE :], screw_m)
+    return (_played(link, screw_m, ten_length[int(link[fb.L_TENDON])] - link[fb.L_REST_m]) - state) / timestep_s
+
+
+@inlined
+def _motor_rate(block, screw, act, ctrl, ten_length, userdata, speed, timestep_s):
+    """Rate of a motor's speed: position and speed loop within current, voltage and power, load, dry friction."""
+    out = int(screw[fb.S_OUT])
+    userdata[out] = userdata[out + 1] = 0.0
+    if screw[fb.S_SEIZED] != 0.0:
+        return -speed / timestep_s
+    command_actuator = int(screw[fb.S_COMMAND])
+    entry = block[int(block[fb.ACTUATORS_START]) + command_actuator * fb.ACTUATOR_SIZE :]
+    angle = entry[fb.A_SCALE] * ctrl[command_actuator] + entry[fb.A_OFFSET]
+    beyond = angle < entry[fb.A_LOW] or angle > entry[fb.A_HIGH]
+    angle = min(max(angle, entry[fb.A_LOW]), entry[fb.A_HIGH])
+    position, lead = act[int(screw[fb.S_ACT])], screw[fb.S_LEAD_mprad]
+    missing = (_polynomial(screw[fb.S_TRAVEL :], angle) - position) / lead
+    limit = screw[fb.S_SPEED_LIMIT_radps]
+    wanted = min(max(screw[fb.S_POSITION_GAIN_1ps] * missing, -limit), limit)
+    load, carried = 0.0, 0.0
+    for index in range(int(screw[fb.S_N_LINKS])):
+        link = block[int(block[fb.SCREWS_START]) + int(screw[fb.S_LINK + index]) :]
+        longer_m = ten_length[int(link[fb.L_TENDON])] - link[fb.L_REST_m]
+        tension = link[fb.L_STIFFNESS_Npm] * (longer_m - act[int(link[fb.L_ACT])])
+        load += link[fb.L_SIGN] * tension * lead
+        carried += abs(tension) * lead
+    friction = screw[fb.S_FRICTION_Nm] + screw[fb.S_LOAD_FRICTION] * carried
+    # The speed loop, its integral part settled: what the speed asked for needs against load and friction.
+    target = speed - (wanted - speed) * math.expm1(-screw[fb.S_SPEED_GAIN_1ps] * timestep_s)
+    per_torque = timestep_s / screw[fb.S_INERTIA_kgm2]
+    needed = (target - speed) / per_torque - load + math.copysign(friction, target)
+    if abs(missing) * lead <= screw[fb.S_TOLERANCE_m] and abs(load) <= friction:
+        # It is there, and the screw holds by itself: no current.
+        needed = 0.0
+    low, high = _motor_limits(screw, speed)
+    torque = min(max(needed, low), high)
+    userdata[out] = torque
+    userdata[out + 1] = 1.0 if beyond or torque != needed or abs(wanted) == limit else 0.0
+    free = speed + per_torque * (torque + load)
+    new = math.copysign(max(abs(free) - per_torque * friction, 0.0), free)
+    reached = position + timestep_s * lead * new
+    if reached > screw[fb.S_STOP_m]:
+        new = (screw[fb.S_STOP_m] - position) / (timestep_s * lead)
+    elif reached < -screw[fb.S_STOP_m]:
+        new = (-screw[fb.S_STOP_m] - position) / (timestep_s * lead)
+    return (new - speed) / timestep_s
+
+
+@inlined
+def _screw_rate(block, entry, act, ctrl, ten_length, userdata, timestep_s):
+    """Rate of a screwed link's change of length, of a screw's position, or of its motor's speed."""
+    kind, state = entry[fb.A_KIND], act[int(entry[fb.A_ACT])]
+    record = block[int(block[fb.SCREWS_START]) + int(entry[fb.A_FIRST]) :]
+    if kind == fb.KIND_LINK:
+        return _link_rate(record, state, act, ten_length, userdata, timestep_s)
+    if kind == fb.KIND_SCREW:
+        return record[fb.S_LEAD_mprad] * act[int(record[fb.S_MOTOR_ACT])]
+    return _motor_rate(block, record, act, ctrl, ten_length, userdata, state, timestep_s)
+
+
+@inlined
+def _motor_limits(screw, speed):
+    """Least and greatest torque that current, voltage and power allow at a speed [N m]."""
+    high = min(screw[fb.S_PEAK_Nm], max(screw[fb.S_STALL_Nm] - screw[fb.S_SLOPE_Nmsprad] * speed, 0.0))
+    low = -min(screw[fb.S_PEAK_Nm], max(screw[fb.S_STALL_Nm] + screw[fb.S_SLOPE_Nmsprad] * speed, 0.0))
+    if speed > 0.0:
+        high = min(high, screw[fb.S_POWER_W] / speed)
+    elif speed < 0.0:
+        low = max(low, screw[fb.S_POWER_W] / speed)
+    return low, high
+
+
+def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:
+    """Compiles the three callbacks, or loads them from numba's cache.
 
     The offsets are closure variables on purpose: numba makes those part of the cache key.
     """
     (
         m_count, m_timestep, m_numbers, d_qvel, d_act, d_ctrl, d_userdata, d_xpos, d_xmat, d_com, d_cdof, d_ten_j,
-        d_ten_velocity, d_cvel, d_qfrc, _,
+        d_ten_velocity, d_cvel, d_qfrc, d_ten_length, d_sensordata, _,
     ) = layout  # fmt: skip
 
     @compiled_callback(types.void, types.intp, types.intp)
@@ -275,19 +377,30 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any]:
         if kind == fb.KIND_DRIVE:
             rate = _drive_rate(block, qvel, entry[fb.A_FIRST], entry[fb.A_SECOND], command, state, timestep_s)
         elif kind == fb.KIND_FRICTION:
-            index = int(entry[fb.A_SECOND])
-            if entry[fb.A_HIGH] == fb.ALONG_TENDON:
-                speed = array_at(data, d_ten_velocity, int(block[fb.N_TENDONS]))[index]
-            else:
-                speed = qvel[index]
-            # The free joint of the chassis is the first (`Vehicle` sees to it): its velocity in the world.
-            vibration = entry[fb.A_FIRST] * (qvel[0] * qvel[0] + qvel[1] * qvel[1]) ** 0.25
-            rate = friction_rate(state, speed, vibration, entry[fb.A_LOW], timestep_s)
+            ten_velocity = array_at(data, d_ten_velocity, int(block[fb.N_TENDONS]))
+            rate = _friction_rate(entry, qvel, ten_velocity, state, timestep_s)
         elif kind == fb.KIND_BRAKE:
             rate = _brake_rate(entry, qvel, command, state, timestep_s)
+        elif kind >= fb.KIND_LINK:
+            rate = _screw_rate(
+                block, entry, array_at(data, d_act, int(block[fb.N_ACTIVATIONS])),
+                array_at(data, d_ctrl, int(block[fb.N_CONTROLS])),
+                array_at(data, d_ten_length, int(block[fb.N_TENDONS])),
+                array_at(data, d_userdata, int(block[fb.N_USERDATA])), timestep_s,
+            )  # fmt: skip
         return rate
 
-    return passive, actuator_rate
+    @compiled_callback(types.void, types.intp, types.intp, types.intc)
+    def screw_sensors(model, data, _stage):
+        block = _our_block(model, m_count, m_numbers)
+        if block.size == 0:
+            return
+        count, start = int(block[fb.N_SCREW_SENSORS]), int(block[fb.SCREW_SENSORS])
+        # Behind them stands how many faults act.
+        said = array_at(data, d_userdata, int(block[fb.N_USERDATA]))[-1 - count : -1]
+        array_at(data, d_sensordata, start + count)[start:] = said
+
+    return passive, actuator_rate, screw_sensors
 
 
 _installed: list[Any] = []
@@ -303,6 +416,7 @@ def install_native_forces() -> None:
     slots = (
         ("mjcb_passive", mujoco.get_mjcb_passive(), mujoco.set_mjcb_passive),
         ("mjcb_act_dyn", mujoco.get_mjcb_act_dyn(), mujoco.set_mjcb_act_dyn),
+        ("mjcb_sensor", mujoco.get_mjcb_sensor(), mujoco.set_mjcb_sensor),
     )
     for name, present, _ in slots:
         if present is not None and not any(present is ours for ours in _installed):
@@ -324,3 +438,5 @@ def remove_native_forces() -> None:
         mujoco.set_mjcb_passive(None)
     if any(mujoco.get_mjcb_act_dyn() is ours for ours in _installed):
         mujoco.set_mjcb_act_dyn(None)
+    if any(mujoco.get_mjcb_sensor() is ours for ours in _installed):
+        mujoco.set_mjcb_sensor(None)

@@ -13,6 +13,7 @@ from activesteer.sensors.parameters import Sensors
 from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.force_block import MAX_CURVE_POINTS
+from activesteer.vehicle.rear_actuator import RearActuator
 
 Positive = Annotated[float, Range(1e-12)]
 NotNegative = Annotated[float, Range(0.0)]
@@ -257,6 +258,8 @@ class VehicleParameters:
     powertrain: Powertrain
     steering: Steering
     aerodynamics: Aerodynamics
+    rear_actuator: RearActuator = RearActuator()
+    """The model's hinges where not given."""
     friction: Friction = Friction()
     """None where not given."""
     sensors: Sensors = Sensors()

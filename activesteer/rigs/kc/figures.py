@@ -16,6 +16,7 @@ from activesteer.plotting import new_figure, save_all
 from activesteer.rigs.kc.definitions import Axle
 from activesteer.rigs.kc.metrics_kinematics import roll_angle_rad
 from activesteer.rigs.kc.metrics_steering import mean_steer_rad, ratio_curve
+from activesteer.rigs.kc.programme import rear_screw_travel_m
 from activesteer.rigs.kc.result import KcMetric, KcResult
 from activesteer.rigs.kc.sweep import Sweep
 
@@ -79,6 +80,8 @@ def draw(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
         "steering": _steering,
         "targets": _targets,
     }
+    if "rear_steering_bump" in result.curves:
+        pictures["rear_steering"] = _rear_steering
     return save_all(pictures, result, folder)
 
 
@@ -264,6 +267,31 @@ def _steering(result: KcResult) -> Figure:
     parking.legend(frameon=False, fontsize="small")
     for axis in (angles, ratio, ackermann, parking):
         _style(axis)
+    return figure
+
+
+def _rear_steering(result: KcResult) -> Figure:
+    """Of the left rear wheel over the travel of the screw in its toe link: angle, camber, half of the track."""
+    figure = _new_figure(result, "rear steering by the toe link, left wheel", 9.5, 3.6)
+    design = result.curves["rear_steering"]
+    travel = 1e3 * rear_screw_travel_m(result.measured.vehicle, design.x)
+    middle_m = design.contact_m[design.zero, 2, 1]
+    panels = (
+        ("steer angle [deg] (+ to the left)", lambda sweep: _DEG * sweep.steer_rad[:, 2]),
+        ("camber [deg] (- top in)", lambda sweep: _DEG * sweep.camber_rad[:, 2]),
+        (
+            "contact point outwards [mm]",
+            lambda sweep: 1e3 * (sweep.contact_m[:, 2, 1] - middle_m),
+        ),
+    )
+    looks = (("_bump", "bump 40 mm", _LEFT), ("", "standing", _GREY), ("_rebound", "rebound 40 mm", _RIGHT))
+    for axis, (label, values) in zip(figure.subplots(1, 3), panels, strict=True):
+        for ending, words, colour in looks:
+            axis.plot(travel, values(result.curves[f"rear_steering{ending}"]), color=colour, lw=1.6, label=words)
+        axis.set_xlabel("travel of the screw [mm] (+ longer)")
+        axis.set_ylabel(label)
+        _style(axis)
+    figure.axes[0].legend(frameon=False, fontsize="small")
     return figure
 
 

@@ -98,7 +98,7 @@ class HeldCar:
         self.model = model = vehicle.model if springs == "in" else copy.copy(vehicle.model)
         self.data = data = mujoco.MjData(model)
         self._wheels = [model.body(f"{corner}_wheel").id for corner in CORNERS]
-        self._bind()
+        self._bind(vehicle)
         standing = vehicle.data.xpos[self._wheels, 2]
         lean = vehicle.data.xmat[self._wheels, 7]
         self.radius_m = standing / np.sqrt(1.0 - lean * lean)
@@ -116,7 +116,7 @@ class HeldCar:
         self.equilibrium(Case("nothing" if springs == "locked" else "centre"))
         self._start = data.qpos.copy(), self.load_N.copy(), self._inverse.copy(), self._held
 
-    def _bind(self) -> None:
+    def _bind(self, vehicle: Vehicle) -> None:
         model = self.model
         root = model.joint("root")
         self._root = int(root.qposadr[0])
@@ -125,6 +125,7 @@ class HeldCar:
         self._free = np.setdiff1d(np.arange(model.nv), held)
         self._steering_wheel = int(model.actuator("steering_wheel").id)
         self._rear = [int(model.actuator(f"{corner}_steer").id) for corner in CORNERS[2:]]
+        self._rear_states_at = vehicle.rear_states_at
 
     def _take_out_springs(self, *, lock_dampers: bool) -> None:
         model, data = self.model, self.data
@@ -194,16 +195,19 @@ class HeldCar:
 
     def _command(self, case: Case) -> None:
         """Commands the servos. The search begins where they will arrive: further away one is at its torque's limit."""
+        model, data = self.model, self.data
         commands = [(self._steering_wheel, case.steering_wheel_rad)]
         commands += [(actuator, case.rear_steer_rad) for actuator in self._rear]
         for actuator, angle in commands:
-            if self.data.ctrl[actuator] != angle:
-                self.data.ctrl[actuator] = angle
-                state = int(self.model.actuator_actadr[actuator])
-                if state >= 0:
-                    # A servo that has arrived: its state is its command, and its rate zero.
-                    self.data.act[state] = angle
-                self.data.qpos[int(self.model.jnt_qposadr[self.model.actuator_trnid[actuator, 0]])] = angle
+            if data.ctrl[actuator] == angle:
+                continue
+            data.ctrl[actuator] = angle
+            if actuator in self._rear:
+                # Servos that have arrived.
+                for state, value in self._rear_states_at(angle).items():
+                    data.act[state] = value
+            if model.actuator_trntype[actuator] == int(mujoco.mjtTrn.mjTRN_JOINT):
+                data.qpos[int(model.jnt_qposadr[model.actuator_trnid[actuator, 0]])] = angle
 
     def _residual(self, case: Case) -> Array:
         """Forces that are not balanced [N, N m], and heights that are not met (scaled), shape (free + 4,)."""

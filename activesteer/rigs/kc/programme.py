@@ -29,6 +29,8 @@ _STEERING_POINTS: Final = 24
 """Points of the steering sweep to either side."""
 _AXIS_STEER_RAD: Final = math.radians(5.0)
 """Steering wheel angle to either side between which the steering axis is found: a third of a degree at the wheel."""
+_STEERED_BUMP_M: Final = 0.04
+"""Bump and rebound in which the rear wheels are steered too, where screws in the toe links do it [m]."""
 _AXIS_REAR_RAD: Final = math.radians(0.3)
 
 
@@ -157,7 +159,20 @@ def _sweeps(
             "rear steering", "angle of the rear steering actuators, positive to the left", "rad", rear,
             lambda angle: Case("contact", rear_steer_rad=angle),
         ),
+        **({
+            f"rear_steering_{name}": sweep(
+                f"rear steering with {name} of {1e3 * abs(height):.0f} mm",
+                "angle of the rear steering actuators, positive to the left", "rad", rear,
+                lambda angle, height=height: Case("contact", height * both, rear_steer_rad=angle),
+            ) for name, height in (("bump", _STEERED_BUMP_M), ("rebound", -_STEERED_BUMP_M))
+        } if vehicle.parameters.rear_actuator.is_screw else {}),
     }  # fmt: skip
+
+
+def rear_screw_travel_m(vehicle: Vehicle, angles_rad: Array) -> Array:
+    """By how much the screw of the left toe link makes it longer at angles of the actuators [m], shape (n,)."""
+    address = int(vehicle.model.actuator_actadr[vehicle.model.actuator("rl_steer").id])
+    return np.array([vehicle.rear_states_at(float(angle))[address] for angle in angles_rad])
 
 
 def _steering_angles(vehicle: Vehicle) -> Array:

@@ -1,0 +1,137 @@
+"""What steers the rear wheels, as a vehicle file says: the model's hinges, or screws in the toe links.
+
+The presets of the screws are classes of actuators, not products. What is published of products (angles, arrangement,
+kind of screw) is in docs/actuators.md; forces, speeds, motors and friction are assumptions of the class.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Final, Literal, Self
+
+from activesteer.config import Range
+from activesteer.errors import ParameterError
+
+_HINGE: Final = "hinge"
+Positive = Annotated[float, Range(1e-9)]
+
+
+@dataclass(frozen=True)
+class RearActuator:
+    """The rear steering actuator; with `hinge` all other keys belong to the model and have no effect here."""
+
+    preset: Literal["hinge", "screw_3deg", "screw_10deg"] = "hinge"
+    """`hinge`: the model's own; `screw_3deg`, `screw_10deg`: screws in the toe links, which the keys below change."""
+    arrangement: Literal["per_side", "central"] | None = None
+    """Whether each side has an actuator, or one in the middle moves both toe links."""
+    limit_rad: Annotated[float, Range(math.radians(0.5), math.radians(15.0))] | None = None
+    """Greatest wheel angle to either side that it takes as a demand; the end stops lie 3 % beyond [rad]."""
+    lead_m: Annotated[float, Range(1e-4, 0.05)] | None = None
+    """Travel per turn of the screw [m]."""
+    gear: Annotated[float, Range(0.1, 200.0)] | None = None
+    """Turns of the motor per turn of the screw: belt or gear."""
+    screw_stiffness_Npm: Annotated[float, Range(1e5, 1e10)] | None = None
+    """Nut, thread, bearing and housing, in series with the link [N/m]."""
+    backlash_m: Annotated[float, Range(0.0, 5e-3)] | None = None
+    """Free play between link and screw, from end to end [m]."""
+    friction_torque_Nm: Annotated[float, Range(0.0, 10.0)] | None = None
+    """Dry friction at the motor without load: bearings, seals, brush [N m]."""
+    load_friction: Annotated[float, Range(0.0, 20.0)] | None = None
+    """Friction of the thread over the load's torque, tan(friction angle) / tan(lead angle): 1 and more locks itself."""
+    rotor_inertia_kgm2: Annotated[float, Range(1e-7, 1e-2)] | None = None
+    """All that turns with the motor, screw included [kg m2]."""
+    peak_torque_Nm: Positive | None = None
+    """Most torque of the motor: its current limit [N m]."""
+    stall_torque_Nm: Positive | None = None
+    """Torque at rest without that limit, at nominal voltage: where its line begins [N m]."""
+    no_load_speed_radps: Positive | None = None
+    """Speed at which it has none left, at nominal voltage [rad/s]."""
+    speed_limit_radps: Positive | None = None
+    """Speed that its controller asks for at most [rad/s]."""
+    nominal_voltage_V: Positive | None = None
+    """Voltage to which these belong [V]."""
+    supply_voltage_V: Annotated[float, Range(0.0, 1000.0)] | None = None
+    """Voltage that it gets; 0: unpowered [V]."""
+    supply_power_W: Annotated[float, Range(0.0, 1e5)] | None = None
+    """Most mechanical power that the supply allows the motor [W]."""
+    position_gain_1ps: Annotated[float, Range(1.0, 300.0)] | None = None
+    """Position loop: speed asked for over the error of the position [1/s]."""
+    speed_gain_1ps: Annotated[float, Range(5.0, 700.0)] | None = None
+    """Speed loop: how fast an error of the speed goes where the motor is strong enough [1/s]."""
+    position_tolerance_m: Annotated[float, Range(0.0, 1e-3)] | None = None
+    """Error of the screw's position at which the motor is switched off, if the screw then holds by itself [m]."""
+
+    def __post_init__(self) -> None:
+        """No key without effect.
+
+        Raises:
+            ParameterError: the hinge is given what only a screw has.
+        """
+        given = [field.name for field in fields(self)[1:] if getattr(self, field.name) is not None]
+        if self.preset == _HINGE and given:
+            problem = "has no effect on the hinge, whose numbers are in the model; preset screw_3deg is a screw"
+            raise ParameterError(problem, key=given[0], value=getattr(self, given[0]))
+
+    @property
+    def is_screw(self) -> bool:
+        """Whether screws move the toe links."""
+        return self.preset != _HINGE
+
+    def resolved(self) -> Self:
+        """The same with the preset's value for every key that is not given."""
+        values = PRESETS[self.preset]
+        return replace(self, **{key: value for key, value in values.items() if getattr(self, key) is None})
+
+
+_COMMON: Final = {
+    # Assumptions [K]: nut, thread and two axial bearings in a light-metal housing; some hundredths of play when new;
+    # 13 V on board; loops of 8 Hz, the bandwidth that series actuators are said to have.
+    "screw_stiffness_Npm": 5e7,
+    "backlash_m": 3e-5,
+    "nominal_voltage_V": 13.0,
+    "supply_voltage_V": 13.0,
+    "position_gain_1ps": 50.0,
+    "speed_gain_1ps": 200.0,
+    "position_tolerance_m": 2e-5,
+}
+PRESETS: Final = {
+    # 3 deg and a concentric motor on a screw: BMW Integral Active Steering (FISITA F2008-03-047). One a side, or
+    # central: ZF AKC. Trapezoidal thread, self-locking (as Schaeffler says of what its planetary roller screw
+    # replaces): 3 mm of lead on 20 mm, friction 0.1 on 15 deg flanks: 0.10 / 0.048 = 2.2. The motor is an assumption:
+    # 250 W; 100 rad/s are 12 deg/s at the compact, whose toe link steers by an arm of 0.22 m.
+    "screw_3deg": {
+        **_COMMON,
+        "arrangement": "per_side",
+        "limit_rad": math.radians(3.0),
+        "lead_m": 3e-3,
+        "gear": 1.0,
+        "friction_torque_Nm": 0.15,
+        "load_friction": 2.2,
+        "rotor_inertia_kgm2": 6e-5,
+        "peak_torque_Nm": 4.0,
+        "stall_torque_Nm": 7.0,
+        "no_load_speed_radps": 250.0,
+        "speed_limit_radps": 100.0,
+        "supply_power_W": 250.0,
+    },
+    # 10 deg by motor, belt and spindle, one for the axle: Mercedes EQS and S (group-media.mercedes-benz.com). Belt 2.5,
+    # lead 5 mm on 22 mm, friction 0.1: 0.10 / 0.072 = 1.4. The motor is an assumption: 500 W, 16 deg/s
+    # at the compact.
+    "screw_10deg": {
+        **_COMMON,
+        "arrangement": "central",
+        "limit_rad": math.radians(10.0),
+        "lead_m": 5e-3,
+        "gear": 2.5,
+        "friction_torque_Nm": 0.10,
+        "load_friction": 1.4,
+        "rotor_inertia_kgm2": 8e-5,
+        "peak_torque_Nm": 4.5,
+        "stall_torque_Nm": 10.0,
+        "no_load_speed_radps": 420.0,
+        "speed_limit_radps": 200.0,
+        "supply_power_W": 500.0,
+    },
+}
+"""Preset -> what its keys are where they are not given."""

@@ -1,0 +1,192 @@
+"""Screws in the toe links of a car whose model has hinges: what is changed in the model, what the callbacks need.
+
+The hinge between knuckle and carrier goes, and each toe link gets an actuator along it. A link of stiffness k that is
+longer by z carries -k (L - L_0 - z): the tendon has the first part, the actuator k z. Beside it stand two states
+without a force: position of the screw, speed of the motor. With free play, z is anywhere within the play about the
+screw's position: where the link carries nothing if that is possible, at an end of the play otherwise.
+
+A screw on a motor of speed w, with the lead l per radian of the motor and the links' tension T, has
+
+    J dw/dt = M + l T - friction        |friction| <= M_0 + r l |T|, all of it at rest if that suffices
+    dz/dt = l w
+
+so that it locks itself where r >= 1. M is what the speed loop needs, within current, voltage and power; its integral
+part counts as settled, so that it knows load and friction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+
+from activesteer.errors import ModelError
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.rear_actuator import RearActuator
+from activesteer.vehicle.toe_link_kinematics import toe_link_map
+
+CORNERS: Final = ("rl", "rr")
+LINKS: Final = ("toe_link", "tie_rod")
+"""What a rear toe link may be called behind its corner."""
+STOP_BEYOND: Final = 1.03
+"""Where the end stops are, over the travel at the limit."""
+SCREW, MOTOR = "_screw", "_motor"
+"""How the states beside an actuator are called: of its own side, or `rear_...` of one in the middle."""
+
+
+def fit_screws(spec: mujoco.MjSpec, actuator: RearActuator) -> None:
+    """Changes a model.
+
+    Args:
+        spec: The model with hinges.
+        actuator: What the vehicle file says, with all keys.
+
+    Raises:
+        ModelError: the rear suspension has no toe link whose stiffness is one number, or no hinge.
+    """
+    spec.nuserdata += len(CORNERS)
+    for key in list(spec.keys):
+        spec.delete(key)  # made for a car with hinges
+    parts = CORNERS if actuator.arrangement == "per_side" else ("rear",)
+    for corner in CORNERS:
+        link = toe_link_of(spec, corner)
+        name = f"{corner}_steer"
+        for part in (spec.sensor(f"{name}_angle"), spec.actuator(name), spec.joint(name)):
+            if part is None:
+                raise ModelError(f"the model has no rear steering hinge {name!r} for the screws to take the place of")
+            spec.delete(part)
+        stiffness = np.asarray(link.stiffness, dtype=np.float64)
+        if stiffness[0] <= 0.0 or stiffness[1:].any():
+            raise ModelError(f"the toe link {link.name!r} needs one stiffness above 0 and no hardening")
+        assert actuator.screw_stiffness_Npm is not None
+        together = 1.0 / (1.0 / stiffness[0] + 1.0 / actuator.screw_stiffness_Npm)
+        link.stiffness = [together, 0.0, 0.0]
+        _add(spec, name, link.name, together, actuator)
+    # The callback fills these, in this order: what the actuator's own controller knows of its screw ...
+    for corner in CORNERS:
+        spec.add_sensor(name=f"{corner}_steer_angle", type=mujoco.mjtSensor.mjSENS_USER, dim=1)
+    for part in parts:
+        # ... and torque of the motor, and whether it is at a limit.
+        spec.add_sensor(name=part + MOTOR, type=mujoco.mjtSensor.mjSENS_USER, dim=2)
+        spec.nuserdata += 2
+        for state in (SCREW, MOTOR):
+            _add(spec, part + state, toe_link_of(spec, "rl" if part == "rear" else part).name, 0.0, None)
+
+
+def _add(spec: mujoco.MjSpec, name: str, tendon: str, gain: float, actuator: RearActuator | None) -> None:
+    added = spec.add_actuator(
+        name=name, target=tendon, trntype=mujoco.mjtTrn.mjTRN_TENDON, dyntype=mujoco.mjtDyn.mjDYN_USER,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED, biastype=mujoco.mjtBias.mjBIAS_NONE,
+    )  # fmt: skip
+    added.gainprm[0] = gain
+    if actuator is not None and actuator.limit_rad is not None:
+        added.ctrllimited = mujoco.mjtLimited.mjLIMITED_FALSE
+        added.ctrlrange = [-actuator.limit_rad, actuator.limit_rad]
+
+
+def toe_link_of(spec: Any, corner: str) -> Any:
+    """The tendon that is the toe link of a rear corner.
+
+    Raises:
+        ModelError: there is none.
+    """
+    for name in LINKS:
+        if (tendon := spec.tendon(f"{corner}_{name}")) is not None:
+            return tendon
+    names = " or ".join(f"{corner}_{name}" for name in LINKS)
+    raise ModelError(f"the rear suspension has no toe link for a screw: a tendon {names} is needed")
+
+
+@dataclass(frozen=True)
+class Screws:
+    """The records of a car's screws, and where its actuators find them.
+
+    Attributes:
+        records: What stands in the block: a record for each link, then one for each screw.
+        places: Name of an actuator -> kind and start of its record behind the first.
+        sensors: Where in `sensordata` their sensors begin, and how many numbers these have.
+    """
+
+    records: list[list[float]]
+    places: dict[str, tuple[float, int]]
+    sensors: tuple[int, int]
+
+
+def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
+    """Solves the kinematics and collects what the callbacks need.
+
+    Args:
+        model: The model with screws, compiled.
+        actuator: What the vehicle file says, with all keys.
+
+    Raises:
+        ModelError: the toe links do not steer the wheels so far.
+    """
+    limit = _set(actuator.limit_rad)
+    names = [_tendon(model, corner) for corner in CORNERS]
+    left = toe_link_map(model, "rl", names[0], limit)
+    right = toe_link_map(model, "rr", names[1], limit)
+    maps = (left, right)
+    lead = _set(actuator.lead_m) / (2.0 * math.pi * _set(actuator.gear))
+    central = actuator.arrangement == "central"
+    parts = ("rear",) if central else CORNERS
+    places: dict[str, tuple[float, int]] = {}
+    records: list[list[float]] = []
+    # The sensors, and behind them how many faults act, are the end of `userdata`.
+    count = len(CORNERS) + 2 * len(parts)
+    outs = model.nuserdata - 1 - count
+    first_screw = len(CORNERS) * fb.LINK_SIZE
+    for index, (corner, tendon) in enumerate(zip(CORNERS, names, strict=True)):
+        part = "rear" if central else corner
+        sign = -1.0 if central and corner == "rr" else 1.0
+        places[f"{corner}_steer"] = (fb.KIND_LINK, index * fb.LINK_SIZE)
+        tendon_id = model.tendon(tendon).id
+        records.append([
+            tendon_id, float(model.tendon_length0[tendon_id]), float(model.tendon_stiffness[tendon_id]),
+            _set(actuator.backlash_m), _act(model, f"{corner}_steer"), _act(model, part + SCREW), sign,
+            outs + index, *maps[index].angle_of_travel,
+        ])  # fmt: skip
+    ratio = _set(actuator.supply_voltage_V) / _set(actuator.nominal_voltage_V)
+    for index, part in enumerate(parts):
+        start = first_screw + index * fb.SCREW_SIZE
+        places[part + SCREW], places[part + MOTOR] = (fb.KIND_SCREW, start), (fb.KIND_MOTOR, start)
+        # One for both: what moves the left link out moves the right one in.
+        travel = maps[index].travel_of_angle if not central else (0.5 * (left.travel_of_angle - right.travel_of_angle))
+        command = model.actuator(f"{CORNERS[index]}_steer").id
+        links = [0, fb.LINK_SIZE] if central else [index * fb.LINK_SIZE]
+        most = max(mapped.travel_m for mapped in maps)
+        records.append([
+            _act(model, part + SCREW), _act(model, part + MOTOR), command, lead, _set(actuator.rotor_inertia_kgm2),
+            _set(actuator.position_gain_1ps), _set(actuator.speed_gain_1ps), _set(actuator.speed_limit_radps),
+            _set(actuator.peak_torque_Nm) if ratio > 0.0 else 0.0, _set(actuator.stall_torque_Nm) * ratio,
+            _set(actuator.stall_torque_Nm) / _set(actuator.no_load_speed_radps), _set(actuator.supply_power_W),
+            _set(actuator.friction_torque_Nm), _set(actuator.load_friction), STOP_BEYOND * most,
+            _set(actuator.position_tolerance_m), 0.0,
+            outs + len(CORNERS) + 2 * index, len(links), *links, *([0] * (2 - len(links))), *travel,
+        ])  # fmt: skip
+    assert all(len(record) in (fb.LINK_SIZE, fb.SCREW_SIZE) for record in records)
+    sensors = int(model.sensor_adr[model.sensor(f"{CORNERS[0]}_steer_angle").id])
+    return Screws(records, places, (sensors, count))
+
+
+def _set(value: float | None) -> float:
+    assert value is not None
+    return value
+
+
+def _act(model: mujoco.MjModel, actuator: str) -> int:
+    return int(model.actuator_actadr[model.actuator(actuator).id])
+
+
+def _tendon(model: mujoco.MjModel, corner: str) -> str:
+    present = {model.tendon(index).name for index in range(model.ntendon)}
+    return next(f"{corner}_{name}" for name in LINKS if f"{corner}_{name}" in present)
+
+
+def flattened(records: Sequence[Sequence[float]]) -> list[float]:
+    """All records, one behind the other."""
+    return [float(number) for record in records for number in record]
