@@ -63,10 +63,10 @@ def run_scenario(
     timestep_s: float = DEFAULT_TIMESTEP_S,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
-    """Runs a prepared scenario, and writes the recording while it runs where a path is given.
+    """Runs a scenario, and writes the recording while it runs where a path is given.
 
     Args:
-        scenario: What to run; see `activesteer.simulation.preparation`.
+        scenario: What to run; an amplitude that has to be found by driving is found first, if it is not known yet.
         controller: The controller, as in `simulate`.
         path: MCAP file to write.
         timestep_s: Step of the simulation [s].

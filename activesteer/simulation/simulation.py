@@ -76,8 +76,8 @@ class Simulation:
         """Builds the car and lets it settle, as `simulate` does; the arguments are the same.
 
         Args:
-            maneuver: Name, path, or table of a manoeuvre; or a prepared `Scenario`, which holds vehicle,
-                driver and overrides already; see `activesteer.simulation.preparation.prepared`.
+            maneuver: Name, path, or table of a manoeuvre; or a `Scenario`, which holds vehicle, driver and overrides
+                already.
             controller: Name of a controller, or a user's own.
             vehicle: Name, path, or table of a vehicle.
             overrides: Dotted key -> value.
@@ -89,12 +89,13 @@ class Simulation:
         """
         controller = find_controller(controller)
         if not isinstance(maneuver, Scenario):
-            maneuver = prepared(resolve(maneuver, vehicle, overrides, driver), timestep_s)
+            maneuver = resolve(maneuver, vehicle, overrides, driver)
         elif overrides or vehicle != "compact" or driver != DEFAULT_DRIVER:
             raise ParameterError(
                 "a Scenario has its vehicle, driver and overrides already", key="vehicle, overrides, driver"
             )
-        self.scenario = maneuver
+        # Does nothing where everything is known already.
+        self.scenario = prepared(maneuver, timestep_s)
         self.loop = ClosedLoop(self.scenario, controller, timestep_s)
         self.context = RunContext.of(self.scenario, self.loop.vehicle, controller)
         self._given: dict[str, int] = {}

@@ -303,3 +303,12 @@ def test_a_run_with_a_file_does_not_go_back(tmp_path: Any) -> None:
         simulation.advance(10)
         with pytest.raises(RecordingError, match="file"):
             simulation.restore_state(state)
+
+
+def test_scenario_whose_amplitude_is_not_known_yet_is_prepared() -> None:
+    keys = {"duration_s": 0.7, "settle_s": 0.5}
+    simulation = Simulation(resolve("step_steer", overrides=keys), "ars")
+    assert simulation.scenario.maneuver.search is None
+    simulation.run()
+    assert_same(simulation.recording(), activesteer.simulate("step_steer", "ars", overrides=keys))
+    assert simulation.recording()["steering_wheel_demand_rad"][-1] > 0.5
