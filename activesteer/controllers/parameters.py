@@ -47,7 +47,7 @@ class RearSteerParameters:
 
     corrector: CorrectorParameters = CorrectorParameters()
     """Feedback."""
-    prediction_gain: Annotated[float, Range(0.0, 1.0)] = 1.0
+    prediction_gain: Annotated[float, Range(0.0, 2.0)] = 1.0
     """Share of the predicted rear angle that is used; 1 is the zero-sideslip feed-forward of eq. 5 [-]."""
     limit_rad: Annotated[float, Range(0.0, math.radians(10.0))] = math.radians(3.0)
     """Most rear angle demanded [rad]."""
