@@ -28,6 +28,8 @@ from activesteer.studies.store import RESULTS
 
 SUMMARY: Final = "summary.json"
 RUNS: Final = "runs.parquet"
+_EVERY: Final = 2
+"""A band is smoother than the curves: every second of their values will do."""
 _KEPT: Final = ("sample", "maneuver", "controller", "status")
 
 
@@ -103,7 +105,9 @@ def _bands(table: pa.Table) -> dict[tuple[str, str, str], Band]:
                 continue
             for name in channels:
                 if name not in TRACK:
-                    found[maneuver, controller, name] = band_over_time(curves[name], CURVE_STEP_S)
+                    found[maneuver, controller, name] = band_over_time(
+                        [curve[::_EVERY] for curve in curves[name]], _EVERY * CURVE_STEP_S
+                    )
             tracks = list(zip(*(curves[name] for name in TRACK), strict=True))
             found[maneuver, controller, TRACK[1]] = band_of_tracks(tracks)
     return found

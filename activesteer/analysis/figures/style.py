@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.analysis.bands import Band, bands_of
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import ParameterError
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+BAND_ALPHA: Final = 0.16
+BAND_LABEL: Final = "10 to 90 % of the population"
 MAX_POINTS: Final = 5000
 """A curve with more samples than this is drawn with fewer: a picture cannot show them, and its file would hold them."""
 
@@ -41,11 +45,13 @@ class Curve(NamedTuple):
         recording: The run.
         label: Its name in the legend.
         colour: Its colour.
+        bands: Where the curves of the population lie, by channel; empty where the run belongs to none.
     """
 
     recording: RecordingLike
     label: str
     colour: str
+    bands: Mapping[str, Band] = MappingProxyType({})
 
 
 def curves(recordings: Mapping[str, RecordingLike]) -> list[Curve]:
@@ -61,15 +67,29 @@ def curves(recordings: Mapping[str, RecordingLike]) -> list[Curve]:
     colours = dict(zip(SYSTEM_LABELS, RUN_COLOURS, strict=False))
     spare = RUN_COLOURS[len(SYSTEM_LABELS) :]
     colours |= {label: spare[i % len(spare)] for i, label in enumerate(others)}
-    return [Curve(recordings[label], SYSTEM_LABELS.get(label, label), colours[label]) for label in known + others]
+    return [
+        Curve(recordings[label], SYSTEM_LABELS.get(label, label), colours[label], bands_of(recordings[label]))
+        for label in known + others
+    ]
 
 
 def draw(axis: Axes, curve: Curve, panel: Quantity, label: str = "", width: float = 1.4, style: str = "-") -> None:
     """One channel of one run over time; without a label it stays out of the legend."""
+    draw_band(axis, curve, panel.channel, panel.factor)
     values = thinned(curve.recording[panel.channel]) * panel.factor
     # A leading underscore keeps a line out of the legend.
     line = label or "_hidden"
     axis.plot(thinned(curve.recording.time_s), values, style, color=curve.colour, linewidth=width, label=line)
+
+
+def draw_band(axis: Axes, curve: Curve, channel: str, factor: float = 1.0) -> None:
+    """Where a channel lies in the population, behind all curves."""
+    band = curve.bands.get(channel)
+    if band is not None:
+        edges = band.low * factor, band.high * factor
+        axis.fill_between(
+            band.at, *edges, color=curve.colour, alpha=BAND_ALPHA, linewidth=0.0, zorder=1.5, label=f"_{BAND_LABEL}"
+        )
 
 
 def added_channels(curve: Curve) -> list[str]:
@@ -111,6 +131,11 @@ def explain(axis: Axes, lines: Sequence[tuple[str, float, str]]) -> None:
 def name_curves(figure: Figure, axis: Axes) -> None:
     """The legend of the runs, above all axes."""
     handles, labels = axis.get_legend_handles_labels()
+    if any(collection.get_label() == f"_{BAND_LABEL}" for collection in axis.collections):
+        from matplotlib.patches import Patch  # noqa: PLC0415 - an extra, and slow to import
+
+        handles.append(Patch(color="#777777", alpha=2.0 * BAND_ALPHA, linewidth=0.0))
+        labels.append(BAND_LABEL)
     figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 3), frameon=False)
 
 

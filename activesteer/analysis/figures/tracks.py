@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from activesteer.analysis import track
+from activesteer.analysis.bands import TRACK
 from activesteer.analysis.course_view import CourseView, view_of
 from activesteer.analysis.figures import style
 from activesteer.analysis.source import RecordingLike, read_course
@@ -74,6 +75,7 @@ def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
     """Draws the course, and the track of the front axle centre of every run."""
     drawn = style.curves(recordings)
     for curve in drawn:
+        style.draw_band(axis, curve, TRACK[1])
         x, y = (style.thinned(values) for values in track.front_axle(curve.recording))
         axis.plot(x, y, color=curve.colour, linewidth=1.4, label=curve.label)
     _draw_course(axis, read_course(drawn[0].recording), TRACK_ASPECT)
