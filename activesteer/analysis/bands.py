@@ -50,7 +50,7 @@ def band_over_time(curves: Sequence[Array], step_s: float) -> Band:
     """
     length = min(map(len, curves))
     low, high = np.quantile(np.stack([curve[:length] for curve in curves]), SHARES, axis=0)
-    return Band(step_s * np.arange(length), low, high)
+    return Band(step_s * np.arange(length, dtype=np.float64), low, high)
 
 
 def band_of_tracks(tracks: Sequence[tuple[Array, Array]]) -> Band:

@@ -96,8 +96,8 @@ def _in_short(table: pa.Table) -> pa.Table:
 def _bands(table: pa.Table) -> dict[tuple[str, str, str], Band]:
     found = {}
     channels = [name.removeprefix(CURVE) for name in table.column_names if name.startswith(CURVE)]
-    for maneuver in pc.unique(table["maneuver"]).to_pylist():
-        for controller in pc.unique(table["controller"]).to_pylist():
+    for maneuver in table["maneuver"].unique().to_pylist():
+        for controller in table["controller"].unique().to_pylist():
             chosen = (pc.field("maneuver") == maneuver) & (pc.field("controller") == controller)
             rows = table.filter(chosen & (pc.field("status") == "ok"))
             curves = {name: _curves(rows, name) for name in channels}
