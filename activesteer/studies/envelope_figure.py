@@ -1,0 +1,82 @@
+"""The envelope as a picture: a map over speed and line for each driver, entry speeds at the manoeuvre's own line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from activesteer.conventions import RUN_COLOURS
+from activesteer.errors import StudyError
+from activesteer.plotting import new_figure, save
+from activesteer.studies.envelope import Envelope, State
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLOURS: Final = {
+    State.NOBODY: "#d9ead3",
+    State.NONE_ONLY: "#8fbfe0",
+    State.SOME: "#fff2cc",
+    State.ALL: "#e6b8af",
+}
+
+
+def draw_envelope(made: Envelope, path: Path) -> Path:
+    """Draws it.
+
+    Args:
+        made: The envelope.
+        path: File to write.
+
+    Returns:
+        The file.
+
+    Raises:
+        ActiveSteerError: the file cannot be written, or matplotlib is not installed.
+    """
+    return save(_drawn(made), path, StudyError)
+
+
+def _drawn(made: Envelope) -> Figure:
+    from matplotlib.patches import Patch  # noqa: PLC0415 - an extra, and slow to import
+
+    title = f"{made.maneuver}: who gets through. Dots: highest entry speed by bisection; cross: as the manoeuvre has it"
+    figure = new_figure(1.2 + 4.6 * len(made.drivers), 4.2, title)
+    panels = figure.subplots(1, len(made.drivers), sharey=True, squeeze=False)[0]
+    for axes, driver in zip(panels, made.drivers, strict=True):
+        _draw_map(axes, made, driver)
+    panels[0].set_ylabel(f"{made.line.label} [m]")
+    shown = {state for driver in made.drivers for state in made.cells(driver).values()}
+    patches = [Patch(facecolor=_COLOURS[state], edgecolor="grey", label=state.value) for state in State if state in shown]
+    dots, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles=[*patches, *dots], labels=[*(patch.get_label() for patch in patches), *labels],
+                  loc="outside lower center", ncols=4, fontsize="small")  # fmt: skip
+    return figure
+
+
+def _draw_map(axes: Axes, made: Envelope, driver: str) -> None:
+    cells = made.cells(driver)
+    speeds, lines = (sorted({place[axis] for place in cells}) for axis in (0, 1))
+    for place, state in cells.items():
+        left, right = _edges(speeds, place[0])
+        low, high = _edges(lines, place[1])
+        axes.fill_between([left, right], low, high, facecolor=_COLOURS[state], edgecolor="white")
+        if state is State.SOME:
+            text = "\n".join(made.kept_by(driver, place))
+            axes.text(place[0], place[1], text, ha="center", va="center", fontsize="xx-small")
+    for entry in made.entry_speeds:
+        if entry["driver"] == driver and entry["entry_speed_kmh"] is not None:
+            colour = RUN_COLOURS.get(entry["controller"], "black")
+            axes.plot(entry["entry_speed_kmh"], made.nominal[1], "o", color=colour, label=entry["controller"])
+    axes.plot(*made.nominal, "kx", markersize=9, markeredgewidth=2)
+    axes.set_xlabel("speed [km/h]")
+    axes.set_title(driver, fontsize="medium")
+
+
+def _edges(values: list[float], value: float) -> tuple[float, float]:
+    """Where the cell of a value begins and ends: half-way to its neighbours."""
+    index = values.index(value)
+    before = values[index - 1] if index else 2.0 * value - (values[1] if len(values) > 1 else value + 1.0)
+    after = values[index + 1] if index + 1 < len(values) else 2.0 * value - (values[-2] if index else value - 1.0)
+    return 0.5 * (before + value), 0.5 * (value + after)
