@@ -67,8 +67,8 @@ def _envelope(options: argparse.Namespace) -> int:
     if options.json:
         print_json(made.to_json() | {"figures": [] if figure is None else [str(figure)]})
         return 0
-    speed, line = made.nominal
-    print(f"highest entry speed at {made.line.key} = {line:g}, between {RANGE_KMH[0]:g} and {RANGE_KMH[1]:g} km/h")
+    tried = f"between {RANGE_KMH[0]:g} and {RANGE_KMH[1]:g} km/h"
+    print(f"highest entry speed at {made.line.key} = {made.nominal[1]:g}, {tried}")
     for entry in made.entry_speeds:
         found = "gets through at none" if entry["entry_speed_kmh"] is None else f"{entry['entry_speed_kmh']:.0f} km/h"
         print(f"  {entry['driver']:<12}{entry['controller']:<8}{found}")

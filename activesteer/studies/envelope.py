@@ -1,8 +1,8 @@
 """How fast each car gets through a course: entry speeds by bisection, and a map over speed and line that checks them.
 
-A car gets through where its whole body keeps to the lanes, or, in a slalom, where it passes every cone on the right side
-and hits none. Bisection assumes that a car which gets through at one speed gets through at every lower one. The map does
-not: it is driven cell by cell, and `Envelope.exceptions` are its cells that speak against the assumption.
+A car gets through where its whole body keeps to the lanes, or, in a slalom, where it passes every cone on the right
+side and hits none. Bisection assumes that a car which gets through at one speed gets through at every lower one. The
+map does not: it is driven cell by cell, and `Envelope.exceptions` are its cells that speak against the assumption.
 """
 
 from __future__ import annotations
@@ -50,18 +50,26 @@ class Line(NamedTuple):
     kept: Callable[[Mapping[str, float]], bool]
 
 
+def _stays_in_lanes(metrics: Mapping[str, float]) -> bool:
+    return metrics["stays_in_lanes"] == 1.0
+
+
+def _passes_cones(metrics: Mapping[str, float]) -> bool:
+    return metrics["cones_hit"] == 0.0 and metrics["cones_missed"] == 0.0
+
+
 LINES: Final = {
     "lane_change": Line(
         "lane.margin_m",
         "margin between the car and the lanes",
         (0.0, 0.04, 0.08, 0.12, 0.16, 0.2),
-        lambda metrics: metrics["stays_in_lanes"] == 1.0,
+        _stays_in_lanes,
     ),
     "slalom": Line(
         "cones.offset_m",
         "distance of the line from the cones",
         (1.3, 1.6, 1.9, 2.2, 2.5, 2.8),
-        lambda metrics: metrics["cones_hit"] == 0.0 and metrics["cones_missed"] == 0.0,
+        _passes_cones,
     ),
 }
 """Kind of manoeuvre -> its second axis."""
@@ -127,8 +135,7 @@ class Envelope:
             if faster["kept"] and not row["kept"]:
                 keys = ("driver", "controller", "line_m")
                 found.append(
-                    {key: row[key] for key in keys}
-                    | {"lost_kmh": row["speed_kmh"], "kept_kmh": faster["speed_kmh"]}
+                    {key: row[key] for key in keys} | {"lost_kmh": row["speed_kmh"], "kept_kmh": faster["speed_kmh"]}
                 )
         return found
 
@@ -257,13 +264,15 @@ def envelope(
 
 def _duration_s(maneuver: FileOrTable, vehicle: FileOrTable, overrides: Mapping[str, Any], speed_kmh: float) -> float:
     course = resolve(maneuver, vehicle, overrides).maneuver.course
-    assert course is not None and course.last_gate_x_m is not None, "kinds of LINES have a last gate"
+    assert course is not None, "kinds of LINES have a course"
+    assert course.last_gate_x_m is not None, "and it has gates"
     return round(3.6 * course.last_gate_x_m / speed_kmh + _AFTER_S, 2)
 
 
 def _map_row(driver: str, line: Line, row: Mapping[str, Any]) -> dict[str, Any]:
     place = {"driver": driver, "controller": row["controller"], "speed_kmh": row["speed_kmh"], "line_m": row[line.key]}
-    metrics = {name: value for name, value in row.items() if isinstance(value, float) and name not in (*place, line.key)}
+    told = {*place, line.key}
+    metrics = {name: value for name, value in row.items() if isinstance(value, float) and name not in told}
     # A run that did not come to its end has no metrics: its car did not get through.
     return {**place, "kept": row["status"] == "ok" and line.kept(row), **metrics}
 

@@ -48,10 +48,10 @@ def _drawn(made: Envelope) -> Figure:
         _draw_map(axes, made, driver)
     panels[0].set_ylabel(f"{made.line.label} [m]")
     shown = {state for driver in made.drivers for state in made.cells(driver).values()}
-    patches = [Patch(facecolor=_COLOURS[state], edgecolor="grey", label=state.value) for state in State if state in shown]
-    dots, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles=[*patches, *dots], labels=[*(patch.get_label() for patch in patches), *labels],
-                  loc="outside lower center", ncols=4, fontsize="small")  # fmt: skip
+    states = [state for state in State if state in shown]
+    patches = [Patch(facecolor=_COLOURS[state], edgecolor="grey") for state in states]
+    dots, names = panels[0].get_legend_handles_labels()
+    figure.legend([*patches, *dots], [*states, *names], loc="outside lower center", ncols=4, fontsize="small")
     return figure
 
 
