@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from activesteer.conventions import RUN_COLOURS
+from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import StudyError
 from activesteer.plotting import new_figure, save
 from activesteer.studies.envelope import Envelope, State
@@ -65,9 +65,10 @@ def _draw_map(axes: Axes, made: Envelope, driver: str) -> None:
         if state is State.SOME:
             text = "\n".join(made.kept_by(driver, place))
             axes.text(place[0], place[1], text, ha="center", va="center", fontsize="xx-small")
+    known = [*SYSTEM_LABELS, *(entry["controller"] for entry in made.entry_speeds)]
     for entry in made.entry_speeds:
         if entry["driver"] == driver and entry["entry_speed_kmh"] is not None:
-            colour = RUN_COLOURS.get(entry["controller"], "black")
+            colour = RUN_COLOURS[list(dict.fromkeys(known)).index(entry["controller"]) % len(RUN_COLOURS)]
             axes.plot(entry["entry_speed_kmh"], made.nominal[1], "o", color=colour, label=entry["controller"])
     axes.plot(*made.nominal, "kx", markersize=9, markeredgewidth=2)
     axes.set_xlabel("speed [km/h]")

@@ -61,18 +61,19 @@ def test_both_lane_changes_differ_by_the_road_and_by_how_much_of_the_lanes_is_us
     assert isinstance(slippery, LaneChange)
     assert dry.course.lanes == slippery.course.lanes
     assert replace(dry.lane, margin_m=slippery.lane.margin_m) == slippery.lane
-    # Neither line asks for more than its road gives.
-    for maneuver in (dry, slippery):
+    # The line of the dry road asks for less than there is, that of the slippery one for more.
+    for maneuver, least, most in ((dry, 0.6, 0.75), (slippery, 1.0, 1.1)):
         asked = np.abs(maneuver.course.path.curvature_1pm).max() * maneuver.speed_mps**2
-        assert asked < maneuver.road.mu * 9.81 * 1.01
+        assert least < asked / (maneuver.road.mu * 9.81) < most
     assert dry.lane.standard == "iso_3888_1"
     assert dry.speed_mps == slippery.speed_mps
 
 
-def test_slalom_has_the_spacing_that_suits_its_speed():
+def test_the_sine_of_the_slalom_asks_for_nearly_what_the_road_gives():
     maneuver = resolve("slalom").maneuver
     assert isinstance(maneuver, Slalom)
-    assert maneuver.cones.spacing_m == 36.0
+    asked = maneuver.cones.offset_m * (np.pi * maneuver.speed_mps / maneuver.cones.spacing_m) ** 2
+    assert 0.9 < asked / (maneuver.road.mu * 9.81) < 1.0
 
 
 @pytest.mark.parametrize("name", list_maneuvers())
