@@ -35,7 +35,7 @@ class Evaluable:
     """A recorded run whose channels are fit for formulas: each that is asked for is finite, in two rows or more."""
 
     def __init__(self, recording: RecordingLike) -> None:
-        """Takes a run.
+        """Refuses a run that is too short.
 
         Raises:
             RecordingError: it has less than two rows.

@@ -18,7 +18,7 @@ class ProgressBar:
     """Shows how much is done."""
 
     def __init__(self, label: str, *, quiet: bool) -> None:
-        """Takes what stands before the bar.
+        """Shows nothing yet.
 
         Args:
             label: The words.
@@ -53,7 +53,7 @@ class RunCounter:
     """
 
     def __init__(self, label: str, *, quiet: bool) -> None:
-        """Takes what stands before the bar.
+        """Shows nothing yet.
 
         Args:
             label: The words.

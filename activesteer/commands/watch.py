@@ -87,7 +87,7 @@ def check_display() -> None:
     """
     import glfw
 
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         window = None
         if glfw.init():
@@ -98,6 +98,6 @@ def check_display() -> None:
             glfw.terminate()
     if not window:
         # GLFW's messages come as "(number) b'words'".
-        reasons = [re.sub(r"^\(\d+\) b'(.*)'$", r"\1", str(warning.message)) for warning in told]
+        reasons = [re.sub(r"^\(\d+\) b'(.*)'$", r"\1", str(warning.message)) for warning in caught]
         msg = f"there is no display to open a window on: {reasons[-1] if reasons else 'GLFW does not say why'}"
         raise PlaybackError(f"{msg}; {_ELSEWHERE}")

@@ -64,7 +64,7 @@ class Corrector:
     """
 
     def __init__(self, parameters: CorrectorParameters, timestep_s: float) -> None:
-        """Takes gains.
+        """Makes the feedback of one run.
 
         Args:
             parameters: Gains and tolerance band.

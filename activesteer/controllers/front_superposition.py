@@ -13,7 +13,7 @@ class FrontSuperposition:
     """Active front steering (AFS): the corrector of the rear system with the opposite sign, and no prediction."""
 
     def __init__(self, desired: DesiredYawRate, parameters: FrontSuperpositionParameters, timestep_s: float) -> None:
-        """Takes its parts.
+        """Makes the controller of one run.
 
         Args:
             desired: Desired yaw rate, from the driver's own angle.

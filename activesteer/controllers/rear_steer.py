@@ -58,7 +58,7 @@ class RearSteer:
         parameters: RearSteerParameters,
         timestep_s: float,
     ) -> None:
-        """Takes its parts.
+        """Makes the controller of one run.
 
         Args:
             desired: Desired yaw rate.

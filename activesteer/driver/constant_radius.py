@@ -21,7 +21,7 @@ class ConstantRadiusDriver:
     """
 
     def __init__(self, robot: OpenLoopDriver, wheelbase_m: float, timestep_s: float) -> None:
-        """Takes its parts.
+        """Makes the driver of one run.
 
         Args:
             robot: Turns the steering wheel and holds the speed.

@@ -23,7 +23,7 @@ class OpenLoopDriver:
         steering_wheel_limit_rad: float,
         rack_per_steering_wheel_m: float | None = None,
     ) -> None:
-        """Takes its parts.
+        """Makes the driver of one run.
 
         Args:
             speed_hold: The cruise control.

@@ -68,7 +68,7 @@ class PathPreviewDriver:
     def __init__(
         self, robot: OpenLoopDriver, model: LateralModel, parameters: DriverParameters, timestep_s: float
     ) -> None:
-        """Takes its parts.
+        """Makes the driver of one run.
 
         Args:
             robot: Limits the steering wheel angle and holds the speed.

@@ -27,7 +27,7 @@ class SpeedHold:
     def __init__(
         self, parameters: DriverParameters, drive: Drive, mass_kg: float, wheel_radius_m: float, timestep_s: float
     ) -> None:
-        """Takes gains and limits.
+        """Makes the speed control of one run.
 
         Args:
             parameters: Gains.

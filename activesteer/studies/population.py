@@ -34,7 +34,7 @@ CHANGES: Final = (
     "yaw_rate_after_1750ms_share",
     "steering_wheel_rms_rad",
 )
-"""Metrics whose change by a system is told: peak of the sideslip, oscillation that is left, steering effort."""
+"""Metrics whose change by a system is reported: peak of the sideslip, oscillation that is left, steering effort."""
 _RANGE: Final = (0.05, 0.5, 0.95)
 
 

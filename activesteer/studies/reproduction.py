@@ -77,7 +77,7 @@ def reproduce(
         Files and scorecard.
 
     Raises:
-        ActiveSteerError: an input is wrong. A run that fails ends no other run; it is told in `failures`.
+        ActiveSteerError: an input is wrong. A run that fails ends no other run; it is named in `failures`.
     """
     scenarios = {name: resolve(name, vehicle, overrides) for name in SCENARIOS}
     target = make_folder(folder, ParameterError)

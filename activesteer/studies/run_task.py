@@ -185,7 +185,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
         with amplitude_store.not_on_disk():
             ready = prepared(scenario, settings.timestep_s)
     except ActiveSteerError as error:
-        return [failed_row(settings, request, Status.FAILED, _told(error)) for request in requests]
+        return [failed_row(settings, request, Status.FAILED, _words_of(error)) for request in requests]
     rows = []
     recordings: dict[str, Recording] = {}
     for request in requests:
@@ -211,7 +211,7 @@ def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, 
     try:
         recording = run_scenario(ready, controller, path=path if keeps else None, timestep_s=settings.timestep_s)
     except ActiveSteerError as error:
-        row |= {"status": Status.FAILED.value, "error": _told(error)}
+        row |= {"status": Status.FAILED.value, "error": _words_of(error)}
         if every == "failed" and path is not None and error.recording is not None and len(error.recording):
             try:
                 error.recording.save(path)
@@ -276,7 +276,7 @@ def _row(settings: Settings, request: Request) -> Row:
     }
 
 
-def _told(error: ActiveSteerError) -> str:
+def _words_of(error: ActiveSteerError) -> str:
     text = "; ".join([f"{type(error).__name__}: {error}", *getattr(error, "__notes__", [])])
     return text[:_ERROR_CHARACTERS]
 

@@ -86,7 +86,7 @@ def study(
         if output is None:
             output = stack.enter_context(tempfile.TemporaryDirectory(prefix="activesteer-study-"))
         folder = Path(output).absolute()
-        # Wrong addresses are told before, what is wrong with the study before a process is started.
+        # Wrong addresses are reported before, what is wrong with the study before a process is started.
         plan = Plan(parsed, folder / RECORDINGS)
         store = stack.enter_context(Store(folder, parsed.keys).opened(parsed.to_toml(), plan.digest, len(plan)))
         missing = store.missing(len(plan))

@@ -309,7 +309,7 @@ def in_parallel(
     function: Callable[..., Any],
     arguments: Sequence[tuple[Any, ...]],
     jobs: int | None = None,
-    told: Callable[[int, int], None] = lambda _place, _done: None,
+    report: Callable[[int, int], None] = lambda _place, _done: None,
 ) -> list[Any]:
     """Calls a function with each set of arguments, spread over processes.
 
@@ -317,7 +317,7 @@ def in_parallel(
         function: A function of a module, so that it pickles.
         arguments: Its arguments, one tuple a call.
         jobs: Number of processes; that of the processors where not given. With 1 all is done in this process.
-        told: Called after each call with the place of its arguments and how many calls are done.
+        report: Called after each call with the place of its arguments and how many calls are done.
 
     Returns:
         What it returned, in the order of the arguments.
@@ -331,5 +331,5 @@ def in_parallel(
         tasks = ((place, function, *each) for place, each in enumerate(arguments))
         for outcome in TaskQueue(workers).outcomes(tasks):
             results[outcome.key] = outcome.result()
-            told(outcome.key, len(results))
+            report(outcome.key, len(results))
     return [results[place] for place in range(len(arguments))]

@@ -13,8 +13,8 @@ from markupsafe import Markup
 from activesteer.plotting import new_figure
 from activesteer.quantities import quantity_of
 from activesteer.validation.kinematics import Curves
+from activesteer.validation.our_runs import QUANTITIES, RMS_TOLERANCE, traces
 from activesteer.validation.reference import Table
-from activesteer.validation.runs import QUANTITIES, RMS_TOLERANCE, traces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

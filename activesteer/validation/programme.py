@@ -19,8 +19,8 @@ from activesteer.studies.workers import in_parallel
 from activesteer.validation.comparison import Comparison, to_json
 from activesteer.validation.kinematics import Curves, compare_kinematics
 from activesteer.validation.motion import reference_columns
+from activesteer.validation.our_runs import compare_run
 from activesteer.validation.reference import ReferenceData, Table
-from activesteer.validation.runs import compare_run
 from activesteer.validation.static import compare_static
 from activesteer.validation.tyre_grid import compare_tyre
 

@@ -65,7 +65,7 @@ class Drive:
     """The drive as its driver knows it: what it can give at the speed that the wheels have."""
 
     def __init__(self, parameters: Powertrain) -> None:
-        """Takes the parameters."""
+        """The limits and shares of the parameters."""
         self._share = parameters.wheel_shares
         self._limits = (
             parameters.max_torque_Nm,

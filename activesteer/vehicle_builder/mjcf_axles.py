@@ -203,13 +203,13 @@ def link_tendons(car: Car) -> str:
 def part_tendons(car: Car, part: str) -> str:
     """Springs or dampers of all corners."""
     lines = []
-    told = set()
+    reported = set()
     for axle in car.axles:
         mount = axle.spring if part == "spring" else axle.damper
         if mount.lever == 1.0 or mount.start_m is None:
             continue
         divisor = 1.0 / mount.lever
-        told.add(axle.name)
+        reported.add(axle.name)
         lines += [
             f"    <!-- {axle.name}: the {part} stands on {mount.carrier}, which has no body: the",
             f"         pulley ({num(divisor)}) is its lever, from *_{part}_lever on it has the {part}'s length.",

@@ -12,8 +12,8 @@ from activesteer import simulate
 from activesteer.errors import ParameterError
 from activesteer.validation import Validation, to_json, validate
 from activesteer.validation.motion import reference_columns
+from activesteer.validation.our_runs import compare_run
 from activesteer.validation.reference import ReferenceData
-from activesteer.validation.runs import compare_run
 
 RUNS = ("coast_80", "sine_0p5Hz", "step_0p2g_L", "step_0p4g_L")
 KEPT_BACK = {"step_0p1g_L", "step_0p4g_R", "step_0p6g_L", "sine_1p0Hz", "swd_0p7Hz", "sis_15s", "brake_0p4g"}

@@ -4,7 +4,7 @@ The plots are drawn in the browser by uPlot (https://github.com/leeoniya/uPlot, 
 `activesteer/pages/templates`.
 """
 
+from activesteer.analysis.report.groups import open_all
 from activesteer.analysis.report.page import report_page, write_report
-from activesteer.analysis.report.runs import open_all
 
 __all__ = ["open_all", "report_page", "write_report"]

@@ -10,7 +10,7 @@ import numpy as np
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.course_view import view_of
-from activesteer.analysis.report.runs import Group, Run
+from activesteer.analysis.report.groups import Group, Run
 from activesteer.analysis.source import read_course
 from activesteer.analysis.track import front_axle, path_distance
 from activesteer.conventions import CORNERS, Array

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from activesteer.analysis.claims import SYSTEMS, Scorecard, claims_for, scorecard
-from activesteer.analysis.report.runs import Group, entry
+from activesteer.analysis.report.groups import Group, entry
 from activesteer.errors import ActiveSteerError
 from activesteer.recording import Recording
 

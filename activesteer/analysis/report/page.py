@@ -9,9 +9,9 @@ from typing import Final, NamedTuple
 
 from activesteer.analysis.claims.scorecard import Verdict, number_lines
 from activesteer.analysis.report.curves import plots
+from activesteer.analysis.report.groups import Group, entry, groups_of
 from activesteer.analysis.report.judgement import Judgement, judge
-from activesteer.analysis.report.parameters import Row, rows
-from activesteer.analysis.report.runs import Group, entry, groups_of
+from activesteer.analysis.report.parameter_table import Row, rows
 from activesteer.analysis.report.tables import MetricRow, file_rows, metric_rows, metric_titles, verdict_counts
 from activesteer.errors import ParameterError
 from activesteer.files import write_text

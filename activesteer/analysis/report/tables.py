@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict
-from activesteer.analysis.report.runs import Group, Run, entry
+from activesteer.analysis.report.groups import Group, Run, entry
 from activesteer.quantities import metric_label
 
 

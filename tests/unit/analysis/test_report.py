@@ -12,9 +12,9 @@ import pytest
 
 from activesteer.analysis.report import open_all, report_page, write_report
 from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
+from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.judgement import judge
-from activesteer.analysis.report.parameters import rows
-from activesteer.analysis.report.runs import groups_of
+from activesteer.analysis.report.parameter_table import rows
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
 from activesteer.signals import Channel
