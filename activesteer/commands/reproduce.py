@@ -49,12 +49,12 @@ def _reproduce(options: argparse.Namespace) -> int:
 
     with ProgressBar("reproduce", quiet=options.json) as bar:
 
-        def report(what: str, done: int, total: int) -> None:
+        def show(what: str, done: int, total: int) -> None:
             bar(done / total, what)
             if not options.json and not sys.stderr.isatty():
                 print(f"{done}/{total} {what}", file=sys.stderr)
 
-        result = reproduce(folder, options.vehicle, jobs=options.jobs, progress=report)
+        result = reproduce(folder, options.vehicle, jobs=options.jobs, progress=show)
     for (scenario, system), problem in result.failures.items():
         print(f"{scenario} {system} failed: {problem}", file=sys.stderr)
     files = [str(path) for systems in result.paths.values() for path in systems.values()]
