@@ -46,7 +46,7 @@ class RearSteerParameters:
     """Active rear steering (ARS)."""
 
     corrector: CorrectorParameters = CorrectorParameters()
-    """Feedback."""
+    """Feedback of the yaw rate."""
     prediction_gain: Annotated[float, Range(0.0, 2.0)] = 1.0
     """Share of the predicted rear angle that is used; 1 is the zero-sideslip feed-forward of eq. 5 [-]."""
     limit_rad: Annotated[float, Range(0.0, math.radians(10.0))] = math.radians(3.0)
@@ -58,7 +58,7 @@ class FrontSuperpositionParameters:
     """Active front steering by superposition (AFS)."""
 
     corrector: CorrectorParameters = CorrectorParameters()
-    """Feedback."""
+    """Feedback of the yaw rate."""
     limit_rad: Annotated[float, Range(0.0, math.radians(10.0))] = math.radians(3.0)
     """Most angle added at the road wheels [rad]."""
 
