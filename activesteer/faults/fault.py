@@ -18,11 +18,18 @@ class Actuator(NamedTuple):
 
     Attributes:
         members: The engine's actuators that it stands for.
+        unit: Unit of a size, as names end in it.
         by_ratio: Whether their angle is the steering ratio times that of a road wheel, which a size is given at.
     """
 
     members: tuple[str, ...]
+    unit: str = "rad"
     by_ratio: bool = False
+
+    @property
+    def is_brake(self) -> bool:
+        """Whether it brakes: its demand is a torque, and it has one stop only."""
+        return self.unit == "Nm"
 
 
 class Sensor(NamedTuple):
@@ -61,15 +68,16 @@ ACTUATORS: Final = {
     "rear_left": Actuator(("rl_steer",)),
     "rear_right": Actuator(("rr_steer",)),
     "superposition": Actuator(("superposition",), by_ratio=True),
+    **{f"{corner}_brake": Actuator((f"{corner}_brake",), "Nm") for corner in CORNERS},
 }
 """Part -> which actuators it stands for."""
 SENSORS: Final = _sensors()
 """Part -> which signal it stands for."""
 
 KINDS: Final = {
-    "stuck": "an actuator stays where it is, a sensor at its last reading",
-    "runaway": "an actuator runs to its stop, a sensor reads the end of its range",
-    "float": "an actuator is cut from its drive and moves freely",
+    "stuck": "an actuator stays where it is, a brake at its torque, a sensor at its last reading",
+    "runaway": "an actuator runs to its stop, a brake to its strength, a sensor reads the end of its range",
+    "float": "a steering actuator is cut from its drive and moves freely",
     "offset": "the demand of an actuator, or the reading of a sensor, is off",
     "reversed": "demand or reading has the opposite sign",
     "delayed": "demand or reading comes late",
@@ -77,7 +85,7 @@ KINDS: Final = {
 }
 """Kind of fault -> what it does."""
 
-_SIZES: Final = ("size_rad", "size_radps", "size_mps", "size_mps2")
+_SIZES: Final = ("size_rad", "size_radps", "size_mps", "size_mps2", "size_Nm")
 
 
 @dataclass(frozen=True)
@@ -85,7 +93,8 @@ class Fault:
     """A fault of one part."""
 
     part: str
-    """What fails: `rear`, `rear_left`, `rear_right`, `superposition`, or a sensor as `yaw_rate_sensor`."""
+    """What fails: `rear`, `rear_left`, `rear_right`, `superposition`, `fl_brake` and the others, or a sensor as
+    `yaw_rate_sensor`."""
     kind: str
     """What happens: `stuck`, `runaway`, `float`, `offset`, `reversed`, `delayed` or `dropout`."""
     start_s: Annotated[float, Range(0.0)]
@@ -93,7 +102,7 @@ class Fault:
     end_s: Annotated[float, Range(0.0)] | None = None
     """When the part works again [s]; never where not given."""
     side: str | None = None
-    """To which stop an actuator runs away: `left` or `right`."""
+    """To which stop a steering actuator runs away: `left` or `right`."""
     size_rad: float | None = None
     """Offset of an actuator (at the road wheel) or an angle sensor, or what such a sensor reads at runaway [rad]."""
     size_radps: float | None = None
@@ -102,6 +111,8 @@ class Fault:
     """The same of a speed sensor [m/s]."""
     size_mps2: float | None = None
     """The same of an acceleration sensor [m/s2]."""
+    size_Nm: float | None = None
+    """Offset of a brake [N m]."""
     delay_s: Annotated[float, Range(0.001, 10.0)] | None = None
     """How late demand or reading come [s]."""
 
@@ -120,6 +131,9 @@ class Fault:
             raise ManeuverError(problem, key="kind", value=self.kind, allowed=list(KINDS))
         if self.kind == "float" and self.part in SENSORS:
             problem = "a sensor has nothing that could move freely; a broken wire is a dropout"
+            raise ManeuverError(problem, key="kind", value=self.kind)
+        if self.kind in ("float", "reversed") and self._is_brake:
+            problem = "a brake can do neither; a dropout leaves it open"
             raise ManeuverError(problem, key="kind", value=self.kind)
         if self.end_s is not None and self.end_s <= self.start_s:
             problem = f"is {self.end_s:g} s; the fault begins at {self.start_s:g} s (start_s)"
@@ -143,10 +157,14 @@ class Fault:
         if self.kind == "delayed":
             return "delay_s"
         if self.kind == "runaway" and self.part in ACTUATORS:
-            return "side"
+            return None if self._is_brake else "side"
         if self.kind in ("offset", "runaway"):
-            return "size_rad" if self.part in ACTUATORS else f"size_{SENSORS[self.part].unit}"
+            return f"size_{(ACTUATORS.get(self.part) or SENSORS[self.part]).unit}"
         return None
+
+    @property
+    def _is_brake(self) -> bool:
+        return self.part in ACTUATORS and ACTUATORS[self.part].is_brake
 
     @property
     def size(self) -> float:

@@ -9,7 +9,7 @@ from activesteer.errors import ParameterError, shown
 
 _NUMBER: Final = r"\d+(?:\.\d*)?(?:[eE][+-]?\d+)?|\.\d+"
 _FAULT: Final = re.compile(
-    rf"(?P<part>\w+):(?P<kind>\w+)(?:=(?P<value>[+-]?(?:{_NUMBER}))(?P<unit>[a-z]\w*)|=(?P<side>[a-z]+))?"
+    rf"(?P<part>\w+):(?P<kind>\w+)(?:=(?P<value>[+-]?(?:{_NUMBER}))(?P<unit>[A-Za-z]\w*)|=(?P<side>[a-z]+))?"
     rf"(?:@(?P<start>{_NUMBER})(?:-(?P<end>{_NUMBER}))?)?"
 )
 _WHAT: Final = "PART:KIND[=SIZE]"

@@ -16,7 +16,7 @@ Method:
 Validity: small motions about straight driving on a level, even road. Dampers enter with the mean of the slopes of
 their curves on both sides of rest, friction of their seals as the road's vibration leaves it at small speeds. Friction
 of the rack is left out: about a point of rest it would hold the rack by its elasticity, while the rack of a steered car
-slides.
+slides. So are friction and play of screws in the toe links.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -205,7 +205,10 @@ def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, 
         "kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0, "settle_s": _SETTLE_S,
     }  # fmt: skip
     sliding = {**(overrides or {}), "vehicle.friction.rack_N": 0.0}
-    step = DiscreteTimeMap(ClosedLoop(resolve(straight, vehicle, sliding)).vehicle)
+    scenario = resolve(straight, vehicle, sliding)
+    config = scenario.car.config
+    smooth = replace(config, rear_actuator=config.rear_actuator.smooth())
+    step = DiscreteTimeMap(ClosedLoop(replace(scenario, car=replace(scenario.car, config=smooth))).vehicle)
     step.trim(speed_mps)
     a, c = step.derivatives("x")
     b, d = step.derivatives("u")

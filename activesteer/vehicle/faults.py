@@ -128,7 +128,7 @@ class _ActuatorFault:
         begins: Step at which it begins; `ends`: that from which on the part works again.
         listens: Step from which on it must know the demands.
         watches: Whether it has something to do every step.
-        memory: The last demands, of a delay.
+        memory: The last demands, of a delay; that at which a brake sticks.
     """
 
     def __init__(self, fault: Fault, name: str, vehicle: Vehicle) -> None:
@@ -162,6 +162,10 @@ class _ActuatorFault:
             else:
                 # The nut is off its thread, and plays as far as the end stops let it.
                 link[fb.L_BACKLASH_m] = 4.0 * screw[fb.S_STOP_m]
+        elif kind == "stuck" and ACTUATORS[self.fault.part].is_brake:
+            if not self.memory:
+                self.memory.append(float(self._ctrl[self._index]))
+            record[fb.A_SCALE], record[fb.A_OFFSET] = 0.0, self.memory[0]
         elif kind == "stuck":
             # No rate: the servo holds the angle that it has reached, with its stiffness and its strength.
             record[fb.A_SECOND] = 0.0
@@ -172,8 +176,8 @@ class _ActuatorFault:
         elif kind == "offset":
             record[fb.A_OFFSET] = self._offset
         else:
-            record[fb.A_SCALE] = 0.0
-            record[fb.A_OFFSET] = record[_STOPS[self.fault.side]] if self.fault.side is not None else 0.0
+            stop = record[_STOPS[self.fault.side or "left"]]
+            record[fb.A_SCALE], record[fb.A_OFFSET] = 0.0, stop if kind == "runaway" else 0.0
 
     def release(self) -> None:
         """The actuator works as built."""

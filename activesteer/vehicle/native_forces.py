@@ -27,6 +27,8 @@ from activesteer.vehicle.native_memory import array_at, f64_pointer, pointer_to,
 from activesteer.vehicle.powertrain import CLUTCH_OPEN, drive_limits
 
 _MARKER: Final = fb.MARKER
+_CONTACT_S: Final = 3e-4
+"""Time in which a screwed link finds its place in the play; of 0, the linearised car would have no such mode [s]."""
 _tyre_pointer: Final = pointer_to(from_dtype(TYRE_RECORD))
 
 
@@ -251,7 +253,8 @@ def _played(link, screw_m, longer_m):
 def _link_rate(link, state, act, ten_length, userdata, timestep_s):
     screw_m = link[fb.L_SIGN] * act[int(link[fb.L_SCREW_ACT])]
     userdata[int(link[fb.L_OUT])] = _polynomial(link[fb.L_ANGLE :], screw_m)
-    return (_played(link, screw_m, ten_length[int(link[fb.L_TENDON])] - link[fb.L_REST_m]) - state) / timestep_s
+    target = _played(link, screw_m, ten_length[int(link[fb.L_TENDON])] - link[fb.L_REST_m])
+    return -math.expm1(-timestep_s / _CONTACT_S) * (target - state) / timestep_s
 
 
 @inlined

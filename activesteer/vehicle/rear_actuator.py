@@ -78,6 +78,12 @@ class RearActuator:
         """Whether screws move the toe links."""
         return self.preset != _HINGE
 
+    def smooth(self) -> Self:
+        """The same without play, dry friction and tolerance of the position, within which slopes mean nothing."""
+        if not self.is_screw:
+            return self
+        return replace(self, backlash_m=0.0, friction_torque_Nm=0.0, load_friction=0.0, position_tolerance_m=0.0)
+
     def resolved(self) -> Self:
         """The same with the preset's value for every key that is not given."""
         values = PRESETS[self.preset]

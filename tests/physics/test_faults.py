@@ -205,3 +205,40 @@ def test_the_search_for_an_amplitude_drives_the_car_in_order() -> None:
     one, other = (Simulation("step_steer", overrides={**aimed, **more}) for more in ({}, fault))
     found, expected = (simulation.context.metadata["maneuver"]["steer"] for simulation in (one, other))
     assert found == expected
+
+
+BRAKING: dict[str, Any] = {
+    "kind": "open_loop", "speed_kmh": 80.0, "duration_s": 2.0, "settle_s": 0.5, "drive": "coast",
+    "brake": {"time_s": [0.2, 0.3], "pedal": [0.0, 0.2]},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def braking() -> Recording:
+    return activesteer.simulate(BRAKING)
+
+
+@pytest.mark.parametrize(
+    ("fault", "torque_Nm"),
+    [
+        ("stuck", lambda good: good[ROW - 1]),
+        ("dropout", lambda good: 0.0),
+        ("offset=100Nm", lambda good: good[-1] + 100.0),
+    ],
+)
+def test_faults_of_one_brake_pull_the_car_to_a_side(fault: str, torque_Nm: Any, braking: Recording) -> None:
+    failed = activesteer.simulate(BRAKING, overrides={"fault": [fault_table(f"fl_brake:{fault}@{AT_S}")]})
+    good = -braking["fl_brake_torque_Nm"]
+    drag_Nm = 2.0
+    assert -failed["fl_brake_torque_Nm"][-1] == pytest.approx(torque_Nm(good), abs=0.02 * good.max() + drag_Nm)
+    np.testing.assert_allclose(failed["fr_brake_torque_Nm"][-1], braking["fr_brake_torque_Nm"][-1], rtol=0.02)
+    pull = {"stuck": 0.0, "dropout": -1.0, "offset=100Nm": 1.0}[fault]
+    if pull:
+        assert pull * failed["yaw_rate_radps"][-1] > 0.003
+
+
+def test_a_brake_that_runs_away_brakes_with_all_its_strength() -> None:
+    table = {**BRAKING, "brake": {"time_s": [0.0], "pedal": [0.0]}}
+    failed = activesteer.simulate(table, overrides={"fault": [fault_table(f"rl_brake:runaway@{AT_S}")]})
+    assert failed["rl_slip_ratio"][-1] < -0.9
+    assert failed["yaw_rate_radps"][ROW + 200] > 0.0

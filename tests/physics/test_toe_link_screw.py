@@ -14,6 +14,7 @@ from activesteer.errors import ParameterError
 from activesteer.faults import fault_table
 from activesteer.rigs import kinematics_compliance
 from activesteer.scenario import load_car
+from activesteer.studies.linearisation import linearise
 from activesteer.vehicle.rear_actuator import PRESETS
 from activesteer.vehicle.toe_link_kinematics import evaluated, toe_link_map
 
@@ -194,3 +195,12 @@ def test_the_rig_shows_angle_camber_and_track_over_the_screw_s_travel() -> None:
         math.radians(result["rear", "bump_camber"]) * 0.04, rel=0.3
     )
     assert "rear_steering_bump" not in kinematics_compliance("compact").curves
+
+
+def test_the_linearised_car_with_screws_steers_as_the_one_with_hinges() -> None:
+    hinge, screw = (
+        linearise("compact", 80.0 / 3.6, overrides).dcgain()
+        for overrides in ({}, {"rear_actuator.preset": "screw_10deg"})
+    )
+    # The axis about which the toe link turns the wheel leans, and link and screw give way otherwise than the hinge.
+    np.testing.assert_allclose(screw[:2, 1], hinge[:2, 1], rtol=0.05)

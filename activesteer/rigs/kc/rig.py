@@ -50,9 +50,7 @@ def kinematics_compliance(
     bands = load_targets(car.name, targets)
     # Dry friction pushes as far one way as the other: without it the rig finds the mean of both directions of a sweep.
     # The same of the play of screws, whose two ends it would find by chance.
-    rear = car.config.rear_actuator
-    if rear.is_screw:
-        rear = dataclasses.replace(rear, backlash_m=0.0)
+    rear = car.config.rear_actuator.smooth()
     smooth = dataclasses.replace(car, config=dataclasses.replace(car.config, friction=Friction(), rear_actuator=rear))
     try:
         measured = measure(smooth.on(), car.tyres)

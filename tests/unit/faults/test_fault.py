@@ -64,6 +64,8 @@ def test_every_signal_that_a_controller_gets_can_fail() -> None:
         ({"part": "rear", "kind": "stuck", "start_s": 2.0, "end_s": 1.0}, r"end_s: .*begins at 2 s"),
         ({"part": "rear", "kind": "stuck", "start_s": 99.0}, r"start_s: is 99 s, but the run ends at 10 s"),
         ({"part": "yaw_rate_sensor", "kind": "float", "start_s": 1.0}, r"dropout"),
+        ({"part": "fl_brake", "kind": "float", "start_s": 1.0}, r"dropout"),
+        ({"part": "fl_brake", "kind": "offset", "start_s": 1.0, "size_deg": 1.0}, r"size_rad: has no effect.*size_Nm"),
         ({"part": "rear", "kind": "stuck", "start_s": 1.0, "tiem": 2.0}, r"fault\.0\.tiem: there is no such key"),
     ],
 )
