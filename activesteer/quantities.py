@@ -144,6 +144,8 @@ def _row(
     return Quantity(channel, label, short or label, unit or display_unit(channel), digits, min_span)
 
 
+MEASURED: Final = "measured"
+"""Before the name of a channel, which is then what a sensor says of it."""
 _QUANTITIES: Final = {
     row.channel: row
     for row in (
@@ -178,7 +180,10 @@ def quantity_of(channel: str) -> Quantity:
     """How a channel is shown.
 
     Args:
-        channel: Its name, with or without a corner before it.
+        channel: Its name, with or without a corner or `measured` before it.
     """
     corner, _, rest = channel.partition("_")
+    if corner == MEASURED:
+        true = quantity_of(rest)
+        return true._replace(channel=channel, label=f"measured {true.label}", short=f"measured {true.short}")
     return _QUANTITIES[rest]._replace(channel=channel) if corner in CORNERS else _QUANTITIES[channel]

@@ -58,11 +58,18 @@ def _of_car(channel: str) -> Plot:
 MOTION: Final = (
     _of_car("steering_wheel_rad"),
     Plot(
-        quantity_of("yaw_rate_radps")._replace(label="yaw rate, desired one thin").title,
-        (Series("yaw_rate_radps"), Series("yaw_rate_desired_radps", "desired", "#f0e442", 0.8)),
+        quantity_of("yaw_rate_radps")._replace(label="yaw rate, desired and measured ones thin").title,
+        (
+            Series("yaw_rate_radps"),
+            Series("yaw_rate_desired_radps", "desired", "#f0e442", 0.8),
+            Series("measured_yaw_rate_radps", "measured", "#a6a6a6", 0.8),
+        ),
     ),
     _of_car("sideslip_rad"),
-    _of_car("ay_mps2"),
+    Plot(
+        quantity_of("ay_mps2").title,
+        (Series("ay_mps2"), Series("measured_ay_mps2", "measured", "#a6a6a6", 0.8)),
+    ),
     Plot(
         quantity_of("rear_steer_rad")._replace(label="added steer angles, rear thick, front thin").title,
         (

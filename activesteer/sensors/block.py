@@ -69,12 +69,16 @@ class SensorBlock:
             truth: What is there.
         """
         self.memory[:] = 0.0
-        self.outputs[:] = (*truth[1:-1], *truth[-1])
+        self.say(truth)
         for chain, value in zip(self.chains, self.outputs[1:], strict=True):
             own = self.memory[chain["memory"] :][: LINE + chain["ring"]]
             own[[FILTERED, HELD, SPEED]] = value
             own[PHASE] = 0.5  # as far to the next edge forwards as backwards
             own[LINE:] = value
+
+    def say(self, measurement: Measurement) -> None:
+        """Has them say something else until the next step, as where a fault acts on what they say."""
+        self.outputs[:] = (*measurement[1:-1], *measurement[-1])
 
     def measurement(self, time_s: float) -> Measurement:
         """What they now say.

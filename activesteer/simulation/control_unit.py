@@ -69,7 +69,8 @@ class ControlUnit:
         if self._steering_ratio is None:
             return command
         angle = measurement.steering_wheel_rad
-        return command._replace(steering_wheel_demand_rad=angle, front_steer_demand_rad=angle / self._steering_ratio)
+        # Its first and its last field; `_replace` would cost more than all else here.
+        return tuple.__new__(DriverCommand, (angle, *command[1:-1], angle / self._steering_ratio))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> ControlUnit:
         # The truth is the car's, which is no part of it.

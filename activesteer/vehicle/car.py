@@ -458,6 +458,11 @@ class Vehicle:
     def _actuator_names(self) -> set[str]:
         return {self.model.actuator(index).name for index in range(self.model.nu)}
 
+    def note_measurement(self, measurement: Measurement) -> None:
+        """Has recorded what faulty sensors say, where the measurement is recorded at all."""
+        if self._sensors is not None:
+            self._sensors.say(measurement)
+
     def note_faults(self, count: int) -> None:
         """Has it recorded from now on how many faults act."""
         self.data.userdata[-1] = count

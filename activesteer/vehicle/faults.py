@@ -115,6 +115,8 @@ class Faults:
                 delay.after_step()
             for sensor, active in sensors:
                 measurement = sensor.read(measurement, active=active)
+            if sensors:
+                vehicle.note_measurement(measurement)
             return measurement, motion
 
         return step

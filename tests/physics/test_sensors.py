@@ -112,6 +112,14 @@ def test_sensors_without_chance_treat_left_and_right_alike() -> None:
         np.testing.assert_allclose(there, here, rtol=1e-9)
 
 
+def test_what_a_faulty_sensor_says_is_recorded_and_the_truth_stays() -> None:
+    fault = {"part": "yaw_rate_sensor", "kind": "stuck", "start_s": 0.8}
+    recording = activesteer.simulate("step_steer", "none", overrides=PRODUCTION | {"fault": [fault]})
+    assert np.ptp(recording["measured_yaw_rate_radps"][802:]) == 0.0
+    assert np.ptp(recording["yaw_rate_radps"][802:]) > 0.01
+    assert np.ptp(recording["measured_ay_mps2"][802:]) > 0.01
+
+
 def test_there_is_no_seed_without_chance() -> None:
     with pytest.raises(ParameterError, match="seed"):
         resolve("step_steer", overrides=PRODUCTION | NOT_RANDOM | {"sensors.seed": 7})
