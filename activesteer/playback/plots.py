@@ -58,7 +58,7 @@ def _of_car(channel: str) -> Plot:
 MOTION: Final = (
     _of_car("steering_wheel_rad"),
     Plot(
-        quantity_of("yaw_rate_radps")._replace(label="yaw rate, desired and measured ones thin").title,
+        quantity_of("yaw_rate_radps")._replace(label="yaw rate, desired one thin").title,
         (
             Series("yaw_rate_radps"),
             Series("yaw_rate_desired_radps", "desired", "#f0e442", 0.8),
@@ -174,10 +174,11 @@ def views(plots: Sequence[Plot], runs: Sequence[Run]) -> list[rrb.TimeSeriesView
     """A view for each plot that has something to show, with the lines of all these runs."""
     shown = []
     for plot in plots:
-        contents = [f"/{path}" for run in runs for path, _ in _entities(run, plot)]
+        entities = [entity for run in runs for entity in _entities(run, plot)]
+        contents = [f"/{path}" for path, _ in entities]
         if contents:
             # The colours of several runs are the same in all plots: one legend is enough, and the plots are small.
-            legend = plot is plots[0] if len(runs) > 1 else len(plot.series) > 1
+            legend = plot is plots[0] if len(runs) > 1 else sum(len(lines) for _, lines in entities) > 1
             shown.append(_view(plot.title, contents, legend=legend))
     return shown
 

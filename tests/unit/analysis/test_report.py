@@ -171,6 +171,19 @@ def test_added_angles_are_those_of_the_systems_that_add_any(page):
     assert [(series["run"], series["dashed"]) for series in panel["series"]] == [(1, False), (2, True)]
 
 
+def test_what_sensors_say_is_drawn_with_the_truth_dashed_where_it_was_recorded():
+    ideal = step_steer()
+    real = step_steer()
+    real.channels["measured_yaw_rate_radps"] = 1.1 * real.channels["yaw_rate_radps"]
+    pages = {name: recording_of(run, metrics={}) for name, run in (("ideal.mcap", ideal), ("real.mcap", real))}
+    panels = {panel["title"]: panel for panel in data_of(report_page(pages))[0]["panels"]}
+    said, truth = panels["Measured yaw rate"]["series"]
+    assert [(series["run"], series["dashed"]) for series in (said, truth)] == [(1, False), (1, True)]
+    assert said["values"][-1] == pytest.approx(1.1 * truth["values"][-1], rel=1e-3)
+    assert panels["Measured yaw rate"]["unit"] == "deg/s"
+    assert "Measured lateral acceleration" not in panels
+
+
 def test_track_has_lanes_cones_and_path(page):
     track = data_of(page)[2]["track"]
     assert [lane["name"] for lane in track["lanes"]] == ["entry", "offset", "exit"]

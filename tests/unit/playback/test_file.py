@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from activesteer.errors import PlaybackError
 from activesteer.playback import runs_of, save
 from activesteer.playback.course import extent, map_bounds
+from activesteer.playback.plots import MOTION, views
 from activesteer.playback.tyres import FORCE_SCALE_NPM, force_arrows, use_colours
 from activesteer.recording import Recording
 from activesteer.signals import Channel
@@ -116,6 +117,19 @@ def test_plots_are_in_degrees_and_hold_the_recorded_values(tmp_path: Path) -> No
     together = rrd.numbers("/ars/plots/tyre_fy_N", "Scalars:scalars")
     assert together.shape == (len(run.recording), 4)
     assert together == pytest.approx(1e-3 * synthetic.FY_N)  # kN
+
+
+def test_what_sensors_say_stands_in_the_plot_of_the_truth(tmp_path: Path) -> None:
+    ideal = circle()
+    said = Channel("measured_yaw_rate_radps", "rad/s", "", "measured")
+    values = np.column_stack([ideal.values, np.full(len(ideal), 0.3)])
+    real = Recording([*ideal.channels, said], ideal.time_s, values, poses=ideal.poses, metadata=ideal.metadata)
+    path = "/ars/plots/measured_yaw_rate_radps"
+    assert path not in saved(tmp_path, {"ars": ideal}).entities
+    assert saved(tmp_path, {"ars": real}).numbers(path, "Scalars:scalars") == pytest.approx(math.degrees(0.3))
+    yaw_rate = next(plot for plot in MOTION if plot.title.startswith("Yaw rate"))
+    (view,) = views([yaw_rate], list(runs_of({"ars": real})))
+    assert path in list(view.contents)
 
 
 def test_an_angle_that_nobody_asked_for_is_not_plotted(tmp_path: Path) -> None:
