@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 from activesteer.controllers import Controller, ControllerParameters, ControllerSetup, find_controller
 from activesteer.errors import ParameterError
@@ -13,6 +13,9 @@ from activesteer.plugins import Plugin
 from activesteer.scenario import Scenario
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 from activesteer.vehicle import Vehicle
+
+_STEERING_WHEEL: Final = DriverCommand._fields.index("steering_wheel_demand_rad")
+_FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
 
 
 class ControlUnit:
@@ -68,9 +71,11 @@ class ControlUnit:
     def _seen(self, command: DriverCommand, measurement: Measurement) -> DriverCommand:
         if self._steering_ratio is None:
             return command
-        angle = measurement.steering_wheel_rad
-        # Its first and its last field; `_replace` would cost more than all else here.
-        return tuple.__new__(DriverCommand, (angle, *command[1:-1], angle / self._steering_ratio))
+        # `_replace` would cost more than all else here.
+        seen: list[Any] = [*command]
+        seen[_STEERING_WHEEL] = angle = measurement.steering_wheel_rad
+        seen[_FRONT_STEER] = angle / self._steering_ratio
+        return tuple.__new__(DriverCommand, seen)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> ControlUnit:
         # The truth is the car's, which is no part of it.
