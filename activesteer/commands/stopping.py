@@ -36,7 +36,8 @@ class StopSignals:
 
     Attributes:
         number: The signal that has come; None where none has.
-        options: What the command was called with; its `output` is the file or folder that it writes.
+        options: What the command was called with; its `output` is the file or folder that it writes, and
+            `how_to_go_on`, where it has one, is said behind what is saved.
         finished: Whether the command is done, and only the interpreter still has to end.
     """
 
@@ -106,7 +107,7 @@ class StopSignals:
             except Exception:
                 saved = "what was saved cannot be told"
             name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
-            line = f"activesteer: stopped by {name}; {saved}"
+            line = f"activesteer: stopped by {name}; {saved}{getattr(self.options, 'how_to_go_on', '')}"
             if not self._watching:
                 print(line, file=sys.stderr)
                 return 128 + number

@@ -42,6 +42,8 @@ def _study(options: argparse.Namespace) -> int:
 
     if given.is_dir():
         read_environment(given)  # says what is wrong with a folder without a study
+    options.output = folder
+    options.how_to_go_on = f"; go on with `activesteer study {folder}`"
     with RunCounter("study", quiet=options.json) as counter:
         study(
             given / "study.toml" if given.is_dir() else options.study,

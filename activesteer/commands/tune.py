@@ -29,6 +29,7 @@ def add_to(commands: Any) -> None:
 def _tune(options: argparse.Namespace) -> int:
     from activesteer.studies.tuning import tune
 
+    options.how_to_go_on = "; the same command goes on with it"
     with ProgressBar("tune", quiet=options.json) as bar:
         result = tune(
             options.study,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 import sys
@@ -77,10 +78,44 @@ def from_file(text: str, kind: Kind) -> FromFile:
 
 
 def source_of(text: str) -> dict[str, bytes]:
-    """The file that a text names, by its name, without running it; empty for anything else, as a built-in one."""
+    """The file that a text names and the modules beside it that it imports, without running them.
+
+    Args:
+        text: As in `from_file`.
+
+    Returns:
+        Path in the file's folder -> content; empty for anything that names no file, as a built-in one.
+    """
     form = _FORM.fullmatch(text)
     path = None if form is None else user_path(form["path"], ParameterError)
-    return {path.name: read_bytes(path, ParameterError)} if path is not None and is_file(path) else {}
+    found: dict[str, bytes] = {}
+    waiting = [path] if path is not None and is_file(path) else []
+    while waiting:
+        file = waiting.pop()
+        name = file.relative_to(path.parent).as_posix() if path else file.name
+        if name not in found:
+            found[name] = read_bytes(file, ParameterError)
+            waiting += _imported_from(file.parent, found[name])
+    return found
+
+
+def _imported_from(folder: Path, source: bytes) -> list[Path]:
+    """The modules, and files of the packages, of a folder that a source imports; none where it is no Python."""
+    try:
+        nodes = list(ast.walk(ast.parse(source)))
+    except (SyntaxError, ValueError, RecursionError):
+        return []
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    for node in nodes:
+        if isinstance(node, ast.ImportFrom):
+            names |= {node.module} if node.module else {alias.name for alias in node.names}
+    found = []
+    for name in sorted({name.partition(".")[0] for name in names}):
+        if is_file(folder / f"{name}.py"):
+            found.append(folder / f"{name}.py")
+        elif is_file(folder / name / "__init__.py"):
+            found += sorted((folder / name).rglob("*.py"))
+    return found
 
 
 def _parameters(text: str, fail: Any) -> dict[str, Any]:

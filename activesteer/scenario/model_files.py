@@ -6,6 +6,7 @@ memory or take minutes. What a car needs is far from that, so sizes are bounded 
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import struct
@@ -51,13 +52,14 @@ _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")
 
 
 def model_files(mjcf: Path) -> dict[str, bytes]:
-    """Reads an MJCF file and what it includes.
+    """Reads an MJCF file, what it includes, and what its meshes, textures and height fields are read from.
 
     Args:
         mjcf: The model file.
 
     Returns:
-        Path relative to the model's folder -> content, the model file first.
+        Path relative to the model's folder -> content, the model file first; of a mesh or picture, which may be large,
+        only its SHA-256, under its path and `.sha256`.
 
     Raises:
         ModelError: a file cannot be read or is no XML, or the model asks for more than a car needs.
@@ -88,7 +90,8 @@ def model_files(mjcf: Path) -> dict[str, bytes]:
     for file, name in assets.items():
         for path in (folder / asked for folder in folders for asked in (file, Path(file).name)):
             if os.path.lexists(path):
-                _check_asset(path, name)
+                found = _check_asset(path, name)
+                files[f"{_name(path, mjcf)}.sha256"] = hashlib.sha256(found).hexdigest().encode()
     return files
 
 
@@ -165,12 +168,13 @@ def _asset_names(element: ElementTree.Element) -> list[str]:
     return [file for attribute, file in element.items() if attribute.startswith("file") and file]
 
 
-def _check_asset(path: Path, name: str) -> None:
+def _check_asset(path: Path, name: str) -> bytes:
     data = read_bytes(path, ModelError, _MAX_ASSET_BYTES)
     if data.startswith(b"\x89PNG") and len(data) > 24:
         width, height = struct.unpack(">II", data[16:24])
         if width * height > _MAX_PIXELS:
             raise _too_much(f"the picture {shown(path.name)} has {width * height:.3g} points", _MAX_PIXELS, name)
+    return data
 
 
 def _too_much(what: str, most: float, name: str) -> ModelError:

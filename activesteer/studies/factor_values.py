@@ -15,9 +15,11 @@ def label_of(item: FileOrTable) -> str:
     """The name that a manoeuvre, vehicle or controller has in the result."""
     if isinstance(item, Mapping):
         return str(item.get("name") or "table")
-    path, colon, class_name = str(item).rpartition(":")
+    # Only before the parameters: the value of one may hold a colon, too.
+    named, mark, parameters = str(item).partition("?")
+    path, colon, class_name = named.rpartition(":")
     if colon:
-        return f"{Path(path).name}:{class_name}"
+        return f"{Path(path).name}:{class_name}{mark}{parameters}"
     return Path(item).stem if str(item).endswith(".toml") else str(item)
 
 

@@ -1,0 +1,108 @@
+"""`activesteer study` and `tune`: what they print, how they are stopped, and that they go on."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from activesteer.commands.progress import RunCounter
+from activesteer.studies.study import StudyProgress
+
+ROOT = Path(__file__).resolve().parents[2]
+MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
+
+STUDY = """
+controllers = ["none"]
+
+[[maneuvers]]
+name = "short"
+kind = "step_steer"
+speed_kmh = 80
+duration_s = 2.3
+settle_s = 0.1
+steer = { start_s = 0.05, steering_wheel_deg = 20.0 }
+
+[factors]
+"road.mu" = { uniform = [0.7, 1.0] }
+
+[design]
+kind = "sobol"
+samples = 64
+
+[tune]
+trials = 3
+objectives = [{ name = "yaw", terms = [{ metric = "yaw_rate_overshoot", controller = "none" }] }]
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "grip.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    return path
+
+
+def test_a_study_is_made_in_pieces_and_says_how_far_it_is(file, tmp_path, call):
+    folder = str(tmp_path / "s")
+    first = call("study", str(file), "-o", folder, "--jobs", "1", "--limit", "2")
+    assert first.status == 0
+    assert "2 of 64 runs are done: 2 ok" in first.out
+    assert f"go on with `activesteer study {folder}`" in first.out
+    second = call("study", folder, "--jobs", "1", "--limit", "1", "--json").json
+    assert (second["done"], second["missing"], second["results"]) == (3, 61, None)
+    assert call("study", folder, "--status", "--json").json["by_status"] == {"ok": 3}
+    page = call("study", folder, "--report", "--json").json["report"]
+    assert "3 ok" in Path(page).read_text(encoding="utf-8")
+
+
+def test_a_search_goes_on_where_it_was(file, tmp_path, call):
+    folder = str(tmp_path / "t")
+    assert call("tune", str(file), "-o", folder, "--jobs", "1", "--trials", "2", "--json").json["done"] == 2
+    told = call("tune", str(file), "-o", folder, "--jobs", "1")
+    assert told.status == 0
+    assert told.out.startswith("3 sets were tried, of 0 a run failed; the best:")
+    assert "road.mu = " in told.out
+
+
+@pytest.mark.parametrize(
+    ("words", "made", "how"),
+    [
+        (("study",), "parts/[0-9]*", r"go on with `activesteer study \S+`"),
+        (("tune", "--trials", "1000"), "journal*", "the same command goes on with it"),
+    ],
+)
+def test_ctrl_c_says_how_to_go_on(file, tmp_path, words, made, how):
+    command = [sys.executable, "-c", MAIN, words[0], str(file), *words[1:], "-o", str(tmp_path / "out"), "--jobs", "1"]
+    process = subprocess.Popen(
+        command, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        deadline = time.monotonic() + 120.0
+        while not list((tmp_path / "out").glob(made)) and time.monotonic() < deadline:
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=30.0)
+    finally:
+        process.kill()
+    assert process.returncode == 128 + signal.SIGINT, told
+    assert re.search(rf"activesteer: stopped by Ctrl-C; saved: .*; {how}$", told.strip().splitlines()[-1]), told
+
+
+def test_a_log_gets_a_line_of_progress_at_the_end(capsys):
+    with RunCounter("study", quiet=False) as counter:
+        counter(StudyProgress(done=4, total=8, failed=0, here=2))
+        assert capsys.readouterr().err == ""  # not more than one in ten seconds
+        counter(StudyProgress(done=8, total=8, failed=1, here=6))
+    line = capsys.readouterr().err
+    assert re.fullmatch(r"8/8 runs, \S+ runs/s, 0:00:00 left, 1 failed\n", line)
+    with RunCounter("study", quiet=True) as counter:
+        counter(StudyProgress(done=8, total=8, failed=1, here=6))
+    assert capsys.readouterr().err == ""
