@@ -235,11 +235,8 @@ def envelope(
         {"driver": label_of(driver), "controller": controller, "entry_speed_kmh": speed}
         for (driver, controller), speed in zip(pairs, found, strict=True)
     ]
-    cases = [
-        {"speed_kmh": speed, line.key: value, "duration_s": _duration_s(maneuver, vehicle, given, speed)}
-        for speed in speeds
-        for value in lines
-    ]
+    factors = {"speed_kmh": {"grid": list(speeds)}, line.key: {"grid": list(lines)}}
+    duration_s = _duration_s(maneuver, vehicle, given, min(speeds))
     rows: list[dict[str, Any]] = []
     for driver in drivers:
         tell = report(f"map of {label_of(driver)}")
@@ -249,9 +246,9 @@ def envelope(
                 "vehicles": [vehicle],
                 "driver": driver,
                 "controllers": list(controllers),
-                "overrides": given,
+                "overrides": {**given, "duration_s": duration_s},
                 "metrics": list(_METRICS),
-                "design": {"cases": cases},
+                "factors": factors,
             },
             output=None if output is None else Path(output) / label_of(driver),
             jobs=jobs,
