@@ -1,0 +1,99 @@
+"""Entry speeds by bisection, and the map that checks what bisection assumes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from activesteer.errors import ParameterError, SimulationDiverged
+from activesteer.recording import Recording
+from activesteer.studies import envelope as module
+from activesteer.studies.envelope import LINES, RANGE_KMH, RESOLUTION_KMH, Envelope, State, envelope
+from activesteer.studies.envelope_figure import draw_envelope
+
+LANES = LINES["lane_change"]
+
+
+def entry_speed(monkeypatch: pytest.MonkeyPatch, most_kmh: float) -> float | None:
+    """What bisection finds where the car keeps to the lanes up to a speed."""
+
+    def drive(scenario: Any, _controller: str) -> Any:
+        return SimpleNamespace(metrics={"stays_in_lanes": float(3.6 * scenario.maneuver.speed_mps <= most_kmh)})
+
+    monkeypatch.setattr(module, "run_scenario", drive)
+    return module._entry_speed("double_lane_change", "compact", {}, LANES, "typical", "none")
+
+
+@pytest.mark.parametrize("most_kmh", [41.3, 77.7, 149.9])
+def test_the_highest_speed_is_found(monkeypatch: pytest.MonkeyPatch, most_kmh: float) -> None:
+    found = entry_speed(monkeypatch, most_kmh)
+    assert found is not None
+    assert found <= most_kmh < found + RESOLUTION_KMH
+
+
+def test_a_car_that_gets_through_nowhere_or_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert entry_speed(monkeypatch, RANGE_KMH[0] - 1.0) is None
+    assert entry_speed(monkeypatch, RANGE_KMH[1] + 1.0) == RANGE_KMH[1]
+
+
+def test_a_run_that_ends_early_is_lost_and_a_wrong_input_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def diverge(*_: Any) -> Any:
+        error = SimulationDiverged("at 1 s")
+        error.recording = Recording([], [], [])
+        raise error
+
+    monkeypatch.setattr(module, "run_scenario", diverge)
+    assert module._entry_speed("slalom", "compact", {}, LINES["slalom"], "typical", "none") is None
+    monkeypatch.setattr(module, "run_scenario", lambda *_: (_ for _ in ()).throw(ParameterError("no such controller")))
+    with pytest.raises(ParameterError):
+        module._entry_speed("slalom", "compact", {}, LINES["slalom"], "typical", "none")
+
+
+def row(controller: str, speed: float, line: float, kept: bool) -> dict[str, Any]:
+    return {"driver": "typical", "controller": controller, "speed_kmh": speed, "line_m": line, "kept": kept}
+
+
+def made() -> Envelope:
+    """At 60 km/h all get through; at 70 the systems; at 80 ars alone; at 90 nobody; at 100 afs again."""
+    kept = {60.0: ("none", "ars", "afs"), 70.0: ("ars", "afs"), 80.0: ("ars",), 90.0: (), 100.0: ("afs",)}
+    rows = [row(name, speed, 0.1, name in kept[speed]) for speed in kept for name in ("none", "ars", "afs")]
+    entries = [
+        {"driver": "typical", "controller": name, "entry_speed_kmh": speed}
+        for name, speed in (("none", 64.0), ("ars", 83.0), ("afs", None))
+    ]
+    return Envelope("lanes", LANES, (80.0, 0.1), entries, rows)
+
+
+def test_cells_say_who_is_lost() -> None:
+    cells = made().cells("typical")
+    states = [State.NOBODY, State.NONE_ONLY, State.SOME, State.ALL, State.SOME]
+    assert [cells[speed, 0.1] for speed in (60.0, 70.0, 80.0, 90.0, 100.0)] == states
+    assert made().kept_by("typical", (80.0, 0.1)) == ["ars"]
+
+
+def test_cells_that_speak_against_bisection_are_found() -> None:
+    found = made().exceptions
+    assert found == [{"driver": "typical", "controller": "afs", "line_m": 0.1, "lost_kmh": 90.0, "kept_kmh": 100.0}]
+
+
+def test_json_and_picture(tmp_path: Path) -> None:
+    table = made().to_json()
+    assert table["line"] == "lane.margin_m"
+    assert {cell["state"] for cell in table["cells"]} == {state.value for state in State}
+    assert draw_envelope(made(), tmp_path / "map.png").stat().st_size > 5000
+
+
+def test_what_has_no_gates_has_no_entry_speed() -> None:
+    with pytest.raises(ParameterError, match="step_steer is a step_steer; entry speeds are those of lane_change"):
+        envelope("step_steer")
+
+
+def test_a_map_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "in_parallel", lambda _, pairs, *__: [50.0] * len(pairs))
+    found = envelope("double_lane_change", ("none",), speeds_kmh=(60.0, 140.0), lines_m=(0.15,), jobs=1)
+    assert found.cells("typical") == {(60.0, 0.15): State.NOBODY, (140.0, 0.15): State.ALL}
+    assert found.nominal == (80.0, 0.2)
+    assert found.exceptions == []
