@@ -1,0 +1,17 @@
+"""The table of claims in the guide is that of the statements, the nominal runs and the stored population."""
+
+from __future__ import annotations
+
+from activesteer.analysis.claims import STATEMENTS
+from tools.make_claims_table import PAGE, page
+
+TEXT = PAGE.read_text(encoding="utf-8")
+
+
+def test_table_is_as_the_tool_writes_it():
+    assert page(TEXT) == TEXT
+
+
+def test_every_statement_is_in_the_table_once():
+    for number in STATEMENTS:
+        assert TEXT.count(f"| {number} | ") == 1
