@@ -1,7 +1,7 @@
 """Writes the table of claims into docs/claims.md: `python tools/make_claims_table.py`; a test holds it to that.
 
-What is said of the nominal run is what `not_reproduced.toml` lists, which another test holds to the runs; the shares are
-those of the population that is stored with the package.
+What is said of the nominal run is what `not_reproduced.toml` lists, which another test holds to the runs; the
+shares are those of the population that is stored with the package.
 """
 
 from __future__ import annotations
