@@ -38,11 +38,12 @@ _BY_SUFFIX: Final = {
     "_mps2": DisplayUnit("m/s²", 1.0),
     "_mps": DisplayUnit("km/h", 3.6),
     "_Nm": DisplayUnit("Nm", 1.0),
+    "_Pa": DisplayUnit("bar", 1e-5),
     "_N": DisplayUnit("N", 1.0),
     "_m": DisplayUnit("m", 1.0),
     "_s": DisplayUnit("s", 1.0),
 }
-_FRACTIONS: Final = ("_overshoot", "_share", "_friction_use")
+_FRACTIONS: Final = ("_overshoot", "_share", "_friction_use", "_efficiency", "wheel_slip_max")
 """Endings of pure numbers that are shown in percent; they are words of the name."""
 _PERCENT: Final = DisplayUnit("%", 100.0)
 _PURE: Final = DisplayUnit("-", 1.0)
@@ -169,6 +170,7 @@ _QUANTITIES: Final = {
         _row("tyre_mz_Nm", "aligning moment", 1, 5.0),
         _row("drive_torque_Nm", "drive torque", 0, 5.0),
         _row("brake_torque_Nm", "brake torque", 0, 5.0),
+        _row("brake_pressure_Pa", "brake pressure", 0, 5.0),
         _row("steer_rad", "steer angle", 2, 0.1),
         _row("tie_rod_force_N", "tie rod force", 2, 0.5, unit=_KILONEWTON),
         _row("friction_use", "friction utilisation", 0, 10.0, unit=_PERCENT),

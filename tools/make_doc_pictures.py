@@ -38,7 +38,7 @@ DOTS_PER_INCH: Final = 90
 COLOURS: Final = 64
 """A plot has few colours and their shades: a palette makes the file a third as large."""
 SYSTEMS: Final = ("none", "ars", "afs")
-CONTROL_FREE: Final = frozenset({"slowly_increasing_steer", "constant_radius", "open_loop"})
+CONTROL_FREE: Final = frozenset({"slowly_increasing_steer", "constant_radius", "open_loop", "straight_braking"})
 """Kinds that are there to look at the car itself, or in which no system has anything to do."""
 
 CORNER_WORDS: Final = {"fl": "front left", "rl": "rear left"}
@@ -57,6 +57,9 @@ PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
     "standstill": (DISTANCE, *LOADS),
     "hill_hold": (DISTANCE, at_wheel("fl_brake_torque_Nm"), *LOADS),
     "drive_off_and_stop": (SPEED, quantity_of("ax_mps2"), quantity_of("pitch_rad"), *LOADS),
+    "straight_braking": (
+        SPEED, quantity_of("ax_mps2"), at_wheel("fl_brake_pressure_Pa"), at_wheel("rl_brake_pressure_Pa"),
+    ),
     "parking": (
         STEERING_WHEEL, at_wheel("fl_steer_rad"), at_wheel("fl_tyre_mz_Nm"), at_wheel("fl_tie_rod_force_N"),
     ),
@@ -71,7 +74,7 @@ def main(names: Sequence[str]) -> None:
     pictures: dict[str, Callable[[], Mapping[str, Figure]]] = {
         name: lambda name=name: {f"manoeuvre_{name}": _manoeuvre(name)} for name in list_maneuvers()
     }
-    pictures |= {"controller": _controller, "tyres": _tyres}
+    pictures |= {"controller": _controller, "tyres": _tyres, "brakes": _brakes}
     for name in names or pictures:
         if name not in pictures:
             sys.exit(f"there is no picture {name}; there are: {', '.join(pictures)}")
@@ -152,6 +155,30 @@ def _tyres() -> dict[str, Figure]:
     style.plain(axis, "side force [kN]")
     axis.legend(frameon=False)
     return {"tyres_side_force": figure}
+
+
+def _brakes() -> dict[str, Figure]:
+    """Speeds, slip and pressures of a left front and a left rear wheel in a stop with the anti-lock system."""
+    figure = new_figure(7.5, 6.5)
+    recording = run_scenario(resolve("straight_braking"))
+    time_s, speed_kmh = recording.time_s, 3.6 * recording["speed_mps"]
+    axes = figure.subplots(3, 1, sharex=True)
+    axes[0].plot(time_s, speed_kmh, color="#333333", label="car")
+    axes[0].plot(time_s, 3.6 * recording["abs_speed_mps"], color="#333333", linestyle=":", label="car, estimated")
+    for corner, colour in (("fl", "#0072b2"), ("rl", "#d55e00")):
+        spin, words = recording[f"{corner}_wheel_speed_radps"], CORNER_WORDS[corner]
+        wheel_kmh = speed_kmh[0] / spin[0] * spin
+        axes[0].plot(time_s, wheel_kmh, color=colour, linewidth=1.0, label=words)
+        moving = speed_kmh > 7.0
+        slip = 100.0 * (1.0 - wheel_kmh[moving] / speed_kmh[moving])
+        axes[1].plot(time_s[moving], slip, color=colour, linewidth=1.0)
+        axes[2].plot(time_s, 1e-5 * recording[f"{corner}_brake_pressure_Pa"], color=colour, linewidth=1.0)
+    for axis, title in zip(axes, ("speed\n[km/h]", "slip above 7 km/h\n[%]", "brake pressure\n[bar]"), strict=True):
+        style.plain(axis, title)
+    axes[0].legend(frameon=False)
+    axes[-1].set(xlabel="time [s]", xlim=(0.4, 4.2))
+    figure.align_ylabels(list(axes))
+    return {"brakes_stop": figure}
 
 
 def _draw(kind: str, runs: Mapping[str, Any]) -> Figure:

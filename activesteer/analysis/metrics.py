@@ -13,6 +13,7 @@ from activesteer.analysis import (
     path_following,
     sine_with_dwell,
     step_response,
+    straight_braking,
 )
 from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
 
@@ -26,6 +27,7 @@ BY_KIND: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "slalom": path_following.metrics,
     "follow_path": path_following.metrics,
     "brake_in_turn": brake_in_turn.metrics,
+    "straight_braking": straight_braking.metrics,
 }
 """Kinds of manoeuvre with metrics of their own; every other kind gets those of `general`."""
 

@@ -69,9 +69,9 @@ class TractionControl:
     """Slip that is allowed, by the speed of the wheels that are not driven."""
     spin_mps: Annotated[float, Range(0.05, 5.0)] = 0.6
     """Speed that is allowed beside [m/s]."""
-    engine_gain_Nmspm: NotNegative = 300.0
+    engine_gain_Nmspm: NotNegative = 400.0
     """Drive torque taken back at once, per speed beyond [Nm/(m/s)]."""
-    engine_integral_gain_Nmpm: NotNegative = 6000.0
+    engine_integral_gain_Nmpm: NotNegative = 1500.0
     """Drive torque taken back in time, per speed beyond and second [Nm/m]."""
     brake_gain_Paspm: NotNegative = 1.5e6
     """Pressure at a driven wheel per speed beyond that of its axle's other wheel [Pa/(m/s)]."""

@@ -12,6 +12,7 @@ from activesteer.maneuver.sine_with_dwell import SineWithDwell
 from activesteer.maneuver.slalom import Slalom
 from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
 from activesteer.maneuver.step_steer import StepSteer
+from activesteer.maneuver.straight_braking import StraightBraking
 from activesteer.road.lane import Lane
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "Slalom",
     "SlowlyIncreasingSteer",
     "StepSteer",
+    "StraightBraking",
     "build_maneuver",
     "filled_from_csv",
     "maneuver_class",

@@ -21,6 +21,7 @@ from activesteer.maneuver.sine_with_dwell import SineWithDwell
 from activesteer.maneuver.slalom import Slalom
 from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
 from activesteer.maneuver.step_steer import StepSteer
+from activesteer.maneuver.straight_braking import StraightBraking
 
 KINDS: Final[dict[str, type[Maneuver]]] = {
     "step_steer": StepSteer,
@@ -30,6 +31,7 @@ KINDS: Final[dict[str, type[Maneuver]]] = {
     "sine_sweep": SineSweep,
     "sine_with_dwell": SineWithDwell,
     "brake_in_turn": BrakeInTurn,
+    "straight_braking": StraightBraking,
     "lane_change": LaneChange,
     "slalom": Slalom,
     "follow_path": FollowPath,

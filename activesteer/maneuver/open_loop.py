@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.choices import DRIVES, check_choice
-from activesteer.maneuver.open_loop_tables import BrakeTable, SpeedTable, SteeringTable, WheelTorqueTable, check_table
+from activesteer.maneuver.open_loop_tables import (
+    BrakeTable,
+    ParkingBrakeTable,
+    SpeedTable,
+    SteeringTable,
+    WheelTorqueTable,
+    check_table,
+)
 from activesteer.signals import Reference, WheelTorques
 
 
@@ -23,7 +30,9 @@ class OpenLoop(Maneuver):
     speed: SpeedTable | None = None
     """Speed to hold; the speed at the start where not given."""
     brake: BrakeTable | None = None
-    """Brake; released where not given. While it is pressed, the drive is off."""
+    """Brake; released where not given. While it is pressed, or the parking brake applied, the drive is off."""
+    parking_brake: ParkingBrakeTable | None = None
+    """Parking brake, at the rear wheels; released where not given."""
     wheel_torques: WheelTorqueTable | None = None
     """Torques of each wheel, at once and without the engine's lag; where given, nothing else drives or brakes."""
     drive_csv: str | None = None
@@ -48,13 +57,13 @@ class OpenLoop(Maneuver):
             tables.append(("speed", self.speed.time_s, self.speed.speed_mps))
         if self.brake is not None:
             tables.append(("brake", self.brake.time_s, self.brake.pedal))
+        if self.parking_brake is not None:
+            tables.append(("parking_brake", self.parking_brake.time_s, self.parking_brake.applied))
         if torques is not None:
             columns = [*(torques.columns("drive") or ()), *(torques.columns("brake") or ())]
             tables += [("wheel_torques", torques.time_s, column) for column in columns]
-            if self.speed is not None or self.brake is not None:
-                raise ManeuverError(
-                    "given beside a speed or a brake pedal; either the one or the other", key="wheel_torques"
-                )
+            if self.speed is not None or self.brake is not None or self.parking_brake is not None:
+                raise ManeuverError("given beside a speed or a brake; either the one or the other", key="wheel_torques")
         for key, times_s, values in tables:
             try:
                 check_table(times_s, values)
@@ -81,7 +90,10 @@ class OpenLoop(Maneuver):
             return Reference(angle, self.speed_mps, 0.0, False, None, rack, self._torques(self.wheel_torques, time_s))
         speed = self.speed_mps if self.speed is None else _interpolate(time_s, self.speed.time_s, self.speed.speed_mps)
         pedal = 0.0 if self.brake is None else _interpolate(time_s, self.brake.time_s, self.brake.pedal)
-        return Reference(angle, speed, pedal, self.drive == "hold_speed" and pedal == 0.0, None, rack)
+        parking = self.parking_brake
+        applied = 0.0 if parking is None else _interpolate(time_s, parking.time_s, parking.applied)
+        drives = self.drive == "hold_speed" and pedal == 0.0 and applied == 0.0
+        return Reference(angle, speed, pedal, drives, None, rack, parking_brake=applied)
 
     def settling_reference(self) -> Reference:
         """As at the start, but without torques of the wheels: the car is to roll at its speed; see the base class."""

@@ -83,6 +83,16 @@ class BrakeTable:
 
 
 @dataclass(frozen=True)
+class ParkingBrakeTable:
+    """Parking brake over time."""
+
+    time_s: tuple[float, ...]
+    """Times, increasing [s]; linear between them, constant outside."""
+    applied: Annotated[tuple[float, ...], Range(0.0, 1.0)]
+    """How far it is applied, 0 to 1."""
+
+
+@dataclass(frozen=True)
 class WheelTorqueTable:
     """Torques of each wheel over time; what is not given is zero."""
 

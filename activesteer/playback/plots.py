@@ -84,8 +84,9 @@ _DEMAND_OF: Final = {
     "yaw_rate_desired_radps": "yaw_rate_desired_radps",
     "rear_steer_rad": "rear_steer_demand_rad",
     "superposition_rad": "superposition_demand_rad",
+    **{f"{corner}_brake_pressure_Pa": f"{corner}_brake_pressure_Pa" for corner in CORNERS},
 }
-"""Channel, and the one that is not all zero where a controller asks for it: else it shows the give of a hinge."""
+"""Channel, and the one that is not all zero where it has something to show: a hinge gives way without being asked."""
 
 
 def _of_wheels(channel: str, entity: str = "") -> Plot:
@@ -99,6 +100,7 @@ WHEELS: Final = (
     _of_wheels("friction_use"),
     _of_wheels("tyre_fy_N", "tyre_fy_N"),
     _of_wheels("tyre_fx_N", "tyre_fx_N"),
+    _of_wheels("brake_pressure_Pa", "brake_pressure_Pa"),
 )
 """Plots of the four wheels."""
 

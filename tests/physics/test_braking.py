@@ -1,39 +1,188 @@
-"""Full braking from 80 km/h on mu 0.8 without anti-lock system: the front wheels lock first (UN R13-H)."""
+"""Full braking with and without the anti-lock system: what locks, how far it goes, where the energy goes, who turns."""
 
 from __future__ import annotations
 
+from typing import Any
+
+import mujoco
 import numpy as np
 import pytest
 
-from activesteer import simulate
+from activesteer import ActuatorCommand, DriverCommand, Recording, Simulation, simulate
+from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.resources import models_dir
+from activesteer.theory.single_track import SingleTrack
+from activesteer.tyre.evaluation import MagicFormula
+from activesteer.tyre.file.tir import load_tir
+from activesteer.vehicle import Vehicle
+from tests.physics.runs import car, corners, mass_kg, run
 
-FULL_BRAKING = {
-    "kind": "open_loop",
-    "name": "full_braking",
-    "speed_kmh": 80,
-    "duration_s": 2.5,
-    "road": {"mu": 0.8},
-    "brake": {"time_s": [0.5, 1.5], "pedal": [0.0, 1.0]},
-}
-
-
-@pytest.fixture(scope="module")
-def braking():
-    return simulate(FULL_BRAKING, overrides={"vehicle.brakes.abs": False})
-
-
-def locked_at_s(recording, corner):
-    locked = np.flatnonzero(recording[f"{corner}_slip_ratio"] < -0.5)
-    return recording.time_s[locked[0]] if locked.size else np.inf
+SLIPPERY = {"road__mu": 0.3, "duration_s": 11.5}
+WITHOUT = {"vehicle__brakes__abs": False}
+COASTING = {
+    "kind": "open_loop", "name": "coasting", "speed_kmh": 80, "duration_s": 1.0, "settle_s": 1.0, "drive": "coast",
+}  # fmt: skip
 
 
-def test_the_front_wheels_lock_before_the_rear_ones(braking):
-    front = max(locked_at_s(braking, "fl"), locked_at_s(braking, "fr"))
-    rear = min(locked_at_s(braking, "rl"), locked_at_s(braking, "rr"))
-    assert np.isfinite(front)
-    assert front < rear
+def from_100(changes: dict[str, Any] | None = None) -> Recording:
+    return run("straight_braking", **(changes or {}))
 
 
-def test_the_car_stays_straight_and_decelerates_by_what_the_road_bears(braking):
-    assert np.abs(braking["yaw_rad"]).max() < 1e-6
-    assert -0.95 * 9.81 < braking["ax_mps2"].min() < -0.7 * 9.81
+@pytest.mark.parametrize("changes", [{}, SLIPPERY])
+def test_no_wheel_locks_and_nine_tenths_of_the_friction_are_used(changes: dict[str, Any]) -> None:
+    found = from_100(changes).metrics
+    assert found["wheel_slip_max"] < 0.5
+    assert 0.9 <= found["braking_efficiency"] <= 1.0
+
+
+def test_the_sedan_stops_without_a_locked_wheel_too() -> None:
+    """Half of its brake torque is at the rear wheels, so that they run to their limit first."""
+    found = simulate("straight_braking", vehicle="sedan").metrics
+    assert found["wheel_slip_max"] < 0.5
+    assert found["braking_efficiency"] > 0.87
+
+
+def test_without_it_all_wheels_lock_the_front_ones_first_and_the_way_is_longer() -> None:
+    locked = from_100(WITHOUT)
+    at_s = [locked.time_s[int(np.argmax(locked[f"{corner}_slip_ratio"] < -0.8))] for corner in CORNERS]
+    assert min(at_s) > 0.5
+    assert max(at_s[:2]) < min(at_s[2:])
+    assert np.abs(locked["yaw_rad"]).max() < 1e-6
+    assert from_100().metrics["stopping_distance_m"] < 0.9 * locked.metrics["stopping_distance_m"]
+
+
+def test_locked_wheels_slide_as_far_as_their_friction_says() -> None:
+    """v^2 / (2 mu_slide g); drag and the lag of the last tenth of a second are the tolerance."""
+    locked = from_100(WITHOUT)
+    begin = int(np.argmax(locked.time_s >= 1.2))
+    assert (corners(locked, "slip_ratio")[begin:][locked["speed_mps"][begin:] > 2.0] < -0.97).all()
+    end = int(np.argmax(locked["speed_mps"] < 2.0))
+    tyre = MagicFormula(load_tir(models_dir() / "tyres" / "compact_205_55R16.tir"))
+    loads_N = corners(locked, "tyre_fz_N")[begin:end].mean(axis=0)
+    sliding = -tyre.evaluate(loads_N, -1.0, 0.0, road_friction=0.9).fx_N.sum() / loads_N.sum()
+    way_m = (locked["speed_mps"][begin] ** 2 - 2.0**2) / (2.0 * sliding * GRAVITY_MPS2)
+    assert locked["x_m"][end] - locked["x_m"][begin] == pytest.approx(way_m, rel=0.03)
+
+
+def wheel_inertia_kgm2(vehicle: Vehicle) -> float:
+    """Inertia of a wheel about its axis, the clutch open."""
+    spin = int(vehicle.model.joint("rl_spin").dofadr[0])
+    product = np.empty(vehicle.model.nv)
+    mujoco.mj_mulM(vehicle.model, vehicle.data, product, np.eye(vehicle.model.nv)[spin])
+    return float(product[spin])
+
+
+@pytest.mark.parametrize("changes", [{}, WITHOUT, SLIPPERY])
+def test_brakes_tyres_and_air_take_the_energy(changes: dict[str, Any]) -> None:
+    recording = from_100(changes)
+    first, last = int(np.argmax(recording.time_s >= 0.5)), int(np.argmax(recording["speed_mps"] < 3.0))
+    part = slice(first, last)
+    spin, speed = corners(recording, "wheel_speed_radps")[part], recording["speed_mps"][part]
+    brakes_W = -(corners(recording, "brake_torque_Nm")[part] * spin).sum(axis=1)
+    slower_mps = speed[:, None] - corners(recording, "loaded_radius_m")[part] * spin
+    sliding_W = -(corners(recording, "tyre_fx_N")[part] * slower_mps).sum(axis=1)
+    air_W = 0.5 * 1.2 * 0.65 * speed**3
+    rolling_W = -(corners(recording, "tyre_my_Nm")[part] * spin).sum(axis=1)
+    lost_J = np.trapezoid(brakes_W + sliding_W + air_W + rolling_W, recording.time_s[part])
+    inertia_kgm2 = wheel_inertia_kgm2(car())
+    before_J, after_J = (
+        0.5 * mass_kg(car()) * speed[row] ** 2 + 0.5 * inertia_kgm2 * (spin[row] ** 2).sum() for row in (0, -1)
+    )
+    assert lost_J == pytest.approx(before_J - after_J, rel=0.01)
+    in_brakes = np.trapezoid(brakes_W, recording.time_s[part]) / lost_J
+    assert in_brakes < 0.1 if changes is WITHOUT else in_brakes > 0.85
+
+
+def test_the_driver_keeps_a_car_on_split_friction_and_without_him_it_turns_to_the_grip() -> None:
+    held = run("split_mu_braking")
+    assert held.metrics["lateral_deviation_max_m"] < 1.0
+    assert np.degrees(np.abs(held["yaw_rad"]).max()) < 10.0
+    assert held.metrics["wheel_slip_max"] < 0.5
+    left = run("split_mu_braking", hold_line=False, duration_s=3.0)
+    assert left["yaw_rad"][-1] > 0.1
+    # The rear wheels get what the slippery side bears, the front one on the grip more.
+    later = (held.time_s > 1.0) & (held["speed_mps"] > 5.0)
+    pressures = {corner: held[f"{corner}_brake_pressure_Pa"][later].mean() for corner in CORNERS}
+    assert pressures["rl"] == pytest.approx(pressures["rr"], rel=1e-6)
+    assert pressures["fl"] > 1.5 * pressures["fr"]
+
+
+def coasting_with(brakes_Nm: tuple[float, float, float, float]) -> Recording:
+    simulation = Simulation(COASTING)
+    command = DriverCommand(gear=0)
+    simulation.advance(simulation.steps, command, ActuatorCommand(brake_torque_demand_Nm=brakes_Nm))
+    return simulation.recording()
+
+
+def test_a_braked_left_wheel_turns_the_car_left_by_its_lever() -> None:
+    """The single-track model with the moment of the force at half the track, in steady state."""
+    torque_Nm = 150.0
+    left, right = coasting_with((torque_Nm, 0.0, torque_Nm, 0.0)), coasting_with((0.0, torque_Nm, 0.0, torque_Nm))
+    np.testing.assert_allclose(left["yaw_rate_radps"], -right["yaw_rate_radps"], atol=1e-9)
+    setup = Simulation(COASTING).loop.controller_setup
+    car, speed = setup.single_track, float(left["speed_mps"][-1])
+    front, rear = car.front_stiffness_Nprad, car.rear_stiffness_Nprad
+    to_front, to_rear = car.cg_to_front_m, car.cg_to_rear_m
+    wheelbase_m = SingleTrack(car).wheelbase_m
+    moment_Nm = 2.0 * torque_Nm / 0.307 * 0.5 * 1.53
+    resisting = front * rear * wheelbase_m**2 / speed + car.mass_kg * speed * (rear * to_rear - front * to_front)
+    expected = moment_Nm * (front + rear) / resisting
+    assert left["yaw_rate_radps"][-1] == pytest.approx(expected, rel=0.25)
+
+
+def test_a_pedal_that_locks_no_wheel_leaves_the_anti_lock_system_without_a_trace() -> None:
+    gentle = {**COASTING, "duration_s": 2.0, "brake": {"time_s": [0.1, 0.3], "pedal": [0.0, 0.3]}}
+    on, off = simulate(gentle), simulate(gentle, overrides={"vehicle.brakes.abs": False})
+    assert on["speed_mps"][-1] < on["speed_mps"][0] - 5.0
+    for name in ("x_m", "fl_tyre_fx_N", "rr_brake_torque_Nm"):
+        np.testing.assert_array_equal(on[name], off[name])
+
+
+def test_a_state_saved_while_it_acts_goes_on_bit_for_bit() -> None:
+    simulation = Simulation("straight_braking", overrides={"duration_s": 1.6})
+    simulation.advance(900)
+    saved = simulation.save_state()
+    assert simulation.truth["fl_abs_phase"] > 0.0
+    simulation.run()
+    first = simulation.recording()
+    simulation.restore_state(saved)
+    simulation.run()
+    again = simulation.recording()
+    for name in ("x_m", "fl_brake_pressure_Pa", "rr_slip_ratio", "abs_speed_mps"):
+        np.testing.assert_array_equal(first[name], again[name])
+
+
+def test_on_ice_the_car_comes_to_rest_and_stays() -> None:
+    ice = {**COASTING, "speed_kmh": 15, "duration_s": 9.0, "road": {"mu": 0.15},
+           "brake": {"time_s": [0.2, 0.3], "pedal": [0.0, 1.0]}}  # fmt: skip
+    recording = simulate(ice)
+    rest = recording.time_s > 7.5
+    assert np.abs(recording["speed_mps"][rest]).max() < 1e-3
+    assert recording["x_m"].max() - recording["x_m"][-1] < 0.03
+    assert np.abs(corners(recording, "wheel_speed_radps")[rest]).max() < 1e-2
+
+
+def test_the_parking_brake_holds_the_car_on_a_hill() -> None:
+    hill = {
+        "kind": "open_loop", "speed_kmh": 0, "duration_s": 4.0, "settle_s": 0.0, "drive": "coast",
+        "road": {"mu": 0.9, "grade": 0.15}, "parking_brake": {"time_s": [0.0], "applied": [0.6]},
+    }  # fmt: skip
+    held, rolling = simulate(hill), simulate(hill, overrides={"parking_brake.applied": [0.3]})
+    assert abs(held["x_m"][-1] - held["x_m"][3000]) < 1e-4
+    assert rolling["x_m"][-1] < -1.0
+
+
+def test_traction_control_keeps_the_driven_wheels_from_spinning() -> None:
+    start = {**COASTING, "speed_kmh": 10, "duration_s": 2.0, "road": {"mu": 0.3}}
+    spin_mps, end_mps = {}, {}
+    for tcs in (True, False):
+        simulation = Simulation(start, overrides={"vehicle.brakes.tcs": tcs})
+        simulation.advance(simulation.steps, DriverCommand(drive_torque_demand_Nm=2500.0))
+        recording = simulation.recording()
+        assert recording["tcs_active"].max() == tcs
+        later = recording.time_s > 1.0
+        spin_mps[tcs] = (0.305 * recording["fl_wheel_speed_radps"] - recording["speed_mps"])[later].max()
+        end_mps[tcs] = recording["speed_mps"][-1]
+    assert spin_mps[True] < 2.0
+    assert spin_mps[False] > 20.0
+    assert end_mps[True] > end_mps[False] > 10.0 / 3.6

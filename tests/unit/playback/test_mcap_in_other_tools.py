@@ -22,7 +22,8 @@ from activesteer.playback.viewer import viewer_binary
 Messages = dict[str, list[tuple[int, Any]]]
 
 UNITS = {
-    "": "", "m": "_m", "rad": "_rad", "rad/s": "_radps", "m/s": "_mps", "m/s2": "_mps2", "N": "_N", "Nm": "_Nm",
+    "": "", "m": "_m", "rad": "_rad", "rad/s": "_radps", "m/s": "_mps", "m/s2": "_mps2", "N": "_N",
+    "Nm": "_Nm", "Pa": "_Pa",
 }  # fmt: skip
 """Unit of a signal, and what its name ends in."""
 

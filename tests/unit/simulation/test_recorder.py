@@ -45,7 +45,8 @@ def test_every_channel_is_named_once_and_ends_in_its_unit():
     names = [channel.name for channel in channels]
     assert len(set(names)) == len(names)
     suffixes = {
-        "rad": "_rad", "rad/s": "_radps", "m": "_m", "m/s": "_mps", "m/s2": "_mps2", "N": "_N", "Nm": "_Nm",
+        "rad": "_rad", "rad/s": "_radps", "m": "_m", "m/s": "_mps", "m/s2": "_mps2", "N": "_N",
+        "Nm": "_Nm", "Pa": "_Pa",
     }  # fmt: skip
     for channel in channels:
         assert channel.meaning

@@ -1,0 +1,63 @@
+"""Braking straight ahead to rest: the whole road of one friction (ISO 21994) or each side its own (ISO 14512)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+from activesteer.config import Range
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.brake_in_turn import BrakeInput
+from activesteer.road.course import Course
+from activesteer.road.path import Path
+from activesteer.signals import Reference
+
+_LEAST_SPEED_MPS: Final = 10.0 / 3.6
+"""Slower than this there is no braking to be evaluated [m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StraightBraking(Maneuver):
+    """The car rolls straight ahead at its speed, then the clutch is opened and the brake pressed until it stands."""
+
+    brake: BrakeInput
+    """The brake."""
+    hold_line: bool = True
+    """Whether the driver keeps the car on a straight line; else the steering wheel is held straight."""
+
+    def __post_init__(self) -> None:
+        """The car drives forwards, and the brake is pressed within the run.
+
+        Raises:
+            ManeuverError: it is not.
+        """
+        if self.speed_mps < _LEAST_SPEED_MPS:
+            least_kmh = 3.6 * _LEAST_SPEED_MPS
+            problem = f"is {3.6 * self.speed_mps:g} km/h; braking begins at {least_kmh:g} km/h or more, forwards"
+            raise ManeuverError(problem, key="speed_kmh", value=3.6 * self.speed_mps, allowed=Range(least_kmh))
+        pressed_s = self.brake.start_s + self.brake.rise_s
+        if pressed_s >= self.duration_s:
+            problem = f"the brake is pressed down at {pressed_s:g} s, but the run ends at {self.duration_s:g} s"
+            raise ManeuverError(problem, key="brake.start_s", value=self.brake.start_s)
+
+    @property
+    def course(self) -> Course | None:
+        """The straight line that the driver keeps, if he does."""
+        return self._course if self.hold_line else None
+
+    @cached_property
+    def _course(self) -> Course:
+        return Course(Path.through([0.0, self.speed_mps * self.duration_s], [0.0, 0.0]))
+
+    def reference(self, time_s: float) -> Reference:
+        """Speed, then the ramp of the brake; see the base class."""
+        brake, course = self.brake, self.course
+        pressed = min(max((time_s - brake.start_s) / brake.rise_s, 0.0), 1.0)
+        path = None if course is None else course.path
+        return Reference(0.0, self.speed_mps, pressed * brake.pedal, hold_speed=time_s < brake.start_s, path=path)
+
+    def settling_reference(self) -> Reference:
+        """Straight ahead at the speed of the manoeuvre."""
+        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
