@@ -109,6 +109,7 @@ class Measurement(NamedTuple):
         rear_steer_rad: Angle of the rear steering actuators, mean of both [rad], left positive.
         superposition_rad: Angle added by the front superposition, at the road wheel [rad].
         wheel_speed_radps: Rotational speeds of the four wheels [rad/s], order of `CORNERS`.
+        brake_pressure_Pa: Pressures in the four wheel brakes [Pa], same order.
     """
 
     time_s: float
@@ -120,6 +121,7 @@ class Measurement(NamedTuple):
     rear_steer_rad: float
     superposition_rad: float
     wheel_speed_radps: tuple[float, float, float, float]
+    brake_pressure_Pa: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
 class Motion(NamedTuple):

@@ -2,6 +2,20 @@
 
 from activesteer.sensors.block import SensorBlock
 from activesteer.sensors.parameters import Sensors
-from activesteer.sensors.sensor_kinds import AccelerationSensor, AngleSensor, RateSensor, WheelSpeedSensor
+from activesteer.sensors.sensor_kinds import (
+    AccelerationSensor,
+    AngleSensor,
+    PressureSensor,
+    RateSensor,
+    WheelSpeedSensor,
+)
 
-__all__ = ["AccelerationSensor", "AngleSensor", "RateSensor", "SensorBlock", "Sensors", "WheelSpeedSensor"]
+__all__ = [
+    "AccelerationSensor",
+    "AngleSensor",
+    "PressureSensor",
+    "RateSensor",
+    "SensorBlock",
+    "Sensors",
+    "WheelSpeedSensor",
+]

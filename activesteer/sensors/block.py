@@ -17,7 +17,8 @@ from activesteer.sensors.signal_chain import CHAIN, FILTERED, HELD, LINE, PHASE,
 from activesteer.signals import Measurement
 
 _SCALARS: Final = ("yaw_rate", "ay", "ax", "steering_wheel", "rear_steer", "superposition")
-"""Sensors in the order of the members of `Measurement` behind time and speed; those of the wheels follow."""
+"""Sensors in the order of the members of `Measurement` behind time and speed; those of the wheels and of their brakes
+follow."""
 _N_SCALARS: Final = len(_SCALARS)
 _N_WHEELS: Final = len(CORNERS)
 MEASURED: Final = (
@@ -29,6 +30,7 @@ MEASURED: Final = (
     ("rear_steer_rad", "rad", "position of the rear steering actuators"),
     ("superposition_rad", "rad", "position of the front superposition, at the road wheels,"),
     *((f"{corner}_wheel_speed_radps", "rad/s", f"rotational speed of the wheel {corner}") for corner in CORNERS),
+    *((f"{corner}_brake_pressure_Pa", "Pa", f"brake pressure of the wheel {corner}") for corner in CORNERS),
 )
 """Name, unit and meaning of the outputs, in their order: the members of `Measurement` without its time."""
 _NAMES: Final = [name for name, _, _ in MEASURED]
@@ -53,7 +55,9 @@ class SensorBlock:
             sensors: What the vehicle file says.
             timestep_s: Step of the simulation [s].
         """
-        every = [sensors.all()[name] for name in (*_SCALARS, *["wheel_speed"] * _N_WHEELS)]
+        every = [
+            sensors.all()[name] for name in (*_SCALARS, *["wheel_speed"] * _N_WHEELS, *["brake_pressure"] * _N_WHEELS)
+        ]
         self.chains = np.zeros(len(every), CHAIN)
         place = len(MEASURED)
         for index, sensor in enumerate(every):
@@ -78,7 +82,8 @@ class SensorBlock:
 
     def say(self, measurement: Measurement) -> None:
         """Has them say something else until the next step, as where a fault acts on what they say."""
-        self.outputs[:] = (*measurement[1:-1], *measurement[-1])
+        *scalars, wheel_speeds_radps, brake_pressures_Pa = measurement[1:]
+        self.outputs[:] = (*scalars, *wheel_speeds_radps, *brake_pressures_Pa)
 
     def measurement(self, time_s: float) -> Measurement:
         """What they now say.
@@ -86,8 +91,9 @@ class SensorBlock:
         Args:
             time_s: Time of the measurement [s].
         """
-        *values, fl, fr, rl, rr = self.outputs.tolist()
-        return Measurement(time_s, *values, wheel_speed_radps=(fl, fr, rl, rr))
+        values = self.outputs.tolist()
+        speeds, pressures = tuple(values[-2 * _N_WHEELS : -_N_WHEELS]), tuple(values[-_N_WHEELS:])
+        return Measurement(time_s, *values[: -2 * _N_WHEELS], speeds, pressures)
 
 
 def speed_radii(front_share: float, rolling_radii_m: Sequence[float]) -> tuple[float, ...]:
@@ -142,7 +148,7 @@ def measured(chains, memory, wheel_radii_m, timestep_s, truth):
     Returns:
         The members of `Measurement`; they stand in the outputs too.
     """
-    time_s, speed, yaw_rate, ay, ax, steering_wheel, rear_steer, superposition, wheels = truth
+    time_s, speed, yaw_rate, ay, ax, steering_wheel, rear_steer, superposition, wheels, pressures = truth
     for index, value in enumerate((yaw_rate, ay, ax, steering_wheel, rear_steer, superposition)):
         memory[1 + index] = passed_on(chains[index], memory, value, timestep_s)
     from_wheels, counted = 0.0, 0.0
@@ -152,8 +158,10 @@ def measured(chains, memory, wheel_radii_m, timestep_s, truth):
         memory[1 + index] = spin
         from_wheels += wheel_radii_m[wheel] * spin
         counted += wheel_radii_m[wheel]
+        index += _N_WHEELS
+        memory[1 + index] = passed_on(chains[index], memory, pressures[wheel], timestep_s)
     memory[0] = from_wheels if counted > 0.0 else speed
     return (
         time_s, memory[0], memory[1], memory[2], memory[3], memory[4], memory[5], memory[6],
-        (memory[7], memory[8], memory[9], memory[10]),
+        (memory[7], memory[8], memory[9], memory[10]), (memory[11], memory[12], memory[13], memory[14]),
     )  # fmt: skip

@@ -11,7 +11,14 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 from activesteer.config import Range
 from activesteer.errors import ParameterError
 from activesteer.sensors.presets import PRESETS
-from activesteer.sensors.sensor_kinds import AccelerationSensor, AngleSensor, RateSensor, Sensor, WheelSpeedSensor
+from activesteer.sensors.sensor_kinds import (
+    AccelerationSensor,
+    AngleSensor,
+    PressureSensor,
+    RateSensor,
+    Sensor,
+    WheelSpeedSensor,
+)
 
 RANDOM: Final = ("noise", "bias", "drift")
 """How the keys begin whose values are drawn from the seed."""
@@ -45,6 +52,8 @@ class Sensors:
     """Position of the front superposition, at the road wheels."""
     wheel_speed: WheelSpeedSensor = WheelSpeedSensor()
     """Rotational speed of each wheel."""
+    brake_pressure: PressureSensor = PressureSensor()
+    """Pressure in each wheel brake."""
     speed_from_wheels: bool | None = None
     """Whether the speed is that of the wheels that are not driven (of all, where all are) times their rolling radius;
     else it is the car's own."""

@@ -16,7 +16,13 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from activesteer.conventions import GRAVITY_MPS2
-from activesteer.sensors.sensor_kinds import AccelerationSensor, AngleSensor, RateSensor, WheelSpeedSensor
+from activesteer.sensors.sensor_kinds import (
+    AccelerationSensor,
+    AngleSensor,
+    PressureSensor,
+    RateSensor,
+    WheelSpeedSensor,
+)
 
 _DEG: Final = math.radians(1.0)
 
@@ -62,10 +68,17 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "rear_steer": _ACTUATOR,
         "superposition": _ACTUATOR,
         "wheel_speed": WheelSpeedSensor(
-            sample_time_s=0.01,  # assumption
-            delay_s=0.005,  # assumption
+            sample_time_s=0.005,  # assumption: cycle of an anti-lock control, to whose unit the sensors are wired
             noise_radps=0.02,  # assumption: pitch error of the pulse wheel, 0.03 % at 80 km/h
             teeth=48,  # assumption of the class
+        ),
+        "brake_pressure": PressureSensor(
+            bandwidth_Hz=100.0,  # assumption
+            sample_time_s=0.005,  # assumption, as for the wheel speeds
+            noise_Pa=2e4,  # assumption: 0.1 % of the range
+            bias_Pa=1e5,  # assumption: 0.5 % of the range
+            quantum_Pa=1e4,  # assumption
+            limit_Pa=20e6,  # assumption: the range of the class
         ),
         "speed_from_wheels": True,
     },

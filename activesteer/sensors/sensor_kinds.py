@@ -83,6 +83,22 @@ class AccelerationSensor(Sensor):
 
 
 @dataclass(frozen=True)
+class PressureSensor(Sensor):
+    """A sensor of a hydraulic pressure."""
+
+    noise_Pa: _Amount | None = None
+    """White noise of the samples, rms [Pa]."""
+    bias_Pa: _Amount | None = None
+    """Offset of a run, drawn from the seed: rms over seeds [Pa]."""
+    drift_Pa: _Amount | None = None
+    """Random walk of the offset: rms of its change within a minute [Pa]."""
+    quantum_Pa: _Amount | None = None
+    """Step of quantisation [Pa]."""
+    limit_Pa: _Amount | None = None
+    """Where it saturates, to either side [Pa]."""
+
+
+@dataclass(frozen=True)
 class AngleSensor(Sensor):
     """A sensor of an angle."""
 

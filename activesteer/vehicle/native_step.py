@@ -212,6 +212,7 @@ def _sense(plan):
     yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     cos, sin = math.cos(yaw), math.sin(yaw)
     east, north = s[plan.velocity], s[plan.velocity + 1]
+    pressure_Pa = carray(_state_pointer(plan.brake_state), (1,))[0].pressure_Pa
     return (
         sane,
         (
@@ -224,6 +225,7 @@ def _sense(plan):
             0.5 * (s[plan.rear_left_angle] + s[plan.rear_right_angle]),
             s[plan.superposition_angle] / plan.ratio,
             (s[plan.wheel_speed], s[plan.wheel_speed + 1], s[plan.wheel_speed + 2], s[plan.wheel_speed + 3]),
+            (pressure_Pa[0], pressure_Pa[1], pressure_Pa[2], pressure_Pa[3]),
         ),
         (s[plan.position], s[plan.position + 1], yaw, cos * east + sin * north, cos * north - sin * east, yaw_rate),
     )
@@ -255,7 +257,7 @@ def _record(plan, tape):
     tape.room -= 1
 
 
-_MEASUREMENT: Final = types.Tuple([types.float64] * 8 + [types.UniTuple(types.float64, 4)])
+_MEASUREMENT: Final = types.Tuple([types.float64] * 8 + [types.UniTuple(types.float64, 4)] * 2)
 _SENSED: Final = types.Tuple([types.boolean, _MEASUREMENT, types.UniTuple(types.float64, 6)])
 
 

@@ -20,7 +20,7 @@ NOT_RANDOM = {
     f"sensors.{sensor}.{word}_{unit}": 0.0
     for sensor, unit in (
         ("yaw_rate", "radps"), ("ax", "mps2"), ("ay", "mps2"), ("steering_wheel", "rad"), ("rear_steer", "rad"),
-        ("superposition", "rad"), ("wheel_speed", "radps"),
+        ("superposition", "rad"), ("wheel_speed", "radps"), ("brake_pressure", "Pa"),
     )
     for word in ("noise", "bias", "drift")
 }  # fmt: skip
@@ -133,3 +133,16 @@ def test_a_car_that_brakes_to_a_stop_and_stands_has_wheels_that_stand() -> None:
         assert recording[f"measured_{corner}_wheel_speed_radps"][-1] == pytest.approx(0.0, abs=0.2)
         error = _error(recording, f"{corner}_wheel_speed_radps")
         assert np.abs(error).max() < 0.15 * np.abs(recording[f"{corner}_wheel_speed_radps"]).max()
+
+
+def test_brake_pressures_are_measured() -> None:
+    overrides = {"sensors.preset": "production", "sensors.seed": 2}
+    recording = activesteer.simulate("brake_in_turn", overrides=overrides)
+    for corner in CORNERS:
+        error = _error(recording, f"{corner}_brake_pressure_Pa")
+        assert recording[f"{corner}_brake_pressure_Pa"].max() > 1e6
+        # Before braking begins, noise about the bias of the run, 0.5 % of the range.
+        assert 0.0 < error[:300].std() < 4e4
+        assert np.abs(error[:300]).max() < 5e5
+        rising = np.abs(error).max()
+        assert rising < 0.5 * recording[f"{corner}_brake_pressure_Pa"].max()

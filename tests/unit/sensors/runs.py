@@ -15,15 +15,25 @@ from activesteer.signals import Measurement
 
 Values = NDArray[np.float64]
 STANDING: Final = Measurement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
-PLACES: Final = {"speed": 0, "yaw_rate": 1, "ay": 2, "ax": 3, "steering_wheel": 4, "rear_steer": 5, "wheel_speed": 7}
-"""Columns of what is shown and said; the wheels have the last four."""
+PLACES: Final = {
+    "speed": 0,
+    "yaw_rate": 1,
+    "ay": 2,
+    "ax": 3,
+    "steering_wheel": 4,
+    "rear_steer": 5,
+    "wheel_speed": 7,
+    "brake_pressure": 11,
+}
+"""Columns of what is shown and said; the wheels have four each."""
 
 
 @njit
 def _shown(chains, memory, wheel_radii_m, timestep_s, truth, said):
     for row in range(len(truth)):
         t = truth[row]
-        members = (0.0, t[0], t[1], t[2], t[3], t[4], t[5], t[6], (t[7], t[8], t[9], t[10]))
+        scalars = (0.0, t[0], t[1], t[2], t[3], t[4], t[5], t[6])
+        members = (*scalars, (t[7], t[8], t[9], t[10]), (t[11], t[12], t[13], t[14]))
         measured(chains, memory, wheel_radii_m, timestep_s, members)
         said[row] = memory[: said.shape[1]]
 
@@ -36,7 +46,7 @@ def block(timestep_s: float = 0.001, **tables: Any) -> SensorBlock:
 
 
 def shown(sensors: SensorBlock, truth: Values, timestep_s: float = 0.001, radii_m: Values | None = None) -> Values:
-    """What they say of a truth, both of shape (n, 11)."""
+    """What they say of a truth, both of shape (n, 15)."""
     said = np.empty_like(truth)
     _shown(sensors.chains, sensors.memory, np.zeros(4) if radii_m is None else radii_m, timestep_s, truth, said)
     return said
@@ -45,7 +55,7 @@ def shown(sensors: SensorBlock, truth: Values, timestep_s: float = 0.001, radii_
 def said_of(name: str, truth: ArrayLike, steps: int = 0, timestep_s: float = 0.001, **table: Any) -> Values:
     """What one sensor says of what it is shown, shape (n,); all others are ideal."""
     signal: Any = np.full(steps, truth) if steps else np.asarray(truth)
-    rows = np.zeros((len(signal), 11))
+    rows = np.zeros((len(signal), 15))
     rows[:, PLACES[name]] = signal
     given = {key: table.pop(key) for key in ("preset", "seed") if key in table}
     return shown(block(timestep_s, **given, **{name: table}), rows, timestep_s)[:, PLACES[name]]

@@ -30,7 +30,7 @@ def test_noise_is_white_and_normal_with_the_rms_that_is_asked_for():
 
 def test_every_sensor_and_every_seed_has_a_noise_of_its_own():
     asked = block(yaw_rate={"noise_radps": 0.1}, ay={"noise_mps2": 0.1}, wheel_speed={"noise_radps": 0.1})
-    rows = shown(asked, np.zeros((N, 11)))
+    rows = shown(asked, np.zeros((N, 15)))
     noisy = [rows[:, place] for place in (PLACES["yaw_rate"], PLACES["ay"], 7, 8, 9, 10)]
     other_seed = said_of("yaw_rate", 0.0, N, seed=1, noise_radps=0.1)
     again = said_of("yaw_rate", 0.0, N, seed=0, noise_radps=0.1)
@@ -97,10 +97,10 @@ def test_limit_holds_to_both_sides_and_noise_does_not_pass_it():
 
 
 def test_sensors_without_any_error_pass_on_the_truth_bit_for_bit(rng):
-    truth = rng.standard_normal((500, 11))
+    truth = rng.standard_normal((500, 15))
     # One of them is not ideal, so that the block is used at all.
     said = shown(block(yaw_rate={"noise_radps": 1.0}), truth)
-    others = [column for column in range(11) if column != PLACES["yaw_rate"]]
+    others = [column for column in range(15) if column != PLACES["yaw_rate"]]
     np.testing.assert_array_equal(said[:, others], truth[:, others])
 
 
@@ -138,7 +138,7 @@ def test_stopped_pulse_wheel_says_no_more_than_the_time_since_its_last_edge_allo
 
 
 def test_what_is_remembered_goes_on_bit_for_bit(rng):
-    truth = rng.standard_normal((800, 11)) + 20.0
+    truth = rng.standard_normal((800, 15)) + 20.0
     sensors = block(preset="production", seed=5)
     shown(sensors, truth[:400])
     kept = sensors.memory.copy()
@@ -148,8 +148,8 @@ def test_what_is_remembered_goes_on_bit_for_bit(rng):
 
 
 def test_speed_is_that_of_the_wheels_that_count():
-    truth = np.zeros((100, 11))
-    truth[:, 0], truth[:, 7:] = 25.0, (70.0, 70.0, 80.0, 82.0)
+    truth = np.zeros((100, 15))
+    truth[:, 0], truth[:, 7:11] = 25.0, (70.0, 70.0, 80.0, 82.0)
     sensors = block(yaw_rate={"noise_radps": 1.0})
     assert shown(sensors, truth)[-1, 0] == 25.0
     said = shown(sensors, truth, radii_m=np.array([0.0, 0.0, 0.15, 0.15]))
