@@ -93,7 +93,7 @@ class SensorBlock:
         """
         values = self.outputs.tolist()
         speeds, pressures = tuple(values[-2 * _N_WHEELS : -_N_WHEELS]), tuple(values[-_N_WHEELS:])
-        return Measurement(time_s, *values[: -2 * _N_WHEELS], speeds, pressures)
+        return Measurement._make((time_s, *values[: -2 * _N_WHEELS], speeds, pressures))
 
 
 def speed_radii(front_share: float, rolling_radii_m: Sequence[float]) -> tuple[float, ...]:
