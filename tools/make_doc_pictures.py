@@ -74,7 +74,7 @@ def main(names: Sequence[str]) -> None:
     pictures: dict[str, Callable[[], Mapping[str, Figure]]] = {
         name: lambda name=name: {f"manoeuvre_{name}": _manoeuvre(name)} for name in list_maneuvers()
     }
-    pictures |= {"controller": _controller, "tyres": _tyres, "brakes": _brakes}
+    pictures |= {"controller": _controller, "sensors": _sensors, "tyres": _tyres, "brakes": _brakes}
     for name in names or pictures:
         if name not in pictures:
             sys.exit(f"there is no picture {name}; there are: {', '.join(pictures)}")
@@ -138,6 +138,25 @@ def _controller() -> dict[str, Figure]:
         file.write_text(found[1], encoding="utf-8")
         runs = {"none": run_scenario(scenario), "YawDamper": run_scenario(scenario, f"{file}:YawDamper")}
     return {"controller_sine_with_dwell": _draw(scenario.maneuver.kind, runs)}
+
+
+def _sensors() -> dict[str, Figure]:
+    """True and measured yaw rate and lateral acceleration at the beginning of a sine with dwell."""
+    run = run_scenario(prepared(resolve("sine_with_dwell", overrides={"sensors.preset": "production"})), "ars")
+    begin = run.metrics["steer_begin_time_s"] - 0.1
+    shown = (run.time_s >= begin) & (run.time_s < begin + 0.8)
+    figure = new_figure(7.5, 4.5)
+    axes = figure.subplots(2, 1, sharex=True)
+    for axis, channel in zip(axes, ("yaw_rate_radps", "ay_mps2"), strict=True):
+        quantity = quantity_of(channel)
+        for name, colour, label in ((channel, "#222222", "true"), (f"measured_{channel}", "#d55e00", "measured")):
+            values = run[name][shown] * quantity.factor
+            axis.step(run.time_s[shown], values, where="post", color=colour, linewidth=1.2, label=label)
+        style.plain(axis, quantity.axis_title)
+    axes[-1].set_xlabel("time [s]")
+    axes[0].legend(frameon=False)
+    figure.align_ylabels(list(axes))
+    return {"sensors": figure}
 
 
 def _tyres() -> dict[str, Figure]:
