@@ -24,6 +24,8 @@ class DriverParameters:
     """First-order lag of arms and hands [s]."""
     steering_rate_limit_radps: Annotated[float, Range(0.1, 50.0)]
     """How fast the steering wheel is turned at most [rad/s]."""
+    steering_torque_limit_Nm: Annotated[float, Range(0.5, 200.0)] | None = None
+    """Most torque that the hands hold at the steering wheel, as `hand_torque_Nm` is counted; any if not given [N m]."""
 
     speed_gain_1ps: Annotated[float, Range(0.0)] = 3.4
     """Acceleration asked for per speed error [1/s]: 1 km/h off asks for about 0.9 m/s2."""

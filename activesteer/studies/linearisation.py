@@ -207,7 +207,11 @@ def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, 
     sliding = {**(overrides or {}), "vehicle.friction.rack_N": 0.0}
     scenario = resolve(straight, vehicle, sliding)
     config = scenario.car.config
-    smooth = replace(config, rear_actuator=config.rear_actuator.smooth())
+    smooth = replace(
+        config,
+        rear_actuator=config.rear_actuator.smooth(),
+        superposition_actuator=config.superposition_actuator.smooth(),
+    )
     step = DiscreteTimeMap(ClosedLoop(replace(scenario, car=replace(scenario.car, config=smooth))).vehicle)
     step.trim(speed_mps)
     a, c = step.derivatives("x")

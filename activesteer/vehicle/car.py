@@ -442,13 +442,22 @@ class Vehicle:
             if records := self.screw_records(index):
                 yield records
 
+    def limit_hands(self, torque_Nm: float | None) -> None:
+        """Lets the hands on the steering wheel hold no more than a torque [N m]; any where not given."""
+        hands, felt = self._places.steering_wheel, 1.0 - self.parameters.steering.assist_share
+        self.model.actuator_forcelimited[hands] = torque_Nm is not None
+        most = 0.0 if torque_Nm is None else torque_Nm / felt
+        self.model.actuator_forcerange[hands] = -most, most
+
     def screw_records(self, index: int) -> tuple[NDArray[np.float64], ...]:
-        """The records of link and screw of an actuator that has a screw (see `force_block`); nothing of any other."""
+        """The records of link and screw of an actuator (see `force_block`), that of its motor alone, or nothing."""
         record = self.actuator_record(index)
-        if record[fb.A_KIND] != fb.KIND_LINK:
+        if record[fb.A_KIND] not in (fb.KIND_LINK, fb.KIND_SCREW):
             return ()
         block = self.model.numeric_data[int(self.model.numeric_data[-fb.TRAILER_SIZE]) :]
         first = int(block[fb.SCREWS_START])
+        if record[fb.A_KIND] == fb.KIND_SCREW:
+            return (block[first + int(record[fb.A_FIRST]) :][: fb.SCREW_SIZE],)
         link = block[first + int(record[fb.A_FIRST]) :][: fb.LINK_SIZE]
         part = self.model.actuator(index).name[:2]
         screw_actuator = part + SCREW if part + SCREW in self._actuator_names() else f"rear{SCREW}"

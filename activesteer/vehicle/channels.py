@@ -26,7 +26,8 @@ from activesteer.vehicle.native_channels import (
     saturations,
 )
 from activesteer.vehicle.parameters import VehicleParameters
-from activesteer.vehicle.toe_link_screws import MOTOR, SCREW
+from activesteer.vehicle.superposition_actuator import MOTOR, NAME
+from activesteer.vehicle.toe_link_screws import SCREW
 
 _STANDSTILL_MPS: Final = 0.2
 """Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""
@@ -104,7 +105,7 @@ class ChannelMap:
             # They are read block by block; a missing one is to show now.
             self._sensor(name)
         signals = [
-            *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(), *self._screws(),
+            *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(), *self._motors(),
             *(Signal(channel, Column("commands", place)) for channel, place in COMMAND_CHANNELS.items()),
             *self._measured(), *self._brakes(),
         ]  # fmt: skip
@@ -186,6 +187,7 @@ class ChannelMap:
         rear = [self._sensor(f"{corner}_steer_angle").start for corner in ("rl", "rr")]
         front = [self._sensor(f"{corner}_wheel_axis") for corner in ("fl", "fr")]
         demand = find(self._model, mujoco.mjtObj.mjOBJ_ACTUATOR, "steering_wheel")
+        felt = 1.0 - self._parameters.steering.assist_share
 
         def channel(name: str, unit: str, meaning: str) -> Channel:
             return Channel(name, unit, meaning, "vehicle")
@@ -198,6 +200,10 @@ class ChannelMap:
             Signal(
                 channel("steering_wheel_demand_rad", "rad", "steering wheel angle that the driver demands"),
                 Column("ctrl", demand),
+            ),
+            Signal(
+                channel("hand_torque_Nm", "Nm", "torque of the hands at the steering wheel, left positive"),
+                lambda rows: felt * rows.actuator_force[:, demand],
             ),
             Signal(
                 channel("front_steer_rad", "rad", "mean steer angle of the front wheels against the chassis"),
@@ -318,27 +324,36 @@ class ChannelMap:
 
         return force
 
-    def _screws(self) -> list[Signal]:
-        """What the motors of screws in the toe links do."""
+    def _motors(self) -> list[Signal]:
+        """What the motors of screws in the toe links, and of the superposition, do."""
         model, signals = self._model, []
-        for name, words in (("rl", "of the left link"), ("rr", "of the right link"), ("rear", "of both links")):
+        for name, words in (
+            ("rl", "of the left toe link"), ("rr", "of the right toe link"), ("rear", "of both toe links"),
+            (NAME, "of the superposition"),
+        ):  # fmt: skip
             if name + MOTOR not in self._sensors:
                 continue
             place = self._sensor(name + MOTOR).start
-            position, speed = (int(model.actuator_actadr[model.actuator(name + state).id]) for state in (SCREW, MOTOR))
 
             def channel(what: str, unit: str, meaning: str, *, name: str = name, words: str = words) -> Channel:
                 return Channel(f"{name}_{what}", unit, f"{meaning} {words}", "vehicle")
 
+            def state(ending: str, *, name: str = name) -> Column:
+                return Column("act", int(model.actuator_actadr[model.actuator(name + ending).id]))
+
+            if name != NAME:
+                signals.append(Signal(channel("screw_m", "m", "travel of the screw"), state(SCREW)))
             signals += [
-                Signal(channel("screw_m", "m", "travel of the screw"), Column("act", position)),
-                Signal(channel("motor_speed_radps", "rad/s", "speed of the motor"), Column("act", speed)),
+                Signal(channel("motor_speed_radps", "rad/s", "speed of the motor"), state(MOTOR)),
                 Signal(channel("motor_torque_Nm", "Nm", "torque of the motor"), Column("sensordata", place)),
                 Signal(
-                    channel("steer_saturated", "", "1 at a limit of angle, speed, torque or supply of the motor"),
+                    channel(
+                        "saturated" if name == NAME else "steer_saturated", "",
+                        "1 at a limit of angle, speed, torque or supply of the motor",
+                    ),
                     Column("sensordata", place + 1),
                 ),
-            ]
+            ]  # fmt: skip
         return signals
 
     def _actuators(self) -> list[Signal]:
@@ -367,6 +382,7 @@ class ChannelMap:
                 model.actuator_actadr[index] >= 0
                 and model.actuator_gainprm[index, 0] > 0.0
                 and model.actuator_trntype[index] != int(mujoco.mjtTrn.mjTRN_TENDON)
+                and name + MOTOR not in self._sensors
             ):
                 signals.append(
                     Signal(

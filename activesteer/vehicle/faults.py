@@ -157,13 +157,11 @@ class _ActuatorFault:
     def engage(self) -> None:
         """Lets the fault act."""
         record, kind = self._record, self.fault.kind
-        if self._screw and kind in ("stuck", "float"):
-            link, screw = self._screw
-            if kind == "stuck":
-                screw[fb.S_SEIZED] = 1.0
-            else:
-                # The nut is off its thread, and plays as far as the end stops let it.
-                link[fb.L_BACKLASH_m] = 4.0 * screw[fb.S_STOP_m]
+        if self._screw and kind == "stuck":
+            self._screw[-1][fb.S_SEIZED] = 1.0
+        elif len(self._screw) == 2 and kind == "float":
+            # The nut is off its thread, and plays as far as the end stops let it.
+            self._screw[0][fb.L_BACKLASH_m] = 4.0 * self._screw[1][fb.S_STOP_m]
         elif kind == "stuck" and ACTUATORS[self.fault.part].is_brake:
             if not self.memory:
                 self.memory.append(float(self._ctrl[self._index]))

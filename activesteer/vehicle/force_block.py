@@ -68,12 +68,14 @@ AREA_SIZE: Final = 5
 ) = range(9)  # fmt: skip
 POWERS: Final = 5
 LINK_SIZE: Final = L_ANGLE + POWERS
-# ... and one for each screw: with the starts of its links' records, and the coefficients of travel over angle.
+# ... and one for each screw: with the starts of its links' records, and the coefficients of travel over angle. The
+# superposition's motor has such a record too: its travel is an angle [rad], and it has the steering column for links.
 (
     S_ACT, S_MOTOR_ACT, S_COMMAND, S_LEAD_mprad, S_INERTIA_kgm2, S_POSITION_GAIN_1ps, S_SPEED_GAIN_1ps,
     S_SPEED_LIMIT_radps, S_PEAK_Nm, S_STALL_Nm, S_SLOPE_Nmsprad, S_POWER_W, S_FRICTION_Nm, S_LOAD_FRICTION, S_STOP_m,
-    S_TOLERANCE_m, S_SEIZED, S_OUT, S_N_LINKS, S_LINK, S_SECOND_LINK, S_TRAVEL,
-) = range(22)  # fmt: skip
+    S_TOLERANCE_m, S_SEIZED, S_OUT, S_N_LINKS, S_LINK, S_SECOND_LINK, S_COLUMN, S_COLUMN_STIFFNESS_Npm,
+    S_COLUMN_REST_m, S_COLUMN_ARM_m, S_TRAVEL,
+) = range(26)  # fmt: skip
 SCREW_SIZE: Final = S_TRAVEL + POWERS
 
 # What the callback writes into mjData.userdata: one record per wheel, then the force of each damper, then what the

@@ -16,7 +16,8 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.load import apply_load
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, DamperCurve, VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
-from activesteer.vehicle.toe_link_screws import fit_screws, flattened, screw_records
+from activesteer.vehicle.superposition_actuator import MOTOR, NAME, fit_motor, motor_record
+from activesteer.vehicle.toe_link_screws import fit_screws, flattened, screw_records, sensor_range
 
 _USER_DYNAMICS: Final = int(mujoco.mjtDyn.mjDYN_USER)
 _RATES: Final = {"slip_x": fb.U_RATE_X, "slip_y": fb.U_RATE_Y, "slip_z": fb.U_RATE_Z}
@@ -55,6 +56,8 @@ def load_model(
         spec.nuserdata = len(CORNERS) * (fb.USERDATA_PER_WHEEL + 1) + 1
         if parameters.rear_actuator.is_screw:
             fit_screws(spec, parameters.rear_actuator.resolved())
+        if parameters.superposition_actuator.is_geared:
+            fit_motor(spec)
         _fit_actuators(spec, parameters)
         apply_load(spec, parameters)
         block = _force_block(spec.compile(), parameters, tyres, road).to_array()
@@ -158,7 +161,12 @@ def _force_block(
     if parameters.rear_actuator.is_screw:
         screws = screw_records(model, parameters.rear_actuator.resolved())
         block.screws.extend(flattened(screws.records))
-        block.screw_sensors, places = screws.sensors, screws.places
+        places |= screws.places
+    if parameters.superposition_actuator.is_geared:
+        start = float(len(block.screws))
+        places |= {NAME: (fb.KIND_SCREW, int(start)), NAME + MOTOR: (fb.KIND_MOTOR, int(start))}
+        block.screws.extend(motor_record(model, parameters.superposition_actuator.resolved()))
+    block.screw_sensors = sensor_range(model)
     for index in range(model.nu):
         if (place := places.get(model.actuator(index).name)) is None:
             block.actuators.append(_actuator(model, index, parameters))

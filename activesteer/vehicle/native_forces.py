@@ -258,6 +258,24 @@ def _link_rate(link, state, act, ten_length, userdata, timestep_s):
 
 
 @inlined
+def _motor_load(block, screw, act, ten_length):
+    """Torque of the load at the motor, positive where it helps forwards, and the sum of its parts' magnitudes [N m]."""
+    lead = screw[fb.S_LEAD_mprad]
+    if screw[fb.S_N_LINKS] == 0.0:
+        stretch = ten_length[int(screw[fb.S_COLUMN])] - screw[fb.S_COLUMN_REST_m]
+        load = -screw[fb.S_COLUMN_STIFFNESS_Npm] * stretch * screw[fb.S_COLUMN_ARM_m] * lead
+        return load, abs(load)
+    load, carried = 0.0, 0.0
+    for index in range(int(screw[fb.S_N_LINKS])):
+        link = block[int(block[fb.SCREWS_START]) + int(screw[fb.S_LINK + index]) :]
+        longer_m = ten_length[int(link[fb.L_TENDON])] - link[fb.L_REST_m]
+        tension = link[fb.L_STIFFNESS_Npm] * (longer_m - act[int(link[fb.L_ACT])])
+        load += link[fb.L_SIGN] * tension * lead
+        carried += abs(tension) * lead
+    return load, carried
+
+
+@inlined
 def _motor_rate(block, screw, act, ctrl, ten_length, userdata, speed, timestep_s):
     """Rate of a motor's speed: position and speed loop within current, voltage and power, load, dry friction."""
     out = int(screw[fb.S_OUT])
@@ -273,13 +291,7 @@ def _motor_rate(block, screw, act, ctrl, ten_length, userdata, speed, timestep_s
     missing = (_polynomial(screw[fb.S_TRAVEL :], angle) - position) / lead
     limit = screw[fb.S_SPEED_LIMIT_radps]
     wanted = min(max(screw[fb.S_POSITION_GAIN_1ps] * missing, -limit), limit)
-    load, carried = 0.0, 0.0
-    for index in range(int(screw[fb.S_N_LINKS])):
-        link = block[int(block[fb.SCREWS_START]) + int(screw[fb.S_LINK + index]) :]
-        longer_m = ten_length[int(link[fb.L_TENDON])] - link[fb.L_REST_m]
-        tension = link[fb.L_STIFFNESS_Npm] * (longer_m - act[int(link[fb.L_ACT])])
-        load += link[fb.L_SIGN] * tension * lead
-        carried += abs(tension) * lead
+    load, carried = _motor_load(block, screw, act, ten_length)
     friction = screw[fb.S_FRICTION_Nm] + screw[fb.S_LOAD_FRICTION] * carried
     # The speed loop, its integral part settled: what the speed asked for needs against load and friction.
     target = speed - (wanted - speed) * math.expm1(-screw[fb.S_SPEED_GAIN_1ps] * timestep_s)

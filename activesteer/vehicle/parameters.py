@@ -14,6 +14,7 @@ from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.force_block import MAX_CURVE_POINTS
 from activesteer.vehicle.rear_actuator import RearActuator
+from activesteer.vehicle.superposition_actuator import SuperpositionActuator
 
 Positive = Annotated[float, Range(1e-12)]
 NotNegative = Annotated[float, Range(0.0)]
@@ -145,6 +146,9 @@ class Steering:
     """Steering wheel angle over mean road-wheel angle around straight ahead [-]."""
     steering_wheel_limit_rad: Positive
     """Lock angle of the steering wheel to either side [rad]."""
+    assist_share: Annotated[float, Range(0.0, 0.99)] = 0.35
+    """Share of the column's torque that the power assist carries and the hands do not feel [-]; 0.35 is what the
+    compact's column is made for (its README). Only `hand_torque_Nm` and the hands' own limit depend on it."""
 
 
 @dataclass(frozen=True)
@@ -260,6 +264,8 @@ class VehicleParameters:
     aerodynamics: Aerodynamics
     rear_actuator: RearActuator = RearActuator()
     """The model's hinges where not given."""
+    superposition_actuator: SuperpositionActuator = SuperpositionActuator()
+    """The model's servo where not given."""
     friction: Friction = Friction()
     """None where not given."""
     sensors: Sensors = Sensors()

@@ -12,13 +12,13 @@ from typing import Annotated, Final, Literal, Self
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
+from activesteer.vehicle.electric_actuator import ElectricActuator
 
 _HINGE: Final = "hinge"
-Positive = Annotated[float, Range(1e-9)]
 
 
 @dataclass(frozen=True)
-class RearActuator:
+class RearActuator(ElectricActuator):
     """The rear steering actuator; with `hinge` all other keys belong to the model and have no effect here."""
 
     preset: Literal["hinge", "screw_3deg", "screw_10deg"] = "hinge"
@@ -29,36 +29,10 @@ class RearActuator:
     """Greatest wheel angle to either side that it takes as a demand; the end stops lie 3 % beyond [rad]."""
     lead_m: Annotated[float, Range(1e-4, 0.05)] | None = None
     """Travel per turn of the screw [m]."""
-    gear: Annotated[float, Range(0.1, 200.0)] | None = None
-    """Turns of the motor per turn of the screw: belt or gear."""
     screw_stiffness_Npm: Annotated[float, Range(1e5, 1e10)] | None = None
     """Nut, thread, bearing and housing, in series with the link [N/m]."""
     backlash_m: Annotated[float, Range(0.0, 5e-3)] | None = None
     """Free play between link and screw, from end to end [m]."""
-    friction_torque_Nm: Annotated[float, Range(0.0, 10.0)] | None = None
-    """Dry friction at the motor without load: bearings, seals, brush [N m]."""
-    load_friction: Annotated[float, Range(0.0, 20.0)] | None = None
-    """Friction of the thread over the load's torque, tan(friction angle) / tan(lead angle): 1 and more locks itself."""
-    rotor_inertia_kgm2: Annotated[float, Range(1e-7, 1e-2)] | None = None
-    """All that turns with the motor, screw included [kg m2]."""
-    peak_torque_Nm: Positive | None = None
-    """Most torque of the motor: its current limit [N m]."""
-    stall_torque_Nm: Positive | None = None
-    """Torque at rest without that limit, at nominal voltage: where its line begins [N m]."""
-    no_load_speed_radps: Positive | None = None
-    """Speed at which it has none left, at nominal voltage [rad/s]."""
-    speed_limit_radps: Positive | None = None
-    """Speed that its controller asks for at most [rad/s]."""
-    nominal_voltage_V: Positive | None = None
-    """Voltage to which these belong [V]."""
-    supply_voltage_V: Annotated[float, Range(0.0, 1000.0)] | None = None
-    """Voltage that it gets; 0: unpowered [V]."""
-    supply_power_W: Annotated[float, Range(0.0, 1e5)] | None = None
-    """Most mechanical power that the supply allows the motor [W]."""
-    position_gain_1ps: Annotated[float, Range(1.0, 300.0)] | None = None
-    """Position loop: speed asked for over the error of the position [1/s]."""
-    speed_gain_1ps: Annotated[float, Range(5.0, 700.0)] | None = None
-    """Speed loop: how fast an error of the speed goes where the motor is strong enough [1/s]."""
     position_tolerance_m: Annotated[float, Range(0.0, 1e-3)] | None = None
     """Error of the screw's position at which the motor is switched off, if the screw then holds by itself [m]."""
 
@@ -68,7 +42,7 @@ class RearActuator:
         Raises:
             ParameterError: the hinge is given what only a screw has.
         """
-        given = [field.name for field in fields(self)[1:] if getattr(self, field.name) is not None]
+        given = [item.name for item in fields(self) if item.name != "preset" and getattr(self, item.name) is not None]
         if self.preset == _HINGE and given:
             problem = "has no effect on the hinge, whose numbers are in the model; preset screw_3deg is a screw"
             raise ParameterError(problem, key=given[0], value=getattr(self, given[0]))

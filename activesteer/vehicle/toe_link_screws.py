@@ -26,7 +26,9 @@ import numpy as np
 
 from activesteer.errors import ModelError
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.electric_actuator import known
 from activesteer.vehicle.rear_actuator import RearActuator
+from activesteer.vehicle.superposition_actuator import MOTOR
 from activesteer.vehicle.toe_link_kinematics import toe_link_map
 
 CORNERS: Final = ("rl", "rr")
@@ -34,8 +36,8 @@ LINKS: Final = ("toe_link", "tie_rod")
 """What a rear toe link may be called behind its corner."""
 STOP_BEYOND: Final = 1.03
 """Where the end stops are, over the travel at the limit."""
-SCREW, MOTOR = "_screw", "_motor"
-"""How the states beside an actuator are called: of its own side, or `rear_...` of one in the middle."""
+SCREW: Final = "_screw"
+"""How the state beside an actuator is called that is its screw's: of its own side, or `rear_screw` in the middle."""
 
 
 def fit_screws(spec: mujoco.MjSpec, actuator: RearActuator) -> None:
@@ -108,12 +110,10 @@ class Screws:
     Attributes:
         records: What stands in the block: a record for each link, then one for each screw.
         places: Name of an actuator -> kind and start of its record behind the first.
-        sensors: Where in `sensordata` their sensors begin, and how many numbers these have.
     """
 
     records: list[list[float]]
     places: dict[str, tuple[float, int]]
-    sensors: tuple[int, int]
 
 
 def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
@@ -126,19 +126,17 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
     Raises:
         ModelError: the toe links do not steer the wheels so far.
     """
-    limit = _set(actuator.limit_rad)
+    limit = known(actuator.limit_rad)
     names = [_tendon(model, corner) for corner in CORNERS]
     left = toe_link_map(model, "rl", names[0], limit)
     right = toe_link_map(model, "rr", names[1], limit)
     maps = (left, right)
-    lead = _set(actuator.lead_m) / (2.0 * math.pi * _set(actuator.gear))
+    lead = known(actuator.lead_m) / (2.0 * math.pi * known(actuator.gear))
     central = actuator.arrangement == "central"
     parts = ("rear",) if central else CORNERS
     places: dict[str, tuple[float, int]] = {}
     records: list[list[float]] = []
-    # The sensors, and behind them how many faults act, are the end of `userdata`.
-    count = len(CORNERS) + 2 * len(parts)
-    outs = model.nuserdata - 1 - count
+    outs = model.nuserdata - 1 - sensor_range(model)[1]
     first_screw = len(CORNERS) * fb.LINK_SIZE
     for index, (corner, tendon) in enumerate(zip(CORNERS, names, strict=True)):
         part = "rear" if central else corner
@@ -147,35 +145,42 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
         tendon_id = model.tendon(tendon).id
         records.append([
             tendon_id, float(model.tendon_length0[tendon_id]), float(model.tendon_stiffness[tendon_id]),
-            _set(actuator.backlash_m), _act(model, f"{corner}_steer"), _act(model, part + SCREW), sign,
+            known(actuator.backlash_m), _act(model, f"{corner}_steer"), _act(model, part + SCREW), sign,
             outs + index, *maps[index].angle_of_travel,
         ])  # fmt: skip
-    ratio = _set(actuator.supply_voltage_V) / _set(actuator.nominal_voltage_V)
     for index, part in enumerate(parts):
         start = first_screw + index * fb.SCREW_SIZE
         places[part + SCREW], places[part + MOTOR] = (fb.KIND_SCREW, start), (fb.KIND_MOTOR, start)
         # One for both: what moves the left link out moves the right one in.
         travel = maps[index].travel_of_angle if not central else (0.5 * (left.travel_of_angle - right.travel_of_angle))
-        command = model.actuator(f"{CORNERS[index]}_steer").id
         links = [0, fb.LINK_SIZE] if central else [index * fb.LINK_SIZE]
-        most = max(mapped.travel_m for mapped in maps)
-        records.append([
-            _act(model, part + SCREW), _act(model, part + MOTOR), command, lead, _set(actuator.rotor_inertia_kgm2),
-            _set(actuator.position_gain_1ps), _set(actuator.speed_gain_1ps), _set(actuator.speed_limit_radps),
-            _set(actuator.peak_torque_Nm) if ratio > 0.0 else 0.0, _set(actuator.stall_torque_Nm) * ratio,
-            _set(actuator.stall_torque_Nm) / _set(actuator.no_load_speed_radps), _set(actuator.supply_power_W),
-            _set(actuator.friction_torque_Nm), _set(actuator.load_friction), STOP_BEYOND * most,
-            _set(actuator.position_tolerance_m), 0.0,
-            outs + len(CORNERS) + 2 * index, len(links), *links, *([0] * (2 - len(links))), *travel,
-        ])  # fmt: skip
+        values = actuator.motor_numbers() | {
+            fb.S_ACT: _act(model, part + SCREW),
+            fb.S_MOTOR_ACT: _act(model, part + MOTOR),
+            fb.S_COMMAND: model.actuator(f"{CORNERS[index]}_steer").id,
+            fb.S_LEAD_mprad: lead,
+            fb.S_STOP_m: STOP_BEYOND * max(mapped.travel_m for mapped in maps),
+            fb.S_TOLERANCE_m: known(actuator.position_tolerance_m),
+            fb.S_OUT: outs + len(CORNERS) + 2 * index,
+            fb.S_N_LINKS: len(links),
+        }
+        record = [0.0] * fb.SCREW_SIZE
+        for place, value in values.items():
+            record[place] = float(value)
+        record[fb.S_LINK : fb.S_LINK + len(links)] = links
+        record[fb.S_TRAVEL :] = travel.tolist()
+        records.append(record)
     assert all(len(record) in (fb.LINK_SIZE, fb.SCREW_SIZE) for record in records)
-    sensors = int(model.sensor_adr[model.sensor(f"{CORNERS[0]}_steer_angle").id])
-    return Screws(records, places, (sensors, count))
+    return Screws(records, places)
 
 
-def _set(value: float | None) -> float:
-    assert value is not None
-    return value
+def sensor_range(model: mujoco.MjModel) -> tuple[int, int]:
+    """Where in `sensordata` the sensors begin that a callback fills, and how many numbers they have.
+
+    They, and behind them how many faults act, are the end of `userdata`.
+    """
+    ours = np.flatnonzero(model.sensor_type == int(mujoco.mjtSensor.mjSENS_USER))
+    return (int(model.sensor_adr[ours[0]]), int(model.sensor_dim[ours].sum())) if ours.size else (0, 0)
 
 
 def _act(model: mujoco.MjModel, actuator: str) -> int:

@@ -1,0 +1,71 @@
+"""What all electric actuators have: a motor with its supply and loops, and a gear with friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from activesteer.config import Range
+from activesteer.vehicle import force_block as fb
+
+Positive = Annotated[float, Range(1e-9)]
+
+
+@dataclass(frozen=True)
+class ElectricActuator:
+    """A motor behind a gear; what is not given is the preset's."""
+
+    gear: Annotated[float, Range(0.1, 200.0)] | None = None
+    """Turns of the motor per turn of what it drives."""
+    friction_torque_Nm: Annotated[float, Range(0.0, 10.0)] | None = None
+    """Dry friction at the motor without load: bearings, seals, brush [N m]."""
+    load_friction: Annotated[float, Range(0.0, 20.0)] | None = None
+    """Friction over the load's torque at the motor; of a thread tan(friction angle) / tan(lead angle): 1 and more locks
+    itself."""
+    rotor_inertia_kgm2: Annotated[float, Range(1e-7, 1e-2)] | None = None
+    """All that turns with the motor [kg m2]."""
+    peak_torque_Nm: Positive | None = None
+    """Most torque of the motor: its current limit [N m]."""
+    stall_torque_Nm: Positive | None = None
+    """Torque at rest without that limit, at nominal voltage: where its line begins [N m]."""
+    no_load_speed_radps: Positive | None = None
+    """Speed at which it has none left, at nominal voltage [rad/s]."""
+    speed_limit_radps: Positive | None = None
+    """Speed that its controller asks for at most [rad/s]."""
+    nominal_voltage_V: Positive | None = None
+    """Voltage to which these belong [V]."""
+    supply_voltage_V: Annotated[float, Range(0.0, 1000.0)] | None = None
+    """Voltage that it gets; 0: unpowered [V]."""
+    supply_power_W: Annotated[float, Range(0.0, 1e5)] | None = None
+    """Most mechanical power that the supply allows the motor [W]."""
+    position_gain_1ps: Annotated[float, Range(1.0, 300.0)] | None = None
+    """Position loop: speed asked for over the error of the position [1/s]."""
+    speed_gain_1ps: Annotated[float, Range(5.0, 700.0)] | None = None
+    """Speed loop: how fast an error of the speed goes where the motor is strong enough [1/s]."""
+
+    @property
+    def voltage_ratio(self) -> float:
+        """Supply over nominal voltage [-]."""
+        return known(self.supply_voltage_V) / known(self.nominal_voltage_V)
+
+    def motor_numbers(self) -> dict[int, float]:
+        """What of a record (`force_block`) follows from these, by its index."""
+        ratio = self.voltage_ratio
+        return {
+            fb.S_INERTIA_kgm2: known(self.rotor_inertia_kgm2),
+            fb.S_POSITION_GAIN_1ps: known(self.position_gain_1ps),
+            fb.S_SPEED_GAIN_1ps: known(self.speed_gain_1ps),
+            fb.S_SPEED_LIMIT_radps: known(self.speed_limit_radps),
+            fb.S_PEAK_Nm: known(self.peak_torque_Nm) if ratio > 0.0 else 0.0,
+            fb.S_STALL_Nm: known(self.stall_torque_Nm) * ratio,
+            fb.S_SLOPE_Nmsprad: known(self.stall_torque_Nm) / known(self.no_load_speed_radps),
+            fb.S_POWER_W: known(self.supply_power_W),
+            fb.S_FRICTION_Nm: known(self.friction_torque_Nm),
+            fb.S_LOAD_FRICTION: known(self.load_friction),
+        }
+
+
+def known(value: float | None) -> float:
+    """A value of which the preset has taken care."""
+    assert value is not None
+    return value

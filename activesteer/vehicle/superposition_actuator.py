@@ -1,0 +1,134 @@
+"""What turns the front superposition, as a vehicle file says: the model's servo, or a motor with gear and lock.
+
+The gear adds its angle between steering wheel and rack, so all three carry the same torque: what the superposition
+needs the hands must hold. Motor and gear take the place of the servo's lag and rate limit; its stiffness stays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Final, Literal, Self
+
+import mujoco
+
+from activesteer.config import Range
+from activesteer.errors import ModelError, ParameterError
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.electric_actuator import ElectricActuator, known
+
+NAME: Final = "superposition"
+MOTOR: Final = "_motor"
+"""How the state beside an actuator is called that is the speed of its motor; so is its sensor."""
+_COLUMN: Final = "steering_column"
+_STOP_BEYOND: Final = 1.03
+
+
+@dataclass(frozen=True)
+class SuperpositionActuator(ElectricActuator):
+    """The superposition's actuator; with `servo` all other keys belong to the model and have no effect here."""
+
+    preset: Literal["servo", "strain_wave"] = "servo"
+    """`servo`: the model's own; `strain_wave`: a motor and a strain-wave gear, which the other keys change."""
+    lock_torque_Nm: Annotated[float, Range(0.0, 50.0)] | None = None
+    """What the electromagnetic lock at the motor holds where there is no supply [N m]."""
+    position_tolerance_rad: Annotated[float, Range(0.0, 0.1)] | None = None
+    """Error of the angle behind the gear at which the motor is switched off, if the gear then holds by itself [rad]."""
+
+    def __post_init__(self) -> None:
+        """No key without effect.
+
+        Raises:
+            ParameterError: the servo is given what only a motor has.
+        """
+        given = [item.name for item in fields(self) if item.name != "preset" and getattr(self, item.name) is not None]
+        if not self.is_geared and given:
+            problem = "has no effect on the servo, whose numbers are in the model; preset strain_wave has a motor"
+            raise ParameterError(problem, key=given[0], value=getattr(self, given[0]))
+
+    @property
+    def is_geared(self) -> bool:
+        """Whether a motor turns it through a gear."""
+        return self.preset != "servo"
+
+    def smooth(self) -> Self:
+        """The same without dry friction and tolerance of the angle, within which slopes mean nothing."""
+        if not self.is_geared:
+            return self
+        return replace(self, friction_torque_Nm=0.0, load_friction=0.0, position_tolerance_rad=0.0)
+
+    def resolved(self) -> Self:
+        """The same with the preset's value for every key that is not given."""
+        return replace(self, **{key: value for key, value in STRAIN_WAVE.items() if getattr(self, key) is None})
+
+
+STRAIN_WAVE: Final = {
+    # A strain-wave gear (Audi) or a planetary one (BMW), a motor, and an electromagnetic lock that holds it where it
+    # is: press and training texts. Their numbers are not published; all of these are assumptions: 8 rad/s behind the
+    # gear as the servo has (29 deg/s at the road wheel), 60 N m, three quarters of the power through a gear under load.
+    "gear": 50.0,
+    "friction_torque_Nm": 0.03,
+    "load_friction": 0.3,
+    "rotor_inertia_kgm2": 2e-5,
+    "peak_torque_Nm": 1.6,
+    "stall_torque_Nm": 3.0,
+    "no_load_speed_radps": 800.0,
+    "speed_limit_radps": 400.0,
+    "nominal_voltage_V": 13.0,
+    "supply_voltage_V": 13.0,
+    "supply_power_W": 250.0,
+    "position_gain_1ps": 50.0,
+    "speed_gain_1ps": 200.0,
+    "lock_torque_Nm": 2.0,
+    "position_tolerance_rad": 1e-3,
+}
+"""What the keys of the preset `strain_wave` are where they are not given."""
+
+
+def fit_motor(spec: mujoco.MjSpec) -> None:
+    """Gives the superposition of a model a motor: a state without a force, and a sensor of torque and limits.
+
+    Raises:
+        ModelError: the model has no superposition, or it does not turn the column.
+    """
+    if spec.joint(NAME) is None or spec.actuator(NAME) is None or spec.tendon(_COLUMN) is None:
+        raise ModelError(f"a motor for the superposition needs joint and actuator {NAME!r} and the tendon {_COLUMN!r}")
+    added = spec.add_actuator(
+        name=NAME + MOTOR, target=NAME, trntype=mujoco.mjtTrn.mjTRN_JOINT, dyntype=mujoco.mjtDyn.mjDYN_USER,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED, biastype=mujoco.mjtBias.mjBIAS_NONE,
+    )  # fmt: skip
+    added.gainprm[0] = 0.0
+    spec.add_sensor(name=NAME + MOTOR, type=mujoco.mjtSensor.mjSENS_USER, dim=2)
+    spec.nuserdata += 2
+
+
+def motor_record(model: mujoco.MjModel, actuator: SuperpositionActuator) -> list[float]:
+    """What the callbacks need (`force_block`).
+
+    Args:
+        model: The model with the motor, compiled.
+        actuator: What the vehicle file says, with all keys.
+    """
+    record = [0.0] * fb.SCREW_SIZE
+    index, column = model.actuator(NAME).id, model.tendon(_COLUMN).id
+    parts = range(int(model.tendon_adr[column]), int(model.tendon_adr[column] + model.tendon_num[column]))
+    arms = {int(model.wrap_objid[part]): float(model.wrap_prm[part]) for part in parts}
+    values = actuator.motor_numbers() | {
+        fb.S_ACT: float(model.actuator_actadr[index]),
+        fb.S_MOTOR_ACT: float(model.actuator_actadr[model.actuator(NAME + MOTOR).id]),
+        fb.S_COMMAND: float(index),
+        fb.S_LEAD_mprad: 1.0 / known(actuator.gear),
+        fb.S_STOP_m: _STOP_BEYOND * float(model.actuator_ctrlrange[index, 1]),
+        fb.S_TOLERANCE_m: known(actuator.position_tolerance_rad),
+        # What it says stands last of all sensors, before how many faults act.
+        fb.S_OUT: float(model.nuserdata - 3),
+        fb.S_COLUMN: float(column),
+        fb.S_COLUMN_STIFFNESS_Npm: float(model.tendon_stiffness[column]),
+        fb.S_COLUMN_REST_m: float(model.tendon_lengthspring[column, 0]),
+        fb.S_COLUMN_ARM_m: arms[model.joint(NAME).id],
+        fb.S_TRAVEL: 1.0,
+    }
+    if actuator.voltage_ratio == 0.0:
+        values[fb.S_FRICTION_Nm] += known(actuator.lock_torque_Nm)
+    for place, value in values.items():
+        record[place] = value
+    return record
