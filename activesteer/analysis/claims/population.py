@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
@@ -53,6 +53,10 @@ class ClaimShare:
     def verdict(self) -> ShareVerdict:
         """What the interval says of the claim."""
         return share_verdict(self.low, self.high)
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {**asdict(self), "verdict": self.verdict.value}
 
     @property
     def words(self) -> str:
@@ -134,8 +138,7 @@ class Population:
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values."""
-        claims = [{**asdict(claim), "verdict": claim.verdict.value} for claim in self.claims]
-        return {**asdict(self), "claims": claims}
+        return {**asdict(self), "claims": [claim.to_json() for claim in self.claims]}
 
     @classmethod
     def from_json(cls, table: Mapping[str, Any]) -> Population:
@@ -213,8 +216,3 @@ def stored_population(vehicle: str) -> Population | None:
         text = path.read_text(encoding="utf-8")
     found = Population.from_json(json.loads(text))
     return found if found.vehicle == vehicle else None
-
-
-def sorted_out(population: Population) -> dict[ShareVerdict, Sequence[ClaimShare]]:
-    """Its claims by verdict."""
-    return {verdict: [claim for claim in population.claims if claim.verdict is verdict] for verdict in ShareVerdict}

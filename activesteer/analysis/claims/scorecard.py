@@ -11,10 +11,12 @@ from importlib.resources import files
 from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims.claim import SYSTEMS, Claim
+from activesteer.analysis.claims.population import ClaimShare, Population, percent, stored_population
 from activesteer.analysis.claims.scenarios import STATEMENTS
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.files import finite
 from activesteer.quantities import metric_label
+from activesteer.theory.shares import ShareVerdict
 
 FILE: Final = "not_reproduced.toml"
 
@@ -37,11 +39,13 @@ class Judged(NamedTuple):
         claim: The claim.
         verdict: What became of it.
         reason: Why it is known not to come out; empty where it is not listed.
+        share: How often it holds in the stored population; None where there is none.
     """
 
     claim: Claim
     verdict: Verdict
     reason: str
+    share: ClaimShare | None = None
 
 
 @dataclass(frozen=True)
@@ -50,9 +54,11 @@ class Scorecard:
 
     Attributes:
         judged: All of them, in the order given.
+        population: The stored population of the car; None where there is none.
     """
 
     judged: tuple[Judged, ...]
+    population: Population | None = None
 
     @property
     def exit_status(self) -> int:
@@ -73,18 +79,24 @@ class Scorecard:
                     "criterion": item.claim.criterion,
                     "kind": item.claim.statement.kind.value,
                     "obstacle": item.claim.obstacle,
+                    "population": None if item.share is None else item.share.to_json(),
                 }
                 for item in self.judged
             ],
             "verdicts": {verdict.value: self._count(verdict) for verdict in Verdict},
+            "population": None
+            if self.population is None
+            else {"samples": self.population.samples, "seed": self.population.seed},
         }
 
     def to_text(self) -> str:
         """The scorecard for a terminal: number, verdict, text, then the numbers, in degrees and km/h."""
-        lines = []
-        for claim, verdict, reason in self.judged:
+        beside = any(item.share is not None for item in self.judged)
+        lines = [f"    {'nominal':<14}  population"] if beside else []
+        for claim, verdict, reason, share in self.judged:
             short = {Verdict.FAILED: "FAILED", Verdict.UNEXPECTED: "passed!"}.get(verdict, verdict.value)
-            lines.append(f"{claim.id}  {short:<14}  {claim.text}")
+            held = f"{percent(share.share):>3} %  {share.verdict.value:<13}  " if share is not None else ""
+            lines.append(f"{claim.id}  {short:<14}  {held or (' ' * 22 if beside else '')}{claim.text}")
             lines += [f"{'':20}{line}" for line in number_lines(claim.values)]
             if claim.obstacle:
                 lines.append(f"{'':20}nothing is proved: {claim.obstacle}")
@@ -93,19 +105,44 @@ class Scorecard:
             elif reason:
                 lines.append(f"{'':20}because: {reason}")
         counts = [f"{self._count(verdict)} {verdict.value}" for verdict in Verdict if self._count(verdict)]
-        return "\n".join([*lines, f"{len(self.judged)} claims: {', '.join(counts)}"])
+        lines.append(f"{len(self.judged)} claims: {', '.join(counts)}")
+        if beside and self.population is not None:
+            lines.append(f"in {self.population.samples} other cars, roads and drivers, with 95 % confidence:")
+            lines += [f"{'':2}{verdict.value:<13}  {names}" for verdict, names in self.by_share().items()]
+        return "\n".join(lines)
+
+    def by_share(self) -> dict[ShareVerdict, str]:
+        """What the population says of the claims: verdict -> their numbers, with what each depends on most."""
+        shares = [item.share for item in self.judged if item.share is not None]
+        return {
+            verdict: ", ".join(
+                f"{share.id} ({share.depends_on})" if verdict is ShareVerdict.DEPENDS else share.id
+                for share in shares
+                if share.verdict is verdict
+            )
+            for verdict in ShareVerdict
+            if any(share.verdict is verdict for share in shares)
+        }
 
     def _count(self, verdict: Verdict) -> int:
         return sum(item.verdict is verdict for item in self.judged)
 
 
-def scorecard(claims: Iterable[Claim], vehicle: str = "", *, known: Mapping[str, str] | None = None) -> Scorecard:
+def scorecard(
+    claims: Iterable[Claim],
+    vehicle: str = "",
+    *,
+    known: Mapping[str, str] | None = None,
+    population: Population | None = None,
+) -> Scorecard:
     """Put claims and what is known of them together.
 
     Args:
         claims: Checked claims.
-        vehicle: Name of the vehicle; what is known not to come out with it is looked up, see `not_reproduced`.
+        vehicle: Name of the vehicle; what is known not to come out with it is looked up, see `not_reproduced`, and how
+            often the claims hold in its population.
         known: In place of that, number -> reason of the claims known not to come out.
+        population: In place of the stored one.
 
     Returns:
         The scorecard.
@@ -114,7 +151,12 @@ def scorecard(claims: Iterable[Claim], vehicle: str = "", *, known: Mapping[str,
         ParameterError: the list of what is known is wrong.
     """
     reasons = not_reproduced(vehicle) if known is None else known
-    return Scorecard(tuple(Judged(claim, _verdict(claim, reasons), reasons.get(claim.id, "")) for claim in claims))
+    stored = population or stored_population(vehicle)
+    judged = (
+        Judged(claim, _verdict(claim, reasons), reasons.get(claim.id, ""), stored.of(claim.id) if stored else None)
+        for claim in claims
+    )
+    return Scorecard(tuple(judged), stored)
 
 
 def not_reproduced(vehicle: str, text: str | None = None) -> dict[str, str]:

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from activesteer.analysis.claims.scorecard import Verdict, number_lines
+from activesteer.analysis.claims.population import percent
+from activesteer.analysis.claims.scorecard import Scorecard, Verdict, number_lines
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import Group, entry, groups_of
 from activesteer.analysis.report.judgement import Judgement, judge
@@ -72,15 +73,23 @@ def report_page(recordings: Mapping[str, Recording]) -> str:
     runs = [run for group in groups for run in group.runs]
     every = [run.recording for run in runs]
     file_titles, files = file_rows(groups)
+    cards = [section.judgement.scorecard for section in sections]
+    everything = Scorecard(
+        tuple(item for card in cards for item in card.judged),
+        next((card.population for card in cards if card.population is not None), None),
+    )
     return render(
         "report.html",
         title=TITLE if several else f"{TITLE}: {groups[0].title}",
         runs=runs,
         sections=sections,
         vehicles=list(dict.fromkeys(entry(recording, "vehicle", "name") or "?" for recording in every)),
-        verdicts=verdict_counts(section.judgement.scorecard for section in sections),
+        verdicts=verdict_counts(cards),
         verdict_class=_VERDICT_CLASS,
+        by_share=everything.by_share(),
+        population=everything.population,
         number_lines=number_lines,
+        percent=percent,
         names=[f"{group.name} {run.name}" if several else run.name for group in groups for run in group.runs],
         vehicle=rows(every, "vehicle"),
         versions=rows(every, "versions"),

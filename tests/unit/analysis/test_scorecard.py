@@ -8,6 +8,7 @@ import math
 import pytest
 
 from activesteer.analysis.claims import Claim, Kind, Statement, Verdict, not_reproduced, scorecard
+from activesteer.analysis.claims.population import ClaimShare, Population
 from activesteer.errors import ParameterError
 from tests.raising import raises
 
@@ -54,7 +55,7 @@ def test_all_passed():
 def test_json_has_the_keys_and_no_nan():
     table = scorecard([claim("L1", False, none_x_m=math.nan, ars_x_m=1.0)], known={}).to_json()
     entry = table["claims"][0]
-    keys = {"id", "text", "passed", "values", "criterion", "verdict", "reason", "kind", "obstacle"}
+    keys = {"id", "text", "passed", "values", "criterion", "verdict", "reason", "kind", "obstacle", "population"}
     assert keys == set(entry)
     assert entry["values"] == {"none_x_m": None, "ars_x_m": 1.0}
     assert table["verdicts"]["failed"] == 1
@@ -94,3 +95,26 @@ def test_the_list_of_the_vehicle_is_looked_up_by_its_name():
 def test_a_wrong_list_is_refused(text, key):
     with raises(ParameterError, file="not_reproduced.toml", key=key):
         not_reproduced("compact", text)
+
+
+def test_the_share_of_the_population_stands_beside_the_nominal_verdict():
+    shares = (
+        ClaimShare("S1", True, 100, 0.99, 0.95, 1.0),
+        ClaimShare("S2", True, 100, 0.5, 0.4, 0.6, "road.mu", 0.3, 1),
+        ClaimShare("D1", False, 100, 0.0, 0.0, 0.04),
+    )
+    population = Population(100, 1, "compact", {}, shares, ())
+    claims = [claim("S1", True), claim("S2", True), claim("D1", False), claim("D2", True)]
+    card = scorecard(claims, known={"D1": "why"}, population=population)
+    lines = card.to_text().splitlines()
+    assert "S1  passed           99 %  holds          text of S1" in lines
+    assert "D1  not reproduced    0 %  does not hold  text of D1" in lines
+    assert "D2  passed                                text of D2" in lines
+    assert lines[-3:] == ["  holds          S1", "  depends        S2 (road.mu)", "  does not hold  D1"]
+    first, *_, last = card.to_json()["claims"]
+    assert (first["population"]["verdict"], first["population"]["share"]) == ("holds", 0.99)
+    assert last["population"] is None
+
+
+def test_a_car_without_a_population_has_no_shares():
+    assert "population" not in scorecard([claim("S1", True)], "a car that nobody knows").to_text()
