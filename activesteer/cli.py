@@ -70,6 +70,7 @@ def all_commands() -> Commands:
     """The commands of the program, in the groups under which `--help` lists them."""
     from activesteer.commands import (
         bench,
+        driver,
         envelope,
         fault_map,
         figures,
@@ -99,7 +100,7 @@ def all_commands() -> Commands:
         "drive": (listing, run, watch),
         "look": (info, report, replay, video, recover),
         "car": (vehicle, tyre, kc),
-        "study": (study, tune, envelope, fault_map, identify, linearise),
+        "study": (study, tune, envelope, fault_map, identify, linearise, driver),
         "prove": (reproduce, figures, validate, bench),
     }.items():
         commands.begin_group(title)

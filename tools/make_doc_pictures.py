@@ -1,9 +1,9 @@
 """Makes the pictures of the documentation that come from runs: `python tools/make_doc_pictures.py [NAME]...`.
 
-One for every manoeuvre and those of the pages on controllers and tyres. Without names all are made, in a minute or two;
-to be run again when the car, a controller or a manoeuvre has changed. What `activesteer run MANEUVER --plot` draws is
-taken where it says something; driving straight and standing are shown by other channels, and the sweep as the frequency
-response that it is driven for.
+One for every manoeuvre and those of the pages on controllers, drivers and tyres. Without names all are made, in two
+minutes; to be run again when the car, a controller or a manoeuvre has changed. What `activesteer run MANEUVER --plot`
+draws is taken where it says something; driving straight and standing are shown by other channels, and the sweep as the
+frequency response that it is driven for.
 """
 
 from __future__ import annotations
@@ -22,12 +22,14 @@ from PIL import Image
 from activesteer.analysis.figures import BY_KIND, style, time_histories
 from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
 from activesteer.analysis.frequency_response import frequency_response
+from activesteer.analysis.linear_plots import driver_loops_figure
 from activesteer.plotting import new_figure
 from activesteer.quantities import DisplayUnit, Quantity, quantity_of
 from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
+from activesteer.studies.driver_loop import FREQUENCIES_RADPS, driver_loops
 from activesteer.tyre import MagicFormula, load_tir
 
 if TYPE_CHECKING:
@@ -74,7 +76,7 @@ def main(names: Sequence[str]) -> None:
     pictures: dict[str, Callable[[], Mapping[str, Figure]]] = {
         name: lambda name=name: {f"manoeuvre_{name}": _manoeuvre(name)} for name in list_maneuvers()
     }
-    pictures |= {"controller": _controller, "sensors": _sensors, "tyres": _tyres, "brakes": _brakes}
+    pictures |= {"controller": _controller, "driver": _driver, "sensors": _sensors, "tyres": _tyres, "brakes": _brakes}
     for name in names or pictures:
         if name not in pictures:
             sys.exit(f"there is no picture {name}; there are: {', '.join(pictures)}")
@@ -157,6 +159,13 @@ def _sensors() -> dict[str, Figure]:
     axes[0].legend(frameon=False)
     figure.align_ylabels(list(axes))
     return {"sensors": figure}
+
+
+def _driver() -> dict[str, Figure]:
+    """The loop of the typical driver and the compact: Bode diagrams, and damping over speed."""
+    loops = driver_loops()
+    rows = [loop.to_json() for loop in loops]
+    return {"driver_loop": driver_loops_figure(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])}
 
 
 def _tyres() -> dict[str, Figure]:

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from activesteer.quantities import quantity_of
 if TYPE_CHECKING:
     import control
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 BODE_RANGE_Hz: Final = (0.1, 10.0)
 """Frequencies of a Bode diagram [Hz]."""
@@ -91,6 +92,68 @@ def draw_bode(
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 4), frameon=False)
     return save(figure, Path(path))
+
+
+def driver_loops_figure(
+    rows: Sequence[Mapping[str, Any]],
+    frequency_radps: NDArray[np.float64],
+    responses: Sequence[NDArray[np.complexfloating]],
+) -> Figure:
+    """Bode diagrams of the opened loop of driver and car, and its damping over speed.
+
+    The diagrams are those of the speed in the middle.
+
+    Args:
+        rows: Figures of each loop: `speed_kmh`, `controller`, `damping`, `damping_in_run`, `phase_margin_deg`,
+            `crossover_rad_s`.
+        frequency_radps: Frequencies [rad/s].
+        responses: What comes back of a decision, one row for each loop.
+
+    Raises:
+        ParameterError: matplotlib is not installed.
+    """
+    figure = new_figure(width_in=7.5, height_in=8.0)
+    gain, phase, damping = axes = figure.subplots(3, 1, height_ratios=(1.2, 1.0, 1.0))
+    speeds = sorted({row["speed_kmh"] for row in rows})
+    middle = speeds[len(speeds) // 2]
+    controllers = list(dict.fromkeys(row["controller"] for row in rows))
+    for place, (controller, colour) in enumerate(zip(controllers, RUN_COLOURS * len(controllers), strict=False)):
+        own = [row for row in rows if row["controller"] == controller]
+        shown, response = next(
+            (row, response)
+            for row, response in zip(rows, responses, strict=True)
+            if (row["controller"], row["speed_kmh"]) == (controller, middle)
+        )
+        crossover_radps, margin_deg = shown["crossover_rad_s"], shown["phase_margin_deg"]
+        label = f"{controller}: {crossover_radps:.1f} rad/s, margin {margin_deg:.0f} deg"
+        gain.loglog(frequency_radps, np.abs(response), color=colour, label=label)
+        angle = np.degrees(np.unwrap(np.angle(response)))
+        phase.semilogx(frequency_radps, angle - 360.0 * round((angle[0] + 180.0) / 360.0), color=colour)
+        for axis in (gain, phase):
+            axis.axvline(crossover_radps, color=colour, lw=0.8, ls=":")
+        speed_kmh = [row["speed_kmh"] for row in own]
+        damping.plot(speed_kmh, [row["damping"] for row in own], color=colour)
+        damping.plot(
+            speed_kmh, [row["damping_in_run"] for row in own], "o", color=colour, ms=max(3.0, 9.0 - 3.0 * place)
+        )
+    gain.axhline(1.0, color=RUN_COLOURS[0], lw=0.6)
+    gain.set_ylim(0.05, 50.0)
+    gain.set_ylabel(f"gain at {middle:.0f} km/h [-]")
+    gain.legend(frameon=False)
+    phase.axhline(-180.0, color=RUN_COLOURS[0], lw=0.6)
+    phase.set_ylim(-360.0, -90.0)
+    phase.set_yticks(range(-360, -89, 90))
+    phase.set_ylabel("phase [deg]")
+    phase.set_xlabel("frequency [rad/s]")
+    for axis in (gain, phase):
+        axis.set_xlim(frequency_radps[0], 20.0)
+    damping.set_ylim(bottom=min(0.0, *(row["damping_in_run"] for row in rows)))
+    damping.set_ylabel("damping [-]\nlines linear, dots runs")
+    damping.set_xlabel("speed [km/h]")
+    for axis in axes:
+        _grid(axis)
+    figure.align_ylabels(axes)
+    return figure
 
 
 def draw_root_locus(

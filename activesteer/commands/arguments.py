@@ -95,13 +95,13 @@ def add_overrides(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def add_controller(parser: argparse.ArgumentParser, *, several: bool) -> None:
-    """Adds `-c`; where there may be several, `options.controller` is a list, or None."""
+def add_controller(parser: argparse.ArgumentParser, *, several: bool, default: str = "none") -> None:
+    """Adds `-c`; where there may be several, `options.controller` is a list, or None: then `default`, in words."""
     words = "none, ars, afs, a variant or its file, or my_file.py:MyController?gain=2"
     parser.add_argument(
         "-c", "--controller", metavar="CONTROLLER",
         action="append" if several else "store", default=None if several else "none",
-        help=f"{words}{'; one run for each' if several else ''} (default: none)",
+        help=f"{words}{'; may be repeated' if several else ''} (default: {default})",
     )  # fmt: skip
 
 

@@ -58,7 +58,11 @@ class Variant:
         return {f"controllers/{self.name}.toml": self.source.text.encode()}
 
     def from_vehicle(self, setup: ControllerSetup) -> RearSteer | FrontSuperposition:
-        """Makes the controller for a car.
+        """Makes the controller for a car; raises as `gains_in` does."""
+        return _SYSTEMS[self.system].from_vehicle(replace(setup, gains=self.gains_in(setup)))
+
+    def gains_in(self, setup: ControllerSetup) -> ControllerParameters:
+        """The gains of a car with those of the variant in their places.
 
         Raises:
             ControllerError: a gain that the variant has of its own was overridden for the car, without effect here.
@@ -72,7 +76,7 @@ class Variant:
             for part in path:
                 value = value[part]
             table = merged(ControllerParameters, table, path, value, self.source)
-        return _SYSTEMS[self.system].from_vehicle(replace(setup, gains=build(ControllerParameters, table, self.source)))
+        return build(ControllerParameters, table, self.source)
 
 
 def read_variant(given: str | os.PathLike[str]) -> Variant:

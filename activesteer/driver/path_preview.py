@@ -169,6 +169,40 @@ def _best_steering(
     return along, product / square
 
 
+class SteeringGains(NamedTuple):
+    """What the driver steers, at the road wheel, for each unit by which the car is off a straight path.
+
+    Attributes:
+        per_offset_radpm: Per metre to the left of it [rad/m].
+        per_heading: Per radian of heading [-].
+        per_yaw_rate_s: Per yaw rate [rad/(rad/s)].
+        per_sideslip: Per radian of sideslip [-].
+    """
+
+    per_offset_radpm: float
+    per_heading: float
+    per_yaw_rate_s: float
+    per_sideslip: float
+
+
+def steering_gains(speed_mps: float, model: LateralModel, preview_s: float) -> SteeringGains:
+    """The preview driver's decision for small motions about a straight path: `_best_steering` with straight points.
+
+    Args:
+        speed_mps: Speed [m/s].
+        model: The car as the driver knows it.
+        preview_s: How far ahead he looks [s].
+    """
+    ahead = _look_ahead(round(speed_mps / _SPEED_STEP_MPS) * _SPEED_STEP_MPS, model, preview_s)
+    weight = -ahead.by_steering_m / (ahead.by_steering_m @ ahead.by_steering_m)
+    return SteeringGains(
+        per_offset_radpm=float(weight.sum()),
+        per_heading=float(weight @ ahead.times_s) * speed_mps,
+        per_yaw_rate_s=float(weight @ ahead.by_yaw_rate_m),
+        per_sideslip=float(weight @ ahead.by_sideslip_m),
+    )
+
+
 def _look_ahead(speed_mps: float, model: LateralModel, preview_s: float) -> _Preview:
     """Solves the model over the preview time, exactly for a steering angle that is held."""
     from scipy.linalg import expm  # noqa: PLC0415 - slow to import, and only a driver on a path needs it

@@ -1,87 +1,217 @@
-"""How well driver and car hold a path together: the damping of what is left of a small step of the path."""
+"""Driver, controller and car as one linear loop: crossover frequency, phase margin, damping.
+
+The loop is put together from the linearised car (`linearisation`), the controller's linear form with its corrector
+fully active (`controllers.linear_form`), and the driver's: his preview law about a straight path, decided every 10 ms,
+a reaction delay of whole decisions, and the lag of his arms. One period of 10 ms, which is ten steps of the engine,
+becomes one matrix; nothing is approximated but the motion, which is small.
+
+The loop is opened where the driver has decided. Crossover frequency and phase margin are those of what comes back
+there. Its damping is that of the oscillation that is seen after a small step of the path.
+
+Source: D. T. McRuer and E. S. Krendel, Mathematical Models of Human Pilot Behavior, AGARDograph 188 (1974).
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from activesteer.analysis.source import RecordingLike
-from activesteer.driver import DEFAULT_DRIVER
-from activesteer.errors import StudyError
-from activesteer.scenario import FileOrTable
-from activesteer.simulation.runner import simulate
+from activesteer.controllers.linear_form import LinearController, linear_controller
+from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
+from activesteer.driver import DEFAULT_DRIVER, DriverParameters
+from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains, steering_gains
+from activesteer.errors import DriverError
+from activesteer.scenario import FileOrTable, resolve
+from activesteer.studies.discrete_time_map import OUTPUTS
+from activesteer.studies.linearisation import LinearCar, linear_cars
+from activesteer.studies.small_step import damping_of, small_step
+from activesteer.theory.single_track import SingleTrack
 
-STEP_M: Final = 0.5
-"""How far beside the car the path begins [m]: it asks for some 1.6 m/s2 of lateral acceleration, where tyres are
-linear, and moves the steering wheel further than what the friction of the rack can hide."""
-_DURATION_S: Final = 7.0
-_SPACING_M: Final = 15.0
-_EVERY: Final = 10
-"""Of the steps of the run every so many are fitted."""
+SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0)
+"""Speeds at which the loop is looked at by itself [km/h]."""
+FREQUENCIES_RADPS: Final = np.geomspace(0.2, 60.0, 300)
+"""Frequencies of the response [rad/s]."""
+_NOTICED: Final = 0.05
+"""Share of the largest part that an oscillation must have in a step to be seen."""
 
 
-def small_step(
-    speed_mps: float,
-    controller: Any = "none",
-    vehicle: FileOrTable = "compact",
-    overrides: Mapping[str, Any] | None = None,
-    driver: Any = DEFAULT_DRIVER,
-) -> RecordingLike:
-    """The run from which the damping is read: a straight path that begins `STEP_M` to the left of the car.
+@dataclass(frozen=True)
+class DriverLoop:
+    """The loop over one decision of the driver: x[k+1] = A x[k] + b d[k], d[k] = f x[k], d the angle decided on [rad].
 
-    Args:
-        speed_mps: Speed [m/s].
-        controller: See `simulate`; so are the others.
-        vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value.
-        driver: Who drives.
+    Attributes:
+        a: System matrix of the loop, opened at the decision, shape (n, n).
+        b: What a decision does, shape (n,).
+        f: What is decided, at the steering wheel, shape (n,).
+        offset: Place of the lateral offset from the path in the state.
+        interval_s: Time between two decisions [s].
     """
-    x_m = np.arange(0.0, speed_mps * (_DURATION_S + 6.0), _SPACING_M)
-    path = {"x_m": x_m.tolist(), "y_m": [STEP_M] * len(x_m)}
-    table = {
-        "kind": "follow_path",
-        "name": "small_step",
-        "speed_mps": speed_mps,
-        "duration_s": _DURATION_S,
-        "path": path,
-    }
-    return simulate(table, controller, vehicle, overrides, driver=driver)
+
+    a: Array
+    b: Array
+    f: Array
+    offset: int
+    interval_s: float
+
+    @cached_property
+    def response(self) -> NDArray[np.complexfloating]:
+        """What comes back of a decision at `FREQUENCIES_RADPS`, complex; at -1 is the limit of stability."""
+        z = np.exp(1j * FREQUENCIES_RADPS * self.interval_s)
+        answers = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None])
+        return np.asarray(-(answers[..., 0] @ self.f), dtype=np.complex128)
+
+    def crossover(self) -> tuple[float, float]:
+        """Crossover frequency [rad/s] and phase margin [rad]; the smaller margin where the gain passes 1 several times.
+
+        nan where it passes it nowhere.
+        """
+        gain, phase = np.log(np.abs(self.response)), np.unwrap(np.angle(self.response))
+        # Integrators and a delay: the phase begins between -pi and -2 pi, as near to -pi as it can be.
+        phase -= 2.0 * math.pi * round((phase[0] + math.pi) / (2.0 * math.pi))
+        found = []
+        for place in np.flatnonzero((gain[:-1] > 0.0) & (gain[1:] <= 0.0)):
+            share = gain[place] / (gain[place] - gain[place + 1])
+            frequency = FREQUENCIES_RADPS[place] ** (1.0 - share) * FREQUENCIES_RADPS[place + 1] ** share
+            margin = math.pi + phase[place] + share * (phase[place + 1] - phase[place])
+            found.append((margin, frequency))
+        margin, frequency = min(found, default=(math.nan, math.nan))
+        return float(frequency), float(margin)
+
+    def damping(self) -> tuple[float, float]:
+        """Damping ratio [-] and natural frequency [rad/s] of the oscillation with the largest part in a small step.
+
+        1, and that of the largest part, where no oscillation has one that is seen.
+        """
+        from scipy.linalg import eig  # noqa: PLC0415 - slow to import
+
+        found: Any = eig(self.a + np.outer(self.b, self.f), left=True)
+        values, left, right = found
+        share = np.abs(right[self.offset] * left[self.offset].conj() / np.sum(left.conj() * right, axis=0))
+        swings = share * (values.imag > 0.0)
+        mode = int(np.argmax(swings if swings.max() > _NOTICED * share.max() else share))
+        s = np.log(complex(values[mode])) / self.interval_s
+        return float(-s.real / abs(s)), float(abs(s))
 
 
-def damping_of(recording: RecordingLike) -> tuple[float, float]:
-    """Damping ratio and natural frequency of the oscillation about the path, behind the first crossing of it.
-
-    The decaying oscillation that fits it best, least squares, which is what the logarithmic decrement gives where one
-    decrement is like the next; the friction of the rack makes those of small amplitudes smaller.
+def driver_loop(
+    car: LinearCar, controller: LinearController, driver: DriverParameters, gains: SteeringGains, steering_ratio: float
+) -> DriverLoop:
+    """Puts the loop together.
 
     Args:
-        recording: A run of `small_step`.
+        car: The linearised car.
+        controller: The controller at its speed, with the car's step.
+        driver: The driver.
+        gains: What he steers at that speed.
+        steering_ratio: Steering wheel angle over road-wheel angle [-].
+    """
+    steps = round(PREVIEW_INTERVAL_S / car.timestep_s)
+    waiting = round(driver.reaction_delay_s / PREVIEW_INTERVAL_S)
+    n, states = len(car.a), len(controller.a)
+    heading, offset, wheel = n, n + 1, n + 2
+    first = n + 3  # of the controller's states; behind them the decisions that wait, the newest first
+    newest, size = first + states, first + states + waiting + 1
+    yaw_rate, sideslip = (
+        np.pad(car.c[OUTPUTS.index(name)], (0, size - n)) for name in ("yaw_rate_radps", "sideslip_rad")
+    )
+    # What the arms do first in a step, as the driver comes before controller and car.
+    arms = np.eye(size)
+    lag_s = driver.neuromuscular_lag_s
+    moved = -math.expm1(-car.timestep_s / lag_s) if lag_s > 0.0 else 1.0
+    arms[wheel, wheel], arms[wheel, newest + waiting] = 1.0 - moved, moved
+    rest = np.eye(size)
+    inputs = np.zeros((2, size))
+    inputs[0, wheel] = 1.0 / steering_ratio
+    inputs[1] = yaw_rate
+    own = slice(first, newest)
+    demands = controller.d @ inputs
+    demands[:, own] += controller.c
+    rest[own] = controller.b @ inputs
+    rest[own, own] += controller.a
+    rest[:n] = car.b[:, 1:] @ demands
+    rest[:n, :n] += car.a
+    rest[:n, wheel] += car.b[:, 0]
+    rest[heading] += car.timestep_s * yaw_rate
+    rest[offset] += car.timestep_s * car.speed_mps * sideslip
+    rest[offset, heading] += car.timestep_s * car.speed_mps
+    period = np.linalg.matrix_power(rest @ arms, steps)
+    # The decisions move up by one; the new one comes in at the beginning of the period.
+    moves = np.eye(size)
+    moves[newest:] = np.eye(size, k=-1)[newest:]
+    moves[newest] = 0.0
+    decided = gains.per_yaw_rate_s * yaw_rate + gains.per_sideslip * sideslip
+    decided[offset], decided[heading] = gains.per_offset_radpm, gains.per_heading
+    return DriverLoop(period @ moves, period[:, newest], steering_ratio * decided, offset, steps * car.timestep_s)
 
-    Returns:
-        Damping ratio [-], below 0 where the oscillation grows, and natural frequency [rad/s].
+
+@dataclass(frozen=True)
+class LoopAtSpeed:
+    """A loop at one speed with one controller, and what a run of the full car says of it.
+
+    Attributes:
+        speed_kmh: Speed [km/h].
+        controller: The controller.
+        loop: The linear loop.
+        damping_in_run: Damping ratio after a small step of the path, friction of the rack and tolerance band included.
+    """
+
+    speed_kmh: float
+    controller: str
+    loop: DriverLoop
+    damping_in_run: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Its figures."""
+        crossover_radps, margin_rad = self.loop.crossover()
+        damping, natural_radps = self.loop.damping()
+        return {
+            "speed_kmh": self.speed_kmh,
+            "controller": self.controller,
+            "damping": damping,
+            "natural_frequency_rad_s": natural_radps,
+            "phase_margin_deg": math.degrees(margin_rad),
+            "crossover_rad_s": crossover_radps,
+            "damping_in_run": self.damping_in_run,
+        }
+
+
+def driver_loops(
+    driver: Any = DEFAULT_DRIVER,
+    vehicle: FileOrTable = "compact",
+    controllers: Sequence[str] = ("none", "ars", "afs"),
+    speeds_kmh: Sequence[float] = SPEEDS_KMH,
+    overrides: Mapping[str, Any] | None = None,
+) -> list[LoopAtSpeed]:
+    """The loop with every controller at every speed.
+
+    Args:
+        driver: Name, path or table of a driver.
+        vehicle: Name, path, or table of a vehicle.
+        controllers: `none`, `ars`, `afs`, or variants.
+        speeds_kmh: Speeds [km/h].
+        overrides: Dotted key -> value, of vehicle and driver.
 
     Raises:
-        StudyError: the car does not come to the path.
+        DriverError: the driver is code of a user's own, which has no linear form.
+        ActiveSteerError: an input is wrong.
     """
-    from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
-
-    off = np.asarray(recording["y_m"], dtype=np.float64) / STEP_M - 1.0
-    beyond = np.flatnonzero(off > 0.0)
-    if not beyond.size:
-        raise StudyError("the driver does not come to a path 0.5 m beside him within the run; is he slower than that?")
-    time_s = np.asarray(recording.time_s, dtype=np.float64)[beyond[0] :: _EVERY]
-    time_s, off = time_s - time_s[0], off[beyond[0] :: _EVERY]
-
-    def residual(p: np.ndarray) -> np.ndarray:
-        ratio, natural, sine, cosine, rest = p
-        swing = natural * math.sqrt(1.0 - ratio * ratio) * time_s
-        return np.exp(-ratio * natural * time_s) * (sine * np.sin(swing) + cosine * np.cos(swing)) + rest - off
-
-    bounds = [-0.5, 0.3, -10.0, -10.0, -1.0], [0.999, 15.0, 10.0, 10.0, 1.0]
-    starts = [[ratio, natural, 0.3, 0.0, 0.0] for ratio in (0.1, 0.5) for natural in (1.5, 3.0, 5.0)]
-    fits = [least_squares(residual, start, bounds=bounds) for start in starts]
-    ratio, natural, *_ = min(fits, key=lambda fit: fit.cost).x
-    return float(ratio), float(natural)
+    scenario = resolve("straight_line", vehicle, overrides, driver)
+    if not scenario.driver.plugin.ours:
+        raise DriverError(f"{scenario.driver.plugin.name} is code; only a driver file has a linear form", value=driver)
+    setup, who = scenario.controller_setup(DEFAULT_TIMESTEP_S), scenario.driver.parameters
+    known = SingleTrack(setup.single_track)
+    found = []
+    for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides):
+        gains = steering_gains(car.speed_mps, known.matrices, who.preview_s)
+        for name in controllers:
+            linear = linear_controller(name, setup, car.speed_mps)
+            loop = driver_loop(car, linear, who, gains, setup.steering_ratio)
+            damping, _ = damping_of(small_step(car.speed_mps, name, vehicle, overrides, driver))
+            found.append(LoopAtSpeed(3.6 * car.speed_mps, name, loop, damping))
+    return found

@@ -1,4 +1,4 @@
-"""`activesteer identify` and `activesteer linearise`."""
+"""`activesteer identify`, `activesteer linearise` and `activesteer driver`."""
 
 from __future__ import annotations
 
@@ -48,3 +48,23 @@ def test_linearise_tells_the_modes_and_draws(tmp_path, capsys):
 def test_linearise_needs_a_speed(capsys):
     assert main(["linearise", "--speed-kmh", "0"]) == 1
     assert "speed_mps" in capsys.readouterr().err
+
+
+def test_driver_tells_how_stable_the_loop_is_and_draws(tmp_path, capsys):
+    assert (
+        main(["driver", "expert", "--speed-kmh", "100", "-c", "none", "-c", "afs_tuned", "--json", "-o", str(tmp_path)])
+        == 0
+    )
+    rows = json.loads(capsys.readouterr().out)
+    assert [(row["speed_kmh"], row["controller"]) for row in rows] == [(100.0, "none"), (100.0, "afs_tuned")]
+    for row in rows:
+        assert 0.25 < row["damping_in_run"] < row["damping"] < 1.0
+        assert 30.0 < row["phase_margin_deg"] < 60.0
+        assert 1.5 < row["crossover_rad_s"] < 4.0
+    assert (tmp_path / "driver.png").stat().st_size > 10_000
+
+
+def test_driver_that_is_code_has_no_linear_form(tmp_path, capsys):
+    (tmp_path / "mine.py").write_text("class Mine:\n    def step(self, reference, measurement, motion): ...\n")
+    assert main(["driver", f"{tmp_path}/mine.py:Mine"]) == 1
+    assert "only a driver file has a linear form" in capsys.readouterr().err

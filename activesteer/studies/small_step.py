@@ -1,0 +1,87 @@
+"""How well driver and car hold a path together: the damping of what is left of a small step of the path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from activesteer.analysis.source import RecordingLike
+from activesteer.driver import DEFAULT_DRIVER
+from activesteer.errors import StudyError
+from activesteer.scenario import FileOrTable
+from activesteer.simulation.runner import simulate
+
+STEP_M: Final = 0.5
+"""How far beside the car the path begins [m]: it asks for some 1.6 m/s2 of lateral acceleration, where tyres are
+linear, and moves the steering wheel further than what the friction of the rack can hide."""
+_DURATION_S: Final = 7.0
+_SPACING_M: Final = 15.0
+_EVERY: Final = 10
+"""Of the steps of the run every so many are fitted."""
+
+
+def small_step(
+    speed_mps: float,
+    controller: Any = "none",
+    vehicle: FileOrTable = "compact",
+    overrides: Mapping[str, Any] | None = None,
+    driver: Any = DEFAULT_DRIVER,
+) -> RecordingLike:
+    """The run from which the damping is read: a straight path that begins `STEP_M` to the left of the car.
+
+    Args:
+        speed_mps: Speed [m/s].
+        controller: See `simulate`; so are the others.
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key -> value.
+        driver: Who drives.
+    """
+    x_m = np.arange(0.0, speed_mps * (_DURATION_S + 6.0), _SPACING_M)
+    path = {"x_m": x_m.tolist(), "y_m": [STEP_M] * len(x_m)}
+    table = {
+        "kind": "follow_path",
+        "name": "small_step",
+        "speed_mps": speed_mps,
+        "duration_s": _DURATION_S,
+        "path": path,
+    }
+    return simulate(table, controller, vehicle, overrides, driver=driver)
+
+
+def damping_of(recording: RecordingLike) -> tuple[float, float]:
+    """Damping ratio and natural frequency of the oscillation about the path, behind the first crossing of it.
+
+    The decaying oscillation that fits it best, least squares, which is what the logarithmic decrement gives where one
+    decrement is like the next; the friction of the rack makes those of small amplitudes smaller.
+
+    Args:
+        recording: A run of `small_step`.
+
+    Returns:
+        Damping ratio [-], below 0 where the oscillation grows, and natural frequency [rad/s].
+
+    Raises:
+        StudyError: the car does not come to the path.
+    """
+    from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
+
+    off = np.asarray(recording["y_m"], dtype=np.float64) / STEP_M - 1.0
+    beyond = np.flatnonzero(off > 0.0)
+    if not beyond.size:
+        raise StudyError("the driver does not come to a path 0.5 m beside him within the run; is he slower than that?")
+    time_s = np.asarray(recording.time_s, dtype=np.float64)[beyond[0] :: _EVERY]
+    time_s, off = time_s - time_s[0], off[beyond[0] :: _EVERY]
+
+    def residual(p: np.ndarray) -> np.ndarray:
+        ratio, natural, sine, cosine, rest = p
+        swing = natural * math.sqrt(1.0 - ratio * ratio) * time_s
+        return np.exp(-ratio * natural * time_s) * (sine * np.sin(swing) + cosine * np.cos(swing)) + rest - off
+
+    bounds = [-0.5, 0.3, -10.0, -10.0, -1.0], [0.999, 15.0, 10.0, 10.0, 1.0]
+    starts = [[ratio, natural, 0.3, 0.0, 0.0] for ratio in (0.1, 0.5) for natural in (1.5, 3.0, 5.0)]
+    fits = [least_squares(residual, start, bounds=bounds) for start in starts]
+    ratio, natural, *_ = min(fits, key=lambda fit: fit.cost).x
+    return float(ratio), float(natural)
