@@ -24,7 +24,7 @@ from activesteer.config.keys import (
 )
 from activesteer.config.merging import check_overruled, merged
 from activesteer.config.source import Range, Source
-from activesteer.config.toml import parse_value, read_toml
+from activesteer.config.toml import parse_value, read_toml, toml_text, toml_value
 from activesteer.config.values import build, checked_number, to_table
 
 __all__ = [
@@ -45,4 +45,6 @@ __all__ = [
     "read_toml",
     "spellings",
     "to_table",
+    "toml_text",
+    "toml_value",
 ]

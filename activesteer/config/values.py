@@ -149,16 +149,22 @@ def checked_number(key: str, value: object, limits: Range) -> float:
     return _scalar(float, value, 1.0, limits, Source(""), (key,))
 
 
-def to_table(value: Any) -> Any:
-    """A dataclass as plain tables, ready for JSON; fields that are None are left out, so that `build` takes it back."""
+def to_table(value: Any, *, defaults: bool = True) -> Any:
+    """A dataclass as plain tables, ready for JSON; `build` takes it back.
+
+    Args:
+        value: A dataclass, or what stands in one.
+        defaults: Whether to keep fields that have their default; those that are None are left out in any case.
+    """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        values = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
         return {
-            field.name: to_table(getattr(value, field.name))
-            for field in dataclasses.fields(value)
-            if getattr(value, field.name) is not None
+            field.name: to_table(item, defaults=defaults)
+            for field, item in values.items()
+            if item is not None and (defaults or item != field.default)
         }
     if isinstance(value, dict):
-        return {key: to_table(item) for key, item in value.items()}
+        return {key: to_table(item, defaults=defaults) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [to_table(item) for item in value]
+        return [to_table(item, defaults=defaults) for item in value]
     return value

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from activesteer.config import Source, build, read_toml
+from activesteer.config import Source, build, read_toml, toml_value
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import DEFAULT_DRIVER
 from activesteer.errors import StudyError, nearest_names, shown
@@ -114,10 +114,14 @@ class StudyFile:
     def to_toml(self) -> str:
         """The study as the text of a study file."""
         table = self.to_table()
-        lines = [f"{key} = {_toml(value)}" for key, value in table.items() if not isinstance(value, dict)]
+        lines = [f"{key} = {toml_value(value)}" for key, value in table.items() if not isinstance(value, dict)]
         for name, inner in table.items():
             if isinstance(inner, dict):
-                lines += ["", f"[{name}]", *(f"{json.dumps(key)} = {_toml(value)}" for key, value in inner.items())]
+                lines += [
+                    "",
+                    f"[{name}]",
+                    *(f"{json.dumps(key)} = {toml_value(value)}" for key, value in inner.items()),
+                ]
         return "\n".join(lines) + "\n"
 
 
@@ -262,12 +266,3 @@ def _located_code(item: Any, folder: Path) -> Any:
     if not colon:
         return _located(item, folder)
     return f"{(folder / user_path(path, StudyError)).resolve()}:{class_name}{mark}{parameters}"
-
-
-def _toml(value: Any) -> str:
-    """A value as TOML writes it; JSON's texts, numbers and lists are TOML's too."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{json.dumps(key)} = {_toml(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    return json.dumps(value, ensure_ascii=False)

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from string import Template
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 
-from activesteer.controllers import SingleTrackParameters
+from activesteer.config import read_toml, to_table, toml_text
 from activesteer.conventions import GRAVITY_MPS2
+from activesteer.resources import find_vehicle
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle.mass_properties import mass_properties
-from activesteer.vehicle_builder.design import Axle, Car
-from activesteer.vehicle_builder.numbers import num, sig
-from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
+from activesteer.vehicle_builder.design import Car
+from activesteer.vehicle_builder.trimmed import Trimmed
 
 _LEFT_OF_STIFFNESS: Final = {"front": 0.6, "rear": 1.05}
 """Effective cornering stiffness of an axle over that of its tyres, in the compact: compliance and roll steer."""
-_TEMPLATE: Final = Path(__file__).resolve().parent / "templates" / "vehicle.toml"
+_REMARKS: Final = {
+    "dampers.front": "Compression positive.",
+    "friction": "Dry friction; vibration as in the compact's file (a road of class A at 80 km/h).",
+    "brakes": "Torque per wheel at full pedal.",
+    "powertrain": "At the wheels: torques in first gear, power, rev limit in top gear.",
+    "controllers.desired_yaw_rate": (
+        "Controllers of the compact, a start: their gains were found for that car. What a control-free run of this "
+        "car\nreaches (max_lateral_acceleration_mps2) and its servos' lags decide them; see the comments in the "
+        "compact's file."
+    ),
+}
+"""What is said above a table that is the same for every car."""
 
 
 def vehicle_text(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> str:
@@ -30,58 +39,52 @@ def vehicle_text(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> st
         trimmed: What was trimmed.
         model: The car compiled, for its single-track model; None: a placeholder that serves while it is trimmed.
     """
-    brakes, power, aero = car.brakes, car.powertrain, car.aerodynamics
-    limit_deg = math.degrees(0.99 * car.rack_limit_m / trimmed.pinion_radius_m)
-    dampers = "\n\n".join(_damper(axle, trimmed.axle(axle.name)) for axle in car.axles)
-    point = ", ".join(f"{value:g}" for value in aero.pressure_point_m)
-    track = _single_track(car, model)
-    return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
-        name=car.name,
-        width=num(car.width_m, 3),
-        front_tyre=car.front.tyre,
-        rear_tyre=car.rear.tyre,
-        rack_mm=num(1e3 * car.rack_limit_m, 1),
-        ratio=num(trimmed.ratio, 3),
-        limit=math.floor(limit_deg),
-        dampers=dampers,
-        front_friction=num(trimmed.front.friction_N, 1),
-        rear_friction=num(trimmed.rear.friction_N, 1),
-        rack_friction=num(car.rack_friction_N, 1),
-        front_brake=num(brakes.front_torque_Nm, 1),
-        rear_brake=num(brakes.rear_torque_Nm, 1),
-        brake_drag=num(brakes.drag_torque_Nm, 2),
-        brake_stiffness=sig(brakes.stiffness_Nmprad),
-        front_share=num(power.front_share, 3),
-        max_torque=num(power.max_torque_Nm, 1),
-        max_power=num(power.max_power_W, 1),
-        max_wheel_speed=num(power.max_wheel_speed_radps, 1),
-        drive_inertia=num(power.inertia_kgm2, 2),
-        engine_brake=num(power.engine_brake_torque_Nm, 1),
-        lag=num(power.lag_s, 3),
-        drag_area=num(aero.drag_area_m2, 3),
-        air_density=num(aero.air_density_kgpm3, 4),
-        drag_point=point,
-        left_front=f"{_LEFT_OF_STIFFNESS['front']:g}",
-        left_rear=f"{_LEFT_OF_STIFFNESS['rear']:g}",
-        mass=num(track.mass_kg, 1),
-        yaw_inertia=num(track.yaw_inertia_kgm2, 1),
-        cg_to_front=num(track.cg_to_front_m, 4),
-        cg_to_rear=num(track.cg_to_rear_m, 4),
-        front_stiffness=num(track.front_stiffness_Nprad, 0),
-        rear_stiffness=num(track.rear_stiffness_Nprad, 0),
-        characteristic_speed=num(3.6 * (track.characteristic_speed_mps or 0.0), 1),
-    )
+    remarks = _REMARKS | {
+        "steering": f"Ratio at the centre, unloaded; lock: the rack stops at {1e3 * car.rack_limit_m:.1f} mm.",
+        "single_track": (
+            f"Estimated: stiffnesses are {_LEFT_OF_STIFFNESS['front']:g} (front) and {_LEFT_OF_STIFFNESS['rear']:g} "
+            "(rear) of those of the tyres under static load, as in the compact.\n"
+            f"`activesteer identify --vehicle {car.name}.toml` drives the car and replaces the values."
+        ),
+    }
+    made = "Made by `activesteer vehicle new`; README.md lists what was assumed."
+    return f"# {car.name}: what its MJCF cannot say. {made}\n{toml_text(_table(car, trimmed, model), remarks)}"
 
 
-def _damper(axle: Axle, found: TrimmedAxle) -> str:
-    return (
-        f"[dampers.{axle.name}]\n"
-        f"velocity_mps = [{', '.join(f'{value:g}' for value in found.damper_velocity_mps)}]\n"
-        f"force_N = [{', '.join(f'{value:g}' for value in found.damper_force_N)}]"
-    )
+def _table(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> dict[str, Any]:
+    """The vehicle file; what a car's table gives as a vehicle file has it goes over whole, whatever keys it has."""
+    compact, _ = read_toml(find_vehicle("compact"))
+    limit_rad = 0.99 * car.rack_limit_m / trimmed.pinion_radius_m
+    return {
+        "mjcf": f"{car.name}.xml",
+        "width_m": round(car.width_m, 3),
+        "tyres": {axle.name: axle.tyre for axle in car.axles},
+        "steering": {
+            "ratio": round(trimmed.ratio, 3),
+            "steering_wheel_limit_deg": math.floor(math.degrees(limit_rad)),
+        },
+        "dampers": {
+            axle.name: {
+                "velocity_mps": [float(f"{value:g}") for value in trimmed.axle(axle.name).damper_velocity_mps],
+                "force_N": [float(f"{value:g}") for value in trimmed.axle(axle.name).damper_force_N],
+            }
+            for axle in car.axles
+        },
+        "friction": {
+            "front_damper_N": round(trimmed.front.friction_N, 1),
+            "rear_damper_N": round(trimmed.rear.friction_N, 1),
+            "vibration_mps": compact["friction"]["vibration_mps"],
+            "rack_N": round(car.rack_friction_N, 1),
+        },
+        "brakes": to_table(car.brakes, defaults=False),
+        "powertrain": to_table(car.powertrain, defaults=False),
+        "aerodynamics": to_table(car.aerodynamics, defaults=False),
+        "single_track": _single_track(car, model),
+        "controllers": compact["controllers"],
+    }
 
 
-def _single_track(car: Car, model: mujoco.MjModel | None) -> SingleTrackParameters:
+def _single_track(car: Car, model: mujoco.MjModel | None) -> dict[str, float]:
     """The car as controllers see it, estimated from its tyres; the characteristic speed within 50 to 300 km/h."""
     base = car.wheelbase_m
     mass, inertia, to_front, stiffness = 1500.0, 2300.0, 0.45 * base, {"front": 1e5, "rear": 1.5e5}
@@ -98,4 +101,12 @@ def _single_track(car: Car, model: mujoco.MjModel | None) -> SingleTrackParamete
     moment = rear * (base - to_front) - front * to_front
     square = front * rear * base**2 / (mass * moment) if moment > 0.0 else math.inf
     speed = min(max(math.sqrt(square), 50.0 / 3.6), 300.0 / 3.6)
-    return SingleTrackParameters(mass, inertia, to_front, base - to_front, front, rear, speed)
+    return {
+        "mass_kg": round(mass, 1),
+        "yaw_inertia_kgm2": round(inertia, 1),
+        "cg_to_front_m": round(to_front, 4),
+        "cg_to_rear_m": round(base - to_front, 4),
+        "front_stiffness_Nprad": round(front),
+        "rear_stiffness_Nprad": round(rear),
+        "characteristic_speed_kmh": round(3.6 * speed, 1),
+    }

@@ -1,0 +1,53 @@
+"""The same parameters with every value changed, whatever fields there are."""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from typing import Any, Final
+
+from activesteer.config import Range, dataclass_in
+
+_WORDS: Final = {
+    "combined_slip": "friction_ellipse", "friction_scales": "peaks", "slip_velocity": "wheel_centre",
+    "rolling_radius": "third_of_deflection", "trail_load": "scaled", "source": "identified",
+}  # fmt: skip
+"""Texts that are one of some words."""
+
+
+def all_changed(cls: type, given: Any) -> Any:
+    """A dataclass of which no field, down to the last table, is as it was.
+
+    Args:
+        cls: The dataclass.
+        given: One of it, or None.
+    """
+    hints = typing.get_type_hints(cls, include_extras=True)
+    values = {
+        field.name: _WORDS.get(field.name) or _other(hints[field.name], getattr(given, field.name, None))
+        for field in dataclasses.fields(cls)
+    }
+    assert all(value != getattr(given, name, None) for name, value in values.items())
+    return cls(**values)
+
+
+def _other(hint: Any, value: Any) -> Any:
+    limits = Range()
+    while typing.get_origin(hint) is not typing.Literal and type(None) in typing.get_args(hint):
+        hint = typing.get_args(hint)[0]
+    if typing.get_origin(hint) is typing.Annotated:
+        hint, limits, *_ = typing.get_args(hint)
+    if (inner := dataclass_in(hint)) is not None:
+        return all_changed(inner, value)
+    if typing.get_origin(hint) is typing.Literal:
+        return next(word for word in typing.get_args(hint) if word not in (value, "hinge"))
+    if typing.get_origin(hint) is tuple:
+        return tuple(1.01 * item + 0.001 for item in value or (0.1, 0.2, 0.3))
+    if hint is bool:
+        return not value
+    if hint is str:
+        return f"other {value}"
+    if value is None:
+        value = 1.5 * limits.low if limits.low > 0.0 else min(0.01, limits.high)
+    choices = (7, 8) if hint is int else (1.01 * value + 1e-3, 0.97 * value)
+    return next(number for number in choices if number != value and limits.low <= number <= limits.high)
