@@ -43,7 +43,7 @@ def test_the_sedan_stops_without_a_locked_wheel_too() -> None:
 
 
 def test_it_works_with_the_sensors_of_production_cars() -> None:
-    """Pulse wheels read every 10 ms, late by 5 ms, and a biased acceleration: less is used, and no wheel locks."""
+    """Noisy pulse wheels, and an acceleration that is late and biased: less is used, and no wheel locks."""
     recording = from_100({"vehicle__sensors__preset": "production"})
     assert recording.metrics["braking_efficiency"] >= 0.88
     assert np.abs(corners(recording, "slip_ratio")[recording["speed_mps"] > 15.0 / 3.6]).max() < 0.5
