@@ -45,7 +45,7 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
 def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
     """Tracks of the front axle centre along the course. It says by how much lateral positions are stretched."""
     course = read_course(style.curves(recordings)[0].recording)
-    figure = new_figure(width_in=WIDTH_IN, height_in=1.05 + _axis_height_in(course, TRACK_ASPECT))
+    figure = new_figure(width_in=WIDTH_IN, height_in=1.3 + _axis_height_in(course, TRACK_ASPECT))
     axis: Axes = figure.subplots()
     _draw_tracks(axis, recordings)
     style.name_curves(figure, axis)
