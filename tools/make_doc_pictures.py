@@ -9,6 +9,7 @@ frequency response that it is driven for.
 from __future__ import annotations
 
 import io
+import math
 import re
 import sys
 import tempfile
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from PIL import Image
 
+from activesteer import study
 from activesteer.analysis.figures import BY_KIND, style, time_histories
 from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
 from activesteer.analysis.frequency_response import frequency_response
@@ -76,7 +78,14 @@ def main(names: Sequence[str]) -> None:
     pictures: dict[str, Callable[[], Mapping[str, Figure]]] = {
         name: lambda name=name: {f"manoeuvre_{name}": _manoeuvre(name)} for name in list_maneuvers()
     }
-    pictures |= {"controller": _controller, "driver": _driver, "sensors": _sensors, "tyres": _tyres, "brakes": _brakes}
+    pictures |= {
+        "controller": _controller,
+        "driver": _driver,
+        "rear_steer_gains": _rear_steer_gains,
+        "sensors": _sensors,
+        "tyres": _tyres,
+        "brakes": _brakes,
+    }
     for name in names or pictures:
         if name not in pictures:
             sys.exit(f"there is no picture {name}; there are: {', '.join(pictures)}")
@@ -166,6 +175,35 @@ def _driver() -> dict[str, Figure]:
     loops = driver_loops()
     rows = [loop.to_json() for loop in loops]
     return {"driver_loop": driver_loops_figure(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])}
+
+
+def _rear_steer_gains() -> dict[str, Figure]:
+    """Settled rear angle and sideslip of the step steer over the gains of active rear steering."""
+    prediction, gain, band = (
+        f"controllers.ars.{key}" for key in ("prediction_gain", "corrector.proportional_gain_s", "corrector.full_degps")
+    )
+    rows = study("rear_steer_gains", jobs=2).to_pylist()
+    figure = new_figure(6.5, 5.5)
+    axes = figure.subplots(2, 1, sharex=True)
+    for place, name in enumerate(("rear_steer_steady_state_rad", "sideslip_steady_state_rad")):
+        free = next(math.degrees(row[name]) for row in rows if row["controller"] == "none")
+        axes[place].axhline(free, color="#333333", linewidth=0.8, label="none")
+        for (strength, full_degps), colour in zip(
+            sorted({(row[gain], row[band]) for row in rows}),
+            ("#d55e00", "#e69f00", "#0072b2", "#56b4e9", "#009e73", "#88cc88"),
+            strict=True,
+        ):
+            own = [row for row in rows if (row["controller"], row[gain], row[band]) == ("ars", strength, full_degps)]
+            label = f"corrector {strength:g} s, full at {full_degps:g} deg/s"
+            axes[place].plot(
+                [row[prediction] for row in own], [math.degrees(row[name]) for row in own],
+                "o-", ms=3.0, color=colour, linewidth=1.2, label=label,
+            )  # fmt: skip
+    style.plain(axes[0], "settled rear angle\n[deg]")
+    style.plain(axes[1], "settled sideslip [deg]")
+    axes[1].set_xlabel("prediction gain [-]")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
+    return {"rear_steer_gains": figure}
 
 
 def _tyres() -> dict[str, Figure]:
