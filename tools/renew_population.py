@@ -2,7 +2,7 @@
 
     python tools/renew_population.py [-o DIR] [--samples N] [--jobs N]
 
-500 samples take three quarters of an hour on two processors; it can be interrupted and called again. A folder that
+500 samples take half an hour on two idle processors; it can be interrupted and called again. A folder that
 `activesteer reproduce --population N -o DIR` has finished is taken as it is. tools/make_claims_table.py is to be called
 afterwards.
 """
