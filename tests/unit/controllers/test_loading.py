@@ -224,6 +224,7 @@ def test_controllers_are_told_what_sensors_measure_and_nothing_else():
         "rear_steer_rad",
         "superposition_rad",
         "wheel_speed_radps",
+        "brake_pressure_Pa",
     }
     assert set(Measurement._fields) == allowed
     assert set(DriverCommand._fields) == {
@@ -234,4 +235,5 @@ def test_controllers_are_told_what_sensors_measure_and_nothing_else():
         "saturated",
         "gear",
         "wheel_torques",
+        "parking_brake",
     }
