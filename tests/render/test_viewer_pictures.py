@@ -170,7 +170,8 @@ def test_the_plots_hold_all_runs_in_their_colours(together: Pictures) -> None:
     for start in ("Yaw rate", "Sideslip", "Lateral"):
         pixels = view(together, start)
         seen = [spread(like(pixels, colour, 35)) for colour in (NONE, ARS, AFS)]
-        assert min(seen) > 0.1, (start, seen)
+        # The car without control lies under the one with front superposition for most of the time.
+        assert min(seen) > 0.05, (start, seen)
 
 
 def test_the_plots_of_wheels_and_links_are_drawn(viewer: Headless, drives: Drives, folder: Path) -> None:
