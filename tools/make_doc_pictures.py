@@ -1,9 +1,9 @@
 """Makes the pictures of the documentation that come from runs: `python tools/make_doc_pictures.py [NAME]...`.
 
 One for every manoeuvre and those of the pages on controllers, drivers and tyres. Without names all are made, in two
-minutes; to be run again when the car, a controller or a manoeuvre has changed. What `activesteer run MANEUVER --plot`
-draws is taken where it says something; driving straight and standing are shown by other channels, and the sweep as the
-frequency response that it is driven for.
+minutes and another two for each envelope; to be run again when the car, a controller or a manoeuvre has changed. What
+`activesteer run MANEUVER --plot` draws is taken where it says something; driving straight and standing are shown by
+other channels, and the sweep as the frequency response that it is driven for.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ from activesteer.scenario import resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.driver_loop import FREQUENCIES_RADPS, driver_loops
+from activesteer.studies.envelope import envelope
+from activesteer.studies.envelope_figure import envelope_figure
 from activesteer.tyre import MagicFormula, load_tir
 
 if TYPE_CHECKING:
@@ -72,6 +74,13 @@ PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
 MIN_SPAN: Final = 0.1
 """No axis of these is enlarged further than this, in its unit, so that what stays as it is looks so."""
 
+ENVELOPES: Final[Mapping[str, tuple[Sequence[float], Sequence[float]]]] = {
+    "slalom": ((80, 90, 100, 110, 120), (1.6, 1.9, 2.2, 2.5, 2.8)),
+    "double_lane_change": ((70, 75, 80, 85, 90, 100), (0.0, 0.1, 0.2)),
+    "double_lane_change_low_mu": ((60, 65, 70, 75, 80, 90), (0.0, 0.1, 0.2)),
+}
+"""Manoeuvre -> speeds [km/h] and lines [m] of its map."""
+
 
 def main(names: Sequence[str]) -> None:
     """Draws the pictures with these names, or all."""
@@ -86,6 +95,7 @@ def main(names: Sequence[str]) -> None:
         "tyres": _tyres,
         "brakes": _brakes,
     }
+    pictures |= {f"envelope_{name}": lambda name=name: {f"envelope_{name}": _envelope(name)} for name in ENVELOPES}
     for name in names or pictures:
         if name not in pictures:
             sys.exit(f"there is no picture {name}; there are: {', '.join(pictures)}")
@@ -245,6 +255,12 @@ def _brakes() -> dict[str, Figure]:
     axes[-1].set(xlabel="time [s]", xlim=(0.4, 4.2))
     figure.align_ylabels(list(axes))
     return {"brakes_stop": figure}
+
+
+def _envelope(name: str) -> Figure:
+    """Who gets through, with the typical driver."""
+    speeds_kmh, lines_m = ENVELOPES[name]
+    return envelope_figure(envelope(name, SYSTEMS, speeds_kmh=speeds_kmh, lines_m=lines_m))
 
 
 def _draw(kind: str, runs: Mapping[str, Any]) -> Figure:

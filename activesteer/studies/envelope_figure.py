@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import StudyError
 from activesteer.plotting import new_figure, save
@@ -35,13 +37,14 @@ def draw_envelope(made: Envelope, path: Path) -> Path:
     Raises:
         ActiveSteerError: the file cannot be written, or matplotlib is not installed.
     """
-    return save(_drawn(made), path, StudyError)
+    return save(envelope_figure(made), path, StudyError)
 
 
-def _drawn(made: Envelope) -> Figure:
+def envelope_figure(made: Envelope) -> Figure:
+    """The figure that `draw_envelope` writes."""
     from matplotlib.patches import Patch  # noqa: PLC0415 - an extra, and slow to import
 
-    title = f"{made.maneuver}: who gets through. Dots: highest entry speed by bisection; cross: as the manoeuvre has it"
+    title = f"{made.maneuver}: who gets through\nDots: highest entry speed by bisection; cross: as the manoeuvre has it"
     figure = new_figure(1.2 + 4.6 * len(made.drivers), 4.2, title)
     panels = figure.subplots(1, len(made.drivers), sharey=True, squeeze=False)[0]
     for axes, driver in zip(panels, made.drivers, strict=True):
@@ -63,13 +66,19 @@ def _draw_map(axes: Axes, made: Envelope, driver: str) -> None:
         low, high = _edges(lines, place[1])
         axes.fill_between([left, right], low, high, facecolor=_COLOURS[state], edgecolor="white")
         if state is State.SOME:
-            text = "\n".join(made.kept_by(driver, place))
-            axes.text(place[0], place[1], text, ha="center", va="center", fontsize="xx-small")
+            # At the top of the cell: the dots and the cross are on a line through the middle of some.
+            text = ", ".join(made.kept_by(driver, place))
+            axes.annotate(
+                text, (place[0], high), (0, -2), textcoords="offset points", ha="center", va="top", fontsize="xx-small"
+            )
     known = [*SYSTEM_LABELS, *(entry["controller"] for entry in made.entry_speeds)]
-    for entry in made.entry_speeds:
-        if entry["driver"] == driver and entry["entry_speed_kmh"] is not None:
-            colour = RUN_COLOURS[list(dict.fromkeys(known)).index(entry["controller"]) % len(RUN_COLOURS)]
-            axes.plot(entry["entry_speed_kmh"], made.nominal[1], "o", color=colour, label=entry["controller"])
+    mine = [entry for entry in made.entry_speeds if entry["driver"] == driver and entry["entry_speed_kmh"] is not None]
+    for entry, size in zip(mine, np.linspace(12.0, 6.0, len(mine)), strict=True):
+        colour = RUN_COLOURS[list(dict.fromkeys(known)).index(entry["controller"]) % len(RUN_COLOURS)]
+        # Ever smaller, so that equal speeds are seen as rings.
+        axes.plot(
+            entry["entry_speed_kmh"], made.nominal[1], "o", color=colour, markersize=size, label=entry["controller"]
+        )
     axes.plot(*made.nominal, "kx", markersize=9, markeredgewidth=2)
     axes.set_xlabel("speed [km/h]")
     axes.set_title(driver, fontsize="medium")
