@@ -177,18 +177,18 @@ def test_the_plots_hold_all_runs_in_their_colours(together: Pictures) -> None:
 def test_the_plots_of_wheels_and_links_are_drawn(viewer: Headless, drives: Drives, folder: Path) -> None:
     """They stand on pages behind the first one."""
     runs = runs_of({"ars": drives["ars"]})
-    for page, plots, number in ((1, WHEELS, 5), (2, links(runs[0]), 4)):
+    for page, plots in ((1, WHEELS), (2, links(runs[0]))):
         file = folder / f"page {page}.rrd"
         stream = rr.RecordingStream(f"page {page}")
         stream.save(file)
         fill(stream, runs, blueprint(runs, compare=False, page=page))
         stream.disconnect()
-        titles = tuple(plot.title for plot in plots)
-        assert len(titles) == number
+        # Nobody brakes in these drives, and what is zero throughout has no plot.
+        titles = tuple(plot.title for plot in plots if not plot.title.startswith("Brake pressure"))
+        assert len(titles) == 4
         for name, picture in _looked_at(viewer, file, titles, (AT_S,))[AT_S].items():
             assert picture.reports == []
             bright = np.ptp(picture.pixels, axis=-1) > 60
             assert spread(bright) > 0.6, name  # the legend covers some of it
             hues = {tuple(pixel) for pixel in (picture.pixels[bright] // 64).tolist()}
-            # Nobody brakes in these drives: the pressures of the four wheels lie on each other.
-            assert len(hues) >= (1 if name.startswith("Brake pressure") else 3), name
+            assert len(hues) >= 3, name
