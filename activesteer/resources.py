@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Final
 
 from activesteer.errors import (
     ActiveSteerError,
@@ -22,6 +23,9 @@ from activesteer.errors import (
 from activesteer.files import is_file, is_folder, user_path, why_no_file
 
 _PACKAGE = Path(__file__).resolve().parent
+
+DEFAULT_DRIVER: Final = "typical"
+"""Who drives where nobody is named."""
 
 
 def _data_dir(name: str, error: type[ActiveSteerError]) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import socket
 import subprocess
 import sys
@@ -30,8 +31,14 @@ LONG_FIRST: Final = (
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Several processes must not all compile the same at once: it is done for them before they start."""
-    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+    """Several processes must not all compile the same at once: it is done for them before they start.
+
+    Where the tests are begun in the background of a shell, Ctrl-C is ignored, and by all that they start: not here.
+    """
+    if hasattr(config, "workerinput"):
+        return
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if getattr(config.option, "numprocesses", None):
         drive = "from activesteer import simulate; simulate('step_steer', 'ars', overrides={'duration_s': 1.5})"
         subprocess.run([sys.executable, "-c", drive], cwd=ROOT, check=True)
 

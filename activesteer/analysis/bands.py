@@ -15,7 +15,7 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import Array
 from activesteer.errors import StudyError
 from activesteer.files import reading
-from activesteer.resources import studies_dir
+from activesteer.resources import DEFAULT_DRIVER, studies_dir
 
 SHARES: Final = (0.1, 0.9)
 """Which part of the runs lies below the lower and below the upper edge."""
@@ -101,13 +101,14 @@ def bands_of(recording: RecordingLike) -> Mapping[str, Band]:
         recording: The run.
 
     Returns:
-        Channel -> band; nothing where the run is none of the paper's, or no population of its car is stored.
+        Channel -> band; nothing where the run is none of the paper's as it stands, by the driver that the population
+        varies, or no population of its car is stored.
 
     Raises:
         StudyError: the stored file cannot be read.
     """
-    maneuver, vehicle = (_name(recording, part) for part in ("maneuver", "vehicle"))
-    if claims_for(recording) is None:
+    maneuver, vehicle, driver = (_name(recording, part) for part in ("maneuver", "vehicle", "driver"))
+    if claims_for(recording) is None or recording.metadata.get("overrides") or driver != DEFAULT_DRIVER:
         return {}
     return _stored(vehicle).get((maneuver, str(recording.metadata.get("controller"))), {})
 

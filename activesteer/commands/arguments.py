@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.config import parse_value
 from activesteer.errors import MAX_SHOWN, ParameterError
+from activesteer.resources import DEFAULT_DRIVER
 
 if TYPE_CHECKING:
     from activesteer.scenario import Scenario
@@ -108,7 +109,7 @@ def add_controller(parser: argparse.ArgumentParser, *, several: bool, default: s
 def add_driver(parser: argparse.ArgumentParser) -> None:
     """Adds `--driver`."""
     parser.add_argument(
-        "--driver", default="typical", metavar="DRIVER",
+        "--driver", default=DEFAULT_DRIVER, metavar="DRIVER",
         help="novice, typical, expert, a driver file, or my_file.py:MyDriver (default: typical)",
     )  # fmt: skip
 

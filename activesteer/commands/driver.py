@@ -16,6 +16,7 @@ from activesteer.commands.arguments import (
 from activesteer.commands.output import print_json
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder
+from activesteer.resources import DEFAULT_DRIVER
 
 _COLUMNS = ("speed_kmh", "controller", "damping", "damping_in_run", "phase_margin_deg", "crossover_rad_s")
 
@@ -29,7 +30,7 @@ def add_to(commands: Any) -> None:
         "car, the corrector fully active; beside it the damping after a small step of the path in a run.",
     )
     parser.add_argument(
-        "name", nargs="?", default="typical", metavar="NAME",
+        "name", nargs="?", default=DEFAULT_DRIVER, metavar="NAME",
         help="novice, typical, expert, or a driver file (default: typical)",
     )  # fmt: skip
     add_vehicle(parser)

@@ -18,6 +18,7 @@ from activesteer.commands.arguments import (
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError
+from activesteer.resources import DEFAULT_DRIVER
 
 
 def add_to(commands: Any) -> None:
@@ -41,7 +42,6 @@ def add_to(commands: Any) -> None:
 
 
 def _envelope(options: argparse.Namespace) -> int:
-    from activesteer.driver import DEFAULT_DRIVER
     from activesteer.studies.envelope import RANGE_KMH, State, envelope
 
     with ProgressBar("envelope", quiet=options.json) as bar:

@@ -39,14 +39,17 @@ def add_to(commands: Any) -> None:
 
 
 def _reproduce(options: argparse.Namespace) -> int:
+    # Here, where an interruption finds out what is saved.
+    options.output = options.output or Path("runs" if options.population is None else "population")
     if options.population is not None:
+        options.how_to_go_on = "; the same command goes on with it"
         return _population(options)
     for name in ("seed", "scheduler"):
         if getattr(options, name) is not None:
             raise ParameterError(f"--{name} belongs to --population")
-    folder = options.output or Path("runs")
     from activesteer.studies.reproduction import reproduce
 
+    folder = options.output
     with ProgressBar("reproduce", quiet=options.json) as bar:
 
         def show(what: str, done: int, total: int) -> None:
@@ -106,7 +109,7 @@ def _population(options: argparse.Namespace) -> int:
             options.population,
             seed=options.seed,
             vehicle=options.vehicle,
-            output=options.output or Path("population"),
+            output=options.output,
             jobs=options.jobs,
             scheduler=options.scheduler,
             progress=counter,

@@ -16,9 +16,6 @@ from activesteer.plugins import Kind, Plugin, find
 from activesteer.resources import list_drivers
 from activesteer.signals import DriverCommand, WheelTorques
 
-DEFAULT_DRIVER: Final = "typical"
-"""Who drives where nobody is named."""
-
 _MAX_ANGLE_RAD: Final = 50.0
 """No steering wheel turns so far; more is taken for a mistake, such as degrees [rad]."""
 _MAX_TORQUE_NM: Final = 1e6

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from activesteer.config import build, to_table
-from activesteer.driver import DEFAULT_DRIVER, DriverParameters, find_driver, is_driver_file
+from activesteer.driver import DriverParameters, find_driver, is_driver_file
 from activesteer.errors import DriverError
 from activesteer.plugins import Plugin
-from activesteer.resources import find_driver_file
+from activesteer.resources import DEFAULT_DRIVER, find_driver_file
 from activesteer.scenario.car import read_table
 from activesteer.scenario.overrides import Override, applied
 

@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from activesteer.config import check_overruled, field_in_unit, field_path, key_hint, key_paths, leaf_keys, to_table
 from activesteer.controllers import ControllerParameters, ControllerSetup
-from activesteer.driver import DEFAULT_DRIVER, DriverParameters, DriverSetup
+from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, nearest_names
 from activesteer.maneuver import Maneuver, build_maneuver, filled_from_csv, maneuver_class
-from activesteer.resources import find_maneuver
+from activesteer.resources import DEFAULT_DRIVER, find_maneuver
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
 from activesteer.scenario.driver import ChosenDriver, driver_with
 from activesteer.scenario.overrides import Override, applied, plain

@@ -132,7 +132,7 @@ class ClosedLoop:
         steps: int,
         recorder: Recorder | None,
     ) -> None:
-        vehicle, (command, steer) = self.vehicle, self.commands
+        vehicle, (command, asked) = self.vehicle, self.commands
         timestep_s, measurement, motion = vehicle.timestep_s, self.measurement, self.motion
         tape_address = 0 if recorder is None else recorder.tape_address
         with engine_warnings_held():
@@ -142,9 +142,9 @@ class ClosedLoop:
                     for step in block:
                         reference = reference_at(step * timestep_s)
                         command = driver.step(reference, measurement, motion)
-                        steer = controller.step(command, measurement)
-                        measurement, motion = step_car(command, steer, tape_address)
-        self.step_count, self.commands = self.step_count + steps, (command, steer)
+                        asked = controller.step(command, measurement)
+                        measurement, motion = step_car(command, asked, tape_address)
+        self.step_count, self.commands = self.step_count + steps, (command, asked)
         self.measurement, self.motion = measurement, motion
 
     def save_state(self) -> LoopState:

@@ -34,7 +34,7 @@ class ControlUnit:
         steering_ratio: float | None = None,
         truth: Callable[[], tuple[Measurement, Motion]] | None = None,
     ) -> None:
-        """Takes its parts.
+        """Puts a controller on its rate and its bus.
 
         Args:
             inner: The controller.

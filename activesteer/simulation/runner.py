@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.driver import DEFAULT_DRIVER
 from activesteer.errors import ActiveSteerError
 from activesteer.recording import Recording
+from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario
 from activesteer.simulation.simulation import Simulation
 

@@ -12,9 +12,10 @@ from typing import Any, Final, NamedTuple
 from activesteer.analysis.metrics import metrics
 from activesteer.controllers import CONTROLLER, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.driver import DEFAULT_DRIVER, DRIVER
+from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
 from activesteer.recording import McapWriter, Recording
+from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
 from activesteer.simulation.closed_loop import ClosedLoop, LoopState

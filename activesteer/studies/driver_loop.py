@@ -24,9 +24,10 @@ from numpy.typing import NDArray
 
 from activesteer.controllers.linear_form import LinearController, linear_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
-from activesteer.driver import DEFAULT_DRIVER, DriverParameters
+from activesteer.driver import DriverParameters
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains, steering_gains
 from activesteer.errors import DriverError
+from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.studies.discrete_time_map import OUTPUTS
 from activesteer.studies.linearisation import LinearCar, linear_cars

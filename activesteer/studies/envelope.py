@@ -17,8 +17,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from activesteer.driver import DEFAULT_DRIVER
 from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.plan import label_of

@@ -18,9 +18,9 @@ import numpy as np
 from activesteer.config import Range, Source, build
 from activesteer.controllers import system_of
 from activesteer.conventions import Array
-from activesteer.driver import DEFAULT_DRIVER
 from activesteer.errors import ParameterError, SimulationDiverged, nearest_names
 from activesteer.faults import Fault, fault_table
+from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 from activesteer.simulation.closed_loop import ClosedLoop

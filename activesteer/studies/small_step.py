@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.source import RecordingLike
-from activesteer.driver import DEFAULT_DRIVER
 from activesteer.errors import StudyError
+from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable
 from activesteer.simulation.runner import simulate
 

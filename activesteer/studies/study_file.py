@@ -12,10 +12,9 @@ from typing import Any, Final
 
 from activesteer.config import Source, build, read_toml, toml_value
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.driver import DEFAULT_DRIVER
 from activesteer.errors import StudyError, nearest_names, shown
 from activesteer.files import user_path
-from activesteer.resources import find_study
+from activesteer.resources import DEFAULT_DRIVER, find_study
 from activesteer.scenario import FileOrTable
 from activesteer.studies.design import DesignTable, Samples, cases, choose_design, draw, read_cases
 from activesteer.studies.factors import Factor, read_factor

@@ -23,15 +23,16 @@ from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_step
+from activesteer.vehicle.actuator_records import ActuatorRecords
 from activesteer.vehicle.channels import ChannelMap, RawRows
 from activesteer.vehicle.command_row import CARRIED_OUT, COMMANDS, write_commands
 from activesteer.vehicle.equilibrium import static_ride
-from activesteer.vehicle.loading import find, load_model
+from activesteer.vehicle.loading import load_model
+from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.native_forces import install_native_forces
 from activesteer.vehicle.native_step import FASTEST_MPS, Places, Wheels, sensed, step_plan
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
-from activesteer.vehicle.toe_link_screws import SCREW
 
 _CALIBRATED_AT_MPS: Final = 20.0
 """Speed at which the rolling radii are taken that turn wheel speeds into the speed of the car [m/s]."""
@@ -62,6 +63,7 @@ class Vehicle:
         data: The engine's state.
         parameters: What the vehicle file says.
         channels: Map from raw rows to recorded channels.
+        actuators: What the native forces know of the actuators.
     """
 
     def __init__(
@@ -136,6 +138,7 @@ class Vehicle:
             [actuator(f"{corner}_brake") for corner in CORNERS],
             self.parameters.powertrain.wheel_shares,
         )
+        self.actuators = ActuatorRecords(model, (self._places.rear_left, self._places.rear_right))
         ratio, brakes = self.parameters.steering.ratio, (self._brake_setup, self._brake_state)
         self._plan = step_plan(
             model, data, self.live_arrays(), self._places, self._wheels, ratio, self._sensors, brakes
@@ -158,7 +161,7 @@ class Vehicle:
         """Static equilibrium at the origin of the world, heading along x."""
         mujoco.mj_resetData(self.model, self.data)
         held = [self._root_dof, self._root_dof + 1, self._root_dof + 5, *self._spins]
-        plays = [link[fb.L_BACKLASH_m : fb.L_BACKLASH_m + 1] for link, _ in self._screws()]
+        plays = [link[fb.L_BACKLASH_m : fb.L_BACKLASH_m + 1] for link, _ in self.actuators.rear_screws()]
         given = [play.copy() for play in plays]
         for play in plays:
             play[:] = 0.0  # the search finds its way by slopes, and within a play there is none
@@ -301,15 +304,10 @@ class Vehicle:
     @property
     def rack_per_steering_wheel_m(self) -> float | None:
         """Rack travel per steering wheel angle [m/rad], from the fixed tendon `steering_column`; None without one."""
-        model = self.model
-        tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, "steering_column")
-        if tendon < 0:
+        arms = tendon_arms(self.model, "steering_column")
+        if "rack" not in arms or "steering_wheel" not in arms:
             return None
-        parts = range(int(model.tendon_adr[tendon]), int(model.tendon_adr[tendon] + model.tendon_num[tendon]))
-        ratios = {model.joint(int(model.wrap_objid[part])).name: float(model.wrap_prm[part]) for part in parts}
-        if "rack" not in ratios or "steering_wheel" not in ratios:
-            return None
-        return -ratios["steering_wheel"] / ratios["rack"]
+        return -arms["steering_wheel"] / arms["rack"]
 
     def measure(self) -> Measurement:
         """What the car's sensors say of the instant at which the last step began, and the yaw rate at its end.
@@ -415,57 +413,12 @@ class Vehicle:
         # The step engages a gear only where it changes; this one never occurs, so it does so now.
         self._gear = math.nan
 
-    def actuator_record(self, index: int) -> NDArray[np.float64]:
-        """The record of an actuator in the block of the native forces (see `force_block`), to be changed by faults."""
-        block = self.model.numeric_data[int(self.model.numeric_data[-fb.TRAILER_SIZE]) :]
-        start = int(block[fb.ACTUATORS_START]) + index * fb.ACTUATOR_SIZE
-        return block[start : start + fb.ACTUATOR_SIZE]
-
-    def rear_states_at(self, angle_rad: float) -> dict[int, float]:
-        """Activations of the rear steering actuators that have arrived at an angle [rad], by their addresses."""
-        states: dict[int, float] = {}
-        for index in (self._places.rear_left, self._places.rear_right):
-            address = int(self.model.actuator_actadr[index])
-            if records := self.screw_records(index):
-                link, screw = records
-                powers = angle_rad ** np.arange(1, fb.POWERS + 1)
-                travel = float(screw[fb.S_TRAVEL : fb.S_TRAVEL + fb.POWERS] @ powers)
-                states[int(screw[fb.S_ACT])] = travel
-                states[address] = float(link[fb.L_SIGN]) * travel
-            else:
-                states[address] = angle_rad
-        return states
-
-    def _screws(self) -> Iterator[tuple[NDArray[np.float64], ...]]:
-        """Records of link and screw of every rear wheel that has a screw."""
-        for index in (self._places.rear_left, self._places.rear_right):
-            if records := self.screw_records(index):
-                yield records
-
     def limit_hands(self, torque_Nm: float | None) -> None:
         """Lets the hands on the steering wheel hold no more than a torque [N m]; any where not given."""
         hands, felt = self._places.steering_wheel, 1.0 - self.parameters.steering.assist_share
         self.model.actuator_forcelimited[hands] = torque_Nm is not None
         most = 0.0 if torque_Nm is None else torque_Nm / felt
         self.model.actuator_forcerange[hands] = -most, most
-
-    def screw_records(self, index: int) -> tuple[NDArray[np.float64], ...]:
-        """The records of link and screw of an actuator (see `force_block`), that of its motor alone, or nothing."""
-        record = self.actuator_record(index)
-        if record[fb.A_KIND] not in (fb.KIND_LINK, fb.KIND_SCREW):
-            return ()
-        block = self.model.numeric_data[int(self.model.numeric_data[-fb.TRAILER_SIZE]) :]
-        first = int(block[fb.SCREWS_START])
-        if record[fb.A_KIND] == fb.KIND_SCREW:
-            return (block[first + int(record[fb.A_FIRST]) :][: fb.SCREW_SIZE],)
-        link = block[first + int(record[fb.A_FIRST]) :][: fb.LINK_SIZE]
-        part = self.model.actuator(index).name[:2]
-        screw_actuator = part + SCREW if part + SCREW in self._actuator_names() else f"rear{SCREW}"
-        start = int(self.actuator_record(self.model.actuator(screw_actuator).id)[fb.A_FIRST])
-        return link, block[first + start :][: fb.SCREW_SIZE]
-
-    def _actuator_names(self) -> set[str]:
-        return {self.model.actuator(index).name for index in range(self.model.nu)}
 
     def note_measurement(self, measurement: Measurement) -> None:
         """Has recorded what faulty sensors say, where the measurement is recorded at all."""

@@ -16,7 +16,7 @@ from activesteer.sensors.block import MEASURED
 from activesteer.signals import Channel
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.command_row import COMMAND_CHANNELS
-from activesteer.vehicle.loading import find
+from activesteer.vehicle.named_parts import find
 from activesteer.vehicle.native_channels import (
     Actuator,
     AxialForce,

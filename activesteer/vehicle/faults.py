@@ -20,7 +20,7 @@ from activesteer.faults import ACTUATORS, SENSORS, Fault
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.car import Vehicle
-from activesteer.vehicle.loading import find
+from activesteer.vehicle.named_parts import find
 
 Step = Callable[[DriverCommand, ActuatorCommand, int], tuple[Measurement, Motion]]
 _STOPS: Final = {"left": fb.A_HIGH, "right": fb.A_LOW}
@@ -137,13 +137,13 @@ class _ActuatorFault:
         model = self._model = vehicle.model
         self.fault = fault
         self._index = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
-        self._record: NDArray[Any] = vehicle.actuator_record(self._index)
+        self._record: NDArray[Any] = vehicle.actuators.of(self._index)
         self._healthy = (
             self._record.copy(),
             model.actuator_gainprm[self._index].copy(),
             (model.actuator_biasprm[self._index].copy()),
         )
-        self._screw = vehicle.screw_records(self._index)
+        self._screw = vehicle.actuators.screw(self._index)
         self._healthy_screw = tuple(part.copy() for part in self._screw)
         self._ctrl = vehicle.data.ctrl
         ratio = vehicle.parameters.steering.ratio if ACTUATORS[fault.part].by_ratio else 1.0

@@ -9,11 +9,12 @@ from typing import Final
 import mujoco
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
-from activesteer.errors import ModelError, nearest_names
+from activesteer.errors import ModelError
 from activesteer.road.road import Road
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.load import apply_load
+from activesteer.vehicle.named_parts import find
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, DamperCurve, VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.vehicle.superposition_actuator import MOTOR, NAME, fit_motor, motor_record
@@ -102,27 +103,6 @@ def chain_to(model: mujoco.MjModel, body: int) -> list[int]:
         chain.append(dof)
         dof = int(model.dof_parentid[dof])
     return chain
-
-
-def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    """Index of a named thing.
-
-    Raises:
-        ModelError: there is none of this name.
-    """
-    index = mujoco.mj_name2id(model, kind, name)
-    if index < 0:
-        word = kind.name.removeprefix("mjOBJ_").lower()
-        count = {
-            mujoco.mjtObj.mjOBJ_BODY: model.nbody,
-            mujoco.mjtObj.mjOBJ_JOINT: model.njnt,
-            mujoco.mjtObj.mjOBJ_SENSOR: model.nsensor,
-            mujoco.mjtObj.mjOBJ_TENDON: model.ntendon,
-            mujoco.mjtObj.mjOBJ_ACTUATOR: model.nu,
-        }[kind]
-        names = [mujoco.mj_id2name(model, kind, number) or "" for number in range(count)]
-        raise ModelError(f"the model has no {word} {name!r}; {nearest_names(name, names)}", value=name)
-    return index
 
 
 def _force_block(

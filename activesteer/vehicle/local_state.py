@@ -15,7 +15,7 @@ import numpy as np
 
 from activesteer.conventions import CORNERS, Array, yaw_of
 from activesteer.vehicle.car import Vehicle
-from activesteer.vehicle.loading import find
+from activesteer.vehicle.named_parts import find
 
 _AXES: Final = ("x", "y", "z", "roll", "pitch", "yaw")
 _JOINT_DOFS: Final = {0: _AXES, 1: ("_x", "_y", "_z"), 2: ("",), 3: ("",)}

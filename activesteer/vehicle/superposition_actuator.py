@@ -15,6 +15,7 @@ from activesteer.config import Range
 from activesteer.errors import ModelError, ParameterError
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.electric_actuator import ElectricActuator, known
+from activesteer.vehicle.named_parts import tendon_arms
 
 NAME: Final = "superposition"
 MOTOR: Final = "_motor"
@@ -110,8 +111,6 @@ def motor_record(model: mujoco.MjModel, actuator: SuperpositionActuator) -> list
     """
     record = [0.0] * fb.SCREW_SIZE
     index, column = model.actuator(NAME).id, model.tendon(_COLUMN).id
-    parts = range(int(model.tendon_adr[column]), int(model.tendon_adr[column] + model.tendon_num[column]))
-    arms = {int(model.wrap_objid[part]): float(model.wrap_prm[part]) for part in parts}
     values = actuator.motor_numbers() | {
         fb.S_ACT: float(model.actuator_actadr[index]),
         fb.S_MOTOR_ACT: float(model.actuator_actadr[model.actuator(NAME + MOTOR).id]),
@@ -124,7 +123,7 @@ def motor_record(model: mujoco.MjModel, actuator: SuperpositionActuator) -> list
         fb.S_COLUMN: float(column),
         fb.S_COLUMN_STIFFNESS_Npm: float(model.tendon_stiffness[column]),
         fb.S_COLUMN_REST_m: float(model.tendon_lengthspring[column, 0]),
-        fb.S_COLUMN_ARM_m: arms[model.joint(NAME).id],
+        fb.S_COLUMN_ARM_m: tendon_arms(model, _COLUMN)[NAME],
         fb.S_TRAVEL: 1.0,
     }
     if actuator.voltage_ratio == 0.0:

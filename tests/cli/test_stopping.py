@@ -21,7 +21,7 @@ END_S = 5.0
 
 QUICK = [(("run", "slalom", "-c", "none", "-c", "ars"), signal.SIGINT, after_s) for after_s in (0.1, 0.5, 1.5, 3.0)] + [
     (("run", "slalom"), signal.SIGTERM, 2.0),
-    (("reproduce", "--jobs", "2"), signal.SIGINT, 3.0),
+    (("reproduce", "--jobs", "2"), signal.SIGINT, 6.0),  # some runs are on the disk by then
     (("kc",), signal.SIGTERM, 1.0),
 ]
 COMMANDS = (

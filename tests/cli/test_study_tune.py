@@ -75,7 +75,7 @@ def test_a_search_goes_on_where_it_was(file, tmp_path, call):
     ("words", "made", "how"),
     [
         (("study",), "parts/[0-9]*", r"go on with `activesteer study \S+`"),
-        (("tune", "--trials", "1000"), "journal*", "the same command goes on with it"),
+        (("tune", "--trials", "1000"), "*.journal", "the same command goes on with it"),
     ],
 )
 def test_ctrl_c_says_how_to_go_on(file, tmp_path, words, made, how):

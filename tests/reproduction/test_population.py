@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -89,6 +90,14 @@ def test_every_nominal_run_has_its_bands(runs: dict[str, dict[str, Recording]]):
                 assert (band.low <= band.high).all()
             # The nominal car is one of the population's middle.
             assert bands["yaw_rate_radps"].high.max() > 0.5 * run["yaw_rate_radps"].max()
+
+
+@pytest.mark.parametrize(
+    "other", [{"overrides": {"factors.mass": 1.1}}, {"overrides": {"speed_kmh": 90}}, {"driver": {"name": "expert"}}]
+)
+def test_another_car_manoeuvre_or_driver_has_none(runs: dict[str, dict[str, Recording]], other: dict[str, Any]):
+    run: Any = SimpleNamespace(metadata=runs["slalom"]["ars"].metadata | other)
+    assert bands_of(run) == {}
 
 
 def driven_again(pairs: list[tuple[int, str]]) -> list[tuple[list[Row], list[Row]]]:

@@ -1,6 +1,6 @@
 """A claim of the paper: what is stated, what must hold for it, and what became of it in three runs.
 
-A statement stands before anything is driven. Its sizes come from what its words mean and from what a driver or a
+The sizes of a statement come from what its words mean and from what a driver or a
 sensor can notice (`noticeable`), and it names the fakes that it must not be taken in by.
 """
 

@@ -1,6 +1,7 @@
 """Sizes below which a difference is none: what a driver or a sensor in a test car could not tell.
 
-They were chosen from what is published about sensors and humans, before anything was driven.
+They rest on what is published about sensors and humans. That results of an earlier driver and earlier gains were known
+when they were written down is said in the guide (`docs/claims.md`).
 """
 
 from __future__ import annotations

@@ -125,7 +125,7 @@ class HeldCar:
         self._free = np.setdiff1d(np.arange(model.nv), held)
         self._steering_wheel = int(model.actuator("steering_wheel").id)
         self._rear = [int(model.actuator(f"{corner}_steer").id) for corner in CORNERS[2:]]
-        self._rear_states_at = vehicle.rear_states_at
+        self._rear_states_at = vehicle.actuators.rear_states_at
 
     def _take_out_springs(self, *, lock_dampers: bool) -> None:
         model, data = self.model, self.data

@@ -172,7 +172,7 @@ def _sweeps(
 def rear_screw_travel_m(vehicle: Vehicle, angles_rad: Array) -> Array:
     """By how much the screw of the left toe link makes it longer at angles of the actuators [m], shape (n,)."""
     address = int(vehicle.model.actuator_actadr[vehicle.model.actuator("rl_steer").id])
-    return np.array([vehicle.rear_states_at(float(angle))[address] for angle in angles_rad])
+    return np.array([vehicle.actuators.rear_states_at(float(angle))[address] for angle in angles_rad])
 
 
 def _steering_angles(vehicle: Vehicle) -> Array:
