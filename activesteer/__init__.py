@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from activesteer.recording import Recording
-    from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
+    from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion, Reference
     from activesteer.simulation.runner import simulate
     from activesteer.simulation.simulation import Simulation
     from activesteer.studies.study import study
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ActuatorCommand",
     "DriverCommand",
+    "Estimate",
     "Measurement",
     "Motion",
     "Recording",
@@ -31,6 +32,7 @@ __all__ = [
 _HOMES = {
     "Recording": "activesteer.recording",
     "DriverCommand": "activesteer.signals",
+    "Estimate": "activesteer.signals",
     "Measurement": "activesteer.signals",
     "Motion": "activesteer.signals",
     "Reference": "activesteer.signals",

@@ -144,6 +144,36 @@ class Motion(NamedTuple):
     yaw_rate_radps: float
 
 
+class Estimate(NamedTuple):
+    """What an estimator makes of what the sensors say: the motion of the centre of gravity over the road.
+
+    A standard deviation is that of the error as the estimator itself expects it.
+
+    Attributes:
+        speed_mps: Speed along the car's longitudinal axis [m/s].
+        lateral_speed_mps: Speed across it, left positive [m/s].
+        sideslip_rad: Sideslip angle [rad], left positive; 0 at walking speed.
+        yaw_rate_radps: Yaw rate [rad/s], left positive, without the sensor's offset and age.
+        friction: Friction of the road relative to that of the tyres' files.
+        speed_std_mps: Standard deviation of the speed [m/s].
+        lateral_speed_std_mps: Of the lateral speed [m/s].
+        sideslip_std_rad: Of the sideslip angle [rad].
+        yaw_rate_std_radps: Of the yaw rate [rad/s].
+        friction_std: Of the friction.
+    """
+
+    speed_mps: float
+    lateral_speed_mps: float
+    sideslip_rad: float
+    yaw_rate_radps: float
+    friction: float
+    speed_std_mps: float
+    lateral_speed_std_mps: float
+    sideslip_std_rad: float
+    yaw_rate_std_radps: float
+    friction_std: float
+
+
 NO_BRAKES: Final = (0.0, 0.0, 0.0, 0.0)
 """No brake torque at any wheel [Nm]."""
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from activesteer.config import Range
+from activesteer.errors import ControllerError
+from activesteer.estimation import Estimator, EstimatorParameters, EstimatorSetup
 from activesteer.theory.single_track import SingleTrackParameters
 
 _NotNegative = Annotated[float, Range(0.0)]
@@ -73,6 +75,8 @@ class ControllerParameters:
     """Active rear steering."""
     afs: FrontSuperpositionParameters = FrontSuperpositionParameters()
     """Active front steering."""
+    estimator: EstimatorParameters = EstimatorParameters()
+    """Speed, sideslip and friction, for controllers that ask for them."""
     interval_s: Annotated[float, Range(1e-4, 0.1)] | None = None
     """Time between two calls of a controller, whole steps; its own `interval_s`, else every step, if not given [s]."""
     bus_delay_s: Annotated[float, Range(0.0, 0.1)] = 0.0
@@ -89,6 +93,7 @@ class ControllerSetup:
         steering_ratio: Steering wheel angle over road-wheel angle [-].
         timestep_s: Time between two calls [s].
         overridden: Dotted keys of the gains that were replaced for this run.
+        estimation: What an estimator knows of the car; None where its file has no table [two_track].
     """
 
     single_track: SingleTrackParameters
@@ -96,3 +101,15 @@ class ControllerSetup:
     steering_ratio: float
     timestep_s: float
     overridden: frozenset[str] = frozenset()
+    estimation: EstimatorSetup | None = None
+
+    def estimator(self) -> Estimator:
+        """Makes an estimator of speed, sideslip, yaw rate and friction, to be called in each step of the controller.
+
+        Raises:
+            ControllerError: the vehicle file does not say what it needs.
+        """
+        if self.estimation is None:
+            problem = "an estimator needs the table [two_track] in the vehicle file: `activesteer identify --write`"
+            raise ControllerError(problem, key="two_track")
+        return Estimator(self.estimation, self.gains.estimator, self.timestep_s)

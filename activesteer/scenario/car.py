@@ -19,6 +19,7 @@ from activesteer.scenario.model_files import model_files
 from activesteer.scenario.overrides import Override, applied, plain
 from activesteer.sensors import Sensors
 from activesteer.theory.single_track import IDENTIFY
+from activesteer.theory.two_track import TwoTrackParameters
 from activesteer.tyre.file.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle, VehicleParameters
@@ -37,6 +38,8 @@ class VehicleConfig(VehicleParameters):
 
     single_track: SingleTrackParameters
     """The car as the controllers see it."""
+    two_track: TwoTrackParameters | None = None
+    """What estimators know beyond that; without it there are none."""
     controllers: ControllerParameters = ControllerParameters()
     """Gains and limits."""
     KEY_HINTS: ClassVar = VehicleParameters.KEY_HINTS | {"driver": _DRIVER_HINT}
@@ -50,6 +53,7 @@ class Car:
         config: The vehicle file.
         mjcf: The model file.
         tyres: Tyres of the front and of the rear axle.
+        new_tyres: The same without the factors of the vehicle file.
         overrides: What was changed against the vehicle file.
         files: What it was made from, by name, to be kept with a recording.
     """
@@ -57,6 +61,7 @@ class Car:
     config: VehicleConfig
     mjcf: Path
     tyres: tuple[TyreParameters, TyreParameters]
+    new_tyres: tuple[TyreParameters, TyreParameters]
     overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
 
@@ -132,12 +137,14 @@ def car_with(vehicle: FileOrTable, overrides: list[Override]) -> Car:
     model = mjcf.parent.name.encode("utf-8", "backslashreplace").decode()
     files |= {f"mjcf/{model}/{name}": text for name, text in model_files(mjcf).items()}
     front_tyre = _tyre(front, config)
-    rear_tyre = front_tyre if rear == front else _tyre(rear, config)
-    return Car(config, mjcf, (front_tyre, rear_tyre), files=files)
+    new = front_tyre, front_tyre if rear == front else _tyre(rear, config)
+    front_tyre = config.factors.on_tyre(new[0])
+    fitted = front_tyre, front_tyre if rear == front else config.factors.on_tyre(new[1])
+    return Car(config, mjcf, fitted, new, files=files)
 
 
 def _tyre(path: Path, config: VehicleConfig) -> TyreParameters:
-    return config.factors.on_tyre(replace(load_tir(path), conventions=config.tyres.conventions))
+    return replace(load_tir(path), conventions=config.tyres.conventions)
 
 
 def read_table(

@@ -14,6 +14,7 @@ from activesteer.maneuver import Maneuver, build_maneuver, filled_from_csv, mane
 from activesteer.resources import DEFAULT_DRIVER, find_maneuver
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
 from activesteer.scenario.driver import ChosenDriver, driver_with
+from activesteer.scenario.estimation import estimator_setup
 from activesteer.scenario.overrides import Override, applied, plain
 from activesteer.vehicle.powertrain import Drive
 
@@ -43,7 +44,10 @@ class Scenario:
             first, *rest = key.removeprefix("vehicle.").split(".")
             if first == "controllers":
                 replaced |= {".".join(field_path(ControllerParameters, rest))}
-        return ControllerSetup(car.single_track, car.controllers, car.steering.ratio, timestep_s, frozenset(replaced))
+        return ControllerSetup(
+            car.single_track, car.controllers, car.steering.ratio, timestep_s, frozenset(replaced),
+            estimator_setup(self.car),
+        )  # fmt: skip
 
     def driver_setup(
         self, timestep_s: float, rack_per_steering_wheel_m: float | None, wheel_radius_m: float
