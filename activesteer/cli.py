@@ -79,6 +79,7 @@ def all_commands() -> Commands:
         kc,
         linearise,
         listing,
+        margins,
         recover,
         replay,
         report,
@@ -100,7 +101,7 @@ def all_commands() -> Commands:
         "drive": (listing, run, watch),
         "look": (info, report, replay, video, recover),
         "car": (vehicle, tyre, kc),
-        "study": (study, tune, envelope, fault_map, identify, linearise, driver),
+        "study": (study, tune, envelope, fault_map, identify, linearise, driver, margins),
         "prove": (reproduce, figures, validate, bench),
     }.items():
         commands.begin_group(title)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from activesteer.controllers.variant import read_variant
 from activesteer.conventions import Array
 from activesteer.errors import ControllerError, shown
 from activesteer.theory.single_track import SingleTrack
+
+_SYSTEMS: Final = ("none", "ars", "afs")
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,11 @@ class LinearController:
     d: Array
 
 
+def has_linear_form(given: Any) -> bool:
+    """Whether `linear_controller` knows a controller."""
+    return isinstance(given, str) and (given in _SYSTEMS or is_variant(given))
+
+
 def linear_controller(given: str, setup: ControllerSetup, speed_mps: float) -> LinearController:
     """The linear form of a controller of the package.
 
@@ -54,7 +61,7 @@ def linear_controller(given: str, setup: ControllerSetup, speed_mps: float) -> L
     if is_variant(given):
         variant = read_variant(given)
         gains, system = variant.gains_in(setup), variant.system
-    if system not in ("none", "ars", "afs"):
+    if system not in _SYSTEMS:
         raise ControllerError(
             f"{shown(given)} is no controller of the package or variant of one; only these have a linear form",
             value=given,

@@ -16,6 +16,8 @@ INPUTS: Final = ("steering_wheel_rad", "rear_steer_rad", "superposition_rad")
 """What is demanded of steering wheel [rad], rear steering [rad], and superposition at the road wheel [rad]."""
 OUTPUTS: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 """Channels of a recording that are the outputs."""
+ACTUATORS: Final = ("rear_steer_rad", "superposition_rad")
+"""Channels that say where the actuators of a controller are."""
 
 _DIFFERENCE: Final = 1e-6
 """Step of the central differences [m, rad, m/s, rad/s]: eigenvalues agree between 1e-7 and 1e-4 to four digits."""
@@ -36,7 +38,7 @@ class DiscreteTimeMap:
         self.torque_Nm = 0.0
         self.local = LocalState(vehicle)
         names = [channel.name for channel in vehicle.channels.channels]
-        self._columns = [names.index(name) for name in OUTPUTS]
+        self._columns = [names.index(name) for name in (*OUTPUTS, *ACTUATORS)]
 
     def __call__(self, x: Array, u: Array, more_torque_Nm: float = 0.0) -> Array:
         """The state after the step, as a difference from the reference."""
@@ -91,7 +93,7 @@ class DiscreteTimeMap:
             of: `x` or `u`, by what to differentiate.
 
         Returns:
-            Shapes (n, m) and (len(OUTPUTS), m), m being the size of x or u.
+            Shapes (n, m) and (len(OUTPUTS) + len(ACTUATORS), m), m being the size of x or u.
         """
         size, rest = len(self.local.names), (np.zeros(len(self.local.names)), np.zeros(len(INPUTS)))
         count = size if of == "x" else len(INPUTS)

@@ -65,6 +65,7 @@ class LinearCar:
         b: Input matrix, shape (n, len(INPUTS)).
         c: Output matrix, shape (len(OUTPUTS), n).
         d: Feed-through, shape (len(OUTPUTS), len(INPUTS)).
+        actuators: Where rear steering and superposition are, of the state: shape (len(ACTUATORS), n).
     """
 
     speed_mps: float
@@ -75,6 +76,7 @@ class LinearCar:
     b: Array
     c: Array
     d: Array
+    actuators: Array
 
     def modes(self) -> list[Mode]:
         """All modes, by natural frequency; of a conjugate pair the one with positive imaginary part."""
@@ -216,7 +218,8 @@ def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, 
     step.trim(speed_mps)
     a, c = step.derivatives("x")
     b, d = step.derivatives("u")
-    return LinearCar(speed_mps, step.vehicle.timestep_s, step.torque_Nm, step.local.names, a, b, c, d)
+    count, names = len(OUTPUTS), step.local.names
+    return LinearCar(speed_mps, step.vehicle.timestep_s, step.torque_Nm, names, a, b, c[:count], d[:count], c[count:])
 
 
 def linear_response(recording: RecordingLike, system: control.StateSpace) -> dict[str, Array]:

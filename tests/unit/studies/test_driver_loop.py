@@ -33,7 +33,7 @@ def ideal_car() -> LinearCar:
     c = np.zeros((len(OUTPUTS), 1))
     c[OUTPUTS.index("yaw_rate_radps"), 0] = 1.0
     d = np.zeros((len(OUTPUTS), len(INPUTS)))
-    return LinearCar(SPEED_MPS, STEP_S, 0.0, ("d_yaw",), np.zeros((1, 1)), b, c, d)
+    return LinearCar(SPEED_MPS, STEP_S, 0.0, ("d_yaw",), np.zeros((1, 1)), b, c, d, np.zeros((2, 1)))
 
 
 def loop(delay_s: float = 0.0, lag_s: float = 0.0) -> DriverLoop:

@@ -1,0 +1,148 @@
+"""Margins of loops that can be worked out by hand, and of the parts that a loop is put together from."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from activesteer.cli import main
+from activesteer.controllers import load_controller
+from activesteer.controllers.linear_form import linear_controller
+from activesteer.controllers.response import SIGNALS, pulse_responses
+from activesteer.errors import ControllerError
+from activesteer.scenario import resolve
+from activesteer.signals import ActuatorCommand
+from activesteer.studies.discrete_time_map import ACTUATORS, INPUTS, OUTPUTS
+from activesteer.studies.linearisation import LinearCar
+from activesteer.studies.margins import FREQUENCIES_RADPS, is_stable, margins_of, opened, round_trip
+from tests.unit.controllers.cars import measured, setup
+
+STEP_S, GAIN_1PS = 1e-3, 8.0
+
+
+def integrator(delay_s: float = 0.0):
+    return GAIN_1PS * np.exp(-1j * FREQUENCIES_RADPS * delay_s) / (1j * FREQUENCIES_RADPS)
+
+
+def test_margins_of_an_integrator_with_a_delay_are_those_worked_out_by_hand():
+    delay_s = 0.05
+    margins = margins_of(integrator(delay_s), FREQUENCIES_RADPS)
+    assert margins.phase_rad == pytest.approx(math.pi / 2.0 - GAIN_1PS * delay_s, abs=1e-3)
+    assert margins.delay_s == pytest.approx(math.pi / 2.0 / GAIN_1PS - delay_s, abs=1e-3)
+    assert margins.gain_dB == pytest.approx(20.0 * math.log10(math.pi / 2.0 / (GAIN_1PS * delay_s)), abs=0.01)
+    # It cannot be better than what the margins of gain and phase, each by itself, leave.
+    assert 0.5 < margins.disk < 2.0 * math.tan(margins.phase_rad / 2.0)
+
+
+def test_integrator_alone_has_the_largest_disk_and_no_gain_margin():
+    margins = margins_of(integrator(), FREQUENCIES_RADPS)
+    assert margins.disk == pytest.approx(2.0, rel=1e-6)
+    assert math.isnan(margins.gain_dB)
+
+
+def test_unstable_loop_has_no_margins():
+    margins = margins_of(integrator(), FREQUENCIES_RADPS, stable=False)
+    assert margins.disk == 0.0
+    assert math.isnan(margins.delay_s)
+
+
+def turning_car() -> LinearCar:
+    """A car whose yaw rate is the integral of the rear angle, turned round: x[k+1] = x[k] - h g u[k]."""
+    b = np.zeros((1, len(INPUTS)))
+    b[0, 1] = -STEP_S * GAIN_1PS
+    c = np.zeros((len(OUTPUTS), 1))
+    c[OUTPUTS.index("yaw_rate_radps"), 0] = 1.0
+    still = np.zeros((len(ACTUATORS), 1))
+    return LinearCar(20.0, STEP_S, 0.0, ("d_yaw",), np.eye(1), b, c, np.zeros((len(OUTPUTS), len(INPUTS))), still)
+
+
+def loop_with_bus_delay(delay_s: float):
+    def answer(frequencies_radps):
+        found = np.zeros((len(frequencies_radps), 2, len(SIGNALS)), complex)
+        found[:, 0, 0] = 1.0  # the rear wheels turn as the car does
+        return found
+
+    scenario = resolve("straight_line", overrides={"controllers.bus_delay_s": delay_s} if delay_s else None)
+    return round_trip(turning_car(), answer, scenario, STEP_S, FREQUENCIES_RADPS)
+
+
+def largest_root(steps: int) -> float:
+    """Size of the largest root of z^(n+1) - z^n + h g = 0: the loop as a difference equation, delayed by n steps."""
+    polynomial = np.zeros(steps + 2)
+    polynomial[0], polynomial[1], polynomial[-1] = 1.0, -1.0, polynomial[-1] + STEP_S * GAIN_1PS
+    return float(np.abs(np.roots(polynomial)).max())
+
+
+def test_delay_as_long_as_the_delay_margin_makes_the_loop_marginal():
+    margin_s = margins_of(opened(loop_with_bus_delay(0.0), "rear"), FREQUENCIES_RADPS).delay_s
+    steps = margin_s / STEP_S
+    assert steps == pytest.approx(math.pi / 2.0 / GAIN_1PS / STEP_S, rel=0.01)
+    assert largest_root(math.floor(steps) - 1) < 1.0 < largest_root(math.ceil(steps) + 1)
+
+
+@pytest.mark.parametrize("delay_s", [0.02, 0.09])
+def test_delay_of_the_bus_is_taken_off_the_delay_margin(delay_s):
+    whole, rest = (margins_of(opened(loop_with_bus_delay(d), "rear"), FREQUENCIES_RADPS) for d in (0.0, delay_s))
+    assert whole.delay_s - rest.delay_s == pytest.approx(delay_s, abs=1e-4)
+
+
+def test_loop_that_turns_round_the_critical_point_is_known_as_unstable():
+    returned = loop_with_bus_delay(0.05)
+    assert is_stable(returned)
+    # Twice the gain margin and more.
+    factor = 10.0 ** (margins_of(opened(returned, "rear"), FREQUENCIES_RADPS).gain_dB / 20.0)
+    assert is_stable(0.9 * factor * returned)
+    assert not is_stable(1.1 * factor * returned)
+
+
+@pytest.mark.parametrize("name", ["ars", "afs"])
+def test_answer_to_pulses_is_that_of_the_linear_form(name):
+    bands = {f"controllers.{name}.corrector.{end}_degps": 0.0 for end in ("off", "full")}
+    known = resolve("straight_line", overrides=bands).controller_setup(STEP_S)
+    pulses = pulse_responses(load_controller(name, known), measured(0.0, 25.0), STEP_S)
+    form = linear_controller(name, known, 25.0)
+    assert pulses[0, :, 0] == pytest.approx(form.d[:, 1], abs=1e-9)
+    state = form.b[:, 1]
+    for call in range(1, 50):
+        assert pulses[call, :, 0] == pytest.approx(form.c @ state, abs=1e-9)
+        state = form.a @ state
+    assert not pulses[:, :, 1:].any()
+
+
+class Root:
+    def step(self, _, measurement):
+        return ActuatorCommand(0.01 * math.sqrt(abs(measurement.yaw_rate_radps)))
+
+
+class Integrator:
+    angle_rad = 0.0
+
+    def step(self, _, measurement):
+        self.angle_rad += 0.001 * measurement.yaw_rate_radps
+        return ActuatorCommand(self.angle_rad)
+
+
+@pytest.mark.parametrize(("controller", "words"), [(Root, "in proportion"), (Integrator, "still answers")])
+def test_controller_without_a_linear_form_is_answered(controller, words):
+    with pytest.raises(ControllerError, match=words):
+        pulse_responses(load_controller(controller, setup()), measured(0.0), 0.01, "mine")
+
+
+def test_command_prints_the_margins_of_every_loop(capsys):
+    found = {}
+    for sensors in ("ideal", "production"):
+        arguments = ["-c", "ars", "-c", "afs", "--speed-kmh", "100", "--set", f"sensors.preset={sensors}", "--json"]
+        assert main(["margins", *arguments]) == 0
+        found[sensors] = json.loads(capsys.readouterr().out)
+    keys = {
+        "controller", "loop", "speed_kmh", "gain_margin_dB", "phase_margin_deg", "delay_margin_s", "disk_margin",
+    }  # fmt: skip
+    for ideal, production in zip(found["ideal"], found["production"], strict=True):
+        assert set(ideal) == keys
+        # Bandwidth 8 ms, delay 5 ms, samples 4.5 ms; the bandwidth also takes gain, and with it some of the lag.
+        assert 0.010 < ideal["delay_margin_s"] - production["delay_margin_s"] < 0.0175
+        assert production["disk_margin"] < ideal["disk_margin"]
+    assert [(row["controller"], row["loop"]) for row in found["ideal"]] == [("ars", "rear"), ("afs", "superposition")]
