@@ -103,24 +103,24 @@ def shown(value: object) -> str:
     return _shortened(text, MAX_SHOWN)
 
 
-def nearest_names(name: str, known: Iterable[str], most: int = 5) -> str:
+def nearest_names(name: str, known: Iterable[str], maximum: int = 5) -> str:
     """Words for an error message: which existing names come closest to a wrong one.
 
     Args:
         name: The name that does not exist.
         known: The names that do.
-        most: How many to offer.
+        maximum: How many to offer.
 
     Returns:
         ``"did you mean 'a' or 'b'?"`` where something is close, else all names in a list, or of many the first ones.
     """
     names = sorted(known)
-    close = difflib.get_close_matches(name[:MAX_SHOWN], names, n=most, cutoff=0.5)
+    close = difflib.get_close_matches(name[:MAX_SHOWN], names, n=maximum, cutoff=0.5)
     if close:
         return "did you mean " + " or ".join(repr(match) for match in close) + "?"
     listed = ", ".join(names) if names else "none"
     if len(listed) > MAX_SHOWN:
-        listed = f"{', '.join(names[:most])} and {len(names) - most} more"
+        listed = f"{', '.join(names[:maximum])} and {len(names) - maximum} more"
     return f"known are: {listed}"
 
 
@@ -141,8 +141,8 @@ def _printable(text: str) -> str:
     return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
 
 
-def _shortened(text: str, most: int) -> str:
-    if len(text) <= most:
+def _shortened(text: str, maximum: int) -> str:
+    if len(text) <= maximum:
         return text
-    rest = (most - len(_GAP)) // 4
-    return text[: most - len(_GAP) - rest] + _GAP + text[-rest:]
+    rest = (maximum - len(_GAP)) // 4
+    return text[: maximum - len(_GAP) - rest] + _GAP + text[-rest:]

@@ -43,7 +43,7 @@ _BY_SUFFIX: Final = {
     "_m": DisplayUnit("m", 1.0),
     "_s": DisplayUnit("s", 1.0),
 }
-_FRACTIONS: Final = ("_overshoot", "_share", "_friction_use", "_efficiency", "wheel_slip_max")
+_FRACTIONS: Final = ("_overshoot", "_share", "_friction_utilisation", "_efficiency", "wheel_slip_max")
 """Endings of pure numbers that are shown in percent; they are words of the name."""
 _PERCENT: Final = DisplayUnit("%", 100.0)
 _PURE: Final = DisplayUnit("-", 1.0)
@@ -173,7 +173,7 @@ _QUANTITIES: Final = {
         _row("brake_pressure_Pa", "brake pressure", 0, 5.0),
         _row("steer_rad", "steer angle", 2, 0.1),
         _row("tie_rod_force_N", "tie rod force", 2, 0.5, unit=_KILONEWTON),
-        _row("friction_use", "friction utilisation", 0, 10.0, unit=_PERCENT),
+        _row("friction_utilisation", "friction utilisation", 0, 10.0, unit=_PERCENT),
     )
 }
 

@@ -189,22 +189,23 @@ def _driver() -> dict[str, Figure]:
 
 def _rear_steer_gains() -> dict[str, Figure]:
     """Settled rear angle and sideslip of the step steer over the gains of active rear steering."""
-    prediction, gain, band = (
-        f"controllers.ars.{key}" for key in ("prediction_gain", "corrector.proportional_gain_s", "corrector.full_degps")
-    )
+    keys = ("prediction_gain", "corrector.proportional_gain_s", "corrector.deadband_end_degps")
+    prediction, gain, band = (f"controllers.ars.{key}" for key in keys)
     rows = study("rear_steer_gains", jobs=2).to_pylist()
     figure = new_figure(6.5, 5.5)
     axes = figure.subplots(2, 1, sharex=True)
     for place, name in enumerate(("rear_steer_steady_state_rad", "sideslip_steady_state_rad")):
         free = next(math.degrees(row[name]) for row in rows if row["controller"] == "none")
         axes[place].axhline(free, color="#333333", linewidth=0.8, label="none")
-        for (strength, full_degps), colour in zip(
+        for (strength, band_end_degps), colour in zip(
             sorted({(row[gain], row[band]) for row in rows}),
             ("#d55e00", "#e69f00", "#0072b2", "#56b4e9", "#009e73", "#88cc88"),
             strict=True,
         ):
-            own = [row for row in rows if (row["controller"], row[gain], row[band]) == ("ars", strength, full_degps)]
-            label = f"corrector {strength:g} s, full at {full_degps:g} deg/s"
+            own = [
+                row for row in rows if (row["controller"], row[gain], row[band]) == ("ars", strength, band_end_degps)
+            ]
+            label = f"corrector {strength:g} s, full at {band_end_degps:g} deg/s"
             axes[place].plot(
                 [row[prediction] for row in own], [math.degrees(row[name]) for row in own],
                 "o-", ms=3.0, color=colour, linewidth=1.2, label=label,

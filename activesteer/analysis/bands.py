@@ -17,7 +17,7 @@ from activesteer.errors import StudyError
 from activesteer.files import reading
 from activesteer.resources import DEFAULT_DRIVER, studies_dir
 
-SHARES: Final = (0.1, 0.9)
+QUANTILES: Final = (0.1, 0.9)
 """Which part of the runs lies below the lower and below the upper edge."""
 TRACK: Final = ("front_axle_x_m", "front_axle_y_m")
 """Channels whose band is across the course: y over x."""
@@ -49,7 +49,7 @@ def band_over_time(curves: Sequence[Array], step_s: float) -> Band:
         step_s: Time between two values [s].
     """
     length = min(map(len, curves))
-    low, high = np.quantile(np.stack([curve[:length] for curve in curves]), SHARES, axis=0)
+    low, high = np.quantile(np.stack([curve[:length] for curve in curves]), QUANTILES, axis=0)
     return Band(step_s * np.arange(length, dtype=np.float64), low, high)
 
 
@@ -64,7 +64,7 @@ def band_of_tracks(tracks: Sequence[tuple[Array, Array]]) -> Band:
     at = np.arange(begin, end, TRACK_STEP_M)
     # A car that turns round is looked at until then.
     across = [np.interp(at, x, y, right=np.nan) for x, (_, y) in zip(furthest, tracks, strict=True)]
-    low, high = np.nanquantile(np.stack(across), SHARES, axis=0)
+    low, high = np.nanquantile(np.stack(across), QUANTILES, axis=0)
     return Band(at, low, high)
 
 

@@ -27,7 +27,7 @@ OUTPUTS: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 HALF_BAND_LINES: Final = 2
 """Lines to either side that are summed into one value."""
 MIN_SPECTRUM: Final = 1e-3
-"""Share of its largest amplitude that the input must have at a frequency for a response there to mean something."""
+"""Fraction of its largest amplitude that the input must have at a frequency for a response there to mean something."""
 LOWEST_Hz: Final = 0.2
 HIGHEST_Hz: Final = 4.0
 """Range that metrics are evaluated in [Hz]."""

@@ -30,7 +30,7 @@ from activesteer.theory.single_track import characteristic_speed
 FIT_MPS2: Final = (0.5, 2.0)
 """Range of lateral acceleration over which gradients are fitted [m/s2]."""
 DEPARTURE: Final = 0.05
-"""Share by which the steer angle departs from the line where the linear range ends."""
+"""Fraction by which the steer angle departs from the line where the linear range ends."""
 SMOOTHING_S: Final = 0.5
 """Window of the moving average that limits are read from [s]."""
 MIN_SPEED_MPS: Final = 1.0

@@ -105,7 +105,7 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
     values |= _places(recording, course)
     if maneuver_kind(recording) == "slalom":
         values |= _slalom(recording, course)
-    use = np.array([recording[f"{corner}_friction_use"] for corner in CORNERS], dtype=np.float64)
+    use = np.array([recording[f"{corner}_friction_utilisation"] for corner in CORNERS], dtype=np.float64)
     values["tyre_use_max"], values["tyre_use_mean"] = float(use.max()), float(use.mean())
     speed = recording["speed_mps"]
     values["speed_loss_mps"] = float(speed[0] - speed.min())

@@ -133,16 +133,16 @@ def lag(leader: Array, follower: Array, timestep_s: float, longest_s: float) -> 
         maximum lies at an end of the range (the follower leads, or lags longer), or a signal is zero.
     """
     lead, follow = (np.asarray(values, dtype=np.float64) for values in (leader, follower))
-    count, most = len(lead), round(longest_s / timestep_s)
-    if count < 2 * most:
+    count, maximum = len(lead), round(longest_s / timestep_s)
+    if count < 2 * maximum:
         return math.nan
     energies = np.cumsum(lead**2), np.cumsum(follow[::-1] ** 2)
-    scale = np.sqrt([energies[0][count - k - 1] * energies[1][count - k - 1] for k in range(most + 1)])
+    scale = np.sqrt([energies[0][count - k - 1] * energies[1][count - k - 1] for k in range(maximum + 1)])
     if not scale.all():
         return math.nan
-    alike = np.array([lead[: count - k] @ follow[k:] for k in range(most + 1)]) / scale
+    alike = np.array([lead[: count - k] @ follow[k:] for k in range(maximum + 1)]) / scale
     top = int(alike.argmax())
-    if top in (0, most):
+    if top in (0, maximum):
         return math.nan
     before, here, after = alike[top - 1 : top + 2]
     return float(top + 0.5 * (before - after) / (before - 2.0 * here + after)) * timestep_s
@@ -166,7 +166,7 @@ def timestep(time_s: Array) -> float:
     return mean_s
 
 
-def step_response(time_s: Array, values: Array, step_time_s: float, window_s: float, least: float) -> StepResponse:
+def step_response(time_s: Array, values: Array, step_time_s: float, window_s: float, minimum: float) -> StepResponse:
     """Evaluate the response of one signal to a step.
 
     The signal is at zero before the step; it may move either way. Noise is reduced by `smooth` before crossings and
@@ -177,7 +177,7 @@ def step_response(time_s: Array, values: Array, step_time_s: float, window_s: fl
         values: Signal, shape (n,).
         step_time_s: Time of the step [s].
         window_s: Length of the window at the end whose mean is the steady-state value [s].
-        least: Smallest steady-state value to which times and overshoot are referred, in the unit of the signal.
+        minimum: Smallest steady-state value to which times and overshoot are referred, in the unit of the signal.
 
     Returns:
         The response. Its response time is nan if 90 % is never passed, its peak time if the largest value lies in the
@@ -191,8 +191,8 @@ def step_response(time_s: Array, values: Array, step_time_s: float, window_s: fl
     moving_s, moving = time_s[after], direction * smooth(values, timestep(time_s))[after]
     top = int(np.argmax(moving))
     peak = direction * float(moving[top])
-    if abs(steady_state) < least:
-        note = f"the steady-state value {steady_state:.3g} is too small to refer to (below {least:.3g})"
+    if abs(steady_state) < minimum:
+        note = f"the steady-state value {steady_state:.3g} is too small to refer to (below {minimum:.3g})"
         return StepResponse(steady_state, math.nan, peak, math.nan, math.nan, (note,))
 
     notes: list[str] = []

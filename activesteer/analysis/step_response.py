@@ -30,13 +30,13 @@ class Signal(NamedTuple):
     Attributes:
         name: First part of the names of its metrics.
         unit: Unit suffix.
-        least: Smallest steady-state value to which times and overshoot are referred; below it the run says nothing
+        minimum: Smallest steady-state value to which times and overshoot are referred; below it the run says nothing
             about them.
     """
 
     name: str
     unit: str
-    least: float
+    minimum: float
 
 
 SIGNALS: Final = (
@@ -92,7 +92,7 @@ def evaluate(recording: RecordingLike) -> StepSteer:
     notes: dict[str, tuple[str, ...]] = {}
     for signal in SIGNALS:
         channel = np.asarray(recording[f"{signal.name}_{signal.unit}"], dtype=np.float64)
-        response = step_response(time_s, channel, step_time_s, STEADY_WINDOW_S, signal.least)
+        response = step_response(time_s, channel, step_time_s, STEADY_WINDOW_S, signal.minimum)
         values[f"{signal.name}_steady_state_{signal.unit}"] = response.steady_state
         values[f"{signal.name}_response_time_s"] = response.response_time_s
         values[f"{signal.name}_peak_{signal.unit}"] = response.peak

@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 
 STANDSTILL_MPS: Final = 0.1
 """Below this the car stands [m/s]."""
-FROM_SHARE, TO_SHARE = 0.8, 0.1
-"""Shares of the initial speed between which the deceleration is fully developed (UN R13-H): 80 and 10 of 100 km/h."""
+FROM_FRACTION, TO_FRACTION = 0.8, 0.1
+"""Fractions of the initial speed of a fully developed deceleration (UN R13-H): 80 and 10 of 100 km/h."""
 SLIPS_FROM_MPS: Final = 15.0 / 3.6
 """Speed above which no wheel shall lock [m/s]; UN R13-H, annex 6 asks the same."""
 
@@ -48,7 +48,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     stop = _below(speed, begin, STANDSTILL_MPS)
     start_mps = float(speed[begin])
     deceleration, efficiency = math.nan, math.nan
-    fast, slow = (_below(speed, begin, share * start_mps) for share in (FROM_SHARE, TO_SHARE))
+    fast, slow = (_below(speed, begin, fraction * start_mps) for fraction in (FROM_FRACTION, TO_FRACTION))
     if fast is not None and slow is not None:
         deceleration = float((speed[fast] ** 2 - speed[slow] ** 2) / (2.0 * (way[slow] - way[fast])))
         efficiency = deceleration / _allowed(recording, way, fast, slow)
@@ -78,14 +78,14 @@ def _below(speed: Array, begin: int, level_mps: float) -> int | None:
 def _allowed(recording: RecordingLike, way: Array, first: int, last: int) -> float:
     """Mean over the way of the deceleration that the tyres' peak friction allows [m/s2].
 
-    A tyre's peak force is the one that it gives over the share of its friction that it uses for it.
+    A tyre's peak force is the one that it gives over the fraction of its friction that it uses for it.
     """
     part = slice(first, last + 1)
     peaks, loads = np.zeros(last + 1 - first), np.zeros(last + 1 - first)
     for corner in CORNERS:
         fx, fy, fz, use = (
             np.asarray(recording[f"{corner}_{name}"][part], dtype=np.float64)
-            for name in ("tyre_fx_N", "tyre_fy_N", "tyre_fz_N", "friction_use")
+            for name in ("tyre_fx_N", "tyre_fy_N", "tyre_fz_N", "friction_utilisation")
         )
         used = use > 0.0
         peaks[used] += np.hypot(fx, fy)[used] / use[used]

@@ -6,7 +6,7 @@ each wheel goes round
 
     OFF -> RELEASE -> RECOVER -> BUILD -> RELEASE ...
 
-RELEASE takes the pressure down to a share of what the friction bore (`friction_Nm`, from pressure and deceleration of
+RELEASE lowers the pressure to a fraction of what the friction bore (`friction_Nm`, from pressure and deceleration of
 the wheel), and further if the wheel does not gain speed; RECOVER waits until it rolls with the car again; BUILD begins
 just below what was borne and rises slowly, the faster the longer it lasts, as on a road that has become better. A wheel
 whose limit comes above what the driver asks for is OFF.
@@ -32,7 +32,7 @@ _PATIENCE_S: Final = 0.03
 _SETTLES_S: Final = 0.08
 """Time in which the wheel follows the first pressure of building up, as the tyre's carcass winds up [s]."""
 _KEPT: Final = 0.9
-"""What a wheel that is released again so soon is still trusted to bear, as a share of what it bore before."""
+"""What a wheel that is released again so soon is still trusted to bear, as a fraction of what it bore before."""
 _IMPATIENCE_S: Final = 0.25
 """Time after which building up becomes faster by its own amount [s]."""
 
@@ -49,7 +49,7 @@ def _release(setup, state, wheel):
     if state.phase[wheel] == BUILD and state.phase_s[wheel] < _SETTLES_S:
         borne = max(borne, _KEPT * state.borne_Nm[wheel])
     state.borne_Nm[wheel] = borne
-    state.limit_Pa[wheel] = setup.release_share * state.borne_Nm[wheel] / setup.torque_per_pressure_NmpPa[wheel]
+    state.limit_Pa[wheel] = setup.release_fraction * state.borne_Nm[wheel] / setup.torque_per_pressure_NmpPa[wheel]
     _begin(state, wheel, RELEASE)
 
 
@@ -63,10 +63,10 @@ def _wheel(setup, state, wheel, car_mps2):
     state.phase_s[wheel] += setup.interval_s
     if phase in (OFF, BUILD):
         threshold = setup.first_deceleration_mps2 if phase == OFF else setup.deceleration_mps2
-        least = setup.first_slip if phase == OFF else setup.least_slip - setup.least_slip_gain_s2pm * car_mps2
+        minimum = setup.first_slip if phase == OFF else setup.min_slip - setup.min_slip_gain_s2pm * car_mps2
         if phase == BUILD and state.phase_s[wheel] < _SETTLES_S:
-            least *= 2.0
-        if (gain < -threshold and slip > least) or (slip > setup.largest_slip and gain < _REGAINS_mps2):
+            minimum *= 2.0
+        if (gain < -threshold and slip > minimum) or (slip > setup.largest_slip and gain < _REGAINS_mps2):
             _release(setup, state, wheel)
         elif phase == BUILD:
             faster = 1.0 + state.phase_s[wheel] / _IMPATIENCE_S
@@ -84,7 +84,7 @@ def _wheel(setup, state, wheel, car_mps2):
     else:
         state.borne_Nm[wheel] = max(state.borne_Nm[wheel], state.friction_Nm[wheel])
         if gain < _REGAINS_mps2:
-            state.limit_Pa[wheel] = setup.resume_share * state.borne_Nm[wheel] / per_pressure
+            state.limit_Pa[wheel] = setup.resume_fraction * state.borne_Nm[wheel] / per_pressure
             _begin(state, wheel, BUILD)
 
 
@@ -123,5 +123,5 @@ def _hold_sides_together(setup, state):
     for wheel in range(2):
         other = 1 - wheel
         if state.phase[other] != OFF:
-            most = state.borne_Nm[other] / setup.torque_per_pressure_NmpPa[other] + state.side_Pa
-            state.allowed_Pa[wheel] = min(state.allowed_Pa[wheel], most)
+            maximum = state.borne_Nm[other] / setup.torque_per_pressure_NmpPa[other] + state.side_Pa
+            state.allowed_Pa[wheel] = min(state.allowed_Pa[wheel], maximum)

@@ -9,7 +9,7 @@ from activesteer.config import Range
 
 NotNegative = Annotated[float, Range(0.0)]
 Positive = Annotated[float, Range(1e-9)]
-Share = Annotated[float, Range(0.0, 1.0)]
+Fraction = Annotated[float, Range(0.0, 1.0)]
 
 
 @dataclass(frozen=True)
@@ -39,22 +39,22 @@ class Antilock:
     first_deceleration_mps2: Positive = 20.0
     """Deceleration of a wheel beyond the car's that releases it while the pedal is being pressed [m/s2]: a pressure
     that rises at its fastest makes 14 m/s2 at 100 km/h without any danger, by the slip that it needs."""
-    first_slip: Share = 0.08
+    first_slip: Fraction = 0.08
     """Least slip for that: below it a deceleration comes from the pedal or the road."""
     deceleration_mps2: Positive = 6.0
     """Deceleration beyond the car's once pressure is built up slowly [m/s2]."""
-    least_slip: Share = 0.02
+    min_slip: Fraction = 0.02
     """Least slip for that on a road without grip ..."""
-    least_slip_gain_s2pm: NotNegative = 0.005
+    min_slip_gain_s2pm: NotNegative = 0.005
     """... and its rise with the deceleration of the car, as the slip at the peak of friction rises [s2/m]."""
     largest_slip: Annotated[float, Range(0.05, 0.9)] = 0.3
     """Slip by the estimated speed that releases a wheel however slowly it came."""
-    release_share: Share = 0.85
-    """Pressure of a released wheel, as a share of what its friction bore."""
-    resume_share: Share = 0.95
+    release_fraction: Fraction = 0.85
+    """Pressure of a released wheel, as a fraction of what its friction bore."""
+    resume_fraction: Fraction = 0.95
     """Pressure of a wheel that rolls again, likewise."""
     build_per_s: Positive = 0.5
-    """Slow rise of pressure from there on, in shares of the same a second [1/s]."""
+    """Slow rise of pressure from there on, in fractions of the same a second [1/s]."""
     side_difference_Pa: NotNegative = 0.5e6
     """Pressure by which a front wheel may exceed one that is being released on the other side, at first [Pa] ..."""
     side_difference_rise_Paps: NotNegative = 4e6

@@ -16,7 +16,7 @@ _FOUR: Final = (len(CORNERS),)
 _HYDRAULICS: Final = ("full_pedal_pressure_Pa", "rise_Paps", "fall_Paps", "pump_rise_Paps")
 _ANTILOCK: Final = tuple(Antilock.__dataclass_fields__)
 _OF_WHEELS: Final = (
-    "rolling_radius_m", "torque_per_pressure_NmpPa", "parking_torque_Nm", "drive_share", "inertia_kgm2",
+    "rolling_radius_m", "torque_per_pressure_NmpPa", "parking_torque_Nm", "drive_fraction", "inertia_kgm2",
 )  # fmt: skip
 _TRACTION: Final = tuple(TractionControl.__dataclass_fields__)
 
@@ -30,7 +30,7 @@ BRAKE_SETUP: Final = np.dtype(
         ],
     )
 )
-"""What stays as it is during a run; names as in the vehicle file, `follow` is the share of a pressure's way to its
+"""What stays as it is during a run; names as in the vehicle file, `follow` is the fraction of a pressure's way to its
 demand that it goes in a step."""
 
 PER_WHEEL: Final = (
@@ -71,7 +71,7 @@ def brake_setup(
     brakes: Brakes,
     timestep_s: float,
     rolling_radius_m: Sequence[float],
-    drive_share: Sequence[float],
+    drive_fraction: Sequence[float],
     inertia_kgm2: Sequence[float],
 ) -> NDArray[Any]:
     """The brakes of a car.
@@ -80,7 +80,7 @@ def brake_setup(
         brakes: The table of the vehicle file.
         timestep_s: Step of the engine [s].
         rolling_radius_m: Radius of each wheel by which its rotation is taken for a speed [m].
-        drive_share: Share of the drive torque of each wheel.
+        drive_fraction: Fraction of the drive torque of each wheel.
         inertia_kgm2: Inertia of each wheel about its axis [kg m2].
 
     Returns:
@@ -98,7 +98,7 @@ def brake_setup(
     setup["rolling_radius_m"] = rolling_radius_m
     setup["torque_per_pressure_NmpPa"] = np.array(brakes.torques_Nm) / hydraulics.full_pedal_pressure_Pa
     setup["parking_torque_Nm"] = (0.0, 0.0, brakes.parking_torque_Nm, brakes.parking_torque_Nm)
-    setup["drive_share"], setup["inertia_kgm2"] = drive_share, inertia_kgm2
+    setup["drive_fraction"], setup["inertia_kgm2"] = drive_fraction, inertia_kgm2
     return setup
 
 

@@ -32,16 +32,16 @@ def follow_wheels(setup, state, speeds_radps):
         state: Its `BRAKE_STATE`; `wheel_mps`, `wheel_mps2` and `friction_Nm` are written.
         speeds_radps: Rotational speeds of the wheels [rad/s], order of `CORNERS`.
     """
-    share = setup.interval_s / (setup.interval_s + _SMOOTH_S)
+    fraction = setup.interval_s / (setup.interval_s + _SMOOTH_S)
     for wheel in range(4):
         speed = setup.rolling_radius_m[wheel] * speeds_radps[wheel]
         rate = (speed - state.wheel_mps[wheel]) / setup.interval_s
-        state.wheel_mps2[wheel] += share * (rate - state.wheel_mps2[wheel])
+        state.wheel_mps2[wheel] += fraction * (rate - state.wheel_mps2[wheel])
         state.wheel_mps[wheel] = speed
         # J d omega/dt = r F_x - T_brake
         borne = setup.torque_per_pressure_NmpPa[wheel] * state.pressure_Pa[wheel]
         borne += setup.inertia_kgm2[wheel] / setup.rolling_radius_m[wheel] * state.wheel_mps2[wheel]
-        state.friction_Nm[wheel] += share * (borne - state.friction_Nm[wheel])
+        state.friction_Nm[wheel] += fraction * (borne - state.friction_Nm[wheel])
 
 
 @compiled
@@ -58,7 +58,7 @@ def follow_car(setup, state, ax_mps2, braked):
     for wheel in range(4):
         fastest = max(fastest, state.wheel_mps[wheel])
         slowest = min(slowest, state.wheel_mps[wheel])
-        if setup.drive_share[wheel] == 0.0:
+        if setup.drive_fraction[wheel] == 0.0:
             rolling += state.wheel_mps[wheel]
             free += 1.0
     if braked:

@@ -10,7 +10,7 @@ from activesteer.compilation import compiled
 def traction(setup, state, torque_Nm, braked):
     """One decision.
 
-    Together the driven wheels may turn faster than the car rolls by a share of its speed and a little more. What is
+    Together the driven wheels may turn faster than the car rolls by a fraction of its speed and a little more. What is
     beyond takes back the drive torque, by a proportional and an integral part, the latter from the torque at which it
     began. Of two wheels of an axle the faster one is braked, so that the differential gives the other its torque.
 
@@ -22,7 +22,7 @@ def traction(setup, state, torque_Nm, braked):
     """
     turning, other = 0.0, 0.0
     for wheel in range(4):
-        turning += setup.drive_share[wheel] * state.wheel_mps[wheel]
+        turning += setup.drive_fraction[wheel] * state.wheel_mps[wheel]
     excess = turning - (1.0 + setup.slip) * state.reference_mps - setup.spin_mps
     if braked or torque_Nm <= 0.0 or (state.drive_limit_Nm == NO_LIMIT_NM and excess <= 0.0):
         state.drive_limit_Nm = NO_LIMIT_NM
@@ -40,5 +40,5 @@ def traction(setup, state, torque_Nm, braked):
     for wheel in range(4):
         other = state.wheel_mps[wheel + 1 - 2 * (wheel % 2)]
         beyond = state.wheel_mps[wheel] - other - setup.spin_mps
-        pressure = setup.brake_gain_Paspm * beyond if setup.drive_share[wheel] > 0.0 else 0.0
+        pressure = setup.brake_gain_Paspm * beyond if setup.drive_fraction[wheel] > 0.0 else 0.0
         state.traction_Pa[wheel] = min(max(pressure, 0.0), setup.brake_limit_Pa)

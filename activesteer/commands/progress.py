@@ -37,11 +37,11 @@ class ProgressBar:
         if self._shown:
             print("\r" + " " * self._width + "\r", end="", file=sys.stderr, flush=True)
 
-    def __call__(self, share: float, note: str = "") -> None:
-        """Shows a share, 0 to 1, and a word on what was just done."""
+    def __call__(self, fraction: float, note: str = "") -> None:
+        """Shows a fraction, 0 to 1, and a word on what was just done."""
         if self._shown:
-            filled = round(_CELLS * share)
-            line = f"{self._label} [{'#' * filled}{' ' * (_CELLS - filled)}] {share:4.0%} {note}"
+            filled = round(_CELLS * fraction)
+            line = f"{self._label} [{'#' * filled}{' ' * (_CELLS - filled)}] {fraction:4.0%} {note}"
             print("\r" + line.ljust(self._width), end="", file=sys.stderr, flush=True)
             self._width = max(self._width, len(line))
 

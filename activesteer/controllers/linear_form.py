@@ -75,11 +75,11 @@ def _made(
     desired, predicted, integral, filtered = range(4)  # states
     front, yaw_rate = 4, 5  # inputs, behind the states
     rows = np.zeros((4, 6))
-    share = 1.0 - math.exp(-step_s / gains.desired_yaw_rate.delay_s)
-    rows[desired, desired], rows[desired, front] = 1.0 - share, share * car.yaw_rate_gain(speed_mps)
+    fraction = 1.0 - math.exp(-step_s / gains.desired_yaw_rate.delay_s)
+    rows[desired, desired], rows[desired, front] = 1.0 - fraction, fraction * car.yaw_rate_gain(speed_mps)
     gain, lead_s, lag_s = car.rear_prediction(speed_mps)
-    share = 1.0 - math.exp(-step_s / lag_s)
-    rows[predicted, predicted], rows[predicted, front] = 1.0 - share, share
+    fraction = 1.0 - math.exp(-step_s / lag_s)
+    rows[predicted, predicted], rows[predicted, front] = 1.0 - fraction, fraction
     error = _unit(desired) - _unit(yaw_rate)
     demands = np.zeros((2, 6))
     corrector: CorrectorParameters = gains.afs.corrector if system == "afs" else gains.ars.corrector

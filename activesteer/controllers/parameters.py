@@ -29,9 +29,9 @@ class DesiredYawRateParameters:
 class CorrectorParameters:
     """Tolerance band and PID corrector on the yaw rate error; the paper uses the P part alone."""
 
-    off_radps: _NotNegative = math.radians(0.5)
+    deadband_start_radps: _NotNegative = math.radians(0.5)
     """c_off: below this error there is no action [rad/s]."""
-    full_radps: _NotNegative = math.radians(2.0)
+    deadband_end_radps: _NotNegative = math.radians(2.0)
     """c_in: above this error the action is full [rad/s]."""
     proportional_gain_s: _NotNegative = 0.25
     """Steer angle per yaw rate error [rad/(rad/s)]."""
@@ -50,7 +50,7 @@ class RearSteerParameters:
     corrector: CorrectorParameters = CorrectorParameters()
     """Feedback of the yaw rate."""
     prediction_gain: Annotated[float, Range(0.0, 2.0)] = 1.0
-    """Share of the predicted rear angle that is used; 1 is the zero-sideslip feed-forward of eq. 5 [-]."""
+    """Fraction of the predicted rear angle that is used; 1 is the zero-sideslip feed-forward of eq. 5 [-]."""
     limit_rad: Annotated[float, Range(0.0, math.radians(10.0))] = math.radians(3.0)
     """Most rear angle demanded [rad]."""
 

@@ -34,7 +34,7 @@ class EstimatorSetup:
         steering_ratio: Steering wheel angle over road-wheel angle [-].
         tyres: Tyre of the front and of the rear axle.
         rolling_radius_m: Rolling radius of the wheels, order of `CORNERS` [m].
-        drive_shares: Share of the drive torque of each wheel.
+        drive_fractions: Share of the drive torque of each wheel.
         brake_torque_per_pressure_NmpPa: Of each wheel's brake [Nm/Pa].
         drag_area_m2: Drag coefficient times frontal area [m2].
         sensors: What the data sheets say of the sensors.
@@ -45,7 +45,7 @@ class EstimatorSetup:
     steering_ratio: float
     tyres: tuple[LateralForces, LateralForces]
     rolling_radius_m: tuple[float, float, float, float]
-    drive_shares: tuple[float, float, float, float]
+    drive_fractions: tuple[float, float, float, float]
     brake_torque_per_pressure_NmpPa: tuple[float, float, float, float]
     drag_area_m2: float
     sensors: Sensors

@@ -40,13 +40,13 @@ class AlongCourse(Maneuver):
             )
         last = self.course.last_gate_x_m
         if last is not None and self.duration_s * self.speed_mps < last:
-            least = last / self.speed_mps
+            gate_s = last / self.speed_mps
             raise ManeuverError(
                 f"is {self.duration_s:g} s, but at {3.6 * self.speed_mps:g} km/h the last gate, {last:g} m "
-                f"from the start, is reached after {least:.1f} s; {least + _AFTER_S:.1f} s show how the car settles",
+                f"from the start, is reached at {gate_s:.1f} s; {gate_s + _AFTER_S:.1f} s show how the car settles",
                 key="duration_s",
                 value=self.duration_s,
-                allowed=Range(least + _AFTER_S),
+                allowed=Range(gate_s + _AFTER_S),
             )
 
     @property

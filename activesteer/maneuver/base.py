@@ -102,10 +102,10 @@ def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
         ManeuverError: the speed is too low.
     """
     if speed_mps < MIN_SEARCH_SPEED_MPS:
-        least = 3.6 * MIN_SEARCH_SPEED_MPS
+        minimum = 3.6 * MIN_SEARCH_SPEED_MPS
         raise ManeuverError(
-            f"is {3.6 * speed_mps:g} km/h; {aim} needs at least {least:g} km/h, or give {amplitude}",
+            f"is {3.6 * speed_mps:g} km/h; {aim} needs at least {minimum:g} km/h, or give {amplitude}",
             key="speed_kmh",
             value=3.6 * speed_mps,
-            allowed=Range(least),
+            allowed=Range(minimum),
         )

@@ -88,14 +88,14 @@ class LaneChange(AlongCourse):
     def _check_margin(self, course: Sequence[Lane], width: float) -> None:
         narrowest = min(course, key=lambda lane: lane.left_y_m - lane.right_y_m)
         lane_width = narrowest.left_y_m - narrowest.right_y_m
-        most = 0.5 * (lane_width - width) - _SLACK_M
-        if self.lane.margin_m > most:
+        maximum = 0.5 * (lane_width - width) - _SLACK_M
+        if self.lane.margin_m > maximum:
             raise ManeuverError(
                 f"is {self.lane.margin_m:g} m, but the {narrowest.name} is {lane_width:.3g} m wide and "
-                f"the car {width:g} m; allowed is 0 to {most:.3f} m",
+                f"the car {width:g} m; allowed is 0 to {maximum:.3f} m",
                 key="lane.margin_m",
                 value=self.lane.margin_m,
-                allowed=Range(0.0, most),
+                allowed=Range(0.0, maximum),
             )
 
 
@@ -106,8 +106,8 @@ def _middle(course: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
     middles = [0.5 * (lane.right_y_m + lane.left_y_m) for lane in course]
     y = np.zeros_like(x)
     for (before, after), (low, high) in zip(pairwise(course), pairwise(middles), strict=True):
-        share = np.clip((x - before.end_x_m) / (after.start_x_m - before.end_x_m), 0.0, 1.0)
-        y += (high - low) * share**3 * (10.0 + share * (6.0 * share - 15.0))
+        fraction = np.clip((x - before.end_x_m) / (after.start_x_m - before.end_x_m), 0.0, 1.0)
+        y += (high - low) * fraction**3 * (10.0 + fraction * (6.0 * fraction - 15.0))
     return x, y
 
 

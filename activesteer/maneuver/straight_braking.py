@@ -14,7 +14,7 @@ from activesteer.road.course import Course
 from activesteer.road.path import Path
 from activesteer.signals import Reference
 
-_LEAST_SPEED_MPS: Final = 10.0 / 3.6
+_MIN_SPEED_MPS: Final = 10.0 / 3.6
 """Slower than this there is no braking to be evaluated [m/s]."""
 
 
@@ -33,10 +33,10 @@ class StraightBraking(Maneuver):
         Raises:
             ManeuverError: it is not.
         """
-        if self.speed_mps < _LEAST_SPEED_MPS:
-            least_kmh = 3.6 * _LEAST_SPEED_MPS
-            problem = f"is {3.6 * self.speed_mps:g} km/h; braking begins at {least_kmh:g} km/h or more, forwards"
-            raise ManeuverError(problem, key="speed_kmh", value=3.6 * self.speed_mps, allowed=Range(least_kmh))
+        if self.speed_mps < _MIN_SPEED_MPS:
+            min_kmh = 3.6 * _MIN_SPEED_MPS
+            problem = f"is {3.6 * self.speed_mps:g} km/h; braking begins at {min_kmh:g} km/h or more, forwards"
+            raise ManeuverError(problem, key="speed_kmh", value=3.6 * self.speed_mps, allowed=Range(min_kmh))
         pressed_s = self.brake.start_s + self.brake.rise_s
         if pressed_s >= self.duration_s:
             problem = f"the brake is pressed down at {pressed_s:g} s, but the run ends at {self.duration_s:g} s"

@@ -97,7 +97,7 @@ def _of_wheels(channel: str, entity: str = "") -> Plot:
 
 WHEELS: Final = (
     _of_wheels("tyre_fz_N"),
-    _of_wheels("friction_use"),
+    _of_wheels("friction_utilisation"),
     _of_wheels("tyre_fy_N", "tyre_fy_N"),
     _of_wheels("tyre_fx_N", "tyre_fx_N"),
     _of_wheels("brake_pressure_Pa", "brake_pressure_Pa"),

@@ -26,7 +26,7 @@ _USE_COLOURS: Final = ((0, 158, 115), (240, 228, 66), (230, 120, 0), (220, 20, 2
 CHANNELS: Final = tuple(
     f"{corner}_{name}"
     for corner in CORNERS
-    for name in ("tyre_fx_N", "tyre_fy_N", "contact_x_m", "contact_y_m", "steer_rad", "friction_use")
+    for name in ("tyre_fx_N", "tyre_fy_N", "contact_x_m", "contact_y_m", "steer_rad", "friction_utilisation")
 )
 
 
@@ -35,7 +35,7 @@ def send_tyre_forces(stream: rr.RecordingStream, run: Run) -> None:
     if not run.has("yaw_rad", *CHANNELS):
         return
     origins, vectors = force_arrows(run)
-    colours = use_colours(np.stack([run.channel(f"{corner}_friction_use") for corner in CORNERS], axis=1))
+    colours = use_colours(np.stack([run.channel(f"{corner}_friction_utilisation") for corner in CORNERS], axis=1))
     # A run that diverged ends with numbers that cannot be drawn.
     good = np.isfinite(origins).all(axis=(1, 2)) & np.isfinite(vectors).all(axis=(1, 2))
     when, four = times(run.recording.time_s[good]), [len(CORNERS)] * int(good.sum())
@@ -49,7 +49,7 @@ def send_tyre_forces(stream: rr.RecordingStream, run: Run) -> None:
             lengths=four
         ),
     )
-    discs = f"{run.scene}/tyres/friction_use"
+    discs = f"{run.scene}/tyres/friction_utilisation"
     size = rr.Cylinders3D.from_fields(radii=[_DISC_RADIUS_M], lengths=[0.02], fill_mode="solid")
     stream.log(discs, size, static=True)
     flat = origins[good] * np.array((1.0, 1.0, 0.0), np.float32)
@@ -78,10 +78,10 @@ def force_arrows(run: Run) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     return origins, vectors
 
 
-def use_colours(friction_use: NDArray[np.float64]) -> NDArray[np.uint32]:
+def use_colours(friction_utilisation: NDArray[np.float64]) -> NDArray[np.uint32]:
     """Colours 0xrrggbbff for fractions of the available friction."""
     red, green, blue = (
-        np.interp(np.nan_to_num(friction_use, nan=0.0), _USE, [colour[part] for colour in _USE_COLOURS])
+        np.interp(np.nan_to_num(friction_utilisation, nan=0.0), _USE, [colour[part] for colour in _USE_COLOURS])
         .round()
         .astype(np.uint32)
         for part in range(3)

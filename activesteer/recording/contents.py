@@ -173,10 +173,10 @@ class _Sizes:
             raise fail(key, f"is a whole number of {value.bit_length()} bits, expected one of at most 64")
 
 
-def _letters(value: str, key: str, most: int) -> None:
+def _letters(value: str, key: str, maximum: int) -> None:
     """A text must not be too long, and have no half of a letter, which cannot be written anywhere."""
-    if len(value) > most:
-        raise fail(key[:_SHOWN], f"has {len(value)} letters, at most {most} are allowed")
+    if len(value) > maximum:
+        raise fail(key[:_SHOWN], f"has {len(value)} letters, at most {maximum} are allowed")
     try:
         value.encode()
     except UnicodeEncodeError:
@@ -198,14 +198,14 @@ def check_metrics(metrics: Mapping[str, Any]) -> None:
             raise RecordingError(f"metric {name!r} is {value!r:.{_SHOWN}}, which is no number", key=name, value=value)
 
 
-def check_names(names: Sequence[Any], what: str, most: int) -> None:
+def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
     """Checks names of bodies, parts, attachments.
 
     Raises:
         RecordingError: one is no text or empty, or there are too many.
     """
-    if len(names) > most:
-        raise RecordingError(f"{len(names)} {what}, at most {most} are allowed")
+    if len(names) > maximum:
+        raise RecordingError(f"{len(names)} {what}, at most {maximum} are allowed")
     for name in names:
         if not isinstance(name, str) or not 0 < len(name) <= 255 or not name.isprintable():
             raise RecordingError(f"{what}: {name!r:.{_SHOWN}} is no name of 1 to 255 letters")

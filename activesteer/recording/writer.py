@@ -281,9 +281,9 @@ class McapWriter:
         except RecordingError as second:
             error.add_note(f"The recording could not be ended properly either: {second}")
 
-    def _await(self, most: int) -> None:
+    def _await(self, maximum: int) -> None:
         """Wait until at most that many blocks are still being written; raise what went wrong with them."""
-        while len(self._pending) > most:
+        while len(self._pending) > maximum:
             end_ns, future = self._pending[0]
             try:
                 future.result()

@@ -82,17 +82,17 @@ def _points_at(s, spacing, xs, ys, heading_first, heading_last):
 def nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
     """`PathSearch.nearest` as native code."""
     count = math.ceil(2.0 * window / SPACING_M) + 1
-    best, least, before, after = 0, math.inf, math.inf, math.inf
+    best, minimum, before, after = 0, math.inf, math.inf, math.inf
     previous = math.inf
     for index in range(count):
         px, py = point_at(around - window + index * SPACING_M, spacing, xs, ys, heading_first, heading_last)
         distance = (px - x) ** 2 + (py - y) ** 2
         if index == best + 1:
             after = distance
-        if distance < least:
-            best, least, before, after = index, distance, previous, math.inf
+        if distance < minimum:
+            best, minimum, before, after = index, distance, previous, math.inf
         previous = distance
     # The parabola through the three nearest points: the result moves on smoothly between them.
-    bend = before - 2.0 * least + after
+    bend = before - 2.0 * minimum + after
     shift = 0.5 * (before - after) / bend if 0.0 < bend < math.inf else 0.0
     return around - window + (best + min(max(shift, -1.0), 1.0)) * SPACING_M

@@ -35,7 +35,7 @@ def estimator_setup(car: Car) -> EstimatorSetup | None:
     fl, fr, rl, rr = (torque_Nm / pressure_Pa for torque_Nm in config.brakes.torques_Nm)
     return EstimatorSetup(
         body, config.two_track, config.steering.ratio, (front, rear), (front_m, front_m, rear_m, rear_m),
-        config.powertrain.wheel_shares, (fl, fr, rl, rr), config.aerodynamics.drag_area_m2, config.sensors,
+        config.powertrain.wheel_fractions, (fl, fr, rl, rr), config.aerodynamics.drag_area_m2, config.sensors,
     )  # fmt: skip
 
 

@@ -155,11 +155,11 @@ def _check(element: ElementTree.Element, copies: float, name: str) -> None:
         attributes = _COUNTS[tag] or tuple(element.keys())
         for attribute in attributes:
             text = element.get(attribute, "").strip()
-            most = max(map(abs, _numbers(text)), default=0.0)
+            maximum = max(map(abs, _numbers(text)), default=0.0)
             if attribute == "memory":
-                if most * _BYTES.get(text[-1:].upper(), 1.0) > _MAX_MEMORY:
+                if maximum * _BYTES.get(text[-1:].upper(), 1.0) > _MAX_MEMORY:
                     raise _too_much(f"<{tag} memory={shown(text)}>", _MAX_MEMORY, name)
-            elif most > _MAX_NUMBER:
+            elif maximum > _MAX_NUMBER:
                 raise _too_much(f"<{tag} {attribute}={shown(text)}>", _MAX_NUMBER, name)
 
 
@@ -177,5 +177,5 @@ def _check_asset(path: Path, name: str) -> bytes:
     return data
 
 
-def _too_much(what: str, most: float, name: str) -> ModelError:
-    return ModelError(f"{what}; a car needs no more than {most:g}", file=name, allowed=most)
+def _too_much(what: str, maximum: float, name: str) -> ModelError:
+    return ModelError(f"{what}; a car needs no more than {maximum:g}", file=name, allowed=maximum)

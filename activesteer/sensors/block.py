@@ -96,17 +96,19 @@ class SensorBlock:
         return Measurement._make((time_s, *values[: -2 * _N_WHEELS], speeds, pressures))
 
 
-def speed_radii(front_share: float, rolling_radii_m: Sequence[float]) -> tuple[float, ...]:
+def speed_radii(front_fraction: float, rolling_radii_m: Sequence[float]) -> tuple[float, ...]:
     """What the rotational speed of each wheel adds to the speed of the car [m].
 
     Args:
-        front_share: Share of the drive torque at the front axle.
+        front_fraction: Fraction of the drive torque at the front axle.
         rolling_radii_m: Effective rolling radii, order of `CORNERS` [m].
 
     Returns:
         The rolling radii over their number where the axle is not driven, else 0; where both are driven, all four count.
     """
-    counts = [share == 0.0 for share in (front_share, front_share, 1.0 - front_share, 1.0 - front_share)]
+    counts = [
+        fraction == 0.0 for fraction in (front_fraction, front_fraction, 1.0 - front_fraction, 1.0 - front_fraction)
+    ]
     if not any(counts):
         counts = [True] * len(counts)
     return tuple(radius / sum(counts) if count else 0.0 for radius, count in zip(rolling_radii_m, counts, strict=True))
@@ -116,14 +118,14 @@ def _chain(sensor: Sensor, place: int, seed: int, index: int, timestep_s: float)
     """A record of `CHAIN`; each sensor draws from its own stream, whatever the others are."""
     period = max(1, round((sensor.sample_time_s or 0.0) / timestep_s))
     bandwidth_Hz = sensor.bandwidth_Hz or 0.0
-    share = 1.0 - math.exp(-2.0 * math.pi * bandwidth_Hz * timestep_s) if bandwidth_Hz else 1.0
+    fraction = 1.0 - math.exp(-2.0 * math.pi * bandwidth_Hz * timestep_s) if bandwidth_Hz else 1.0
     noise, bias, drift = (sensor.amount(word) for word in RANDOM)
     stream = np.random.SeedSequence((seed, index))
     return (
         place,
         period,
         round((sensor.delay_s or 0.0) / timestep_s) + 1,
-        share,
+        fraction,
         noise,
         bias * np.random.default_rng(stream).standard_normal(),
         drift * math.sqrt(period * timestep_s / _MINUTE_S),

@@ -20,12 +20,12 @@ CHAIN: Final = np.dtype(
         np.record,
         [
             *((name, np.intp) for name in ("memory", "period", "ring")),
-            *((name, np.float64) for name in ("share", "noise", "bias", "wander", "quantum", "limit", "teeth")),
+            *((name, np.float64) for name in ("fraction", "noise", "bias", "wander", "quantum", "limit", "teeth")),
             ("key", np.uint64),
         ],
     )
 )
-"""What a sensor is: place of its memory, steps between samples, length of its delay line; share of the way that the
+"""What a sensor is: place of its memory, steps between samples, length of its delay line; fraction of the way that the
 low-pass goes in a step, rms of the noise, offset, rms of the drift of a sample, step and limit (0 for none), teeth
 (0 for none), key of its random numbers."""
 
@@ -111,8 +111,8 @@ def passed_on(chain, memory, truth, timestep_s):
     at = chain.memory
     if chain.teeth > 0.0:
         _pass_teeth(chain, memory, truth, timestep_s)
-    elif chain.share < 1.0:
-        memory[at + FILTERED] += chain.share * (truth - memory[at + FILTERED])
+    elif chain.fraction < 1.0:
+        memory[at + FILTERED] += chain.fraction * (truth - memory[at + FILTERED])
     else:
         memory[at + FILTERED] = truth
     steps = int(memory[at + STEPS])

@@ -36,7 +36,7 @@ _RUNS: Final = 8
 _STEADY_S: Final = 0.5
 """Length of the end of a run of that search over which the steady state is taken [s]."""
 _FIT: Final = (1.0 / 3.0, 1.25)
-"""Range of the line through a slow ramp, in shares of what is asked for: 0.1 to 0.375 g for 0.3 g (FMVSS 126)."""
+"""Range of the line through a slow ramp, in fractions of what is asked for: 0.1 to 0.375 g for 0.3 g (FMVSS 126)."""
 _CHUNK_S: Final = 0.25
 """How often it is looked whether a ramp has come far enough [s]."""
 _ROUNDED_RAD: Final = math.radians(0.1)
@@ -137,7 +137,7 @@ def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> flo
     The model is its own mirror image, so that one side stands for both.
     """
     wanted, probe = search.lateral_acceleration_mps2, search.probe
-    low, high = (share * wanted for share in _FIT)
+    low, high = (fraction * wanted for fraction in _FIT)
     simulation = ClosedLoop(scenario, "none", timestep_s)
     recorder = Recorder(simulation.vehicle, simulation.steps)
     chunk, left = round(_CHUNK_S / timestep_s), simulation.steps

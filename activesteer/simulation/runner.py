@@ -70,7 +70,7 @@ def run_scenario(
         controller: The controller, as in `simulate`.
         path: MCAP file to write.
         timestep_s: Step of the simulation [s].
-        progress: Called about every simulated second with the share that is done, 0 to 1.
+        progress: Called about every simulated second with the fraction that is done, 0 to 1.
 
     Returns:
         The recording, with metrics; where the run cannot be evaluated, as when it is too short, there are none and

@@ -26,7 +26,7 @@ class Dependence(NamedTuple):
 
     Attributes:
         factor: Its key.
-        explained: Share of the outcome's variance that is lost without it, 0 to 1.
+        explained: Fraction of the outcome's variance that is lost without it, 0 to 1.
         direction: 1 where more of it makes the outcome more frequent, -1 where less does, 0 where its middle or its
             ends do.
     """

@@ -82,10 +82,10 @@ def _lane_change_s() -> float:
 
 
 def _lane_change(speed_mps: float, time_s: float) -> float:
-    share = (time_s - 1.0) / _lane_change_s()
-    if not 0.0 < share < 1.0:
+    fraction = (time_s - 1.0) / _lane_change_s()
+    if not 0.0 < fraction < 1.0:
         return 0.0
-    return _LANE_M * share * (60.0 + share * (120.0 * share - 180.0)) / (_lane_change_s() * speed_mps) ** 2
+    return _LANE_M * fraction * (60.0 + fraction * (120.0 * fraction - 180.0)) / (_lane_change_s() * speed_mps) ** 2
 
 
 SITUATIONS: Final = {

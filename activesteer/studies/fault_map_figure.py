@@ -25,12 +25,12 @@ class _Shown(NamedTuple):
     Attributes:
         title: What it is.
         value: Row -> what is written into its field; None where nothing came out.
-        share: Value, limits -> 0 good to 1 bad, which is the colour.
+        fraction: Value, limits -> 0 good to 1 bad, which is the colour.
     """
 
     title: str
     value: Callable[[Mapping[str, Any]], float | None]
-    share: Callable[[float, FaultMap], float]
+    fraction: Callable[[float, FaultMap], float]
 
 
 def _tolerated(row: Mapping[str, Any]) -> float | None:
@@ -84,17 +84,17 @@ def _drawn(made: FaultMap, shown: _Shown) -> Figure:
     )
     panels = figure.subplots(1, len(situations), sharey=True, squeeze=False)[0]
     for axes, situation in zip(panels, situations, strict=True):
-        shares = np.full((len(faults), len(speeds)), math.nan)
-        for place in np.ndindex(shares.shape):
+        fractions = np.full((len(faults), len(speeds)), math.nan)
+        for place in np.ndindex(fractions.shape):
             row = cells[faults[place[0]], situation, speeds[place[1]]]
             value = shown.value(row)
             if value is None or math.isnan(value):
                 text = "failed"
             else:
-                shares[place] = shown.share(value, made)
+                fractions[place] = shown.fraction(value, made)
                 text = "" if math.isinf(value) else f"{value:.2g}"
             axes.text(place[1], place[0], text, ha="center", va="center", fontsize=7)
-        axes.imshow(shares, cmap="RdYlGn_r", vmin=0.0, vmax=1.0, aspect="auto")
+        axes.imshow(fractions, cmap="RdYlGn_r", vmin=0.0, vmax=1.0, aspect="auto")
         axes.set_title(situation.replace("_", " "), fontsize="small")
         axes.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds], fontsize=7)
         axes.set_xlabel("speed [km/h]", fontsize=8)

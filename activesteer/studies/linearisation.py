@@ -48,7 +48,7 @@ MIN_SPEED_MPS: Final = 3.0
 
 _SETTLE_S: Final = 1.0
 _NO_INFLUENCE: Final = 1e-8
-"""Share of a mode in every gain of the car below which it does not appear in the state space; symmetric modes have
+"""Fraction of a mode in every gain of the car below which it does not appear in the state space; symmetric modes have
 1e-12, the least of the lateral ones 1e-4."""
 
 
@@ -102,11 +102,11 @@ class LinearCar:
         twice = np.array([2.0 if mode.eigenvalue_1ps.imag > 0.0 else 1.0 for mode in modes])
         gains = np.real(twice[:, None, None] * outputs[:, :, None] * (inputs / (1.0 - discrete)[:, None])[:, None, :])
         # Where a gain nearly vanishes, as in sideslip at some speed, the largest part of a mode is what counts.
-        share = (np.abs(gains) / np.abs(gains).max(axis=0)).max(axis=(1, 2))
+        fraction = (np.abs(gains) / np.abs(gains).max(axis=0)).max(axis=(1, 2))
         kept = [
             index
             for index, mode in enumerate(modes)
-            if mode.natural_frequency_Hz <= cut_off_Hz and share[index] > _NO_INFLUENCE
+            if mode.natural_frequency_Hz <= cut_off_Hz and fraction[index] > _NO_INFLUENCE
         ]
         fast = [index for index, mode in enumerate(modes) if mode.natural_frequency_Hz > cut_off_Hz]
         feedthrough = self.d + gains[fast].sum(axis=0)
@@ -258,7 +258,7 @@ def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> s
             continue
         s = mode.eigenvalue_1ps
         value = f"{s.real:.2f}" + (f" +- {s.imag:.2f}i" if s.imag else "")
-        parts = ", ".join(f"{part} {share:.0%}" for part, share in list(mode.shares.items())[:3])
+        parts = ", ".join(f"{part} {fraction:.0%}" for part, fraction in list(mode.participation.items())[:3])
         rows.append((mode.name, f"{mode.natural_frequency_Hz:.2f}", f"{mode.damping_ratio:.2f}", value, parts))
     widths = [max(len(row[column]) for row in rows) for column in range(4)]
     return "\n".join(

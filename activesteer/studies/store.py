@@ -174,8 +174,8 @@ class Store:
                 for entry in table[column].combine_chunks().value_counts().to_pylist():
                     if entry["values"]:
                         found[entry["values"]] = found.get(entry["values"], 0) + entry["counts"]
-        most = dict(sorted(errors.items(), key=lambda item: -item[1])[:10])
-        return Progress(about["runs"], sum(counts.values()), counts, most, _is_locked(self.folder / ".lock"))
+        maximum = dict(sorted(errors.items(), key=lambda item: -item[1])[:10])
+        return Progress(about["runs"], sum(counts.values()), counts, maximum, _is_locked(self.folder / ".lock"))
 
     def _spans(self) -> list[tuple[int, int]]:
         return sorted(

@@ -24,9 +24,9 @@ def _scalar_calls(tyre, count, pressure_Pa):
     p, total = tyre[0], 0.0
     for index in range(count):
         # Small changes, so that no call can be left out or moved out of the loop.
-        share = (index % 1000) * 0.001
+        fraction = (index % 1000) * 0.001
         fx, fy, mx, my, mz = magic_formula(
-            p, 3000.0 + 2000.0 * share, 0.1 * share - 0.05, 0.08 - 0.16 * share, 0.02, pressure_Pa, 20.0, 0.9
+            p, 3000.0 + 2000.0 * fraction, 0.1 * fraction - 0.05, 0.08 - 0.16 * fraction, 0.02, pressure_Pa, 20.0, 0.9
         )
         total += fx + fy + mx + my + mz
     return total

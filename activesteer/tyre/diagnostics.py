@@ -23,7 +23,7 @@ TRAIL_RANGE_M: Final = (0.005, 0.08)
 """Pneumatic trail at the nominal load: a sixth of a contact patch of 0.1 to 0.25 m, and some room."""
 RELAXATION_RANGE_M: Final = (0.1, 1.5)
 """Lateral relaxation length at the nominal load: one to three contact lengths."""
-STRAIGHT_AHEAD_SHARE: Final = 0.05
+STRAIGHT_AHEAD_FRACTION: Final = 0.05
 """Side force straight ahead, over the load, from which a car on four such tyres clearly pulls."""
 NOMINAL_LOAD_N: Final = (1000.0, 12_000.0)
 """Nominal loads of car tyres; motorcycles and trucks lie outside."""
@@ -127,12 +127,12 @@ def _ranges(params: TyreParameters) -> Iterator[tuple[str, str]]:
         yield f"FZMAX = {params['FZMAX']:g} N is {params['FZMAX'] / nominal:.2f} of the nominal load", consequence
     if params["FZMIN"] > 0.3 * nominal:
         yield f"FZMIN = {params['FZMIN']:g} N is {params['FZMIN'] / nominal:.2f} of the nominal load", consequence
-    for low, high, least, unit, factor in (
+    for low, high, minimum, unit, factor in (
         ("KPUMIN", "KPUMAX", 0.99, "", 1.0),
         ("ALPMIN", "ALPMAX", math.radians(15.0), " deg", math.degrees(1.0)),
         ("CAMMIN", "CAMMAX", math.radians(5.0), " deg", math.degrees(1.0)),
     ):
-        if -params[low] < least or params[high] < least:
+        if -params[low] < minimum or params[high] < minimum:
             span = f"{factor * params[low]:.3g} to {factor * params[high]:.3g}{unit}"
             yield f"{low}, {high} allow {span} only", consequence
 
@@ -199,7 +199,7 @@ def _asymmetry(params: TyreParameters) -> Iterator[tuple[str, str]]:
     nominal = params["FNOMIN"]
     straight = MagicFormula(params).evaluate(nominal, 0.0, 0.0)
     force, stiffness = float(straight.fy_N), abs(float(straight.cornering_stiffness_Nprad))
-    if abs(force) > STRAIGHT_AHEAD_SHARE * nominal:
+    if abs(force) > STRAIGHT_AHEAD_FRACTION * nominal:
         angle = math.degrees(abs(force) / stiffness) if stiffness else math.inf
         yield (
             f"{force:.0f} N of side force straight ahead at the nominal load, worth {angle:.2f} deg of slip angle",

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _COLOURS: Final = ("#0072b2", "#009e73", "#e69f00", "#d55e00", "#cc79a7", "#333333", "#56b4e9")
 """Colours that colour-blind readers can tell apart (Okabe and Ito, 2008)."""
-_LOAD_SHARES: Final = (0.5, 1.0, 1.5, 2.0)
+_LOAD_FRACTIONS: Final = (0.5, 1.0, 1.5, 2.0)
 _DEGREES: Final = math.degrees(1.0)
 _WIDEST_ANGLE_RAD: Final = math.radians(20.0)
 _WIDEST_SLIP: Final = 0.6
@@ -85,7 +85,7 @@ def _in_degrees(angle_rad: float) -> str:
 def _loads(params: TyreParameters) -> list[float]:
     """Loads of the curves [N], rounded to 100 N, within the range of the file."""
     low, high = params["FZMIN"], params["FZMAX"]
-    loads = [max(round(share * params["FNOMIN"] / 100.0) * 100.0, 100.0) for share in _LOAD_SHARES]
+    loads = [max(round(fraction * params["FNOMIN"] / 100.0) * 100.0, 100.0) for fraction in _LOAD_FRACTIONS]
     return [load for load in loads if low <= load <= high] or [min(max(params["FNOMIN"], low), high)]
 
 
@@ -166,10 +166,10 @@ def envelope(formula: MagicFormula, load_N: float, directions: int = _DIRECTIONS
     """
     params = formula.parameters
     # Closer together near zero, where the forces change fastest.
-    share = np.linspace(-1.0, 1.0, _GRID)
-    share = np.sign(share) * np.abs(share) ** 2.5
-    kappa = np.where(share < 0.0, -params["KPUMIN"], params["KPUMAX"]).clip(max=1.0) * share
-    alpha = np.where(share < 0.0, -params["ALPMIN"], params["ALPMAX"]).clip(max=1.4) * share
+    fraction = np.linspace(-1.0, 1.0, _GRID)
+    fraction = np.sign(fraction) * np.abs(fraction) ** 2.5
+    kappa = np.where(fraction < 0.0, -params["KPUMIN"], params["KPUMAX"]).clip(max=1.0) * fraction
+    alpha = np.where(fraction < 0.0, -params["ALPMIN"], params["ALPMAX"]).clip(max=1.4) * fraction
     forces = formula.evaluate(load_N, kappa[:, None], alpha)
     fx, fy = forces.fx_N.ravel(), forces.fy_N.ravel()
     sector = ((np.arctan2(-fx, -fy) / (2.0 * math.pi) + 0.5) * directions).astype(int) % directions
@@ -184,15 +184,15 @@ def _friction_ellipse(formula: MagicFormula) -> Figure:
     params = formula.parameters
     figure = _new_figure(params, "greatest forces at combined slip, over the load", 7.0, 6.0)
     axis = figure.subplots()
-    most = 0.0
+    maximum = 0.0
     for load, colour in zip(_loads(params), _COLOURS, strict=False):
         fx, fy = envelope(formula, load)
         axis.plot(fy / load, fx / load, color=colour, label=f"{load / 1000:g} kN")
-        most = max(most, float(np.abs([fx, fy]).max()) / load)
+        maximum = max(maximum, float(np.abs([fx, fy]).max()) / load)
     circle = np.linspace(0.0, 2.0 * math.pi, 181)
     axis.plot(np.sin(circle), np.cos(circle), "--", color="#999999", linewidth=0.9, label="friction 1")
     _style(axis, "side force over load $F_y / F_z$, to the left positive", "longitudinal force over load $F_x / F_z$")
-    limit = 1.08 * max(most, 1.0)
+    limit = 1.08 * max(maximum, 1.0)
     axis.set(xlim=(limit, -limit), ylim=(-limit, limit), aspect="equal")
     axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="load", fontsize="small", frameon=False)
     return figure

@@ -22,7 +22,7 @@ from activesteer.tyre.kernels.rows import (
     rolling_rows,
 )
 
-_MOST: Final = 1e12
+_MAX_FORCE: Final = 1e12
 """Beyond this [N, Nm, m ...] nothing is a tyre's, and what an engine makes of it is soon not finite either."""
 _ENORMOUS: Final = 1e7
 """In SI no coefficient of a tyre is greater: pressures and stiffnesses are some 1e6."""
@@ -67,7 +67,7 @@ def _is_finite(record: bytes) -> bool:
     evaluate_rows(tyre, inputs, forces, np.empty(len(inputs), np.int64))
     rolling_rows(tyre, inputs, forces, rolling)
     driven = np.array([_on_road(tyre, *point) for point in _motions(tyre[0])])
-    return all(bool((np.abs(values) < _MOST).all()) for values in (forces, rolling, driven))
+    return all(bool((np.abs(values) < _MAX_FORCE).all()) for values in (forces, rolling, driven))
 
 
 @compiled

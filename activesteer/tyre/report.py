@@ -35,7 +35,7 @@ def key_figures(params: TyreParameters) -> dict[str, Any]:
         and radii, without camber, at the file's pressure and speed of measurement.
     """
     nominal = params["FNOMIN"]
-    loads = [share * nominal for share in _LOADS if params["FZMIN"] <= share * nominal <= params["FZMAX"]]
+    loads = [fraction * nominal for fraction in _LOADS if params["FZMIN"] <= fraction * nominal <= params["FZMAX"]]
     return {
         "file": str(params.source) if params.source else None,
         "version": _NAMES[params.version],

@@ -34,13 +34,13 @@ class Quantity(NamedTuple):
         column: Its name in the reference.
         word: Its name in the comparisons.
         unit: Its unit.
-        least_range: A run in which it changes by less says nothing about it, in its unit.
+        min_range: A run in which it changes by less says nothing about it, in its unit.
     """
 
     column: str
     word: str
     unit: str
-    least_range: float
+    min_range: float
 
 
 QUANTITIES: Final = (
@@ -109,7 +109,7 @@ def compare_run(run: str, ours: Table, reference: Table) -> list[Comparison]:
     reference = {column: values[together] for column, values in reference.items()}
     rows: list[Comparison] = []
     for trace in traces(ours, reference, (*QUANTITIES, _PITCH, _DECELERATION)):
-        if trace.span >= trace.quantity.least_range:
+        if trace.span >= trace.quantity.min_range:
             rows += _compare(run, trace)
     end = reference["t"] >= reference["t"][-1] - _STEADY_S
     t = reference["t"][end]

@@ -25,7 +25,7 @@ _TOLERANCES: Final = {
     "half_track": ("mm", 0.15),
 }
 """Quantity -> unit and tolerance of the difference; the others are compared by their relative error."""
-_SHARES: Final = {"load": 0.01, "side_force_inwards": 0.02}
+_FRACTIONS: Final = {"load": 0.01, "side_force_inwards": 0.02}
 
 
 def compare_static(vehicle: Vehicle, data: ReferenceData) -> list[Comparison]:
@@ -48,8 +48,10 @@ def compare_static(vehicle: Vehicle, data: ReferenceData) -> list[Comparison]:
         run = f"static_{speed_kmh}kmh"
         for quantity, reference in theirs.items():
             kind = quantity.removeprefix("front_").removeprefix("rear_")
-            if kind in _SHARES:
-                comparisons.append(relative(run, quantity, units[quantity], ours[quantity], reference, _SHARES[kind]))
+            if kind in _FRACTIONS:
+                comparisons.append(
+                    relative(run, quantity, units[quantity], ours[quantity], reference, _FRACTIONS[kind])
+                )
             else:
                 tolerance = _TOLERANCES[kind][1]
                 comparisons.append(absolute(run, quantity, units[quantity], ours[quantity], reference, tolerance))

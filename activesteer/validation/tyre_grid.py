@@ -14,7 +14,7 @@ from activesteer.validation.comparison import Comparison
 from activesteer.validation.reference import ReferenceData, Table
 
 _TOLERANCE: Final = 0.005
-"""Share of the peak."""
+"""Fraction of the peak."""
 _THEIR_LIMIT: Final = 1.5608
 """The other code limits B times slip, the argument of the formula's arc tangent, to this; ours does not."""
 _SHIFTS: Final = 0.1

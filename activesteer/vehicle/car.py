@@ -106,7 +106,7 @@ class Vehicle:
             self._brake_setup[:] = self._brakes_of(radii_m)
             reset(self._brake_state, self._brake_setup, 0.0)
             if parameters.sensors.speed_from_wheels:
-                self._plan["wheel_radii_m"] = speed_radii(parameters.powertrain.front_share, radii_m)
+                self._plan["wheel_radii_m"] = speed_radii(parameters.powertrain.front_fraction, radii_m)
         except ModelError as reason:
             raise ModelError(str(reason), file=str(mjcf)) from reason
 
@@ -136,7 +136,7 @@ class Vehicle:
         self._wheels = Wheels(
             [actuator(f"{corner}_drive") for corner in CORNERS],
             [actuator(f"{corner}_brake") for corner in CORNERS],
-            self.parameters.powertrain.wheel_shares,
+            self.parameters.powertrain.wheel_fractions,
         )
         self.actuators = ActuatorRecords(model, (self._places.rear_left, self._places.rear_right))
         ratio, brakes = self.parameters.steering.ratio, (self._brake_setup, self._brake_state)
@@ -178,8 +178,8 @@ class Vehicle:
             unit[spin] = 1.0
             mujoco.mj_mulM(self.model, self.data, product, unit)
             inertias_kgm2.append(float(product[spin]))
-        shares = self.parameters.powertrain.wheel_shares
-        return brake_setup(self.parameters.brakes, self.timestep_s, rolling_radii_m, shares, inertias_kgm2)
+        fractions = self.parameters.powertrain.wheel_fractions
+        return brake_setup(self.parameters.brakes, self.timestep_s, rolling_radii_m, fractions, inertias_kgm2)
 
     def start(self, speed_mps: float, time_s: float = 0.0) -> Measurement:
         """Sets the car rolling straight ahead at a speed, from static ride.
@@ -215,9 +215,10 @@ class Vehicle:
 
     @property
     def wheel_radius_m(self) -> float:
-        """Mean height of the driven wheels' centres where the car now is, by their shares of the torque [m]."""
+        """Mean height of the driven wheels' centres where the car now is, by their fractions of the torque [m]."""
         return sum(
-            share * self._rolling_radius(index) for index, share in enumerate(self.parameters.powertrain.wheel_shares)
+            fraction * self._rolling_radius(index)
+            for index, fraction in enumerate(self.parameters.powertrain.wheel_fractions)
         )
 
     def _rolling_radius(self, corner: int) -> float:
@@ -289,12 +290,12 @@ class Vehicle:
         native_step.replay(self._plan_address, inputs)
 
     def _engage(self, gear: int) -> None:
-        """Couples the engine to the driven wheels, each of which then carries its share of the inertia, or frees it."""
+        """Couples the engine to the driven wheels, each of which then carries its part of the inertia, or frees it."""
         self._gear = self._block_gear[0] = gear
         powertrain = self.parameters.powertrain
         inertia_kgm2 = 0.0 if gear == CLUTCH_OPEN else powertrain.inertia_kgm2
-        for dof, own, share in zip(self._spins, self._spin_armature_kgm2, powertrain.wheel_shares, strict=True):
-            self.model.dof_armature[dof] = own + share * inertia_kgm2
+        for dof, own, fraction in zip(self._spins, self._spin_armature_kgm2, powertrain.wheel_fractions, strict=True):
+            self.model.dof_armature[dof] = own + fraction * inertia_kgm2
 
     def _apply_torques(self, torques: WheelTorques) -> None:
         """Torques of the wheels, one by one: past the engine, so at once and whatever that can give."""
@@ -415,10 +416,10 @@ class Vehicle:
 
     def limit_hands(self, torque_Nm: float | None) -> None:
         """Lets the hands on the steering wheel hold no more than a torque [N m]; any where not given."""
-        hands, felt = self._places.steering_wheel, 1.0 - self.parameters.steering.assist_share
+        hands, felt = self._places.steering_wheel, 1.0 - self.parameters.steering.assist_fraction
         self.model.actuator_forcelimited[hands] = torque_Nm is not None
-        most = 0.0 if torque_Nm is None else torque_Nm / felt
-        self.model.actuator_forcerange[hands] = -most, most
+        maximum = 0.0 if torque_Nm is None else torque_Nm / felt
+        self.model.actuator_forcerange[hands] = -maximum, maximum
 
     def note_measurement(self, measurement: Measurement) -> None:
         """Has recorded what faulty sensors say, where the measurement is recorded at all."""

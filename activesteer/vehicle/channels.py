@@ -187,7 +187,7 @@ class ChannelMap:
         rear = [self._sensor(f"{corner}_steer_angle").start for corner in ("rl", "rr")]
         front = [self._sensor(f"{corner}_wheel_axis") for corner in ("fl", "fr")]
         demand = find(self._model, mujoco.mjtObj.mjOBJ_ACTUATOR, "steering_wheel")
-        felt = 1.0 - self._parameters.steering.assist_share
+        felt = 1.0 - self._parameters.steering.assist_fraction
 
         def channel(name: str, unit: str, meaning: str) -> Channel:
             return Channel(name, unit, meaning, "vehicle")
@@ -249,7 +249,10 @@ class ChannelMap:
                 user(fb.U_CONTACT_Y, "contact_y_m", "m", "contact point with the road, world y"),
                 user(fb.U_MU, "mu", "", "friction of the road at the contact point"),
                 user(
-                    fb.U_FRICTION_USE, "friction_use", "", "share of the tyre's peak friction at its load that is used"
+                    fb.U_FRICTION_UTILISATION,
+                    "friction_utilisation",
+                    "",
+                    "fraction of the tyre's peak friction at its load that is used",
                 ),
             ]
             signals += self._wheel(corner, words, index)

@@ -35,7 +35,7 @@ MAX_CHAIN: Final = 32
 # One record per wheel; the chain of degrees of freedom follows.
 (
     W_BODY, W_ROOT, W_ACT_X, W_ACT_Y, W_ACT_Z, W_MU, W_PRESSURE_Pa, W_LOW_SPEED_mps, W_LOW_SPEED_DAMPING_Nspm,
-    W_TYRE_START, W_SPIN, W_DRIVE_SHARE, W_CHAIN_LENGTH, W_CHAIN,
+    W_TYRE_START, W_SPIN, W_DRIVE_FRACTION, W_CHAIN_LENGTH, W_CHAIN,
 ) = range(14)  # fmt: skip
 WHEEL_SIZE: Final = W_CHAIN + MAX_CHAIN
 
@@ -82,7 +82,7 @@ SCREW_SIZE: Final = S_TRAVEL + POWERS
 # sensors of screws say (L_OUT, S_OUT). Behind that stands what it does not write: how many faults act.
 (
     U_FX, U_FY, U_FZ, U_MX, U_MY, U_MZ, U_SLIP_RATIO, U_SLIP_ANGLE, U_INCLINATION, U_RATE_X, U_RATE_Y,
-    U_RATE_Z, U_LOADED_RADIUS, U_LIMITED, U_FRICTION_USE, U_MU, U_CONTACT_X, U_CONTACT_Y,
+    U_RATE_Z, U_LOADED_RADIUS, U_LIMITED, U_FRICTION_UTILISATION, U_MU, U_CONTACT_X, U_CONTACT_Y,
 ) = range(18)  # fmt: skip
 USERDATA_PER_WHEEL: Final = 18
 
@@ -103,7 +103,7 @@ class WheelEntry:
     chain: list[int]
     tyre: np.record
     spin: int = 0
-    drive_share: float = 0.0
+    drive_fraction: float = 0.0
 
 
 @dataclass
@@ -177,7 +177,7 @@ class ForceBlock:
             record = block[self.wheel_start(index) : self.wheel_start(index + 1)]
             record[:W_CHAIN] = (
                 wheel.body, wheel.root, wheel.act_x, wheel.act_y, wheel.act_z, wheel.mu, wheel.pressure_Pa,
-                wheel.low_speed_mps, wheel.low_speed_damping_Nspm, tyre_start, wheel.spin, wheel.drive_share,
+                wheel.low_speed_mps, wheel.low_speed_damping_Nspm, tyre_start, wheel.spin, wheel.drive_fraction,
                 len(wheel.chain),
             )  # fmt: skip
             record[W_CHAIN : W_CHAIN + len(wheel.chain)] = wheel.chain

@@ -41,12 +41,12 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
     _scale_springs(spec, bare, factors)
     body = bare.body("chassis")
     before = mass_properties(bare)
-    share = before.mass_kg / float(body.mass[0])
-    scale = 1.0 + (factors.mass - 1.0) * share
+    fraction = before.mass_kg / float(body.mass[0])
+    scale = 1.0 + (factors.mass - 1.0) * fraction
     if scale <= 0.0:
-        least = 1.0 - 1.0 / share
+        minimum = 1.0 - 1.0 / fraction
         raise ModelError(
-            f"{factors.mass:g} leaves nothing of the chassis; more than {least:.2f} is needed",
+            f"{factors.mass:g} leaves nothing of the chassis; more than {minimum:.2f} is needed",
             key="factors.mass",
             value=factors.mass,
         )

@@ -186,7 +186,7 @@ def _wheel(
         low_speed_mps=fitment.low_speed_mps,
         low_speed_damping_Nspm=fitment.low_speed_damping_Nspm,
         spin=int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_spin")]),
-        drive_share=parameters.powertrain.wheel_shares[CORNERS.index(corner)],
+        drive_fraction=parameters.powertrain.wheel_fractions[CORNERS.index(corner)],
         chain=chain,
         tyre=tyre.mounted_on("LEFT" if corner.endswith("l") else "RIGHT").record,
     )
@@ -221,15 +221,15 @@ def _actuator(
         slot = wheel * fb.USERDATA_PER_WHEEL + _RATES[state]
         return (fb.KIND_SLIP, address, float(slot), 0.0, 0.0, 0.0)
     if state == "drive":
-        share = parameters.powertrain.wheel_shares[CORNERS.index(corner)]
-        return (fb.KIND_DRIVE, address, share, parameters.powertrain.lag_s, 0.0, 0.0)
+        fraction = parameters.powertrain.wheel_fractions[CORNERS.index(corner)]
+        return (fb.KIND_DRIVE, address, fraction, parameters.powertrain.lag_s, 0.0, 0.0)
     if name.endswith("_brake"):
         brakes = parameters.brakes
-        most = (
+        maximum = (
             brakes.front_torque_Nm if corner.startswith("f") else max(brakes.rear_torque_Nm, brakes.parking_torque_Nm)
         )
         spin = float(model.jnt_dofadr[int(model.actuator_trnid[index, 0])])
-        return (fb.KIND_BRAKE, address, brakes.stiffness_Nmprad, spin, brakes.drag_torque_Nm, most)
+        return (fb.KIND_BRAKE, address, brakes.stiffness_Nmprad, spin, brakes.drag_torque_Nm, maximum)
     if name.endswith("_friction"):
         force, stiffness = _friction(name, parameters)
         part = int(model.actuator_trnid[index, 0])

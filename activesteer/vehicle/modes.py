@@ -54,7 +54,7 @@ _PARTS: Final = (
 _BODY_PARTS: Final = ("bounce", "roll", "pitch")
 """Motions of the body that have one mode each."""
 
-_EQUAL_SHARE: Final = 0.9
+_MIN_LIKENESS: Final = 0.9
 """How much alike left and right must move for a mode to count as parallel or opposite."""
 
 
@@ -65,14 +65,14 @@ class Mode:
     Attributes:
         name: After the part that takes part most; with `parallel` or `opposite` where it is one of the wheels.
         eigenvalue_1ps: s [1/s], imaginary part not negative.
-        shares: Participation of the parts, largest first; the sum is 1.
+        participation: Participation factors of the parts, largest first; the sum is 1.
         shape: Right eigenvector, complex, shape (n,).
         left: Left eigenvector, complex, shape (n,); its product with `shape` is 1.
     """
 
     name: str
     eigenvalue_1ps: complex
-    shares: dict[str, float]
+    participation: dict[str, float]
     shape: NDArray[np.complex128]
     left: NDArray[np.complex128]
 
@@ -106,20 +106,20 @@ def find_modes(a: NDArray[np.float64], states: tuple[str, ...], timestep_s: floa
         left = np.linalg.inv(right)
     except np.linalg.LinAlgError as reason:
         raise ModelError(f"the car's motion has no full set of modes: {reason}") from reason
-    shares = np.abs(right * left.T)
-    shares /= shares.sum(axis=0)
+    participation = np.abs(right * left.T)
+    participation /= participation.sum(axis=0)
     parts = [_part_of(state) for state in states]
     by_mode: dict[int, dict[str, float]] = {}
     for index in np.flatnonzero(np.imag(values) >= 0.0):
         sums = dict.fromkeys(parts, 0.0)
-        for part, share in zip(parts, shares[:, index], strict=True):
-            sums[part] += float(share)
+        for part, amount in zip(parts, participation[:, index], strict=True):
+            sums[part] += float(amount)
         by_mode[int(index)] = dict(sorted(sums.items(), key=lambda item: -item[1]))
     names: dict[int, str] = {}
     for part in _BODY_PARTS:
-        most = max(by_mode, key=lambda index: by_mode[index].get(part, 0.0))
-        if by_mode[most].get(part, 0.0) > 0.0:
-            names[most] = part
+        maximum = max(by_mode, key=lambda index: by_mode[index].get(part, 0.0))
+        if by_mode[maximum].get(part, 0.0) > 0.0:
+            names[maximum] = part
     modes = []
     for index, sums in by_mode.items():
         # ln of a negative real z would stand for half a turn a step: such a mode is beyond what the steps resolve.
@@ -127,7 +127,7 @@ def find_modes(a: NDArray[np.float64], states: tuple[str, ...], timestep_s: floa
         name = names.get(index)
         if name is None:
             name = next((part for part in sums if part not in _BODY_PARTS), next(iter(sums)))
-            name += _sides(right[:, index], shares[:, index], states)
+            name += _sides(right[:, index], participation[:, index], states)
         modes.append(Mode(name, s, sums, right[:, index].astype(complex), left[index].astype(complex)))
     return sorted(modes, key=lambda mode: (abs(mode.eigenvalue_1ps), mode.name))
 
@@ -139,9 +139,9 @@ def _part_of(state: str) -> str:
     return state.removeprefix("d_")
 
 
-def _sides(shape: NDArray[np.complex128], shares: NDArray[np.float64], states: tuple[str, ...]) -> str:
+def _sides(shape: NDArray[np.complex128], participation: NDArray[np.float64], states: tuple[str, ...]) -> str:
     """Whether left and right wheels move alike or against each other, where it is the wheels that move."""
-    top = states[int(shares.argmax())]
+    top = states[int(participation.argmax())]
     match = re.search(r"(?<![a-z])([fr])([lr])_", top)
     if match is None:
         return ""
@@ -152,6 +152,6 @@ def _sides(shape: NDArray[np.complex128], shares: NDArray[np.float64], states: t
     one, two = shape[states.index(top)], shape[states.index(other)]
     alike = float((one.conjugate() * two).real) * 2.0 / float(abs(one) ** 2 + abs(two) ** 2)
     # Coordinates of both sides point the same way in vehicle axes: wheels that steer alike turn alike.
-    if abs(alike) < _EQUAL_SHARE:
+    if abs(alike) < _MIN_LIKENESS:
         return ""
     return ", parallel" if alike > 0.0 else ", opposite"

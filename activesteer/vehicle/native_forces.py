@@ -129,7 +129,7 @@ def _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
         out[fb.U_RATE_Z] = tyre.deflection_z_rate_radps
         out[fb.U_LOADED_RADIUS] = tyre.loaded_radius_m
         out[fb.U_LIMITED] = tyre.limited
-        out[fb.U_FRICTION_USE] = tyre.friction_use
+        out[fb.U_FRICTION_UTILISATION] = tyre.friction_utilisation
         out[fb.U_MU] = mu
         out[fb.U_CONTACT_X] = contact_x
         out[fb.U_CONTACT_Y] = contact_y
@@ -190,14 +190,14 @@ def _drag(block, xpos, xmat, com, cvel, cdof, qfrc):
 
 
 @inlined
-def _drive_rate(block, qvel, share, lag_s, command, state, timestep_s):
+def _drive_rate(block, qvel, fraction, lag_s, command, state, timestep_s):
     """Rate of a wheel's drive torque: a first-order lag, within what the engine can give at the speed of its wheels."""
     if block[fb.GEAR] == CLUTCH_OPEN:
         return (command - state) / timestep_s
     speed = 0.0
     for index in range(int(block[fb.N_WHEELS])):
         wheel = block[int(block[fb.WHEELS_START]) + index * fb.WHEEL_SIZE :]
-        speed += wheel[fb.W_DRIVE_SHARE] * qvel[int(wheel[fb.W_SPIN])]
+        speed += wheel[fb.W_DRIVE_FRACTION] * qvel[int(wheel[fb.W_SPIN])]
     low, high = drive_limits(
         speed,
         block[fb.GEAR],
@@ -207,10 +207,10 @@ def _drive_rate(block, qvel, share, lag_s, command, state, timestep_s):
         block[fb.ENGINE_DRAG_Nm],
     )
     torque = state - (command - state) * math.expm1(-timestep_s / lag_s)
-    if share == 0.0:
+    if fraction == 0.0:
         # Not driven: nothing is commanded, and what came past the engine before dies away.
         return (torque - state) / timestep_s
-    return (min(max(torque, share * low), share * high) - state) / timestep_s
+    return (min(max(torque, fraction * low), fraction * high) - state) / timestep_s
 
 
 @inlined

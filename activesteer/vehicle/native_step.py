@@ -50,7 +50,7 @@ class Wheels(NamedTuple):
     """Controls of the drive."""
     brakes: Sequence[int]
     """Controls of the brakes."""
-    drive_shares: Sequence[float]
+    drive_fractions: Sequence[float]
     """What each gets of the drive torque."""
 
 
@@ -88,7 +88,7 @@ STEP_PLAN: Final = np.dtype(
             *((name, np.intp) for name in (*_ADDRESSES, *Places._fields)),
             ("ratio", np.float64),
             *((name, np.intp, (_N_WHEELS,)) for name in ("drives", "brakes")),
-            ("drive_shares", np.float64, (_N_WHEELS,)),
+            ("drive_fractions", np.float64, (_N_WHEELS,)),
             *((name, np.intp) for name in ("n_sensors", "sensors", "sensor_memory", "sensor_memory_size")),
             ("timestep_s", np.float64),
             ("wheel_radii_m", np.float64, (_N_WHEELS,)),
@@ -311,7 +311,7 @@ def step(plan_address, tape_address, torques_stand):
     for wheel in range(_N_WHEELS):
         if not torques_stand:
             # + 0.0: a wheel that is not driven would get -0.0 while the engine brakes.
-            ctrl[plan.drives[wheel]] = plan.drive_shares[wheel] * drive_torque_Nm + 0.0
+            ctrl[plan.drives[wheel]] = plan.drive_fractions[wheel] * drive_torque_Nm + 0.0
             ctrl[plan.brakes[wheel]] = commands.parking_brake * setup.parking_torque_Nm[wheel]
         ctrl[plan.brakes[wheel]] += setup.torque_per_pressure_NmpPa[wheel] * state.pressure_Pa[wheel]
     _call(plan.mj_step, plan.model, plan.data)  # pyright: ignore[reportCallIssue] - numba adds the context

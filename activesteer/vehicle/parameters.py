@@ -18,7 +18,7 @@ from activesteer.vehicle.superposition_actuator import SuperpositionActuator
 
 Positive = Annotated[float, Range(1e-12)]
 NotNegative = Annotated[float, Range(0.0)]
-Share = Annotated[float, Range(0.0, 1.0)]
+Fraction = Annotated[float, Range(0.0, 1.0)]
 _MASS_HINT: Final = (
     "load.payload_kg loads the car, factors.mass scales it; single_track.mass_kg is only what controllers and driver "
     "believe of it"
@@ -116,8 +116,8 @@ class Friction:
 class Powertrain:
     """Engine, gearbox and differentials: torque at the driven wheels and where it goes; see `powertrain`."""
 
-    front_share: Share
-    """Share of the drive torque at the front axle; each axle's part is split evenly [-]."""
+    front_fraction: Fraction
+    """Fraction of the drive torque at the front axle; each axle's part is split evenly [-]."""
     max_torque_Nm: Positive
     """Most drive torque at all wheels together, in first gear [N m]."""
     max_power_W: Positive
@@ -132,9 +132,9 @@ class Powertrain:
     """Time constant of the torque behind its demand: filling of the engine, twist of the driveline [s]."""
 
     @property
-    def wheel_shares(self) -> tuple[float, float, float, float]:
-        """Share of the drive torque that each wheel gets [-], order of `CORNERS`."""
-        front, rear = 0.5 * self.front_share, 0.5 * (1.0 - self.front_share)
+    def wheel_fractions(self) -> tuple[float, float, float, float]:
+        """Fraction of the drive torque that each wheel gets [-], order of `CORNERS`."""
+        front, rear = 0.5 * self.front_fraction, 0.5 * (1.0 - self.front_fraction)
         return front, front, rear, rear
 
 
@@ -146,8 +146,8 @@ class Steering:
     """Steering wheel angle over mean road-wheel angle around straight ahead [-]."""
     steering_wheel_limit_rad: Positive
     """Lock angle of the steering wheel to either side [rad]."""
-    assist_share: Annotated[float, Range(0.0, 0.99)] = 0.35
-    """Share of the column's torque that the power assist carries and the hands do not feel [-]; 0.35 is what the
+    assist_fraction: Annotated[float, Range(0.0, 0.99)] = 0.35
+    """Fraction of the column's torque that the power assist carries and the hands do not feel [-]; 0.35 is what the
     compact's column is made for (its README). Only `hand_torque_Nm` and the hands' own limit depend on it."""
 
 

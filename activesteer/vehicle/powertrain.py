@@ -25,7 +25,7 @@ CLUTCH_OPEN: Final = 0
 """The gear in which the engine is apart from the wheels; what torques they get is no matter of the engine."""
 
 _FADE: Final = 0.02
-"""Share of the speed limit over which the torque fades to zero."""
+"""Fraction of the speed limit over which the torque fades to zero."""
 _CLUTCH_SLIPS_radps: Final = 6.0
 """Speed of the wheels below which the clutch slips, and the engine drags the less the slower they turn [rad/s]: that of
 idling at 800 1/min in first gear."""
@@ -65,8 +65,8 @@ class Drive:
     """The drive as its driver knows it: what it can give at the speed that the wheels have."""
 
     def __init__(self, parameters: Powertrain) -> None:
-        """The limits and shares of the parameters."""
-        self._share = parameters.wheel_shares
+        """The limits and fractions of the parameters."""
+        self._share = parameters.wheel_fractions
         self._limits = (
             parameters.max_torque_Nm,
             parameters.max_power_W,

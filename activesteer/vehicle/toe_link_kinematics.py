@@ -71,17 +71,17 @@ def toe_link_map(model: mujoco.MjModel, corner: str, link: str, limit_rad: float
     if abs(slope) < 0.5:
         raise ModelError(f"the tendon {link!r} does not steer its wheel: {slope:.3g} rad/m, at least 0.5 are needed")
     reach = _BEYOND * limit_rad / abs(slope)
-    least = 0.0
+    minimum = 0.0
     for _ in range(4):
         travels = reach * np.linspace(-1.0, 1.0, _POINTS)
         angles = solver.angles(travels)
-        least = min(abs(angles[0]), abs(angles[-1]))
-        if least >= limit_rad and (np.diff(angles) * slope > 0.0).all():
+        minimum = min(abs(angles[0]), abs(angles[-1]))
+        if minimum >= limit_rad and (np.diff(angles) * slope > 0.0).all():
             break
-        reach *= 1.02 * limit_rad / max(least, 0.5 * limit_rad)
+        reach *= 1.02 * limit_rad / max(minimum, 0.5 * limit_rad)
     else:
         raise ModelError(
-            f"the tendon {link!r} steers its wheel by {np.degrees(least):.2g} deg at most; "
+            f"the tendon {link!r} steers its wheel by {np.degrees(minimum):.2g} deg at most; "
             f"{np.degrees(limit_rad):.3g} deg are asked for (rear_actuator.limit_deg)"
         )
     ways = [_fit(angles, travels), _fit(travels, angles)]

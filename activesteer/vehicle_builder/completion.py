@@ -51,7 +51,7 @@ def complete(
     powertrain = table.powertrain
     if powertrain is None:
         powertrain = Powertrain(
-            front_share=1.0, max_torque_Nm=3170.0, max_power_W=101e3, engine_brake_torque_Nm=345.0, inertia_kgm2=3.7
+            front_fraction=1.0, max_torque_Nm=3170.0, max_power_W=101e3, engine_brake_torque_Nm=345.0, inertia_kgm2=3.7
         )
         log.note("powertrain", "front-wheel drive, 101 kW and 3170 N m at the wheels", "the compact's")
     aero = table.aerodynamics
@@ -223,7 +223,7 @@ def _link(axle: str, kind: LinkKind, table: LinkTable | None, log: Log) -> Link:
     if damping is None and table.stiffness_Npm is table.bushings_Npm is table.bushing is None:
         damping = kind.damping_Nspm
     elif damping is None:
-        damping = next(value for least, value in _DAMPING if stiffness >= least)
+        damping = next(value for minimum, value in _DAMPING if stiffness >= minimum)
         log.note(f"{axle}.links.{kind.name}.damping_Nspm", f"{damping:g} N s/m", "by stiffness, as in the compact")
     return Link(kind.name, kind.inner, kind.outer, stiffness, hardening or 0.0, damping, remark)
 

@@ -17,7 +17,7 @@ from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.vehicle_builder.axle_kinds import AxleKind
 
-_LEAST, _MOST = 0.05, 1.5
+_MIN_LEVER, _MAX_LEVER = 0.05, 1.5
 """Levers beyond these are no springs of a car."""
 
 
@@ -65,10 +65,10 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
         return Mount(carrier, 1.0, f"{part}_outer", upper, length)
     inner, outer = kind.arms[carrier]
     lever = _lever([points[name] for name in inner], points[outer], lower, (upper - lower) / length)
-    if not _LEAST < lever < _MOST:
+    if not _MIN_LEVER < lever < _MAX_LEVER:
         raise ParameterError(
             f"lies at {lever:.2f} of the length of {carrier}, seen from its inner end; a {part} on an arm lies between "
-            f"{_LEAST:g} and {_MOST:g}. Is {part}_on right, and {part}_outer on the left side?",
+            f"{_MIN_LEVER:g} and {_MAX_LEVER:g}. Is {part}_on right, and {part}_outer on the left side?",
             key=f"{axle}.points.{part}_outer",
         )
     return Mount(carrier, lever, outer, points[outer] + (upper - lower) / lever, length)

@@ -30,12 +30,12 @@ def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
             inertia = _usual_inertia(table.chassis_kg, base, car, 0.5)
             log.note("mass.chassis_inertia_kgm2", _words(inertia), _INERTIA_RULE)
         return Solid(table.chassis_kg, np.array(table.chassis_cg), np.array(inertia))
-    if table.total_kg is None or table.front_share is None or table.cg_height_m is None:
+    if table.total_kg is None or table.front_fraction is None or table.cg_height_m is None:
         raise ParameterError(
-            "total_kg, front_share and cg_height_m are needed, or chassis_kg and chassis_cg", key="mass"
+            "total_kg, front_fraction and cg_height_m are needed, or chassis_kg and chassis_cg", key="mass"
         )
     mass = table.total_kg - others.mass_kg
-    cg = np.array([_cg_x(car, table.front_share), 0.0, table.cg_height_m])
+    cg = np.array([_cg_x(car, table.front_fraction), 0.0, table.cg_height_m])
     if mass < 0.3 * table.total_kg:
         raise ParameterError(
             f"wheels, knuckles and rack weigh {others.mass_kg:.0f} kg of {table.total_kg:.0f} kg", key="mass.total_kg"
@@ -44,7 +44,7 @@ def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
     chassis_cg[1] = 0.0
     inertia = table.inertia_kgm2
     if inertia is None:
-        inertia = _usual_inertia(table.total_kg, base, car, table.front_share)
+        inertia = _usual_inertia(table.total_kg, base, car, table.front_fraction)
         log.note("mass.inertia_kgm2", _words(inertia), _INERTIA_RULE)
     left = np.diag(np.array(inertia)).astype(float) - others.inertia_kgm2
     left -= others.mass_kg * point_mass_inertia(others.cg_m - cg) + mass * point_mass_inertia(chassis_cg - cg)
@@ -63,17 +63,17 @@ _INERTIA_RULE = (
 )
 
 
-def _usual_inertia(mass: float, base: float, car: Car, front_share: float) -> tuple[float, float, float]:
-    to_front = (1.0 - front_share) * base
+def _usual_inertia(mass: float, base: float, car: Car, front_fraction: float) -> tuple[float, float, float]:
+    to_front = (1.0 - front_fraction) * base
     yaw = 0.915 * mass * to_front * (base - to_front)
     track = car.front.wheel_centre_m[1] + car.rear.wheel_centre_m[1]
     return round(mass * (0.4 * track) ** 2, 1), round(0.95 * yaw, 1), round(yaw, 1)
 
 
-def _cg_x(car: Car, front_share: float) -> float:
+def _cg_x(car: Car, front_fraction: float) -> float:
     """From the weights on the contact points, which lie below the wheel centres but for camber."""
     rear, front = car.rear.wheel_centre_m[0], car.front.wheel_centre_m[0]
-    return float(rear + front_share * (front - rear))
+    return float(rear + front_fraction * (front - rear))
 
 
 def _words(values: tuple[float, ...] | Array) -> str:

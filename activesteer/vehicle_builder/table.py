@@ -120,8 +120,8 @@ class MassTable:
 
     total_kg: Positive | None = None
     """Mass of the whole car [kg]."""
-    front_share: Annotated[float, Range(0.2, 0.8)] | None = None
-    """Share of the weight on the front wheels."""
+    front_fraction: Annotated[float, Range(0.2, 0.8)] | None = None
+    """Fraction of the weight on the front wheels."""
     cg_height_m: Positive | None = None
     """Height of its centre of gravity over the road [m]."""
     inertia_kgm2: tuple[float, ...] | None = None

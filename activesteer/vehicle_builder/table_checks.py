@@ -91,8 +91,8 @@ def _car_contradictions(table: CarTable) -> Iterator[str]:
     mass = table.mass
     if (mass.total_kg is None) == (mass.chassis_kg is None):
         yield "mass: total_kg (of the whole car) or chassis_kg is needed, one of them"
-    if mass.total_kg is not None and (mass.front_share is None or mass.cg_height_m is None):
-        yield "mass: with total_kg, front_share and cg_height_m are needed"
+    if mass.total_kg is not None and (mass.front_fraction is None or mass.cg_height_m is None):
+        yield "mass: with total_kg, front_fraction and cg_height_m are needed"
     if mass.chassis_kg is not None and mass.chassis_cg is None:
         yield "mass: with chassis_kg, chassis_cg is needed"
     if table.steering.ratio is not None and table.steering.pinion_radius_m is not None:

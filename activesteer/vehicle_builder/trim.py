@@ -37,7 +37,7 @@ Write = Callable[[Trimmed], Path]
 _ROUNDS: Final = 25
 _TRAVEL_M: Final = 1e-5
 _ANGLE_RAD: Final = 2e-6
-_RATE_SHARE: Final = 1e-4
+_RATE_FRACTION: Final = 1e-4
 _SWEEP_M: Final = np.linspace(-0.015, 0.015, 7)
 """As in the rig's definition of the wheel rate [m]."""
 _STEER_RAD: Final = np.radians(np.linspace(-20.0, 20.0, 9))
@@ -85,10 +85,10 @@ def trim(car: Car, write: Write, log: Log) -> Trimmed:
     model = _compiled(mjcf)
     body = mass_properties(model)
     trimmed.cg_m = float(body.cg_m[0]), float(body.cg_m[2])
-    share = float(body.cg_m[0] - car.rear.wheel_centre_m[0]) / car.wheelbase_m
+    fraction = float(body.cg_m[0] - car.rear.wheel_centre_m[0]) / car.wheelbase_m
     loads = {
-        "front": 0.5 * body.mass_kg * share * GRAVITY_MPS2,
-        "rear": 0.5 * body.mass_kg * (1 - share) * GRAVITY_MPS2,
+        "front": 0.5 * body.mass_kg * fraction * GRAVITY_MPS2,
+        "rear": 0.5 * body.mass_kg * (1 - fraction) * GRAVITY_MPS2,
     }
     if min(loads.values()) <= 0.0:
         raise ModelError(
@@ -229,7 +229,7 @@ def _let_stand(
             toe = float(stand.toe_rad[index : index + 2].mean()) - axle.toe_rad
             camber = float(stand.camber_rad[index : index + 2].mean()) - axle.camber_rad
             off = 0.0 if rate is None else rates[axle.name] / rate - 1.0
-            done &= abs(travel) < _TRAVEL_M and max(abs(toe), abs(camber)) < _ANGLE_RAD and abs(off) < _RATE_SHARE
+            done &= abs(travel) < _TRAVEL_M and max(abs(toe), abs(camber)) < _ANGLE_RAD and abs(off) < _RATE_FRACTION
             stiffness = max(rates[axle.name], 0.3 * found.spring_rate_Npm * ratio**2)
             found.spring_force_N += travel * stiffness / ratio
             found.wheel_x_rad += camber

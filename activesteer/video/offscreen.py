@@ -124,9 +124,9 @@ class Offscreen:
                     f"no pictures of {size[0]} x {size[1]} can be drawn here with {self._name}: {reason}"
                 ) from reason
         if self._drawer.offWidth < size[0] or self._drawer.offHeight < size[1]:
-            most = f"{self._drawer.offWidth} x {self._drawer.offHeight}"
+            maximum = f"{self._drawer.offWidth} x {self._drawer.offHeight}"
             self.close()
-            raise PlaybackError(f"pictures of {size[0]} x {size[1]} are larger than what can be drawn here: {most}")
+            raise PlaybackError(f"pictures of {size[0]} x {size[1]} are larger than what can be drawn here: {maximum}")
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
 
     def draw(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> NDArray[np.uint8]:

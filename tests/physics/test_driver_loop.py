@@ -10,7 +10,7 @@ from activesteer.studies.small_step import damping_of, small_step
 ALWAYS_ACTIVE = {
     f"controllers.{system}.corrector.{key}": value
     for system in ("ars", "afs")
-    for key, value in (("off_degps", 0.0), ("full_degps", 0.001))
+    for key, value in (("deadband_start_degps", 0.0), ("deadband_end_degps", 0.001))
 }
 """Correctors without a tolerance band."""
 FRICTIONLESS = {"vehicle.friction.rack_N": 0.0}

@@ -337,7 +337,7 @@ def test_bounce_and_pitch_are_those_of_the_plane_model_on_ride_rates() -> None:
     result = compact()
     rates = np.array([2e3 * result[axle, "ride_rate"] for axle in ("front", "rear")])
     arms = np.array([1.0, -1.0]) * result["car", "wheelbase"] * 1e-3
-    share = result["car", "front_load_share"] / 100.0
+    share = result["car", "front_load_fraction"] / 100.0
     arms *= [1.0 - share, share]
     model = compact().measured.vehicle.model
     unsprung = sum(float(model.body_subtreemass[model.body(f"{corner}_knuckle").id]) for corner in CORNERS)
@@ -360,7 +360,7 @@ def test_roll_gradient_is_that_of_springs_and_roll_centres() -> None:
     result = compact()
     model = result.measured.vehicle.model
     chassis = model.body("chassis").id
-    share = result["car", "front_load_share"] / 100.0
+    share = result["car", "front_load_fraction"] / 100.0
     axis = 1e-3 * (share * result["front", "roll_centre_height"] + (1.0 - share) * result["rear", "roll_centre_height"])
     sprung = float(model.body_mass[chassis]) * (float(result.measured.vehicle.data.xipos[chassis, 2]) - axis)
     whole = result["car", "mass"] * result["car", "cg_height"] * 1e-3

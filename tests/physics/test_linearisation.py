@@ -67,8 +67,8 @@ def test_step_of_an_active_steering_gives_the_response_of_the_full_car(name, amp
     for row, output in enumerate(OUTPUTS):
         # The first 10 ms of the lateral acceleration belong to modes above the cut-off, which answer at once here.
         first = 10 if output == "ay_mps2" else 0
-        driven, most = values[first:, names.index(output)], np.abs(expected[row]).max()
-        assert driven == pytest.approx(expected[row, first:], abs=0.03 * most)
+        driven, maximum = values[first:, names.index(output)], np.abs(expected[row]).max()
+        assert driven == pytest.approx(expected[row, first:], abs=0.03 * maximum)
 
 
 def test_step_steer_of_a_tenth_of_g_is_followed():
@@ -76,10 +76,10 @@ def test_step_steer_of_a_tenth_of_g_is_followed():
     recording = run("step_steer", steer__steering_wheel_deg=9.0, duration_s=3.0, friction__rack_N=0.0)
     found = linear_response(recording, system())
     for output in OUTPUTS:
-        most = np.abs(recording[output]).max()
+        maximum = np.abs(recording[output]).max()
         # The first 10 ms of the lateral acceleration belong to modes above the cut-off, which answer at once here.
         allowed = 0.1 if output == "ay_mps2" else 0.05
-        assert found[output] == pytest.approx(recording[output], abs=allowed * most)
+        assert found[output] == pytest.approx(recording[output], abs=allowed * maximum)
 
 
 def test_reduction_leaves_the_frequency_response_as_the_steps_have_it():

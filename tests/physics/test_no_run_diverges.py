@@ -129,7 +129,7 @@ def test_on_a_slope_of_ice_the_car_slides_back_as_a_block_would(vehicle: str) ->
     recording = activesteer.simulate(case.table(), vehicle=vehicle)
     speed = recording["vx_mps"]
     slope = np.arctan(0.5)
-    least = 9.81 * (np.sin(slope) - 0.05 * np.cos(slope))
+    minimum = 9.81 * (np.sin(slope) - 0.05 * np.cos(slope))
     assert speed[0] > speed[1000] > speed[2000]
-    assert (speed[1000] - speed[2000]) / 1.0 == pytest.approx(least, rel=0.15)
+    assert (speed[1000] - speed[2000]) / 1.0 == pytest.approx(minimum, rel=0.15)
     assert speed[2500] < -5.0

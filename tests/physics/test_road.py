@@ -69,7 +69,7 @@ def test_patches_of_the_road_s_own_friction_change_nothing() -> None:
 @pytest.mark.parametrize("mu", [0.9, 0.4])
 def test_a_wheel_that_locks_uses_all_its_friction_on_the_way(mu: float) -> None:
     recording = drive({"mu": mu}, brake=FULL_BRAKE)
-    use = corners(recording, "friction_use")
+    use = corners(recording, "friction_utilisation")
     assert np.all(recording["speed_mps"][:600] > 15.0)
     assert use[:500].max() < 0.15
     assert np.all((use.max(axis=0) > 0.98) & (use.max(axis=0) < 1.03))
@@ -82,7 +82,7 @@ def test_a_wheel_that_locks_uses_all_its_friction_on_the_way(mu: float) -> None:
 def test_cornering_beyond_the_limit_uses_the_front_tyres_up(mu: float) -> None:
     steer = {"time_s": [0.0, 0.5, 0.8], "steering_wheel_rad": [0.0, 0.0, 2.4]}
     recording = drive({"mu": mu}, steering=steer, hold_last=True, drive="hold_speed")
-    use = corners(recording, "friction_use")
+    use = corners(recording, "friction_utilisation")
     assert use[-1000:, 1].min() > 0.9
     assert use[:450].max() < 0.2
     assert use.max() < MAX_USE
@@ -92,4 +92,4 @@ def test_braking_at_the_limit_of_cornering_keeps_the_resultant_within_the_fricti
     steer = {"time_s": [0.0, 0.5, 0.8], "steering_wheel_rad": [0.0, 0.0, 2.0]}
     brake = {"time_s": [0.0, 1.0, 1.1], "pedal": [0.0, 0.0, 0.5]}
     recording = drive({"mu": 0.9}, steering=steer, hold_last=True, brake=brake)
-    assert 0.98 < corners(recording, "friction_use").max() < MAX_USE
+    assert 0.98 < corners(recording, "friction_utilisation").max() < MAX_USE

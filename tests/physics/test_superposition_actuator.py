@@ -57,7 +57,7 @@ def test_its_reaction_reaches_the_hands(geared: Recording) -> None:
     assert abs(hand[AT - 1]) < 0.05
     # The rack is pushed to the left by 2 deg of superposition; to hold the wheel against it the hands push left too.
     assert hand[-1] > 1.0
-    without = asked({**GEARED, "steering.assist_share": 0.0})
+    without = asked({**GEARED, "steering.assist_fraction": 0.0})
     np.testing.assert_allclose(without["hand_torque_Nm"] * 0.65, hand, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(without["yaw_rate_radps"], geared["yaw_rate_radps"])
 

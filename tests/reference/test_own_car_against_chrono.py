@@ -56,7 +56,7 @@ REST = """
 units, m
 origin, 1.388, 0, -0.2
 mass.total_kg, 1678
-mass.front_share, 0.49
+mass.front_fraction, 0.49
 mass.cg_height_m, 0.41
 mass.inertia_kgm2, 314, 1241, 1431
 front.type, double_wishbone

@@ -131,8 +131,8 @@ def test_car_and_tyre_forces_are_seen_from_above_left_is_up(alone: dict[float, P
 
 def test_the_whole_course_is_on_the_map(alone: dict[float, Pictures]) -> None:
     pixels = alone[AT_S]["Course [m]"].pixels
-    for colour, least in ((CONE, 0.02), (LANE, 0.12), (ARS, 0.7)):
-        assert spread(like(pixels, colour, 50)) > least
+    for colour, minimum in ((CONE, 0.02), (LANE, 0.12), (ARS, 0.7)):
+        assert spread(like(pixels, colour, 50)) > minimum
     track = like(pixels, ARS, 50)
     assert 0.02 < np.flatnonzero(track.any(axis=0)).min() / pixels.shape[1] < 0.2
 

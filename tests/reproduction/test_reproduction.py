@@ -47,11 +47,11 @@ def test_all_systems_are_driven_the_same_way(runs: Runs) -> None:
 
 
 def test_the_limits_of_the_actuators_are_kept(runs: Runs) -> None:
-    most = np.radians(3.0) + 1e-7  # the file keeps 32 bit
+    maximum = np.radians(3.0) + 1e-7  # the file keeps 32 bit
     for systems in runs.values():
         for recording in systems.values():
-            assert np.abs(recording["rear_steer_demand_rad"]).max() <= most
-            assert np.abs(recording["superposition_demand_rad"]).max() <= most
+            assert np.abs(recording["rear_steer_demand_rad"]).max() <= maximum
+            assert np.abs(recording["superposition_demand_rad"]).max() <= maximum
 
 
 def test_the_steering_wheel_angle_is_not_wrapped(runs: Runs) -> None:

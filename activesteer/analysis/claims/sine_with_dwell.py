@@ -31,7 +31,7 @@ KEPT_SIDESLIP_RAD: Final = math.radians(12.0)
 MIN_ANGLE_RAD: Final = math.radians(0.1)
 """Two added angles are compared where both are larger than this [rad]."""
 OPPOSITE_FRACTION: Final = 0.9
-"""Share of this time in which they must be opposite."""
+"""Fraction of this time in which they must be opposite."""
 MIN_COMMON_S: Final = 0.1
 """Time for which both must be that large at all [s]."""
 

@@ -62,31 +62,31 @@ class Trio:
         """Magnitude of a metric."""
         return abs(self.metrics[system][name])
 
-    def lowers(self, system: str, name: str, fraction: float, least: float) -> bool:
+    def lowers(self, system: str, name: str, fraction: float, minimum: float) -> bool:
         """Whether a system brings a metric's magnitude down, to a part of that without control and noticeably.
 
         Args:
             system: The system.
             name: The metric.
             fraction: Most of the value without control that may be left.
-            least: By how much it must be smaller at least.
+            minimum: By how much it must be smaller at least.
         """
         none, value = self.size("none", name), self.size(system, name)
-        return value <= fraction * none and none - value >= least
+        return value <= fraction * none and none - value >= minimum
 
-    def both_lower(self, name: str, fraction: float, least: float) -> bool:
+    def both_lower(self, name: str, fraction: float, minimum: float) -> bool:
         """Whether both systems do; see `lowers`."""
-        return all(self.lowers(system, name, fraction, least) for system in SYSTEMS_WITH_CONTROL)
+        return all(self.lowers(system, name, fraction, minimum) for system in SYSTEMS_WITH_CONTROL)
 
-    def is_smallest(self, system: str, name: str, least: float) -> bool:
+    def is_smallest(self, system: str, name: str, minimum: float) -> bool:
         """Whether a metric's magnitude is noticeably below those of the two other runs."""
         others = [self.size(other, name) for other in SYSTEMS if other != system]
-        return all(other - self.size(system, name) >= least for other in others)
+        return all(other - self.size(system, name) >= minimum for other in others)
 
-    def is_largest(self, system: str, name: str, least: float) -> bool:
+    def is_largest(self, system: str, name: str, minimum: float) -> bool:
         """Whether a metric's magnitude is noticeably above those of the two other runs."""
         others = [self.size(other, name) for other in SYSTEMS if other != system]
-        return all(self.size(system, name) - other >= least for other in others)
+        return all(self.size(system, name) - other >= minimum for other in others)
 
 
 class _Whole(dict[str, float]):
@@ -127,9 +127,9 @@ def _pretence(recordings: Mapping[str, RecordingLike]) -> str:
     """What a run does that its system does not, or does not do that it should, a sentence; empty where all fits."""
     for system in SYSTEMS:
         for name, owner in (("rear_steer", "ars"), ("superposition", "afs")):
-            most = float(np.abs(recordings[system][f"{name}_demand_rad"]).max())
-            if (most >= STEER_RAD) is not (system == owner):
-                words = "asks for" if most >= STEER_RAD else "never asks for"
+            maximum = float(np.abs(recordings[system][f"{name}_demand_rad"]).max())
+            if (maximum >= STEER_RAD) is not (system == owner):
+                words = "asks for" if maximum >= STEER_RAD else "never asks for"
                 angle = f"{math.degrees(STEER_RAD):.2f} deg of {name.replace('_', ' ')}"
                 return f"the run {system} {words} {angle}"
     return ""

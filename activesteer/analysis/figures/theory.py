@@ -74,7 +74,7 @@ def figure_9(recording: RecordingLike) -> Figure:
     bands: dict[tuple[float, float], list[str]] = {}
     for system in ("ars", "afs"):
         corrector = _parameters(recording, "controllers", system, "corrector")
-        band = _number(corrector, "off_radps"), _number(corrector, "full_radps")
+        band = _number(corrector, "deadband_start_radps"), _number(corrector, "deadband_end_radps")
         bands.setdefault(band, []).append(system)
     end = 1.6 * max(full for _, full in bands)
     error_radps = np.linspace(-end, end, 1001)

@@ -82,7 +82,8 @@ def _from_path(recording: Recording) -> Array:
     return path_distance(*front_axle(recording), path.x_m, path.y_m)
 
 
-_DISTANCE, _FRICTION, _LOAD = quantity_of("path_distance_m"), quantity_of("friction_use"), quantity_of("tyre_fz_N")
+_DISTANCE, _LOAD = quantity_of("path_distance_m"), quantity_of("tyre_fz_N")
+_USE = "friction_utilisation"
 
 PANELS: Final = (
     _of("steering_wheel_rad"),
@@ -96,7 +97,7 @@ PANELS: Final = (
     _of("speed_mps"),
     _beside_measured("yaw_rate_radps"),
     _beside_measured("ay_mps2"),
-    Panel("Friction utilisation, highest of four wheels", _FRICTION, (_over_corners("friction_use", np.maximum),)),
+    Panel("Friction utilisation, highest of four wheels", quantity_of(_USE), (_over_corners(_USE, np.maximum),)),
     Panel("Wheel load, lowest of four wheels", _LOAD, (_over_corners("tyre_fz_N", np.minimum),)),
 )  # fmt: skip
 """In pairs, as they stand beside each other."""

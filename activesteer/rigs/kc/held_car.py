@@ -42,7 +42,7 @@ _ROUNDING: Final = 1e-2
 _HEIGHT_SCALE_NPM: Final = 1e4
 """Heights are multiplied by this, so that their residual is of the size of the forces'."""
 _STALE: Final = 0.3
-"""A step that leaves more than this share of the residual shows that the stiffness in use is out of date."""
+"""A step that leaves more than this fraction of the residual shows that the stiffness in use is out of date."""
 _LOCK_NPM: Final = 1e9
 _NO_MOMENT: Final = np.zeros(3)
 _SPRING_ENDINGS: Final = ("_spring", "_damper", "_anti_roll_bar")

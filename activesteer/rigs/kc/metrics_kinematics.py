@@ -178,7 +178,7 @@ def roll_stiffness(axle: Axle) -> float:
 
 
 @metric("%", "car")
-def front_roll_stiffness_share(axle: Axle) -> float:
+def front_roll_stiffness_fraction(axle: Axle) -> float:
     """Roll stiffness of the front axle over that of both, tyres rigid."""
     front, rear = (roll_stiffness(Axle(name, axle.measured)) for name in ("front", "rear"))
     return 100.0 * front / (front + rear)
@@ -234,26 +234,26 @@ def wheelbase_over_height(axle: Axle) -> float:
 
 @metric("%", "front")
 def anti_dive(axle: Axle) -> float:
-    """Share of the dive in braking that the front links prevent: brake share x l/h x slope of the locked wheel's patch.
+    """Fraction of the dive that the front links prevent: brake fraction x l/h x slope of the locked wheel's patch.
 
     Positive where the contact point of the wheel, locked to its knuckle, moves forwards in bump. Links unloaded, brakes
     as distributed at full pedal (Gillespie 1992, ch. 7; Milliken 1995, ch. 17).
     """
-    return 100.0 * _brake_share(axle) * wheelbase_over_height(axle) * _support(axle, _patch(axle))
+    return 100.0 * _brake_fraction(axle) * wheelbase_over_height(axle) * _support(axle, _patch(axle))
 
 
 @metric("%", "rear")
 def anti_lift(axle: Axle) -> float:
-    """Share of the rear's lift in braking that its links prevent: as anti-dive, with the sign of a rear axle.
+    """Fraction of the rear's lift in braking that its links prevent: as anti-dive, with the sign of a rear axle.
 
     Positive where the contact point of the wheel, locked to its knuckle, moves rearwards in bump.
     """
-    return -100.0 * _brake_share(axle) * wheelbase_over_height(axle) * _support(axle, _patch(axle))
+    return -100.0 * _brake_fraction(axle) * wheelbase_over_height(axle) * _support(axle, _patch(axle))
 
 
 @metric("%", "front")
 def anti_lift_drive(axle: Axle) -> float:
-    """Share of the front's lift in acceleration that its links prevent, were it driven alone by half-shafts.
+    """Fraction of the front's lift in acceleration that its links prevent, were it driven alone by half-shafts.
 
     l/h x slope of the wheel centre's path, positive where the wheel centre moves forwards in bump.
     """
@@ -262,7 +262,7 @@ def anti_lift_drive(axle: Axle) -> float:
 
 @metric("%", "rear")
 def anti_squat(axle: Axle) -> float:
-    """Share of the squat in acceleration that the rear links would prevent, were the rear driven alone by half-shafts.
+    """Fraction of squat in acceleration that the rear links would prevent, were the rear driven alone by half-shafts.
 
     l/h x slope of the wheel centre's path, positive where it moves rearwards in bump (Gillespie 1992, ch. 7).
     """
@@ -273,7 +273,7 @@ def _patch(axle: Axle) -> np.ndarray:
     return axle.sweep("parallel_kinematic").patch_m
 
 
-def _brake_share(axle: Axle) -> float:
+def _brake_fraction(axle: Axle) -> float:
     brakes = axle.measured.parameters.brakes
     torque = brakes.front_torque_Nm if axle.name == "front" else brakes.rear_torque_Nm
     total = brakes.front_torque_Nm + brakes.rear_torque_Nm
@@ -301,8 +301,8 @@ def mass(axle: Axle) -> float:
 
 
 @metric("%", "car")
-def front_load_share(axle: Axle) -> float:
-    """Share of the weight on the front axle of the standing car."""
+def front_load_fraction(axle: Axle) -> float:
+    """Fraction of the weight on the front axle of the standing car."""
     load = axle.load_N
     return 100.0 * float(load[:2].sum() / load.sum())
 

@@ -180,8 +180,8 @@ def _named(linear: _Linear) -> dict[str, Mode]:
     energy = np.einsum("im,ij,jm->m", shapes.conj(), linear.mass, shapes).real
     named = {}
     for name, (inertia, rows) in _motions(linear).items():
-        share = inertia * np.sum(np.abs(rows @ shapes) ** 2, axis=0) / energy
-        if not share.size or share.max() < 0.1:
+        fraction = inertia * np.sum(np.abs(rows @ shapes) ** 2, axis=0) / energy
+        if not fraction.size or fraction.max() < 0.1:
             if name.startswith("body"):
                 where = f"of the standing car below {_FASTEST_HZ:g} Hz"
                 raise ModelError(f"kinematics and compliance rig: no mode {where} is its {name}")
@@ -191,12 +191,12 @@ def _named(linear: _Linear) -> dict[str, Mode]:
         if name == "body_pitch":
             # Bounce and pitch share two modes; what bounces more is the bounce.
             taken = np.isclose(np.abs(roots), 2.0 * math.pi * named["body_bounce"].frequency_Hz)
-            share[taken] = 0.0
+            fraction[taken] = 0.0
         # Sideways on its tyres the body sways and rolls in two modes; the slower one is the roll.
         best = (
-            int(np.flatnonzero(share > 0.25)[np.abs(roots)[share > 0.25].argmin()])
+            int(np.flatnonzero(fraction > 0.25)[np.abs(roots)[fraction > 0.25].argmin()])
             if name == "body_roll"
-            else int(share.argmax())
+            else int(fraction.argmax())
         )
         size_of = float(np.abs(roots[best]))
         named[name] = Mode(size_of / (2.0 * math.pi), float(-roots[best].real / size_of))
@@ -234,13 +234,13 @@ def _roll_gradient(linear: _Linear) -> float:
 def _pitch_gradient(linear: _Linear, vehicle: Vehicle) -> float:
     """From the inertial forces of a deceleration, carried by the brakes' forces at the contact points."""
     brakes = vehicle.parameters.brakes
-    share = np.repeat([brakes.front_torque_Nm, brakes.rear_torque_Nm], 2)
-    total = share.sum()
+    fraction = np.repeat([brakes.front_torque_Nm, brakes.rear_torque_Nm], 2)
+    total = fraction.sum()
     if total <= 0.0:
         return math.nan
     weight = float(linear.model.body_subtreemass[0])
     push = np.zeros((4, 3))
-    push[:, 0] = -weight * share / total
+    push[:, 0] = -weight * fraction / total
     forwards = np.zeros(linear.free.size)
     forwards[linear.root] = 1.0
     force = linear.mass @ forwards + linear.at_contacts(push)[linear.free]

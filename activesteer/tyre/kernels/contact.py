@@ -82,7 +82,7 @@ class WheelForces(NamedTuple):
     arm_y_m: float
     arm_z_m: float
     limited: float
-    friction_use: float
+    friction_utilisation: float
 
 
 class _Rolling(NamedTuple):
@@ -99,7 +99,7 @@ class _Rolling(NamedTuple):
     deflection_y_rate_mps: float
     deflection_z_rate_radps: float
     limited: float
-    friction_use: float
+    friction_utilisation: float
 
 
 @compiled
@@ -109,9 +109,9 @@ def _mean_decay(x):
 
 
 @compiled
-def _low_speed_slip_limit(file_limit, sliding_slip, share):
+def _low_speed_slip_limit(file_limit, sliding_slip, fraction):
     """Slip at which the deflection stops growing: where the tyre slides at rest, the file's limit when rolling."""
-    return file_limit + (min(sliding_slip, file_limit) - file_limit) * share
+    return file_limit + (min(sliding_slip, file_limit) - file_limit) * fraction
 
 
 @compiled
@@ -127,33 +127,33 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     limit_x = max(p.KPUMAX if vsx < 0.0 else -p.KPUMIN, _SMALLEST_SLIP_LIMIT)
     limit_y = max(math.tan(min(p.ALPMAX if vsy > 0.0 else -p.ALPMIN, 1.5)), _SMALLEST_SLIP_LIMIT)
     speed = abs(vx)
-    share = 0.0
+    fraction = 0.0
     damping_slip_x = 0.0
     damping_slip_y = 0.0
     if speed < low_speed_mps:
-        share = 0.5 * (1.0 + math.cos(math.pi * speed / low_speed_mps))
+        fraction = 0.5 * (1.0 + math.cos(math.pi * speed / low_speed_mps))
         stiffness_x, stiffness_y = slip_stiffnesses(p, fz, gamma, pressure_Pa, mu)
         stiffness_x = abs(stiffness_x)
         stiffness_y = abs(stiffness_y)
         sliding = _SLIDING_TO_LINEAR * mu / p.REFERENCE_FRICTION * fz
-        limit_x = _low_speed_slip_limit(limit_x, sliding / stiffness_x, share)
-        limit_y = _low_speed_slip_limit(limit_y, sliding / stiffness_y, share)
-        damping_slip_x = -low_speed_damping_Nspm * share * vsx / stiffness_x
-        damping_slip_y = low_speed_damping_Nspm * share * vsy / stiffness_y
+        limit_x = _low_speed_slip_limit(limit_x, sliding / stiffness_x, fraction)
+        limit_y = _low_speed_slip_limit(limit_y, sliding / stiffness_y, fraction)
+        damping_slip_x = -low_speed_damping_Nspm * fraction * vsx / stiffness_x
+        damping_slip_y = low_speed_damping_Nspm * fraction * vsy / stiffness_y
 
     sigma_x, sigma_y = relaxation_lengths(p, fz, gamma, pressure_Pa)
     if p.RELAXATION_OFF != 0.0:
-        sigma_x *= share
-        sigma_y *= share
+        sigma_x *= fraction
+        sigma_y *= fraction
     sigma_x = max(sigma_x, _MIN_RELAXATION_LENGTH_M)
     sigma_y = max(sigma_y, _MIN_RELAXATION_LENGTH_M)
     sliding_x = abs(vsx) / limit_x
     sliding_y = abs(vsy) / limit_y
-    if share > 0.0:
+    if fraction > 0.0:
         # A patch that slides as a whole is dragged along the direction of sliding, so one rate serves both deflections.
-        together = share * math.sqrt(sliding_x * sliding_x + sliding_y * sliding_y)
-        sliding_x = (1.0 - share) * sliding_x + together
-        sliding_y = (1.0 - share) * sliding_y + together
+        together = fraction * math.sqrt(sliding_x * sliding_x + sliding_y * sliding_y)
+        sliding_x = (1.0 - fraction) * sliding_x + together
+        sliding_y = (1.0 - fraction) * sliding_y + together
     rolling = speed + p.SPEED_OFFSET
     carry_x = max(rolling, sliding_x)
     carry_y = max(rolling, sliding_y)
@@ -171,20 +171,20 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     if held or limit_flags(p, fz, kappa, alpha, gamma, pressure_Pa) != 0:
         limited = 1.0
     # Camber works by the path that the tread takes through the patch of a rolling tyre: at rest there is none.
-    gamma *= 1.0 - share
+    gamma *= 1.0 - fraction
     straight = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, 0.0)
     fx, fy, mx, my, mz = straight.fx_N, straight.fy_N, straight.mx_Nm, straight.my_Nm, straight.mz_Nm
-    if share > 0.0:
+    if fraction > 0.0:
         # The formula with turn slip treats camber differently, even without any: the two are blended, never switched.
         turn_slip = (w + timestep_s * rate_z) / half_length
         if turn_slip == 0.0:
             turn_slip = _NO_TURN_SLIP_1PM
         twisted = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, turn_slip)
-        fx += share * (twisted.fx_N - fx)
-        fy += share * (twisted.fy_N - fy)
-        mx += share * (twisted.mx_Nm - mx)
-        my += share * (twisted.my_Nm - my)
-        mz += share * (twisted.mz_Nm - mz)
+        fx += fraction * (twisted.fx_N - fx)
+        fy += fraction * (twisted.fy_N - fy)
+        mx += fraction * (twisted.mx_Nm - mx)
+        my += fraction * (twisted.my_Nm - my)
+        mz += fraction * (twisted.mz_Nm - mz)
     # Beyond the range of the file the formula gives the forces of its greatest load.
     load = min(fz, p.FZMAX)
     use = math.hypot(fx / (straight.friction_x * load), fy / (straight.friction_y * load))
@@ -248,10 +248,10 @@ def tyre_on_road(
     Returns:
         A `WheelForces`. `heading_x`, `heading_y` is the unit vector of the wheel's heading
         in the road plane; `arm_..._m` leads from the wheel centre to the contact point, world frame;
-        `limited` is 1.0 where a limit of validity of the tyre file is exceeded; `friction_use` is the share of the
-        available friction that the forces take, sqrt((F_x / mu_x F_z)^2 + (F_y / mu_y F_z)^2) with the peak
-        coefficients of the file at this load, camber and pressure on this road. It exceeds 1 by as much as the file's
-        shifts and its weights of combined slip let the forces do so.
+        `limited` is 1.0 where a limit of validity of the tyre file is exceeded; `friction_utilisation` is the
+        fraction of the available friction that the forces take, sqrt((F_x / mu_x F_z)^2 + (F_y / mu_y F_z)^2) with the
+        peak coefficients of the file at this load, camber and pressure on this road. It exceeds 1 by as much as the
+        file's shifts and its weights of combined slip let the forces do so.
     """
     horizontal = math.sqrt(axis_x * axis_x + axis_y * axis_y)
     heading_x = axis_y / horizontal
@@ -312,5 +312,5 @@ def tyre_on_road(
         rolling.fx_N, rolling.fy_N, fz, rolling.mx_Nm, rolling.my_Nm, rolling.mz_Nm,
         rolling.slip_ratio, rolling.slip_angle_rad, gamma,
         rolling.deflection_x_rate_mps, rolling.deflection_y_rate_mps, rolling.deflection_z_rate_radps,
-        loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, rolling.limited, rolling.friction_use,
+        loaded_radius, heading_x, heading_y, arm_x, arm_y, arm_z, rolling.limited, rolling.friction_utilisation,
     )  # fmt: skip

@@ -85,12 +85,12 @@ class Usual:
 
     low: float
     high: float
-    least: float = -math.inf
-    most: float = math.inf
+    minimum: float = -math.inf
+    maximum: float = math.inf
 
     def level(self, value: float) -> Level:
         """How a value is: warning outside the usual range, error beyond what is possible."""
-        if not self.least <= value <= self.most:
+        if not self.minimum <= value <= self.maximum:
             return "error"
         return "ok" if self.low <= value <= self.high else "warning"
 

@@ -48,9 +48,9 @@ def _loads(load_N: np.ndarray, mass_kg: float) -> Iterator[Finding]:
     yield judged(
         "standing", "mass of the whole car", mass_kg, "kg", Usual(700.0, 3000.0, 200.0, 6000.0), "check the masses"
     )
-    share = 100.0 * load_N[:2].sum() / load_N.sum()
-    advice = "check mass.front_share, or x of the chassis' centre of gravity"
-    yield judged("standing", "share of the weight in front", share, "%", Usual(40.0, 65.0, 20.0, 80.0), advice)
+    fraction = 100.0 * load_N[:2].sum() / load_N.sum()
+    advice = "check mass.front_fraction, or x of the chassis' centre of gravity"
+    yield judged("standing", "share of the weight in front", fraction, "%", Usual(40.0, 65.0, 20.0, 80.0), advice)
     for axle, left, right in (("front", 0, 1), ("rear", 2, 3)):
         difference = 100.0 * abs(load_N[left] - load_N[right]) / load_N[left : right + 1].mean()
         yield judged(
@@ -126,13 +126,13 @@ def _inertia(model: mujoco.MjModel) -> Iterator[Finding]:
 
 def _tyres(car: Car, load_N: np.ndarray) -> Iterator[Finding]:
     for axle, tyre, load in zip(("front", "rear"), car.tyres, (load_N[:2].mean(), load_N[2:].mean()), strict=True):
-        nominal, most = float(tyre["FNOMIN"]), float(tyre["FZMAX"])
+        nominal, maximum = float(tyre["FNOMIN"]), float(tyre["FZMAX"])
         yield judged(
             "tyres", f"{axle} static load over the tyre's nominal load", float(load) / nominal, "",
             Usual(0.5, 1.3, 0.1, 3.0), "choose a tyre file for this load",
         )  # fmt: skip
         yield judged(
-            "tyres", f"{axle} highest valid load over the static load", most / float(load), "",
+            "tyres", f"{axle} highest valid load over the static load", maximum / float(load), "",
             Usual(1.8, 10.0, 1.05, 100.0),
             "in a turn the outer tyre carries up to twice its load; beyond the file's range forces stay at the limit",
         )  # fmt: skip
@@ -151,9 +151,9 @@ def _dampers(car: Car) -> Iterator[Finding]:
 def _brakes(vehicle: Vehicle, car: Car, mass_kg: float) -> Iterator[Finding]:
     brakes = car.config.brakes
     radius = vehicle.data.xpos[vehicle.model.body("fl_wheel").id, 2]
-    most = 2.0 * (brakes.front_torque_Nm + brakes.rear_torque_Nm) / radius / (mass_kg * GRAVITY_MPS2)
+    maximum = 2.0 * (brakes.front_torque_Nm + brakes.rear_torque_Nm) / radius / (mass_kg * GRAVITY_MPS2)
     yield judged(
-        "standing", "deceleration at full pedal, if the tyres hold", float(most), "g", Usual(0.9, 2.0, 0.0, 10.0),
+        "standing", "deceleration at full pedal, if the tyres hold", float(maximum), "g", Usual(0.9, 2.0, 0.0, 10.0),
         "brakes.front_torque_Nm and rear_torque_Nm are per wheel",
     )  # fmt: skip
 

@@ -22,8 +22,8 @@ VEHICLE: dict[str, Any] = {
         "front_stiffness_Nprad": 100e3, "rear_stiffness_Nprad": 150e3,
     },
     "controllers": {
-        "ars": {"prediction_gain": 0.1, "corrector": {"off_radps": 0.002, "full_radps": 0.005}},
-        "afs": {"corrector": {"off_radps": 0.002, "full_radps": 0.005}},
+        "ars": {"prediction_gain": 0.1, "corrector": {"deadband_start_radps": 0.002, "deadband_end_radps": 0.005}},
+        "afs": {"corrector": {"deadband_start_radps": 0.002, "deadband_end_radps": 0.005}},
     },
 }  # fmt: skip
 """What the metadata of a run say of its vehicle, as far as the analysis reads it."""
@@ -194,7 +194,7 @@ def along_path(
     after: float = 1.0,
     steering_rad: float = 1.0,
     steering_lead_s: float = 0.1,
-    friction_use: float = 0.5,
+    friction_utilisation: float = 0.5,
     stops_m: float | None = None,
     rear_rad: float = 0.0,
     superposition_rad: float = 0.0,
@@ -214,7 +214,7 @@ def along_path(
         after: Factor on both after the last gate.
         steering_rad: Amplitude of the steering wheel angle.
         steering_lead_s: Time by which it is ahead of the yaw rate.
-        friction_use: Of the front left tyre; the others use half.
+        friction_utilisation: Of the front left tyre; the others use half.
         stops_m: Place beyond which the car does not get.
         rear_rad: Amplitude of the rear angle demanded.
         superposition_rad: Amplitude of the superposed angle demanded.
@@ -249,7 +249,9 @@ def along_path(
         left = 0.5 * TRACK_M if corner.endswith("l") else -0.5 * TRACK_M
         channels[f"{corner}_contact_x_m"] = x + ahead * cos - left * sin
         channels[f"{corner}_contact_y_m"] = y + ahead * sin + left * cos
-        channels[f"{corner}_friction_use"] = np.full_like(x, friction_use if corner == "fl" else 0.5 * friction_use)
+        channels[f"{corner}_friction_utilisation"] = np.full_like(
+            x, friction_utilisation if corner == "fl" else 0.5 * friction_utilisation
+        )
     run = SyntheticRun(time_s, channels, kind)
     path_x = np.arange(0.0, 300.0, 0.5)
     run.metadata["course"] = {

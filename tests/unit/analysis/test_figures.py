@@ -159,7 +159,7 @@ def test_figure_9_shows_the_tolerance_function_of_the_controllers():
         (theory.figure_7, ("single_track", "mass_kg"), -1.0),
         (theory.figure_7, ("single_track", "rear_stiffness_Nprad"), 1.0),  # a car that oversteers
         (theory.figure_7, ("controllers", "ars", "prediction_gain"), "all"),
-        (theory.figure_9, ("controllers", "afs", "corrector", "off_radps"), math.nan),
+        (theory.figure_9, ("controllers", "afs", "corrector", "deadband_start_radps"), math.nan),
         (theory.figure_9, ("controllers", "afs", "corrector"), [0.1, 0.2]),
     ],
 )

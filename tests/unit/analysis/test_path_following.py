@@ -94,7 +94,7 @@ def test_deviation_is_that_of_the_front_axle_from_the_path():
 
 
 def test_tyre_use_and_speed_loss():
-    values = metrics(along_path(friction_use=0.8))
+    values = metrics(along_path(friction_utilisation=0.8))
     assert values["tyre_use_max"] == pytest.approx(0.8)
     assert values["tyre_use_mean"] == pytest.approx(0.25 * (0.8 + 3.0 * 0.4))
     assert values["speed_loss_mps"] == pytest.approx(1.0)
@@ -141,6 +141,6 @@ def test_a_small_amplitude_hits_the_cones():
 
 def test_a_missing_channel_is_an_error():
     run = along_path()
-    del run.channels["fl_friction_use"]
-    with pytest.raises(RecordingError, match="fl_friction_use"):
+    del run.channels["fl_friction_utilisation"]
+    with pytest.raises(RecordingError, match="fl_friction_utilisation"):
         metrics(run)

@@ -63,7 +63,7 @@ def test_first_order_lag_has_no_peak_and_says_so():
 def test_second_order_lag_peaks_where_the_closed_form_says(damping, side):
     natural_radps = 9.0
     response = step_response(
-        TIME_S, side * 0.2 * second_order(TIME_S - 1.0, natural_radps, damping), 1.0, 1.0, least=1e-3
+        TIME_S, side * 0.2 * second_order(TIME_S - 1.0, natural_radps, damping), 1.0, 1.0, minimum=1e-3
     )
     root = math.sqrt(1.0 - damping**2)
     # Half a millisecond: peaks are taken from samples. 2e-4: what is left of the oscillation in the last second.

@@ -32,7 +32,7 @@ def stopping(*, slip: float = 0.1, until_s: float = 6.0, pedal: float = 1.0) -> 
         channels |= {
             f"{corner}_tyre_fx_N": -3000.0 * braking, f"{corner}_tyre_fy_N": np.zeros_like(time_s),
             f"{corner}_tyre_fz_N": np.full_like(time_s, 5000.0),
-            f"{corner}_friction_use": np.where(braking, 3000.0 / (PEAK * 5000.0), 0.0),
+            f"{corner}_friction_utilisation": np.where(braking, 3000.0 / (PEAK * 5000.0), 0.0),
             f"{corner}_wheel_speed_radps": speed / RADIUS_M * (1.0 - own * braking),
             f"{corner}_brake_pressure_Pa": 50e5 * braking,
         }  # fmt: skip

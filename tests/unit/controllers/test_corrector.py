@@ -15,7 +15,7 @@ OFF, FULL = 0.01, 0.05
 
 
 def corrector(timestep_s: float = 0.001, **gains: float) -> Corrector:
-    return Corrector(CorrectorParameters(off_radps=OFF, full_radps=FULL, **gains), timestep_s)
+    return Corrector(CorrectorParameters(deadband_start_radps=OFF, deadband_end_radps=FULL, **gains), timestep_s)
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def test_superposition_turns_the_front_wheels_by_the_decision_table(front, yaw_r
 
 
 def test_superposed_angle_is_gain_times_tolerated_error():
-    block = controller(proportional_gain_s=0.1, off_radps=0.01, full_radps=0.06)
+    block = controller(proportional_gain_s=0.1, deadband_start_radps=0.01, deadband_end_radps=0.06)
     for count in range(200):
         steer = block.step(steering(0.01 * math.sin(0.02 * count)), measured(0.03))
         error = steer.yaw_rate_desired_radps - 0.03

@@ -92,7 +92,7 @@ def test_correction_turns_the_rear_wheels_by_the_decision_table(front, yaw_rate,
 
 
 def test_rear_angle_is_prediction_less_gain_times_tolerated_error():
-    block = controller(prediction_gain=0.6, proportional_gain_s=0.1, off_radps=0.01, full_radps=0.06)
+    block = controller(prediction_gain=0.6, proportional_gain_s=0.1, deadband_start_radps=0.01, deadband_end_radps=0.06)
     prediction = RearPrediction(MODEL, 0.001)
     for count in range(200):
         front = 0.01 * math.sin(0.02 * count)

@@ -128,9 +128,9 @@ def test_lanes_are_made_for_the_car_unless_the_file_says_otherwise():
 def test_largest_margin_that_is_allowed_can_be_driven(standard):
     with raises(ManeuverError, key="lane.margin_m") as refused:
         change({"standard": standard, "path": "least_jerk", "margin_m": 0.5})
-    most = refused.value.allowed.high
-    laid = course({"standard": standard, "path": "least_jerk", "margin_m": most - 0.001})
-    assert least_distance_m(laid, 1.8) == pytest.approx(most, abs=0.02)
+    maximum = refused.value.allowed.high
+    laid = course({"standard": standard, "path": "least_jerk", "margin_m": maximum - 0.001})
+    assert least_distance_m(laid, 1.8) == pytest.approx(maximum, abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ def test_no_other_path_within_the_bounds_has_less_jerk(rng):
     bounds = [Bound(x, 0.0, 2.8, 3.6) for x in np.arange(35.0, 46.0, 0.5).tolist()]
     bounds += [Bound(x, 0.0, -0.2, 0.2) for x in np.arange(0.0, 11.0, 0.5).tolist()]
     path = least_jerk(0.0, 80.0, 0.0, bounds)
-    least, tried = jerk(path), 0
+    minimum, tried = jerk(path), 0
     # Between this path and one well inside the bounds, so that some of what is tried keeps them.
     inside = least_jerk(0.0, 80.0, 0.0, [b._replace(low_m=b.low_m + 0.15, high_m=b.high_m - 0.15) for b in bounds])
     for _ in range(200):
@@ -57,7 +57,7 @@ def test_no_other_path_within_the_bounds_has_less_jerk(rng):
         other.c[3:-3] += 0.03 * rng.standard_normal(len(path.c) - 6)
         if all(bound.low_m <= other(bound.x_m) <= bound.high_m for bound in bounds):
             tried += 1
-            assert jerk(other) > least
+            assert jerk(other) > minimum
     assert tried > 20
 
 

@@ -62,9 +62,9 @@ def test_both_lane_changes_differ_by_the_road_and_by_how_much_of_the_lanes_is_us
     assert dry.course.lanes == slippery.course.lanes
     assert replace(dry.lane, margin_m=slippery.lane.margin_m) == slippery.lane
     # The line of the dry road asks for less than there is, that of the slippery one for more.
-    for maneuver, least, most in ((dry, 0.6, 0.75), (slippery, 1.0, 1.1)):
+    for maneuver, minimum, maximum in ((dry, 0.6, 0.75), (slippery, 1.0, 1.1)):
         asked = np.abs(maneuver.course.path.curvature_1pm).max() * maneuver.speed_mps**2
-        assert least < asked / (maneuver.road.mu * 9.81) < most
+        assert minimum < asked / (maneuver.road.mu * 9.81) < maximum
     assert dry.lane.standard == "iso_3888_1"
     assert dry.speed_mps == slippery.speed_mps
 

@@ -86,10 +86,10 @@ def test_wrong_values_are_answered_with_what_is_allowed(keys, key):
 
 
 @pytest.mark.parametrize(
-    ("keys", "least"),
+    ("keys", "minimum"),
     [({"cones": {"offset_m": 0.8}}, 0.9), ({"cones": {"entry_m": 20.0}}, 36.0), ({"duration_s": 8.0}, 11.8)],
 )
-def test_least_that_is_allowed_is_part_of_the_answer(keys, least):
+def test_least_that_is_allowed_is_part_of_the_answer(keys, minimum):
     with raises(ManeuverError) as refused:
         slalom(**keys)
-    assert refused.value.allowed.low == pytest.approx(least, abs=0.05)
+    assert refused.value.allowed.low == pytest.approx(minimum, abs=0.05)

@@ -44,7 +44,7 @@ def circle(duration_s: float = 3.0, metadata: Mapping[str, Any] | None = None, c
     for corner, (ahead, left) in WHEELS.items():
         columns |= {
             f"{corner}_tyre_fx_N": 0.0, f"{corner}_tyre_fy_N": FY_N, f"{corner}_tyre_fz_N": 3500.0,
-            f"{corner}_friction_use": USE, f"{corner}_steer_rad": STEER_RAD if corner[0] == "f" else 0.0,
+            f"{corner}_friction_utilisation": USE, f"{corner}_steer_rad": STEER_RAD if corner[0] == "f" else 0.0,
             f"{corner}_contact_x_m": x + cos * ahead - sin * left,
             f"{corner}_contact_y_m": y + sin * ahead + cos * left,
             f"{corner}_arm_force_N": 800.0,

@@ -160,8 +160,8 @@ def test_a_brake_demand_beyond_its_strength_gives_its_strength() -> None:
     vehicle = floating()
     vehicle.data.ctrl[actuator(vehicle, "rl_brake")] = 1e5
     push(vehicle, "rl", 3000.0, 100)
-    most = vehicle.parameters.brakes.rear_torque_Nm
-    assert vehicle.data.actuator_force[actuator(vehicle, "rl_brake")] == pytest.approx(-most, rel=1e-6)
+    maximum = vehicle.parameters.brakes.rear_torque_Nm
+    assert vehicle.data.actuator_force[actuator(vehicle, "rl_brake")] == pytest.approx(-maximum, rel=1e-6)
 
 
 @pytest.mark.parametrize("corner", CORNERS)
@@ -232,9 +232,11 @@ def test_open_clutch_takes_the_torque_away_at_once() -> None:
 
 
 @pytest.mark.parametrize(("speed_radps", "gear"), [(0.0, 1), (20.0, 1), (80.0, 1), (-20.0, 1), (-20.0, -1)])
-@pytest.mark.parametrize("front_share", [1.0, 0.4])
-def test_the_drive_gives_what_the_engine_gives_at_the_mean_speed_of_its_wheels(speed_radps, gear, front_share) -> None:
-    vehicle = floating({"powertrain.front_share": front_share, "powertrain.lag_s": 0.001})
+@pytest.mark.parametrize("front_fraction", [1.0, 0.4])
+def test_the_drive_gives_what_the_engine_gives_at_the_mean_speed_of_its_wheels(
+    speed_radps, gear, front_fraction
+) -> None:
+    vehicle = floating({"powertrain.front_fraction": front_fraction, "powertrain.lag_s": 0.001})
     engine = vehicle.parameters.powertrain
     turning = speed_radps * np.array([0.6, 1.4, 0.9, 1.1])
     for demand_Nm in (1e5, -1e5):
@@ -247,7 +249,7 @@ def test_the_drive_gives_what_the_engine_gives_at_the_mean_speed_of_its_wheels(s
         given = [float(vehicle.data.actuator_force[actuator(vehicle, f"{corner}_drive")]) for corner in CORNERS]
         low, high = Drive(engine).limits_Nm(speed_radps, gear)
         expected = high if demand_Nm > 0.0 else low
-        np.testing.assert_allclose(given, expected * np.asarray(engine.wheel_shares), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(given, expected * np.asarray(engine.wheel_fractions), rtol=1e-9, atol=1e-9)
         assert float(np.dot(given, turning)) <= engine.max_power_W * (1.0 + 1e-12)
 
 

@@ -34,7 +34,7 @@ def test_frequency_and_damping_of_oscillators_come_out_in_order():
     assert [mode.name for mode in found][:2] == ["speed", "bounce"]
     assert [mode.natural_frequency_Hz for mode in found] == pytest.approx([0.5 / 2 / math.pi, 1.2, 12.0])
     assert [mode.damping_ratio for mode in found] == pytest.approx([1.0, 0.25, 0.3])
-    assert all(sum(mode.shares.values()) == pytest.approx(1.0) for mode in found)
+    assert all(sum(mode.participation.values()) == pytest.approx(1.0) for mode in found)
 
 
 def test_left_and_right_wheels_move_alike_or_against_each_other():

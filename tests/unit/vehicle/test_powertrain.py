@@ -9,7 +9,11 @@ from activesteer.vehicle.parameters import Powertrain
 from activesteer.vehicle.powertrain import Drive
 
 ENGINE = Powertrain(
-    front_share=0.3, max_torque_Nm=3000.0, max_power_W=90e3, engine_brake_torque_Nm=300.0, max_wheel_speed_radps=240.0
+    front_fraction=0.3,
+    max_torque_Nm=3000.0,
+    max_power_W=90e3,
+    engine_brake_torque_Nm=300.0,
+    max_wheel_speed_radps=240.0,
 )
 DRIVE = Drive(ENGINE)
 
@@ -31,8 +35,8 @@ def test_rev_limiter_takes_the_torque_away():
 
 def test_drag_is_shortened_by_the_gear_as_the_torque_is_and_ends_where_the_clutch_opens():
     for speed in (6.0, 20.0, 30.0, 60.0, 200.0):
-        low, most = DRIVE.limits_Nm(speed, 1)
-        assert low / most == pytest.approx(-0.1)
+        low, maximum = DRIVE.limits_Nm(speed, 1)
+        assert low / maximum == pytest.approx(-0.1)
     assert DRIVE.limits_Nm(3.0, 1)[0] == pytest.approx(-150.0)
     assert DRIVE.limits_Nm(0.0, 1)[0] == 0.0
 
@@ -43,10 +47,10 @@ def test_rolling_back_the_clutch_slips_and_the_engine_pulls():
 
 def test_reverse_gear_is_the_mirror():
     for speed in (-100.0, -5.0, 0.0, 5.0, 100.0):
-        low, most = DRIVE.limits_Nm(speed, 1)
-        assert DRIVE.limits_Nm(-speed, -1) == (-most, -low)
+        low, maximum = DRIVE.limits_Nm(speed, 1)
+        assert DRIVE.limits_Nm(-speed, -1) == (-maximum, -low)
 
 
 def test_engine_turns_with_the_mean_of_the_wheels_by_their_shares():
     assert DRIVE.speed_radps((10.0, 30.0, 50.0, 60.0)) == pytest.approx(0.3 * 20.0 + 0.7 * 55.0)
-    assert sum(ENGINE.wheel_shares) == pytest.approx(1.0)
+    assert sum(ENGINE.wheel_fractions) == pytest.approx(1.0)

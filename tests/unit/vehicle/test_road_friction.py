@@ -119,6 +119,6 @@ def test_friction_use_is_that_of_the_formula_s_own_peaks(mu: float, rng: np.rand
         assert load > 100.0
         # Friction does not depend on the slips; the formula wants some all the same.
         mu_x, mu_y = steady_state(tyre, load, 0.01, 0.02, gamma, 250e3, 15.0, mu, 0.0)[5:7]
-        use = record(vehicle, corner, fb.U_FRICTION_USE)
+        use = record(vehicle, corner, fb.U_FRICTION_UTILISATION)
         assert use > 0.02
         assert use == pytest.approx(np.hypot(fx / (mu_x * load), fy / (mu_y * load)), rel=0.02)

@@ -104,7 +104,7 @@ def test_other_units_are_recognised(tmp_path: Path, old: str, new: str, hint: st
         ),
         ('spring_on = "knuckle"', 'spring_on = "spring_lnk"', "did you mean 'spring_link'"),
         ("total_kg = 1430", "", "total_kg (of the whole car) or chassis_kg is needed"),
-        ("cg_height_m = 0.545", "", "with total_kg, front_share and cg_height_m are needed"),
+        ("cg_height_m = 0.545", "", "with total_kg, front_fraction and cg_height_m are needed"),
         ("[front.links.tie_rod]", "[front.links.tierod]", "did you mean 'tie_rod'"),
         ("strut_top = [-87, 575, 860]", "strut_top = [-87, 575]", "front.points.strut_top: 2 numbers given"),
     ],
