@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import typing
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -47,6 +48,12 @@ def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, flo
     return None, 1.0
 
 
+@functools.cache
+def hints_of(cls: type, *, include_extras: bool = False) -> dict[str, Any]:
+    """Types of a dataclass's fields: what `typing.get_type_hints` says, which reads their texts anew at every call."""
+    return typing.get_type_hints(cls, include_extras=include_extras)
+
+
 def fields_of(cls: type) -> dict[str, dataclasses.Field[Any]]:
     """The fields of a dataclass by their names."""
     return {field.name: field for field in dataclasses.fields(cls)}
@@ -69,7 +76,7 @@ def element_of(hint: Any) -> type | None:
 def key_paths(cls: type, prefix: str = "") -> list[str]:
     """All dotted keys that a table for `cls` may have, for messages about keys that do not exist."""
     paths: list[str] = []
-    hints = typing.get_type_hints(cls)
+    hints = hints_of(cls)
     for field in dataclasses.fields(cls):
         inner = dataclass_in(hints[field.name])
         if inner is not None:
@@ -86,7 +93,7 @@ def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:
     name, _ = field_in_unit(path[0], fields_of(cls))
     if name is None:
         return tuple(path)
-    hint, rest = typing.get_type_hints(cls)[name], path[1:]
+    hint, rest = hints_of(cls)[name], path[1:]
     if (inner := dataclass_in(hint)) is not None:
         return (name, *field_path(inner, rest))
     if (inner := element_of(hint)) is not None and rest:
@@ -106,7 +113,7 @@ def leaf_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
 def key_hint(cls: type, key: str) -> str | None:
     """What a class, or that of a table in it, says to those who look for a dotted key that it does not have."""
     first, _, rest = key.partition(".")
-    inner = dataclass_in(typing.get_type_hints(cls).get(first)) if rest else None
+    inner = dataclass_in(hints_of(cls).get(first)) if rest else None
     return getattr(cls, "KEY_HINTS", {}).get(key) if inner is None else key_hint(inner, rest)
 
 

@@ -7,7 +7,7 @@ import typing
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from activesteer.config.keys import dataclass_in, element_of, field_in_unit, fields_of, no_such_key
+from activesteer.config.keys import dataclass_in, element_of, field_in_unit, fields_of, hints_of, no_such_key
 from activesteer.config.source import Source
 from activesteer.errors import nearest_names, shown
 
@@ -34,7 +34,7 @@ def merged(
     where = (*above, path[0])
     if not isinstance(table, Mapping):
         raise source.fail(above, f"is {shown(table)}, which is no table and has no {path[0]}", table)
-    hints, fields = typing.get_type_hints(cls), fields_of(cls)
+    hints, fields = hints_of(cls), fields_of(cls)
     key, rest = path[0], path[1:]
     name, _ = field_in_unit(key, fields)
     if name is None:
@@ -98,7 +98,7 @@ def check_overruled(cls: type, table: Mapping[str, Any], source: Source, given: 
     for path in given:
         owner, within = cls, table
         for key in path[:-1]:
-            inner = dataclass_in(typing.get_type_hints(owner).get(key))
+            inner = dataclass_in(hints_of(owner).get(key))
             if inner is None or not isinstance(within := within.get(key, {}), Mapping):
                 break
             owner = inner

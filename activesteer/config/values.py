@@ -9,7 +9,7 @@ import typing
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, TypeVar
 
-from activesteer.config.keys import element_of, field_in_unit, fields_of, no_such_key, spellings
+from activesteer.config.keys import element_of, field_in_unit, fields_of, hints_of, no_such_key, spellings
 from activesteer.config.source import MAX_NUMBER, Range, Source
 from activesteer.errors import ActiveSteerError, shown
 
@@ -33,7 +33,7 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
     Raises:
         ActiveSteerError: a key is unknown, missing or given twice, or a value is wrong.
     """
-    hints = typing.get_type_hints(cls, include_extras=True)
+    hints = hints_of(cls, include_extras=True)
     fields = fields_of(cls)
     values: dict[str, Any] = {}
     for key, raw in table.items():

@@ -89,7 +89,8 @@ class Car:
             ModelError: the MJCF does not compile, lacks a part, or has no static equilibrium.
         """
         checked_number("timestep_s", timestep_s, TIMESTEP_RANGE_S)
-        return Vehicle(self.mjcf, self.config, self.tyres, Road() if road is None else road, timestep_s)
+        content = {name: text for name, text in self.files.items() if name.startswith("mjcf/")}
+        return Vehicle(self.mjcf, self.config, self.tyres, Road() if road is None else road, timestep_s, content)
 
 
 def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | None = None) -> Car:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -162,7 +162,7 @@ def tune(
     for left in made.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):  # of a killed process
         made.tell(left.number, state=optuna.trial.TrialState.FAIL)
     begun = len(made.trials)
-    made.sampler = _sampler(optuna, table, study.seed + begun)
+    made.sampler = optuna.samplers.TPESampler(seed=study.seed + begun, constant_liar=True)
     with workers_for(jobs, client=client, scheduler=scheduler) as workers:
         if problem := workers.everywhere(prepare_worker, plan.settings):
             raise StudyError(problem)
@@ -173,8 +173,14 @@ def tune(
                 values = {factor.key: _suggest(trial, factor) for factor in study.factors}
                 yield trial, drive, plan.settings, _requests(plan, trial.number, values)
 
+        checked = False
         for place, (trial, rows, error) in enumerate(TaskQueue(workers).outcomes(tasks()), begun + 1):
-            values, violation = (None, 0.0) if error is not None else _judged(table, rows)
+            values, violation = (None, 0.0)
+            if error is None and all(row["status"] == Status.OK for row in rows):
+                if not checked:
+                    _check_metrics(study, table, rows)
+                    checked = True
+                values, violation = _judged(table, rows)
             if values is None:
                 made.tell(trial, state=optuna.trial.TrialState.FAIL)
             else:
@@ -197,15 +203,32 @@ def _table(study: StudyFile) -> TuneTable:
     table = build(TuneTable, study.tune, study.source, ("tune",))
     if not table.objectives:
         raise study.source.fail(("tune", "objectives"), "at least one is needed")
-    names = [label_of(item) for item in study.maneuvers]
-    for number, part in enumerate([*(t for o in table.objectives for t in o.terms), *table.constraints]):
+    names, controllers = ([label_of(item) for item in items] for items in (study.maneuvers, study.controllers))
+    for place, part in _parts(table):
         if part.maneuver not in names and (part.maneuver or len(names) > 1):
-            raise study.source.fail(("tune", str(number), "maneuver"), nearest_names(part.maneuver, names))
-        for controller in (part.controller, getattr(part, "relative_to", "")):
-            if controller and controller not in study.controllers:
-                hint = nearest_names(controller, study.controllers)
-                raise study.source.fail(("tune", str(number), "controller"), f"{controller}: {hint}")
+            raise study.source.fail((*place, "maneuver"), nearest_names(part.maneuver, names), part.maneuver)
+        for key in ("controller", "relative_to"):
+            if (name := getattr(part, key, "")) and name not in controllers:
+                raise study.source.fail((*place, key), nearest_names(name, controllers), name)
     return table
+
+
+def _parts(table: TuneTable) -> Iterator[tuple[tuple[str, ...], Term | Constraint]]:
+    """Everything that looks at a metric, and the keys that lead to it."""
+    for number, objective in enumerate(table.objectives):
+        for place, term in enumerate(objective.terms):
+            yield ("tune", "objectives", str(number), "terms", str(place)), term
+    for number, constraint in enumerate(table.constraints):
+        yield ("tune", "constraints", str(number)), constraint
+
+
+def _check_metrics(study: StudyFile, table: TuneTable, rows: Sequence[Row]) -> None:
+    """Every metric is one that the runs have; which those are shows only in the first set of which none failed."""
+    for place, part in _parts(table):
+        for row in _rows_of(part.controller, part.maneuver, rows):
+            if part.metric not in row:
+                known = [name for name, value in row.items() if isinstance(value, float) and name not in study.keys]
+                raise study.source.fail((*place, "metric"), nearest_names(part.metric, known), part.metric)
 
 
 def _claim_folder(folder: Path, study: StudyFile, plan: Plan) -> None:
@@ -214,12 +237,6 @@ def _claim_folder(folder: Path, study: StudyFile, plan: Plan) -> None:
     if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
         raise StudyError(f"{folder} holds another search; use a new folder")
     write_text(path, text, StudyError)
-
-
-def _sampler(optuna: Any, table: TuneTable, seed: int) -> Any:
-    if len(table.objectives) > 1:
-        return optuna.samplers.NSGAIISampler(seed=seed)
-    return optuna.samplers.TPESampler(seed=seed, constant_liar=True)
 
 
 def _suggest(trial: Any, factor: Factor) -> Any:
@@ -240,9 +257,7 @@ def _requests(plan: Plan, number: int, values: dict[str, Any]) -> list[Request]:
 
 
 def _judged(table: TuneTable, rows: Sequence[Row]) -> tuple[list[float] | None, float]:
-    """Objectives and by how much constraints are broken; no objectives where a run failed or lacks a metric."""
-    if any(row["status"] != Status.OK for row in rows):
-        return None, 0.0
+    """Objectives and by how much constraints are broken; no objectives where a run lacks a metric."""
     values = [sum(_value(term, rows) for term in objective.terms) for objective in table.objectives]
     broken = 0.0
     for constraint in table.constraints:
@@ -261,10 +276,13 @@ def _value(term: Term, rows: Sequence[Row]) -> float:
     return term.weight * total
 
 
-def _found(metric: str, controller: str, maneuver: str, rows: Sequence[Mapping[str, Any]]) -> list[float]:
+def _found(metric: str, controller: str, maneuver: str, rows: Sequence[Row]) -> list[float]:
     """A metric of every vehicle."""
-    chosen = [row for row in rows if row["controller"] == controller and maneuver in ("", row["maneuver"])]
-    return [float(row.get(metric, math.nan)) for row in chosen]
+    return [float(row.get(metric, math.nan)) for row in _rows_of(controller, maneuver, rows)]
+
+
+def _rows_of(controller: str, maneuver: str, rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row["controller"] == controller and maneuver in ("", row["maneuver"])]
 
 
 def _result(optuna: Any, made: Any, table: TuneTable) -> Tuning:

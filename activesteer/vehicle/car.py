@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -73,6 +73,7 @@ class Vehicle:
         tyres: tuple[TyreParameters, TyreParameters],
         road: Road,
         timestep_s: float = DEFAULT_TIMESTEP_S,
+        content: Mapping[str, bytes] | None = None,
     ) -> None:
         """Compiles the car, puts it at rest in static equilibrium and installs the native forces.
 
@@ -82,6 +83,7 @@ class Vehicle:
             tyres: Tyres of the front and of the rear axle.
             road: Friction and grade.
             timestep_s: Step of the engine [s].
+            content: Content of the model's files; see `load_model`.
 
         Raises:
             ModelError: the MJCF does not compile, lacks a part, or has no static equilibrium.
@@ -91,7 +93,7 @@ class Vehicle:
         self.timestep_s = timestep_s
         self._tyre_widths_m = tuple(tyre["WIDTH"] for tyre in tyres)
         try:
-            self.model = load_model(mjcf, parameters, tyres, road, timestep_s)
+            self.model = load_model(mjcf, parameters, tyres, road, timestep_s, content)
             self.data = mujoco.MjData(self.model)
             self._commands = np.zeros(len(COMMANDS))
             self._command_memory = self._commands.data

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 
@@ -25,14 +29,19 @@ _RATES: Final = {"slip_x": fb.U_RATE_X, "slip_y": fb.U_RATE_Y, "slip_z": fb.U_RA
 """Relaxation state of a tyre, as its actuator is called behind the corner -> where the callback leaves its rate."""
 
 
+_compiled: deque[tuple[tuple[Any, ...], mujoco.MjModel]] = deque(maxlen=4)
+"""Cars compiled last, each behind everything that it was compiled from: a car is often driven several times."""
+
+
 def load_model(
     mjcf: Path,
     parameters: VehicleParameters,
     tyres: tuple[TyreParameters, TyreParameters],
     road: Road,
     timestep_s: float,
+    content: Mapping[str, bytes] | None = None,
 ) -> mujoco.MjModel:
-    """Compiles a car.
+    """Compiles a car, or copies it where it was compiled lately.
 
     Args:
         mjcf: The model file.
@@ -40,6 +49,7 @@ def load_model(
         tyres: Tyres of the front and of the rear axle.
         road: Friction and grade.
         timestep_s: Step of the engine [s].
+        content: Content of the model's files by name, which tells a changed file; without it nothing is copied.
 
     Returns:
         The model, ready for the native forces.
@@ -47,6 +57,26 @@ def load_model(
     Raises:
         ModelError: the MJCF does not compile, or lacks something that a car must have.
     """
+    if not content:
+        return _compile(mjcf, parameters, tyres, road, timestep_s)
+    # Not what a vehicle file has besides: controllers and their single-track model are no part of the car.
+    physical = [getattr(parameters, field.name) for field in fields(VehicleParameters)]
+    made_from = (mjcf, dict(content), physical, tyres, road, timestep_s)
+    for known, model in _compiled:
+        if known == made_from:
+            return copy.copy(model)
+    model = _compile(mjcf, parameters, tyres, road, timestep_s)
+    _compiled.append((made_from, copy.copy(model)))
+    return model
+
+
+def _compile(
+    mjcf: Path,
+    parameters: VehicleParameters,
+    tyres: tuple[TyreParameters, TyreParameters],
+    road: Road,
+    timestep_s: float,
+) -> mujoco.MjModel:
     try:
         spec = mujoco.MjSpec.from_file(str(mjcf))
         spec.option.timestep = timestep_s

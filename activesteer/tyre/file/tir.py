@@ -6,6 +6,7 @@ that names the file, the line, the key, the value and what is allowed.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -63,6 +64,7 @@ def load_tir(path: str | Path, mounted: Side | None = None, *, slip_tangent: boo
     return tir_from_text(read_text(path), path, mounted, slip_tangent=slip_tangent)
 
 
+@functools.lru_cache(maxsize=8)  # the cars of a study have the same few tyres
 def tir_from_text(
     text: str, source: Path, mounted: Side | None = None, *, slip_tangent: bool = False
 ) -> TyreParameters:

@@ -70,6 +70,14 @@ def test_a_wrong_table_is_refused_before_anything_runs(tmp_path, change):
         tune({key: value for key, value in GAINS.items() if key != "tune"}, tmp_path, jobs=1)
 
 
+def test_a_metric_that_the_runs_do_not_have_is_told_with_those_that_they_have(tmp_path):
+    constraint = {"metric": "ay_steady_state_mps", "controller": "none", "low": 1.0}
+    table = {**GAINS, "tune": {**GAINS["tune"], "constraints": [constraint]}}
+    with raises(StudyError, key="tune.constraints.0.metric", value="ay_steady_state_mps") as told:
+        tune(table, tmp_path, jobs=1)
+    assert "ay_steady_state_mps2" in str(told.value)
+
+
 def test_a_set_dominates_another_that_is_nowhere_better():
     a, b, c = (Trial(0, {}, {"x": x, "y": y}, 0.0) for x, y in ((1.0, 1.0), (1.0, 2.0), (0.5, 3.0)))
     assert _dominates(a, b)

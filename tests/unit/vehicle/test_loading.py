@@ -5,10 +5,14 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pytest
 
 from activesteer.errors import ModelError
+from activesteer.road.road import Road
 from activesteer.scenario import load_car
+from activesteer.vehicle import loading
 from tests.unit.vehicle.cars import changed_model
 
 
@@ -60,3 +64,37 @@ def test_an_unchanged_copy_loads(tmp_path: Path) -> None:
     path = changed_model(tmp_path, "compact.xml", 'model="compact"', 'model="copy"')
     vehicle = dataclasses.replace(load_car(), mjcf=path).on()
     assert vehicle.model.nv > 30
+
+
+def _bytes_of(model: mujoco.MjModel) -> bytes:
+    found = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, found)
+    return found.tobytes()
+
+
+def test_a_car_that_was_compiled_lately_is_copied_and_the_copy_is_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    car = load_car(overrides={"factors.mass": 1.05})
+    first = car.on()
+    fresh = _bytes_of(first.model)
+    first.model.body_mass[:] = 0.0  # whatever becomes of a car, the next one is not touched
+    monkeypatch.setattr(loading, "_compile", lambda *_: pytest.fail("it is compiled again"))
+    again = load_car(overrides={"factors.mass": 1.05, "controllers.ars.prediction_gain": 0.5}).on()
+    assert _bytes_of(again.model) == fresh
+
+
+@pytest.mark.parametrize("key", ["factors.mass", "factors.tyre_friction", "tyres.front_pressure_Pa"])
+def test_another_car_is_compiled(key: str) -> None:
+    given = load_car().on().model
+    other = load_car(overrides={key: 1.05 if key.startswith("factors") else 2e5}).on().model
+    assert _bytes_of(other) != _bytes_of(given)
+    assert _bytes_of(load_car().on(Road(mu=0.5)).model) != _bytes_of(given)
+
+
+def test_a_model_file_that_has_changed_is_compiled_anew(tmp_path: Path) -> None:
+    path = changed_model(tmp_path, "compact.xml", 'model="compact"', 'model="copy"')
+    masses = []
+    for mass in ("12.5", "13.5"):
+        rear = path.parent / "rear_axle.xml"
+        rear.write_text(rear.read_text(encoding="utf-8").replace('mass="12.5"', f'mass="{mass}"'), encoding="utf-8")
+        masses.append(float(load_car(overrides={"mjcf": str(path)}).on().model.body_mass.sum()))
+    assert masses[1] == pytest.approx(masses[0] + 2.0)
