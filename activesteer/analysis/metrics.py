@@ -12,6 +12,7 @@ from activesteer.analysis import (
     handling,
     path_following,
     sine_with_dwell,
+    slow_ramp,
     step_response,
     straight_braking,
 )
@@ -19,7 +20,7 @@ from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
 
 BY_KIND: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "step_steer": step_response.metrics,
-    "slowly_increasing_steer": handling.metrics,
+    "slowly_increasing_steer": slow_ramp.metrics,
     "constant_radius": handling.metrics,
     "sine_sweep": frequency_response.metrics,
     "sine_with_dwell": sine_with_dwell.metrics,

@@ -24,15 +24,14 @@ from numpy.typing import NDArray
 from activesteer.analysis.filters import low_pass
 from activesteer.analysis.series import crossing_time, timestep
 from activesteer.analysis.source import RecordingLike
+from activesteer.analysis.zeroing import THRESHOLD_RAD, zeroed, zeroing_range
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 
 STEERING_CUT_OFF_Hz: Final = 10.0
 """Filter of the steering wheel angle [Hz]."""
-YAW_RATE_CUT_OFF_Hz: Final = 6.0
-"""Filter of the yaw rate [Hz]."""
-THRESHOLD_RAD: Final = math.radians(5.0)
-"""Steering wheel angle whose first passing is the beginning of steer [rad]."""
+MOTION_CUT_OFF_Hz: Final = 6.0
+"""Filter of yaw rate and lateral acceleration [Hz]."""
 LONGEST_CREEP_S: Final = 0.1
 """A wheel that takes longer than this from the threshold to the centre creeps; its line is then drawn on [s]."""
 PEAK_PROMINENCE: Final = 0.02
@@ -57,12 +56,14 @@ class Steering(NamedTuple):
         begin_s: The wheel first passes 5 deg.
         reversal_s: It passes the centre between the two halves.
         completion_s: It is back at the centre after the second half.
+        straight: Samples before it in which every signal shall be zero.
     """
 
     side: float
     begin_s: float
     reversal_s: float
     completion_s: float
+    straight: slice
 
 
 def steering(recording: RecordingLike) -> Steering:
@@ -73,6 +74,10 @@ def steering(recording: RecordingLike) -> Steering:
     """
     time_s = np.asarray(recording.time_s, dtype=np.float64)
     angle = low_pass(np.asarray(recording["steering_wheel_rad"]), timestep(time_s), STEERING_CUT_OFF_Hz)
+    if abs(angle[0]) > THRESHOLD_RAD:  # more than the offset of a sensor
+        raise RecordingError("the sine with dwell has no beginning: the steering wheel is turned in the first sample")
+    straight = zeroing_range(time_s, angle)
+    angle = zeroed(angle, straight)
     turned = np.flatnonzero(np.abs(angle) > THRESHOLD_RAD)
     if turned.size == 0:
         raise RecordingError(
@@ -80,8 +85,6 @@ def steering(recording: RecordingLike) -> Steering:
             f"{math.degrees(float(np.abs(angle).max())):.3g} deg at most, more than "
             f"{math.degrees(THRESHOLD_RAD):.3g} deg are needed"
         )
-    if turned[0] == 0:
-        raise RecordingError("the sine with dwell has no beginning: the steering wheel is turned in the first sample")
     side = math.copysign(1.0, angle[turned[0]])
     begin_s = crossing_time(time_s, side * angle, THRESHOLD_RAD)
     other = np.flatnonzero(-side * angle > THRESHOLD_RAD)
@@ -89,7 +92,7 @@ def steering(recording: RecordingLike) -> Steering:
         raise RecordingError("the recording holds no sine with dwell: the steering wheel turns to one side only")
     reversal_s = _crossing_before(time_s, -side * angle, int(other[0]))
     completion_s = _completion(time_s, -side * angle, int(other[0]))
-    return Steering(side, begin_s, reversal_s, completion_s)
+    return Steering(side, begin_s, reversal_s, completion_s, straight)
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
@@ -101,7 +104,8 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         and its time. `yaw_rate_after_1000ms_share` and `yaw_rate_after_1750ms_share`: yaw rate so long after the
         completion of steer over this peak [-]; below zero where the car turns the other way by then.
         `lateral_displacement_m`: of the centre of gravity, across the heading at the beginning of steer, 1.07 s after
-        it; positive to the side that is steered to first [m]. `<name>_peak_abs_<unit>` over the whole run. nan where
+        it; positive to the side that is steered to first [m]. `lateral_displacement_integrated_m`: the same from the
+        lateral acceleration, as the standards take it [m]. `<name>_peak_abs_<unit>` over the whole run. nan where
         the run ends before a value is reached.
 
     Raises:
@@ -109,7 +113,10 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     """
     times = steering(recording)
     time_s = np.asarray(recording.time_s, dtype=np.float64)
-    yaw_rate = low_pass(np.asarray(recording["yaw_rate_radps"]), timestep(time_s), YAW_RATE_CUT_OFF_Hz)
+    yaw_rate, ay = (
+        zeroed(low_pass(np.asarray(recording[name]), timestep(time_s), MOTION_CUT_OFF_Hz), times.straight)
+        for name in ("yaw_rate_radps", "ay_mps2")
+    )
     peak_s, peak = _first_peak(time_s, -times.side * yaw_rate, times.reversal_s)
     values = {
         "steer_begin_time_s": times.begin_s,
@@ -122,6 +129,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         later = -times.side * _at(time_s, yaw_rate, times.completion_s + instant_s)
         values[f"yaw_rate_after_{1000.0 * instant_s:.0f}ms_share"] = later / peak
     values["lateral_displacement_m"] = _displacement(recording, times)
+    values["lateral_displacement_integrated_m"] = times.side * integrated_displacement(time_s, ay, times.begin_s)
     for name, unit in PEAKS:
         values[f"{name}_peak_abs_{unit}"] = float(np.abs(recording[f"{name}_{unit}"]).max())
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
@@ -180,6 +188,27 @@ def _displacement(recording: RecordingLike, times: Steering) -> float:
     x0, y0, yaw = (_at(time_s, recording[name], times.begin_s) for name in ("x_m", "y_m", "yaw_rad"))
     x1, y1 = (_at(time_s, recording[name], times.begin_s + DISPLACEMENT_TIME_S) for name in ("x_m", "y_m"))
     return times.side * ((y1 - y0) * math.cos(yaw) - (x1 - x0) * math.sin(yaw))
+
+
+def integrated_displacement(time_s: Array, ay_mps2: Array, begin_s: float) -> float:
+    """Lateral displacement 1.07 s after the beginning of steer, both integrals counted from there.
+
+    Args:
+        time_s: Time of the samples [s], equidistant, shape (n,).
+        ay_mps2: Lateral acceleration of the centre of gravity, without roll and offset [m/s2], shape (n,).
+        begin_s: Beginning of steer [s].
+
+    Returns:
+        Displacement [m], left positive; nan where the run ends before.
+
+    Source: FMVSS 126, S7.11.9.
+    """
+    end_s = begin_s + DISPLACEMENT_TIME_S
+    if end_s > time_s[-1]:
+        return math.nan
+    # An acceleration goes into the displacement with the time that is left to it: one integral in place of two.
+    instants_s = np.linspace(begin_s, end_s, 1 + round(DISPLACEMENT_TIME_S / timestep(time_s)))
+    return float(np.trapezoid((end_s - instants_s) * np.interp(instants_s, time_s, ay_mps2), instants_s))
 
 
 def _at(time_s: Array, values: NDArray[np.floating], instant_s: float) -> float:

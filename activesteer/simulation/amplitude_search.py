@@ -17,6 +17,7 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
+from activesteer.analysis.slow_ramp import FIT, angle_at
 from activesteer.compilation import content_key, processor
 from activesteer.config import to_table
 from activesteer.conventions import GRAVITY_MPS2
@@ -35,8 +36,6 @@ _TOLERANCE: Final = 5e-4
 _RUNS: Final = 8
 _STEADY_S: Final = 0.5
 """Length of the end of a run of that search over which the steady state is taken [s]."""
-_FIT: Final = (1.0 / 3.0, 1.25)
-"""Range of the line through a slow ramp, in fractions of what is asked for: 0.1 to 0.375 g for 0.3 g (FMVSS 126)."""
 _CHUNK_S: Final = 0.25
 """How often it is looked whether a ramp has come far enough [s]."""
 _ROUNDED_RAD: Final = math.radians(0.1)
@@ -137,7 +136,7 @@ def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> flo
     The model is its own mirror image, so that one side stands for both.
     """
     wanted, probe = search.lateral_acceleration_mps2, search.probe
-    low, high = (fraction * wanted for fraction in _FIT)
+    high = FIT[1] * wanted
     simulation = ClosedLoop(scenario, "none", timestep_s)
     recorder = Recorder(simulation.vehicle, simulation.steps)
     chunk, left = round(_CHUNK_S / timestep_s), simulation.steps
@@ -154,9 +153,7 @@ def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> flo
             f"the steering wheel, but {high:.3g} m/s2 ({high / GRAVITY_MPS2:.3g} g) are needed: is the road too "
             f"slippery (road.mu {probe.road.mu:g})? Give the amplitude instead (steering_wheel_deg)"
         )
-    line = slice(int(np.argmax(ay > low)), int(np.argmax(ay > high)))
-    slope, offset = np.polynomial.Polynomial.fit(wheel[line], ay[line], 1).convert().coef[::-1]
-    return round((wanted - offset) / slope / _ROUNDED_RAD) * _ROUNDED_RAD
+    return round(angle_at(wheel, ay, wanted) / _ROUNDED_RAD) * _ROUNDED_RAD
 
 
 def _rows(recorder: Recorder, name: str) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.metrics import metrics
-from activesteer.analysis.sine_with_dwell import steering
+from activesteer.analysis.sine_with_dwell import integrated_displacement, steering
 from activesteer.errors import RecordingError
 from tests.unit.analysis.synthetic import COMPLETION_S, REVERSAL_S, SINE_BEGIN_S, SyntheticRun, sine_with_dwell
 
@@ -102,6 +102,32 @@ def test_displacement_is_taken_after_the_beginning_across_the_heading(side):
         "yaw_rad": np.full_like(x, angle),
     }
     assert metrics(run)["lateral_displacement_m"] == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_integrated_displacement_is_that_of_a_constant_acceleration(side):
+    run = sine_with_dwell(side=side, ay_mps2=4.0)
+    # Velocity and displacement count from the beginning of steer, 0.1 s before which the acceleration would be half.
+    assert metrics(run)["lateral_displacement_integrated_m"] == pytest.approx(0.5 * 4.0 * 1.07**2, rel=0.01)
+
+
+def test_integral_of_a_sine_is_known():
+    time_s, radps = np.arange(3000) * 1e-3, 2.0 * math.pi
+    # s'' = sin(w t) from rest: s = t / w - sin(w t) / w^2.
+    expected = 1.07 / radps - math.sin(radps * 1.07) / radps**2
+    found = integrated_displacement(time_s, np.sin(radps * (time_s - 0.5)), 0.5)
+    assert found == pytest.approx(expected, rel=1e-5)
+    assert math.isnan(integrated_displacement(time_s, time_s, 2.0))
+
+
+def test_offsets_of_the_sensors_are_taken_off():
+    run, late = sine_with_dwell(), sine_with_dwell()
+    late.channels["steering_wheel_rad"] = run["steering_wheel_rad"] + math.radians(3.0)
+    late.channels["yaw_rate_radps"] = run["yaw_rate_radps"] + 0.05
+    late.channels["ay_mps2"] = run["ay_mps2"] - 0.4
+    found, true = metrics(late), metrics(run)
+    for name in ("yaw_rate_after_1000ms_share", "lateral_displacement_integrated_m", "steer_begin_time_s"):
+        assert found[name] == pytest.approx(true[name], abs=1e-9)
 
 
 def test_a_run_that_ends_early_has_no_ratio():

@@ -1,0 +1,60 @@
+"""Metrics of a slow ramp of the steering wheel: steady-state handling, and the angle A of FMVSS 126.
+
+Source: 49 CFR 571.126 (FMVSS 126), S7.6 and S7.11; NHTSA TP-126, which gives the range of the line.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from activesteer.analysis import handling
+from activesteer.analysis.filters import low_pass
+from activesteer.analysis.series import timestep
+from activesteer.analysis.sine_with_dwell import MOTION_CUT_OFF_Hz, STEERING_CUT_OFF_Hz
+from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import GRAVITY_MPS2, Array
+
+REFERENCE_MPS2: Final = 0.3 * GRAVITY_MPS2
+"""Lateral acceleration that A belongs to [m/s2]."""
+FIT: Final = (1.0 / 3.0, 1.25)
+"""Range of the line in shares of the acceleration looked for: 0.1 to 0.375 g for 0.3 g."""
+
+
+def metrics(recording: RecordingLike) -> dict[str, float]:
+    """Metrics of a slow ramp.
+
+    Returns:
+        Those of `handling`, and `steering_wheel_at_0_3g_rad`: the steering wheel angle at 0.3 g, by the line through
+        the filtered signals, with its sign; nan where the run does not reach 0.375 g [rad].
+
+    Raises:
+        RecordingError: as `handling.metrics`.
+    """
+    values = handling.metrics(recording)
+    step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))
+    ay = low_pass(recording["ay_mps2"], step_s, MOTION_CUT_OFF_Hz)
+    steering = low_pass(recording["steering_wheel_rad"], step_s, STEERING_CUT_OFF_Hz)
+    side = math.copysign(1.0, float(ay[int(np.abs(ay).argmax())]))
+    reached = float((side * ay).max()) >= FIT[1] * REFERENCE_MPS2
+    angle = side * angle_at(side * steering, side * ay, REFERENCE_MPS2) if reached else math.nan
+    return values | {"steering_wheel_at_0_3g_rad": angle}
+
+
+def angle_at(steering_rad: Array, ay_mps2: Array, wanted_mps2: float) -> float:
+    """Steering wheel angle at a lateral acceleration, by the line through the range of `FIT` around it.
+
+    Args:
+        steering_rad: Steering wheel angle of a slow ramp to the left [rad], shape (n,).
+        ay_mps2: Lateral acceleration, which must pass the range [m/s2], shape (n,).
+        wanted_mps2: Acceleration looked for [m/s2].
+
+    Returns:
+        Angle [rad].
+    """
+    low, high = (share * wanted_mps2 for share in FIT)
+    line = slice(int(np.argmax(ay_mps2 > low)), int(np.argmax(ay_mps2 > high)))
+    slope, offset = np.polynomial.Polynomial.fit(steering_rad[line], ay_mps2[line], 1).convert().coef[::-1]
+    return float((wanted_mps2 - offset) / slope)

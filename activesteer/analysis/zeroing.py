@@ -1,0 +1,53 @@
+"""What a signal reads while the car still goes straight on, and is therefore taken off it, by FMVSS 126.
+
+Source: 49 CFR 571.126 (FMVSS 126), S7.11.4 and S7.11.5; UN Regulation 140, 9.11.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from activesteer.analysis.series import timestep
+from activesteer.conventions import Array
+
+FAST_RADPS: Final = math.radians(75.0)
+"""Rate of the steering wheel that ends the range [rad/s]."""
+FAST_FOR_S: Final = 0.2
+"""How long the wheel must go on turning so fast [s]."""
+THRESHOLD_RAD: Final = math.radians(5.0)
+"""Steering wheel angle whose first passing is the beginning of steer [rad]; the range ends before."""
+RANGE_S: Final = 1.0
+"""Length of the range [s]."""
+_AVERAGED_S: Final = 0.1
+"""Window of the moving average of the rate [s]."""
+
+
+def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
+    """The second before the steering wheel turns fast.
+
+    Args:
+        time_s: Time of the samples [s], equidistant, shape (n,).
+        steering_rad: Filtered steering wheel angle [rad], shape (n,).
+
+    Returns:
+        Its samples, as many as there are; none where the wheel does not begin to turn at more than 75 deg/s for 200 ms.
+    """
+    step_s = timestep(time_s)
+    width = max(1, round(_AVERAGED_S / step_s))
+    rate = np.convolve(np.gradient(steering_rad, step_s), np.full(width, 1.0 / width), mode="same")
+    fast = np.concatenate(([False], np.abs(rate) > FAST_RADPS, [False])).astype(np.int8)
+    begins, ends = np.flatnonzero(np.diff(fast) > 0), np.flatnonzero(np.diff(fast) < 0)
+    before = np.abs(steering_rad[begins] - steering_rad[0]) < THRESHOLD_RAD
+    long = begins[before & (ends - begins >= FAST_FOR_S / step_s)]
+    if long.size == 0:
+        return slice(0, 0)
+    end = int(long[0])
+    return slice(max(0, end - round(RANGE_S / step_s)), end)
+
+
+def zeroed(values: Array, samples: slice) -> Array:
+    """A signal less its mean over some samples; as it is where there are none."""
+    return values - values[samples].mean() if samples.stop > samples.start else values
