@@ -86,6 +86,7 @@ def all_commands() -> Commands:
         reproduce,
         run,
         study,
+        test,
         tune,
         tyre,
         validate,
@@ -102,7 +103,7 @@ def all_commands() -> Commands:
         "look": (info, report, replay, video, recover),
         "car": (vehicle, tyre, kc),
         "study": (study, tune, envelope, fault_map, identify, linearise, driver, margins),
-        "prove": (reproduce, figures, validate, bench),
+        "prove": (reproduce, test, figures, validate, bench),
     }.items():
         commands.begin_group(title)
         for module in modules:

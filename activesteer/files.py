@@ -109,6 +109,11 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def file_word(text: str) -> str:
+    """A text as part of a file's name: what is no letter, digit, dot, hyphen or underscore becomes an underscore."""
+    return "".join(letter if letter.isalnum() or letter in "._-" else "_" for letter in text)
+
+
 def user_path(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:
     """A path as a user writes it, `~` replaced by the home folder.
 

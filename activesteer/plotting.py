@@ -1,11 +1,14 @@
-"""Figures on paper or in a file: made without a screen, saved with an error that says where."""
+"""Figures on paper, in a file or in a page: made without a screen, saved with an error that says where."""
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
+
+from markupsafe import Markup
 
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.files import make_folder, replacing, shown_path
@@ -33,6 +36,14 @@ def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
     if title:
         figure.suptitle(title, fontsize="medium")
     return figure
+
+
+def as_svg(figure: Figure) -> Markup:
+    """The picture as an SVG element, to stand in a page; matplotlib escapes its texts."""
+    text = io.StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    svg = text.getvalue()
+    return Markup(svg[svg.index("<svg") :])
 
 
 def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterError) -> Path:

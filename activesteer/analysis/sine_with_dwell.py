@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from activesteer.analysis.filters import low_pass
 from activesteer.analysis.series import crossing_time, timestep
 from activesteer.analysis.source import RecordingLike
-from activesteer.analysis.zeroing import THRESHOLD_RAD, zeroed, zeroing_range
+from activesteer.analysis.zeroing import THRESHOLD_RAD, offset, zeroing_range
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 
@@ -77,7 +77,7 @@ def steering(recording: RecordingLike) -> Steering:
     if abs(angle[0]) > THRESHOLD_RAD:  # more than the offset of a sensor
         raise RecordingError("the sine with dwell has no beginning: the steering wheel is turned in the first sample")
     straight = zeroing_range(time_s, angle)
-    angle = zeroed(angle, straight)
+    angle -= offset(recording["steering_wheel_rad"], straight)
     turned = np.flatnonzero(np.abs(angle) > THRESHOLD_RAD)
     if turned.size == 0:
         raise RecordingError(
@@ -104,7 +104,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         and its time. `yaw_rate_after_1000ms_share` and `yaw_rate_after_1750ms_share`: yaw rate so long after the
         completion of steer over this peak [-]; below zero where the car turns the other way by then.
         `lateral_displacement_m`: of the centre of gravity, across the heading at the beginning of steer, 1.07 s after
-        it; positive to the side that is steered to first [m]. `lateral_displacement_integrated_m`: the same from the
+        it; positive to the side that is steered to first [m]. `lateral_displacement_by_ay_m`: the same from the
         lateral acceleration, as the standards take it [m]. `<name>_peak_abs_<unit>` over the whole run. nan where
         the run ends before a value is reached.
 
@@ -114,7 +114,8 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     times = steering(recording)
     time_s = np.asarray(recording.time_s, dtype=np.float64)
     yaw_rate, ay = (
-        zeroed(low_pass(np.asarray(recording[name]), timestep(time_s), MOTION_CUT_OFF_Hz), times.straight)
+        low_pass(np.asarray(recording[name]), timestep(time_s), MOTION_CUT_OFF_Hz)
+        - offset(recording[name], times.straight)
         for name in ("yaw_rate_radps", "ay_mps2")
     )
     peak_s, peak = _first_peak(time_s, -times.side * yaw_rate, times.reversal_s)
@@ -129,7 +130,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         later = -times.side * _at(time_s, yaw_rate, times.completion_s + instant_s)
         values[f"yaw_rate_after_{1000.0 * instant_s:.0f}ms_share"] = later / peak
     values["lateral_displacement_m"] = _displacement(recording, times)
-    values["lateral_displacement_integrated_m"] = times.side * integrated_displacement(time_s, ay, times.begin_s)
+    values["lateral_displacement_by_ay_m"] = times.side * integrated_displacement(time_s, ay, times.begin_s)
     for name, unit in PEAKS:
         values[f"{name}_peak_abs_{unit}"] = float(np.abs(recording[f"{name}_{unit}"]).max())
     values["speed_end_mps"] = float(recording["speed_mps"][-1])

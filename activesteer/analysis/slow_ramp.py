@@ -20,7 +20,7 @@ from activesteer.conventions import GRAVITY_MPS2, Array
 REFERENCE_MPS2: Final = 0.3 * GRAVITY_MPS2
 """Lateral acceleration that A belongs to [m/s2]."""
 FIT: Final = (1.0 / 3.0, 1.25)
-"""Range of the line in shares of the acceleration looked for: 0.1 to 0.375 g for 0.3 g."""
+"""Range of the line in fractions of the acceleration looked for: 0.1 to 0.375 g for 0.3 g."""
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
@@ -54,7 +54,7 @@ def angle_at(steering_rad: Array, ay_mps2: Array, wanted_mps2: float) -> float:
     Returns:
         Angle [rad].
     """
-    low, high = (share * wanted_mps2 for share in FIT)
+    low, high = (fraction * wanted_mps2 for fraction in FIT)
     line = slice(int(np.argmax(ay_mps2 > low)), int(np.argmax(ay_mps2 > high)))
     slope, offset = np.polynomial.Polynomial.fit(steering_rad[line], ay_mps2[line], 1).convert().coef[::-1]
     return float((wanted_mps2 - offset) / slope)

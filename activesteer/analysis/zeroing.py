@@ -48,6 +48,9 @@ def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
     return slice(max(0, end - round(RANGE_S / step_s)), end)
 
 
-def zeroed(values: Array, samples: slice) -> Array:
-    """A signal less its mean over some samples; as it is where there are none."""
-    return values - values[samples].mean() if samples.stop > samples.start else values
+def offset(values: Array, samples: slice) -> float:
+    """Mean of a signal over some samples; 0 where there are none.
+
+    Of the signal as it is recorded: a filter without phase rings before the steering wheel turns.
+    """
+    return float(np.mean(values[samples], dtype=np.float64)) if samples.stop > samples.start else 0.0

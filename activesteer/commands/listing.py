@@ -1,4 +1,4 @@
-"""`activesteer list`: the manoeuvres, controllers, drivers and vehicles that there are."""
+"""`activesteer list`: the manoeuvres, controllers, drivers, vehicles and standards that there are."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _WIDTH: Final = 25
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
-    parser = commands.add_parser("list", help="manoeuvres, controllers, drivers and vehicles that there are")
+    parser = commands.add_parser("list", help="manoeuvres, controllers, drivers, vehicles, standards")
     parser.set_defaults(action=_list)
 
 
@@ -28,6 +28,7 @@ def _list(_options: argparse.Namespace) -> int:
         list_maneuvers,
         list_vehicles,
     )
+    from activesteer.standards.catalogue import STANDARDS
 
     print("manoeuvres:")
     for name in list_maneuvers():
@@ -47,4 +48,7 @@ def _list(_options: argparse.Namespace) -> int:
     print("vehicles:")
     for name in list_vehicles():
         print(f"  {name}")
+    print("standards:")
+    for name, standard in STANDARDS.items():
+        print_entry(f"  {name:{_WIDTH}} ", standard.title, _WIDTH + 3)
     return 0

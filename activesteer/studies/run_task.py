@@ -18,7 +18,7 @@ import numpy as np
 
 from activesteer.analysis.claims import SCENARIOS
 from activesteer.errors import ActiveSteerError, StudyError
-from activesteer.files import make_folder, writing
+from activesteer.files import file_word, make_folder, writing
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation import amplitude_store
@@ -247,8 +247,7 @@ def _recording_path(settings: Settings, request: Request) -> Path | None:
 
 def recording_name(run: int, maneuver: str, controller: str) -> str:
     """Name of the file of a run's recording."""
-    word = "".join(letter if letter.isalnum() or letter in "._-" else "_" for letter in controller)
-    return f"{run:07d}-{maneuver}-{word}.mcap"
+    return f"{run:07d}-{maneuver}-{file_word(controller)}.mcap"
 
 
 @functools.lru_cache(maxsize=4096)

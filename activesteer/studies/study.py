@@ -46,6 +46,7 @@ def study(
     jobs: int | None = None,
     client: Any = None,
     scheduler: str | None = None,
+    workers: Workers | None = None,
     limit: int | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> pa.Table:
@@ -60,6 +61,7 @@ def study(
         jobs: Number of processes; that of the processors where not given. With 1 all runs are made in this process.
         client: A `distributed.Client` whose cluster makes the runs.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
+        workers: Workers that make the runs of several studies, instead.
         limit: Most runs to make now; the rest is left for another time.
         progress: Called after every task.
 
@@ -91,7 +93,7 @@ def study(
         store = stack.enter_context(Store(folder, parsed.keys).opened(parsed.to_toml(), plan.digest, len(plan)))
         missing = store.missing(len(plan))
         if missing:
-            workers = stack.enter_context(workers_for(jobs, client=client, scheduler=scheduler))
+            workers = workers or stack.enter_context(workers_for(jobs, client=client, scheduler=scheduler))
             # What would go wrong in every run is found out before the first of them.
             if problem := workers.everywhere(prepare_worker, plan.settings):
                 raise StudyError(problem)

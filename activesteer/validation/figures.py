@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from markupsafe import Markup
 
 from activesteer.plotting import new_figure
 from activesteer.quantities import quantity_of
@@ -27,14 +25,6 @@ _SHOWN: Final = {column: (quantity_of(name).title, quantity_of(name).factor) for
 _CROSS: Final = (("rack", "ay"), ("ay", "r"), ("ay", "roll"), ("ay", "beta"))
 """Abscissa and ordinate of the cross-plots."""
 _AXIS_NAMES: Final = _SHOWN | {"rack": ("rack [mm] (- steers left)", 1e3)}
-
-
-def as_svg(figure: Figure) -> Markup:
-    """The picture as an SVG element, to stand in a page; matplotlib escapes its texts."""
-    text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})
-    svg = text.getvalue()
-    return Markup(svg[svg.index("<svg") :])
 
 
 def _style(axis: Axes) -> None:

@@ -11,8 +11,9 @@ from markupsafe import Markup
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder, write_text
 from activesteer.pages import render
+from activesteer.plotting import as_svg
 from activesteer.validation.comparison import Comparison
-from activesteer.validation.figures import RUN_FIGURES, as_svg, sweep_figure
+from activesteer.validation.figures import RUN_FIGURES, sweep_figure
 from activesteer.validation.programme import Validation
 from activesteer.validation.study import Response
 

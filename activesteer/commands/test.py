@@ -1,0 +1,72 @@
+"""`activesteer test`: a car by a standard, with verdict and page."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from activesteer.commands.arguments import (
+    add_controller,
+    add_jobs,
+    add_json,
+    add_output,
+    add_overrides,
+    add_scheduler,
+    add_vehicle,
+    overrides_of,
+)
+from activesteer.commands.output import coloured, print_entry, print_json
+from activesteer.commands.progress import ProgressBar
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser("test", help="test a car by a standard: series, verdict, page")
+    parser.add_argument("standard", metavar="STANDARD", help="a name from `activesteer list`, as fmvss126")
+    add_controller(parser, several=True)
+    add_vehicle(parser)
+    add_overrides(parser)
+    add_output(parser, "DIR", "folder for page, JSON and runs, which is gone on with; none are written without it")
+    add_jobs(parser)
+    add_scheduler(parser)
+    add_json(parser)
+    parser.set_defaults(action=_test)
+
+
+def _test(options: argparse.Namespace) -> int:
+    from activesteer.standards.examination import examine, write_json
+    from activesteer.standards.page import write_page
+
+    if options.output is not None:
+        options.how_to_go_on = "; the same command goes on with it"
+    with ProgressBar(options.standard, quiet=options.json) as bar:
+        result = examine(
+            options.standard,
+            options.controller or ["none"],
+            options.vehicle,
+            overrides_of(options),
+            output=options.output,
+            jobs=options.jobs,
+            scheduler=options.scheduler,
+            progress=lambda controller, series, done, total: bar(
+                done / total, f"{controller}: {series} {done}/{total}"
+            ),
+        )
+    files = []
+    if options.output is not None:
+        name = result.standard.name
+        files = [
+            write_page(result, options.output / f"{name}.html"),
+            write_json(result, options.output / f"{name}.json"),
+        ]
+    status = 1 if result.failed else 0
+    if options.json:
+        print_json(result.to_json())
+        return status
+    print(result.standard.title)
+    for controller, found in result.findings.items():
+        word = {True: "passed", False: "FAILED", None: ""}[found.passed]
+        print_entry(coloured(f"{controller:12} {word:7}"), found.summary, 20)
+    for path in files:
+        print(f"written: {path}")
+    return status

@@ -1,0 +1,23 @@
+"""The standards that there are."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from activesteer.errors import ParameterError, nearest_names
+from activesteer.standards import fmvss126
+from activesteer.standards.standard import Standard
+
+STANDARDS: Final[dict[str, Standard]] = {module.STANDARD.name: module.STANDARD for module in (fmvss126,)}
+"""Name -> standard."""
+
+
+def standard_of(name: str) -> Standard:
+    """A standard by its name.
+
+    Raises:
+        ParameterError: there is none of that name.
+    """
+    if name not in STANDARDS:
+        raise ParameterError(f"there is no standard {name!r}; {nearest_names(name, STANDARDS)}", value=name)
+    return STANDARDS[name]

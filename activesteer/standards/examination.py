@@ -1,0 +1,115 @@
+"""A test by a standard: every controller is driven and evaluated, and the result written."""
+
+from __future__ import annotations
+
+import datetime
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from activesteer.errors import ParameterError
+from activesteer.files import file_word, json_text, make_folder, write_text
+from activesteer.scenario import FileOrTable
+from activesteer.standards.catalogue import standard_of
+from activesteer.standards.proving_ground import ProvingGround
+from activesteer.standards.standard import Findings, Standard
+from activesteer.studies.factor_values import label_of
+from activesteer.studies.run_identity import versions
+from activesteer.studies.workers import workers_for
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What came out.
+
+    Attributes:
+        standard: The standard.
+        vehicle: Name of the vehicle.
+        overrides: What was changed of it.
+        findings: Controller -> what came out.
+        versions: What it was made with.
+        date: When [UTC].
+    """
+
+    standard: Standard
+    vehicle: str
+    overrides: Mapping[str, Any]
+    findings: Mapping[str, Findings]
+    versions: Mapping[str, str]
+    date: datetime.date
+
+    @property
+    def failed(self) -> list[str]:
+        """Controllers whose car breaks a limit."""
+        return [name for name, found in self.findings.items() if found.passed is False]
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {
+            "standard": self.standard.name,
+            "edition": self.standard.edition,
+            "vehicle": self.vehicle,
+            "overrides": dict(self.overrides),
+            "versions": dict(self.versions),
+            "controllers": {name: found.values | {"summary": found.summary} for name, found in self.findings.items()},
+        }
+
+
+def examine(
+    name: str,
+    controllers: Sequence[str] = ("none",),
+    vehicle: FileOrTable = "compact",
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    output: str | os.PathLike[str] | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[str, str, int, int], None] | None = None,
+) -> Examination:
+    """Drives and evaluates a standard.
+
+    Args:
+        name: Name of the standard, one of `catalogue.STANDARDS`.
+        controllers: Names or files of controllers, each of which is a test of its own.
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key -> value.
+        output: Folder for the runs, which can be gone on with; they are not kept where not given.
+        jobs: Number of processes; that of the processors where not given.
+        scheduler: Address of a Dask scheduler that drives the runs instead.
+        progress: Called with controller, series, how many of its runs are done, and how many there are.
+
+    Returns:
+        The examination.
+
+    Raises:
+        ActiveSteerError: an input is wrong, or a run failed without which the others make no sense.
+    """
+    standard = standard_of(name)
+    given = dict(overrides or {})
+    found = {}
+    with workers_for(jobs, scheduler=scheduler) as workers:
+        for controller in controllers:
+            label = label_of(controller)
+            folder = None if output is None else Path(output) / "runs" / file_word(label)
+
+            def tell(series: str, done: int, total: int, label: str = label) -> None:
+                if progress is not None:
+                    progress(label, series, done, total)
+
+            ground = ProvingGround(standard.name, vehicle, controller, given, folder, workers, tell)
+            found[label] = standard.examine(ground)
+    return Examination(
+        standard, label_of(vehicle), given, found, versions(), datetime.datetime.now(tz=datetime.UTC).date()
+    )
+
+
+def write_json(result: Examination, path: Path) -> Path:
+    """Writes the result as JSON; a file that exists is replaced.
+
+    Raises:
+        ParameterError: it cannot be written.
+    """
+    make_folder(path.parent, ParameterError)
+    return write_text(path, json_text(result.to_json()) + "\n", ParameterError)

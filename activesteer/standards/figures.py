@@ -1,0 +1,71 @@
+"""The pictures of a test's page."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from activesteer.conventions import RUN_COLOURS
+from activesteer.plotting import new_figure
+from activesteer.standards.standard import Panel, Picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_BESIDE: Final = 3
+"""Most panels beside each other."""
+_LIMIT: Final = "#b3261e"
+_SCALE: Final = "viridis"
+
+
+def draw(picture: Picture) -> Figure:
+    """A picture.
+
+    Raises:
+        ParameterError: matplotlib is not installed.
+    """
+    columns = min(len(picture.panels), _BESIDE)
+    rows = math.ceil(len(picture.panels) / columns)
+    figure = new_figure(9.0, 2.7 * rows + 0.4, picture.title)
+    axes = figure.subplots(rows, columns, squeeze=False)
+    for axis in axes.flat[len(picture.panels) :]:
+        axis.set_visible(False)
+    used = list(axes.flat[: len(picture.panels)])
+    for axis, panel in zip(used, picture.panels, strict=True):
+        _fill(axis, panel)
+    if picture.scale is not None:
+        from matplotlib.cm import ScalarMappable  # noqa: PLC0415 - an extra, and slow to import
+
+        label, low, high = picture.scale
+        colours = ScalarMappable(cmap=_SCALE)
+        colours.set_clim(low, high)
+        figure.colorbar(colours, ax=used, label=label)
+    return figure
+
+
+def _fill(axis: Axes, panel: Panel) -> None:
+    from matplotlib import colormaps  # noqa: PLC0415 - an extra, and slow to import
+
+    scale = colormaps[_SCALE]
+    own = 0
+    for curve in panel.curves:
+        colour, dashes = RUN_COLOURS[own % len(RUN_COLOURS)], "--" if own % 2 else "-"
+        if curve.shade is None:
+            own += 1
+        else:
+            colour, dashes = scale(curve.shade), "-"
+        marker = "o" if curve.marked else None
+        axis.plot(curve.x, curve.y, color=colour, ls=dashes, lw=1.2, marker=marker, ms=3, label=curve.label or None)
+    for value, label in panel.limits:
+        axis.axhline(value, color=_LIMIT, lw=1.0, ls=(0, (4, 2)), label=label)
+    if panel.log:
+        axis.set_xscale("log")
+    axis.set_title(panel.title, fontsize="small")
+    axis.set_xlabel(panel.x_label, fontsize="small")
+    axis.set_ylabel(panel.y_label, fontsize="small")
+    axis.tick_params(labelsize="small")
+    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
+    axis.spines[["top", "right"]].set_visible(False)
+    if axis.get_legend_handles_labels()[1]:
+        axis.legend(frameon=False, fontsize="x-small")

@@ -1,0 +1,229 @@
+"""FMVSS 126 and UN R140: electronic stability control, the series of sines with dwell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+from activesteer.analysis.sine_with_dwell import DISPLACEMENT_TIME_S, INSTANTS_S, RATIO_LIMITS
+from activesteer.analysis.slow_ramp import FIT, REFERENCE_MPS2
+from activesteer.errors import ManeuverError
+from activesteer.standards.standard import Curve, Findings, Ground, Panel, Picture, Run, Standard, Table
+
+RAMP_DEGPS: Final = 13.5
+"""Rate of the slowly increasing steer [deg/s]; S7.6."""
+RAMPS: Final = 3
+"""How many of them to each side."""
+FIRST_FACTOR, STEP_FACTOR, LAST_FACTOR = 1.5, 0.5, 6.5
+"""The amplitudes as multiples of A; S7.9.2 to S7.9.4."""
+LEAST_LAST_DEG, MOST_DEG = 270.0, 300.0
+"""The last amplitude is at least the one, and none is above the other [deg]."""
+DISPLACED_FROM: Final = 5.0
+"""Multiple of A from which the displacement counts; S5.2.3."""
+LEAST_DISPLACEMENT_M: Final = 1.83
+LEAST_HEAVY_DISPLACEMENT_M: Final = 1.52
+HEAVY_KG: Final = 3500.0
+"""Displacement that is needed [m], and mass above which the smaller one is enough [kg]."""
+RATIOS: Final = ("yaw_ratio_1s", "yaw_ratio_175s")
+_METRICS: Final = ("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share")
+_SIDES: Final = ("left", "right")
+_BEGIN_S: Final = 1.5
+"""When the sine begins: the signals are zeroed over the second before [s]."""
+_SINE: Final = {"steer.start_s": _BEGIN_S, "duration_s": 5.6}
+_RAMP: Final = {"steer.end_deg": 120.0, "duration_s": 10.0, "road.mu": 0.9}
+
+
+def amplitudes(a_deg: float) -> list[tuple[float, float]]:
+    """The amplitudes of a series.
+
+    Args:
+        a_deg: A [deg].
+
+    Returns:
+        Multiple of A and amplitude [deg] of each run: from 1.5 A by 0.5 A to the greater of 6.5 A and 270 deg, and
+        where 6.5 A is above 300 deg to 300 deg.
+    """
+    last = LAST_FACTOR * a_deg
+    last = MOST_DEG if last > MOST_DEG else max(last, LEAST_LAST_DEG)
+    found = []
+    factor = FIRST_FACTOR
+    while factor * a_deg < last - 1e-9:
+        found.append((factor, factor * a_deg))
+        factor += STEP_FACTOR
+    return [*found, (last / a_deg, last)]
+
+
+def verdict(row: Mapping[str, float], least_m: float) -> list[str]:
+    """What of a run breaks the limits, in words; nothing where it keeps them.
+
+    Args:
+        row: `factor`, `yaw_ratio_1s`, `yaw_ratio_175s`, `displacement_m`.
+        least_m: Displacement that is needed [m].
+    """
+    broken = [
+        f"yaw rate {100.0 * row[name]:.0f} % {after_s:.2f} s after completion of steer ({100.0 * limit:.0f} % allowed)"
+        for name, after_s, limit in zip(RATIOS, INSTANTS_S, RATIO_LIMITS, strict=True)
+        if not abs(row[name]) <= limit
+    ]
+    if row["factor"] >= DISPLACED_FROM - 1e-9 and not row["displacement_m"] >= least_m:
+        broken.append(f"displacement {row['displacement_m']:.2f} m ({least_m:.2f} m needed)")
+    return broken
+
+
+def _examine(ground: Ground) -> Findings:
+    a_deg, ramps_deg = _reference_angle(ground)
+    mass_kg = ground.scenario("sine_with_dwell").car.config.single_track.mass_kg
+    least_m = LEAST_DISPLACEMENT_M if mass_kg <= HEAVY_KG else LEAST_HEAVY_DISPLACEMENT_M
+    steps = [(side, *step) for side in _SIDES for step in amplitudes(a_deg)]
+    runs = ground.drive(
+        "sine_with_dwell",
+        "sine_with_dwell",
+        [{"steer.direction": side, "steer.steering_wheel_deg": amplitude} for side, _, amplitude in steps],
+        _SINE,
+        ("yaw_rate_radps",),
+    )
+    series, broken = [], []
+    for (side, factor, amplitude), run in zip(steps, runs, strict=True):
+        row: dict[str, Any] = {"direction": side, "amplitude_deg": amplitude, "factor": factor}
+        row |= {name: run.metric(metric) for name, metric in zip(RATIOS, _METRICS, strict=True)}
+        row["displacement_m"] = run.metric("lateral_displacement_by_ay_m")
+        row["displacement_of_position_m"] = run.metric("lateral_displacement_m")
+        broken.append([f"no result: {run.error}"] if run.error else verdict(row, least_m))
+        series.append(row | {"pass": not broken[-1]})
+    passed = all(row["pass"] for row in series)
+    values = {
+        "A_deg": a_deg, "ramps_deg": ramps_deg, "displacement_needed_m": least_m, "series": series, "pass": passed,
+    }  # fmt: skip
+    tables = [
+        Table(
+            f"Slowly increasing steer: A = {a_deg:.1f} deg",
+            ("side", *(f"run {number + 1}: steering wheel at 0.3 g [deg]" for number in range(RAMPS))),
+            [(side, *(f"{angle:.1f}" for angle in found)) for side, found in ramps_deg.items()],
+        ),
+        _table(series, runs, least_m),
+    ]
+    return Findings(values, _summary(series, broken), tables, _pictures(series, runs, least_m))
+
+
+def _reference_angle(ground: Ground) -> tuple[float, dict[str, list[float]]]:
+    """A [deg]: the mean of six slow ramps, each rounded to 0.1 deg, and they themselves by side."""
+    sensors = ground.scenario("slowly_increasing_steer").car.config.sensors
+    signs = {"left": 1.0, "right": -1.0}
+    # Sensors with noise are the only thing that tells repetitions apart.
+    noise = [{} if sensors.seed is None else {"sensors.seed": sensors.seed + number} for number in range(RAMPS)]
+    cases = [{"steer.rate_degps": sign * RAMP_DEGPS, **other} for sign in signs.values() for other in noise]
+    runs = ground.drive("slowly_increasing_steer", "slowly_increasing_steer", cases, _RAMP)
+    found = [math.degrees(abs(run.metric("steering_wheel_at_0_3g_rad"))) for run in runs]
+    for run, angle in zip(runs, found, strict=True):
+        if math.isnan(angle):
+            why = run.error or f"it stays below {FIT[1] * REFERENCE_MPS2:.3g} m/s2"
+            raise ManeuverError(f"A is not found: with {run.case['steer.rate_degps']:g} deg/s of the wheel: {why}")
+    rounded = [round(angle, 1) for angle in found]
+    sides = {side: rounded[RAMPS * number :][:RAMPS] for number, side in enumerate(signs)}
+    return round(sum(rounded) / len(rounded), 1), sides
+
+
+def _summary(series: list[dict[str, Any]], broken: list[list[str]]) -> str:
+    failed = [(row, words) for row, words in zip(series, broken, strict=True) if words]
+    if not failed:
+        return f"all {len(series)} runs keep the limits, up to {series[-1]['amplitude_deg']:.0f} deg to both sides"
+    row, words = min(failed, key=lambda pair: pair[0]["factor"])
+    return (
+        f"first at {row['factor']:.3g} A ({row['amplitude_deg']:.0f} deg), {row['direction']} first: "
+        f"{'; '.join(words)}; {len(failed)} of {len(series)} runs fail"
+    )
+
+
+def _table(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> Table:
+    limits = zip(INSTANTS_S, RATIO_LIMITS, strict=True)
+    columns = (
+        "first to the", "amplitude [A]", "amplitude [deg]",
+        *(f"yaw rate after {instant_s:.2f} s [%], at most {100.0 * limit:.0f}" for instant_s, limit in limits),
+        f"displacement after {DISPLACEMENT_TIME_S:.2f} s [m], at least {least_m:.2f} from {DISPLACED_FROM:g} A on",
+        "result",
+    )  # fmt: skip
+    rows = [
+        (
+            row["direction"], f"{row['factor']:.2f}", f"{row['amplitude_deg']:.1f}",
+            *(_number(100.0 * row[name], 1) for name in RATIOS),
+            _number(row["displacement_m"], 2),
+            "pass" if row["pass"] else f"fail {run.error}".strip(),
+        )
+        for row, run in zip(series, runs, strict=True)
+    ]  # fmt: skip
+    return Table("Sine with dwell", columns, rows, frozenset(i for i, row in enumerate(series) if not row["pass"]))
+
+
+def _number(value: float, digits: int) -> str:
+    return "-" if math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _pictures(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> list[Picture]:
+    last = max(row["factor"] for row in series)
+
+    def panel(channel: str, title: str, side: str) -> Panel:
+        curves = [
+            run.over_time(channel, begin_s=_BEGIN_S, shade=(row["factor"] - FIRST_FACTOR) / (last - FIRST_FACTOR))
+            for row, run in zip(series, runs, strict=True)
+            if row["direction"] == side
+        ]
+        return Panel("time from the beginning of steer [s]", title, curves, f"{side} first")
+
+    def over_amplitude(name: str, label: str, factor: float, limit: tuple[float, str]) -> Panel:
+        curves = [
+            Curve(
+                [row["factor"] for row in series if row["direction"] == side],
+                [factor * row[name] for row in series if row["direction"] == side],
+                f"{side} first", marked=True,
+            )
+            for side in _SIDES
+        ]  # fmt: skip
+        return Panel("amplitude [A]", label, curves, limits=(limit,))
+
+    scale = ("amplitude [A]", FIRST_FACTOR, last)
+    limits = [(100.0 * limit, f"{100.0 * limit:.0f} % allowed") for limit in RATIO_LIMITS]
+    return [
+        Picture("Yaw rate", [panel("yaw_rate_radps", "yaw rate [deg/s]", side) for side in _SIDES], scale),
+        Picture(
+            "Yaw rate after the completion of steer, of its first peak after the reversal; lateral displacement",
+            [
+                *(
+                    over_amplitude(name, f"after {instant_s:.2f} s [%]", 100.0, limit)
+                    for name, instant_s, limit in zip(RATIOS, INSTANTS_S, limits, strict=True)
+                ),
+                over_amplitude("displacement_m", "displacement [m]", 1.0, (least_m, f"{least_m:.2f} m from 5 A on")),
+            ],
+        ),
+    ]
+
+
+STANDARD: Final = Standard(
+    name="fmvss126",
+    title="FMVSS 126 / UN R140: electronic stability control, sine with dwell",
+    edition=(
+        "49 CFR 571.126, S5.2 and S7.6 to S7.11, in the text of 2008 and later; UN Regulation 140 asks for the same. "
+        "Written from knowledge of the public text; the range of the regression is that of NHTSA TP-126."
+    ),
+    implemented=(
+        "Slowly increasing steer at 13.5 deg/s and 80 km/h, three left and three right, of the car as it is, with its "
+        "controller. A is the steering wheel angle at 0.3 g by linear regression from 0.1 to 0.375 g, to 0.1 deg.",
+        "Sine of 0.7 Hz with a dwell of 500 ms at the second peak, throttle released at 80 km/h when it begins, from "
+        "1.5 A by 0.5 A to the greater of 6.5 A and 270 deg, to 300 deg where 6.5 A is above; left first, right first.",
+        "Steering wheel angle filtered at 10 Hz, yaw rate and lateral acceleration at 6 Hz, by 12-pole phaseless "
+        "Butterworth filters, and zeroed over the second before the wheel turns at more than 75 deg/s for 200 ms.",
+        "Limits: yaw rate 1.00 and 1.75 s after completion of steer at most 35 and 20 % of its first peak after the "
+        "reversal, in magnitude; displacement 1.07 s after the beginning of steer, by integrating the lateral "
+        "acceleration twice, at least 1.83 m (1.52 m above 3500 kg) at 5 A and more.",
+    ),
+    left_out=(
+        "Whether the system is an electronic stability control by S5.1, how it detects malfunctions, telltales (S5.3).",
+        "Brake and tyre conditioning (S7.4, S7.5): the model has no warm-up. Ambient conditions; outriggers.",
+        "With ideal sensors, the default, the three repetitions to a side are the same run.",
+        "The car is driven as its file has it; driver and measuring equipment are loaded with --set load. keys. The "
+        "mass that decides on 1.83 or 1.52 m is that of the car as driven, not its gross vehicle weight rating.",
+        "Road: even, peak friction 0.9 in the model.",
+    ),
+    examine=_examine,
+)
+"""FMVSS 126 / UN R140."""

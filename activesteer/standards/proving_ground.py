@@ -1,0 +1,84 @@
+"""Where the runs of a standard are driven: series of runs on the study engine, in one set of workers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.standards.standard import CURVE_STEP_S, Run
+from activesteer.studies import run_task
+from activesteer.studies.study import study
+from activesteer.studies.workers import Workers
+
+assert run_task.CURVE_STEP_S == CURVE_STEP_S
+
+
+@dataclass(frozen=True)
+class ProvingGround:
+    """One car with one controller, and who drives its runs.
+
+    Attributes:
+        standard: Name of the standard.
+        vehicle: Name, path or table of the vehicle.
+        controller: Name or file of the controller.
+        overrides: What the user changes of the car: dotted key -> value.
+        folder: Where the studies go that can be gone on with; None where they are not kept.
+        workers: Who makes the runs.
+        progress: Called with the series, how many runs of it are done, and how many there are.
+    """
+
+    standard: str
+    vehicle: FileOrTable
+    controller: str
+    overrides: Mapping[str, Any]
+    folder: Path | None
+    workers: Workers
+    progress: Callable[[str, int, int], None]
+
+    def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
+        """See `Ground`."""
+        return resolve(maneuver, self.vehicle, {**(overrides or {}), **self.overrides})
+
+    def drive(
+        self,
+        series: str,
+        maneuver: FileOrTable,
+        cases: Sequence[Mapping[str, Any]],
+        overrides: Mapping[str, Any] | None = None,
+        curves: Sequence[str] = (),
+    ) -> list[Run]:
+        """See `Ground`."""
+        table = study(
+            {
+                "title": f"{self.standard}: {series}",
+                "maneuvers": [maneuver],
+                "vehicles": [self.vehicle],
+                "controllers": [self.controller],
+                "overrides": {**(overrides or {}), **self.overrides},
+                "design": {"kind": "list", "cases": [dict(case) for case in cases]},
+                **({"curves": list(curves)} if curves else {}),
+            },
+            output=None if self.folder is None else self.folder / series,
+            workers=self.workers,
+            progress=lambda counted: self.progress(series, counted.done, counted.total),
+        )
+        return [_run(row, case) for row, case in zip(table.to_pylist(), cases, strict=True)]
+
+
+def _run(row: Mapping[str, Any], case: Mapping[str, Any]) -> Run:
+    told = {*case, "run", "sample"}
+    return Run(
+        case,
+        {name: value for name, value in row.items() if isinstance(value, float) and name not in told},
+        {
+            name.removeprefix(run_task.CURVE): np.asarray(value, dtype=np.float64)
+            for name, value in row.items()
+            if name.startswith(run_task.CURVE) and value is not None
+        },
+        "" if row["status"] == run_task.Status.OK else row["error"] or row["status"],
+    )

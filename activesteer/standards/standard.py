@@ -1,0 +1,199 @@
+"""What a standard is here, and what comes out of a test by it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from activesteer.conventions import Array
+from activesteer.quantities import display_unit
+
+if TYPE_CHECKING:
+    from activesteer.scenario import FileOrTable, Scenario
+
+CURVE_STEP_S: Final = 0.02
+"""Time between two values of a channel that is kept [s]; that of studies."""
+
+_LEAD_S: Final = 0.2
+
+
+class Run(NamedTuple):
+    """A run that was driven.
+
+    Attributes:
+        case: What it was driven with beside the others of its series.
+        metrics: Its metrics; empty where it failed or could not be evaluated.
+        channels: Channels over time that are kept, every `CURVE_STEP_S`.
+        error: Why it has no metrics; empty where it has.
+    """
+
+    case: Mapping[str, Any]
+    metrics: Mapping[str, float]
+    channels: Mapping[str, Array]
+    error: str
+
+    def metric(self, name: str) -> float:
+        """A metric; nan where the run has none."""
+        return self.metrics.get(name, math.nan)
+
+    def over_time(self, channel: str, *, begin_s: float = 0.0, **words: Any) -> Curve:
+        """A channel in the unit that it is shown in, from shortly before what time is counted from.
+
+        Args:
+            channel: One of those that were kept.
+            begin_s: What time is counted from [s].
+            **words: Of `Curve`.
+        """
+        values = self.channels.get(channel, np.empty(0))
+        time_s = np.arange(len(values)) * CURVE_STEP_S - begin_s
+        shown = time_s >= -_LEAD_S
+        return Curve(time_s[shown], display_unit(channel).factor * values[shown], **words)
+
+
+class Ground(Protocol):
+    """Where a car with a controller is driven; `proving_ground.ProvingGround` is the one there is."""
+
+    def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
+        """The car and a manoeuvre, resolved."""
+        ...
+
+    def drive(
+        self,
+        series: str,
+        maneuver: FileOrTable,
+        cases: Sequence[Mapping[str, Any]],
+        overrides: Mapping[str, Any] | None = None,
+        curves: Sequence[str] = (),
+    ) -> list[Run]:
+        """Drives a series of runs.
+
+        Args:
+            series: Its name, one for each series of a test.
+            maneuver: Name, path or table.
+            cases: Dotted key -> value of each run, the same keys in all of them.
+            overrides: The same for what all runs share.
+            curves: Channels that are kept over time.
+
+        Returns:
+            The runs, in the order of the cases.
+
+        Raises:
+            ActiveSteerError: an input is wrong.
+        """
+        ...
+
+
+class Curve(NamedTuple):
+    """A curve in a panel, in the units of its axes.
+
+    Attributes:
+        x: Abscissa, shape (n,).
+        y: Ordinate, shape (n,).
+        label: Its name in the legend; none where empty.
+        shade: Place on a scale of colours from 0 to 1, of a curve that is one of many; None for a colour of its own.
+        marked: Whether its points are drawn.
+    """
+
+    x: ArrayLike
+    y: ArrayLike
+    label: str = ""
+    shade: float | None = None
+    marked: bool = False
+
+
+class Panel(NamedTuple):
+    """A pair of axes.
+
+    Attributes:
+        x_label: Name and unit of the abscissa.
+        y_label: Name and unit of the ordinate.
+        curves: What is drawn.
+        title: What stands above.
+        limits: Values of the ordinate that a standard sets, with their names.
+        log: Whether the abscissa is logarithmic.
+    """
+
+    x_label: str
+    y_label: str
+    curves: Sequence[Curve]
+    title: str = ""
+    limits: Sequence[tuple[float, str]] = ()
+    log: bool = False
+
+
+class Picture(NamedTuple):
+    """Panels beside each other.
+
+    Attributes:
+        title: What they show.
+        panels: The panels.
+        scale: What the colours of curves with a shade mean: name, least and greatest value.
+    """
+
+    title: str
+    panels: Sequence[Panel]
+    scale: tuple[str, float, float] | None = None
+
+
+class Table(NamedTuple):
+    """A table.
+
+    Attributes:
+        title: What it shows.
+        columns: Heads, with units.
+        rows: Cells, as they are read.
+        outside: Numbers of the rows that break a limit.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    outside: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What came out of a test of one car with one controller.
+
+    Attributes:
+        values: What `--json` prints. With `pass` where the standard has limits, and else without it.
+        summary: The verdict, or what was found, in a sentence.
+        tables: For the page.
+        pictures: For the page.
+    """
+
+    values: dict[str, Any]
+    summary: str
+    tables: Sequence[Table] = field(default_factory=tuple)
+    pictures: Sequence[Picture] = field(default_factory=tuple)
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the limits are kept; None for a test method without limits."""
+        return self.values.get("pass")
+
+
+@dataclass(frozen=True)
+class Standard:
+    """A standard.
+
+    Attributes:
+        name: How it is called on the command line.
+        title: What it is.
+        edition: Which edition, and from where the text is known.
+        implemented: What of it is done here, a sentence each.
+        left_out: What is not, or not as it says.
+        examine: Drives the runs of one car with one controller, and evaluates them.
+    """
+
+    name: str
+    title: str
+    edition: str
+    implemented: Sequence[str]
+    left_out: Sequence[str]
+    examine: Callable[[Ground], Findings]

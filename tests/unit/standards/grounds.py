@@ -1,0 +1,39 @@
+"""A proving ground whose runs are written down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.standards.standard import Run
+
+Driven = Callable[[str, Mapping[str, Any]], Mapping[str, float]]
+"""Series, case -> metrics."""
+
+
+@dataclass
+class WrittenGround:
+    """Gives the metrics that a test writes, and keeps what was asked for."""
+
+    driven: Driven
+    vehicle: FileOrTable = "compact"
+    changed: dict[str, Any] = field(default_factory=dict)
+    asked: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+
+    def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
+        return resolve(maneuver, self.vehicle, {**(overrides or {}), **self.changed})
+
+    def drive(
+        self,
+        series: str,
+        maneuver: FileOrTable,
+        cases: Sequence[Mapping[str, Any]],
+        overrides: Mapping[str, Any] | None = None,
+        curves: Sequence[str] = (),
+    ) -> list[Run]:
+        # Every case must be one that can be driven.
+        resolve(maneuver, self.vehicle, {**(overrides or {}), **self.changed, **cases[0]})
+        self.asked.setdefault(series, []).extend(dict(case) for case in cases)
+        return [Run(case, self.driven(series, case), {}, "") for case in cases]

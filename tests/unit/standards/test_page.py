@@ -1,0 +1,46 @@
+"""The page of a test: everything in it, nothing fetched, what a name holds stays text."""
+
+from __future__ import annotations
+
+import datetime
+
+import pytest
+
+from activesteer.standards.examination import Examination
+from activesteer.standards.page import page
+from activesteer.standards.standard import Curve, Findings, Panel, Picture, Standard, Table
+
+EVIL = '</td><script>alert(1)</script><img src="http://example.org/x">{{ version }}'
+
+
+def examination(word: str, **values: bool) -> Examination:
+    picture = Picture(word, [Panel(word, word, [Curve([1.0, 2.0], [1.0, 2.0], word)], word, [(1.5, word)])])
+    shaded = Picture(word, [Panel("x", "y", [Curve([1.0, 2.0], [1.0, 2.0], shade=0.5)], log=True)], (word, 0.0, 1.0))
+    found = Findings(dict(values), word, [Table(word, [word], [[word]], frozenset([0]))], [picture, shaded])
+    standard = Standard("one", word, word, [word], [word], lambda _: found)
+    return Examination(standard, word, {"road.mu": word}, {word: found}, {"activesteer": word}, datetime.date.min)
+
+
+def test_page_shows_all_and_fetches_nothing():
+    pytest.importorskip("matplotlib")
+    text = page(examination("plain", **{"pass": False}))
+    assert text.count("<svg") == 2
+    assert ">fail<" in text
+    assert 'class="outside"' in text
+    assert "0001-01-01" in text
+
+
+def test_names_stay_text():
+    pytest.importorskip("matplotlib")
+    text = page(examination(EVIL))
+    assert "<script" not in text
+    assert "<img" not in text
+    assert "{{ version }}" in text
+
+
+def test_a_method_without_limits_never_says_pass():
+    pytest.importorskip("matplotlib")
+    text = page(examination("plain"))
+    assert ">pass<" not in text
+    assert ">fail<" not in text
+    assert "no limits" in text
