@@ -107,7 +107,7 @@ def test_displacement_is_taken_after_the_beginning_across_the_heading(side):
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_integrated_displacement_is_that_of_a_constant_acceleration(side):
     run = sine_with_dwell(side=side, ay_mps2=4.0)
-    # The filter spreads the step over some 50 ms; what it moves before the beginning of steer is lost to both integrals.
+    # The filter spreads the step over 50 ms; what it moves before the beginning of steer is lost to both integrals.
     assert metrics(run)["lateral_displacement_by_ay_m"] == pytest.approx(0.5 * 4.0 * 1.07**2, abs=4.0 * 0.01 * 1.07)
 
 
