@@ -12,10 +12,10 @@ import numpy as np
 
 from activesteer.analysis import handling
 from activesteer.analysis.filters import low_pass
-from activesteer.analysis.series import timestep
+from activesteer.analysis.series import Array, timestep
 from activesteer.analysis.sine_with_dwell import MOTION_CUT_OFF_Hz, STEERING_CUT_OFF_Hz
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import GRAVITY_MPS2, Array
+from activesteer.conventions import GRAVITY_MPS2
 
 REFERENCE_MPS2: Final = 0.3 * GRAVITY_MPS2
 """Lateral acceleration that A belongs to [m/s2]."""

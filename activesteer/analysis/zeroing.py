@@ -10,8 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.analysis.series import timestep
-from activesteer.conventions import Array
+from activesteer.analysis.series import Array, timestep
 
 FAST_RADPS: Final = math.radians(75.0)
 """Rate of the steering wheel that ends the range [rad/s]."""
