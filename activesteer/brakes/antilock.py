@@ -7,9 +7,10 @@ each wheel goes round
     OFF -> RELEASE -> RECOVER -> BUILD -> RELEASE ...
 
 RELEASE lowers the pressure to a fraction of what the friction bore (`friction_Nm`, from pressure and deceleration of
-the wheel), and further if the wheel does not gain speed; RECOVER waits until it rolls with the car again; BUILD begins
-just below what was borne and rises slowly, the faster the longer it lasts, as on a road that has become better. A wheel
-whose limit comes above what the driver asks for is OFF.
+the wheel), on ice further, where that leaves too little torque to speed the wheel up, and still further if the wheel
+does not gain speed; RECOVER waits until it rolls with the car again; BUILD begins just below what was borne and rises
+slowly, the faster the longer it lasts, as on a road that has become better. A wheel whose limit comes above what the
+driver asks for is OFF. A car that is nearly at rest is handed over to him by pressures that rise slowly.
 
 Source of the cycle by wheel deceleration: Bosch, Automotive Handbook, chapter on ABS; Pasillas-Lepine (2006), Hybrid
 modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms. Shares, thresholds and rates are
@@ -25,8 +26,7 @@ from activesteer.compilation import compiled
 OFF, RELEASE, RECOVER, BUILD = 0.0, 1.0, 2.0, 3.0
 
 _REGAINS_mps2: Final = 3.0
-"""A wheel that gains speed on the car by more than this is recovering, and rolls with it once it no longer does
-[m/s2]."""
+"""A wheel that gains speed on the car by more than this is recovering; by less it rolls with it in any case [m/s2]."""
 _PATIENCE_S: Final = 0.03
 """Time that a released wheel gets to gain speed before its pressure is taken down further [s]."""
 _SETTLES_S: Final = 0.08
@@ -49,7 +49,9 @@ def _release(setup, state, wheel):
     if state.phase[wheel] == BUILD and state.phase_s[wheel] < _SETTLES_S:
         borne = max(borne, _KEPT * state.borne_Nm[wheel])
     state.borne_Nm[wheel] = borne
-    state.limit_Pa[wheel] = setup.release_fraction * state.borne_Nm[wheel] / setup.torque_per_pressure_NmpPa[wheel]
+    needed_Nm = setup.inertia_kgm2[wheel] / setup.rolling_radius_m[wheel] * setup.regain_mps2
+    left = max(min(setup.release_fraction * borne, borne - needed_Nm), 0.0)
+    state.limit_Pa[wheel] = left / setup.torque_per_pressure_NmpPa[wheel]
     _begin(state, wheel, RELEASE)
 
 
@@ -66,9 +68,14 @@ def _wheel(setup, state, wheel, car_mps2):
         minimum = setup.first_slip if phase == OFF else setup.min_slip - setup.min_slip_gain_s2pm * car_mps2
         if phase == BUILD and state.phase_s[wheel] < _SETTLES_S:
             minimum *= 2.0
+        minimum += setup.min_slip_speed_mps / state.reference_mps
         if (gain < -threshold and slip > minimum) or (slip > setup.largest_slip and gain < _REGAINS_mps2):
             _release(setup, state, wheel)
-        elif phase == BUILD:
+        elif phase == OFF:
+            # Less than the highest where the car has become faster again, after a hand-over.
+            highest = setup.full_pedal_pressure_Pa
+            state.limit_Pa[wheel] = min(state.limit_Pa[wheel] + setup.hand_over_Paps * setup.interval_s, highest)
+        else:
             faster = 1.0 + state.phase_s[wheel] / _IMPATIENCE_S
             rate = setup.build_per_s * faster * state.borne_Nm[wheel] / per_pressure
             state.limit_Pa[wheel] += rate * setup.interval_s
@@ -77,13 +84,15 @@ def _wheel(setup, state, wheel, car_mps2):
                 _begin(state, wheel, OFF)
     elif phase == RELEASE:
         if gain > _REGAINS_mps2:
+            state.regained_mps2[wheel] = gain
             _begin(state, wheel, RECOVER)
         elif state.phase_s[wheel] > _PATIENCE_S:
             lower = state.limit_Pa[wheel] - setup.fall_Paps * setup.interval_s
             state.limit_Pa[wheel] = max(lower, 0.0)
     else:
         state.borne_Nm[wheel] = max(state.borne_Nm[wheel], state.friction_Nm[wheel])
-        if gain < _REGAINS_mps2:
+        state.regained_mps2[wheel] = max(state.regained_mps2[wheel], gain)
+        if gain < max(_REGAINS_mps2, setup.rolls_fraction * state.regained_mps2[wheel]):
             state.limit_Pa[wheel] = setup.resume_fraction * state.borne_Nm[wheel] / per_pressure
             _begin(state, wheel, BUILD)
 
@@ -98,12 +107,15 @@ def antilock(setup, state, ax_mps2):
         ax_mps2: Longitudinal acceleration as measured [m/s2].
     """
     highest = setup.full_pedal_pressure_Pa
+    slow = state.reference_mps < setup.lowest_speed_mps
     for wheel in range(4):
-        slow = state.reference_mps < setup.lowest_speed_mps
-        if slow or state.demand_Pa[wheel] == 0.0 or setup.torque_per_pressure_NmpPa[wheel] == 0.0:
-            if state.phase[wheel] != OFF:
-                _begin(state, wheel, OFF)
+        idle = state.demand_Pa[wheel] == 0.0 or setup.torque_per_pressure_NmpPa[wheel] == 0.0
+        if (idle or slow) and state.phase[wheel] != OFF:
+            _begin(state, wheel, OFF)
+        if idle:
             state.limit_Pa[wheel] = highest
+        elif slow:
+            state.limit_Pa[wheel] = min(state.allowed_Pa[wheel] + setup.hand_over_Paps * setup.interval_s, highest)
         else:
             _wheel(setup, state, wheel, ax_mps2 - state.offset_mps2)
         state.allowed_Pa[wheel] = state.limit_Pa[wheel]

@@ -34,8 +34,10 @@ class Antilock:
 
     select_low: bool = True
     """Whether both rear wheels get the pressure of the one with less grip."""
-    lowest_speed_mps: Annotated[float, Range(0.5, 10.0)] = 2.0
-    """Speed below which it leaves the brakes to the driver [m/s]."""
+    lowest_speed_mps: Annotated[float, Range(0.5, 10.0)] = 1.5
+    """Speed below which it leaves the brakes to the driver [m/s] ..."""
+    hand_over_Paps: NotNegative = 4e6
+    """... by letting the pressures rise this fast to what he asks for [Pa/s]."""
     first_deceleration_mps2: Positive = 20.0
     """Deceleration of a wheel beyond the car's that releases it while the pedal is being pressed [m/s2]: a pressure
     that rises at its fastest makes 14 m/s2 at 100 km/h without any danger, by the slip that it needs."""
@@ -46,12 +48,18 @@ class Antilock:
     min_slip: Fraction = 0.02
     """Least slip for that on a road without grip ..."""
     min_slip_gain_s2pm: NotNegative = 0.005
-    """... and its rise with the deceleration of the car, as the slip at the peak of friction rises [s2/m]."""
+    """... its rise with the deceleration of the car, as the slip at the peak of friction rises [s2/m] ..."""
+    min_slip_speed_mps: NotNegative = 0.1
+    """... and what it is more at low speed, where the estimated speed is wrong, and wheels swing, by as much [m/s]."""
     largest_slip: Annotated[float, Range(0.05, 0.9)] = 0.3
     """Slip by the estimated speed that releases a wheel however slowly it came."""
-    release_fraction: Fraction = 0.85
-    """Pressure of a released wheel, as a fraction of what its friction bore."""
-    resume_fraction: Fraction = 0.95
+    release_fraction: Fraction = 0.9
+    """Pressure of a released wheel, as a fraction of what its friction bore ..."""
+    regain_mps2: NotNegative = 10.0
+    """... or less, where that friction would not speed the wheel up by this, as on ice [m/s2]."""
+    rolls_fraction: Fraction = 0.5
+    """A released wheel rolls with the car again once it regains speed by less than this fraction of what it did [-]."""
+    resume_fraction: Fraction = 0.97
     """Pressure of a wheel that rolls again, likewise."""
     build_per_s: Positive = 0.5
     """Slow rise of pressure from there on, in fractions of the same a second [1/s]."""

@@ -35,7 +35,7 @@ demand that it goes in a step."""
 
 PER_WHEEL: Final = (
     "demand_Pa", "pressure_Pa", "limit_Pa", "allowed_Pa", "traction_Pa", "phase", "phase_s", "friction_Nm",
-    "borne_Nm", "wheel_mps", "wheel_mps2",
+    "borne_Nm", "regained_mps2", "wheel_mps", "wheel_mps2",
 )  # fmt: skip
 ALONE: Final = (
     "drive_limit_Nm", "traction_Nm", "reference_mps", "offset_mps2", "side_Pa", "steps_left",
@@ -50,7 +50,8 @@ demand_Pa: pressure that driver and controller ask for;
 pressure_Pa: pressure in the wheel brake; limit_Pa: what the anti-lock system allows the wheel by itself, allowed_Pa:
 with regard to the others; traction_Pa: what traction control wants; phase, phase_s: phase of the anti-lock control, see
 `antilock`, and time in it; friction_Nm: torque of the road by the wheel's motion; borne_Nm: the one that the wheel bore
-last; wheel_mps, wheel_mps2: speed and acceleration of its circumference.
+last; regained_mps2: the fastest that it has regained speed in its recovery; wheel_mps, wheel_mps2: speed and
+acceleration of its circumference.
 
 drive_limit_Nm: what traction control leaves of the drive torque, traction_Nm:
 its integral, tcs_active: whether it acts; reference_mps: estimated speed of the car; offset_mps2: estimated error of

@@ -31,6 +31,8 @@ from activesteer.vehicle.toe_link_screws import SCREW
 
 _STANDSTILL_MPS: Final = 0.2
 """Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""
+_ROCKS_BACK_MPS: Final = 1.0
+"""Likewise backwards below this speed, as where a car that has stopped swings back on suspension and tyres [m/s]."""
 
 _MOTION_SENSORS: Final = (
     "cg_position", "front_axle_position", "chassis_orientation", "cg_velocity", "cg_accelerometer", "cg_gyro",
@@ -465,7 +467,8 @@ class _Frame:
         self.vx_mps = vx * cos + vy * sin
         self.vy_mps = vy * cos - vx * sin
         self.speed_mps = np.hypot(vx, vy)
-        self.sideslip_rad = np.where(self.speed_mps > _STANDSTILL_MPS, np.arctan2(self.vy_mps, self.vx_mps), 0.0)
+        slowest = np.where(self.vx_mps < 0.0, _ROCKS_BACK_MPS, _STANDSTILL_MPS)
+        self.sideslip_rad = np.where(self.speed_mps > slowest, np.arctan2(self.vy_mps, self.vx_mps), 0.0)
         ax, ay, az = columns("cg_accelerometer")
         cp, sp = np.cos(self.pitch_rad), np.sin(self.pitch_rad)
         cr, sr = np.cos(self.roll_rad), np.sin(self.roll_rad)

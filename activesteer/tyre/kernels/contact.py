@@ -149,16 +149,22 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     sigma_y = max(sigma_y, _MIN_RELAXATION_LENGTH_M)
     sliding_x = abs(vsx) / limit_x
     sliding_y = abs(vsy) / limit_y
+    held = 1.0
     if fraction > 0.0:
         # A patch that slides as a whole is dragged along the direction of sliding, so one rate serves both deflections.
         together = fraction * math.sqrt(sliding_x * sliding_x + sliding_y * sliding_y)
         sliding_x = (1.0 - fraction) * sliding_x + together
         sliding_y = (1.0 - fraction) * sliding_y + together
+        # What a patch that slid at speed has more than one can have that slides at this speed is given back by sliding,
+        # not kept for pushing the car away once it stands.
+        held = max(1.0, math.hypot(u / (sigma_x * limit_x), v / (sigma_y * limit_y)))
     rolling = speed + p.SPEED_OFFSET
     carry_x = max(rolling, sliding_x)
     carry_y = max(rolling, sliding_y)
-    rate_x = (-vsx - carry_x * u / sigma_x) * _mean_decay(timestep_s * carry_x / sigma_x)
-    rate_y = (vsy - carry_y * v / sigma_y) * _mean_decay(timestep_s * carry_y / sigma_y)
+    rate_x = (-vsx - carry_x * u / held / sigma_x) * _mean_decay(timestep_s * carry_x / sigma_x)
+    rate_x -= u * (1.0 - 1.0 / held) / timestep_s
+    rate_y = (vsy - carry_y * v / held / sigma_y) * _mean_decay(timestep_s * carry_y / sigma_y)
+    rate_y -= v * (1.0 - 1.0 / held) / timestep_s
     half_length = max(0.5 * contact_patch(p, fz, pressure_Pa)[0], _MIN_RELAXATION_LENGTH_M)
     carry_z = max(speed, abs(turn) * half_length / _SLIDING_TWIST_RAD)
     rate_z = (turn - carry_z * w / half_length) * _mean_decay(timestep_s * carry_z / half_length)
@@ -167,8 +173,8 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
 
     # Where the wind-up limit of a rolling tyre holds the deflection, the slip that it should have is out of range.
     limited = 0.0
-    held = speed >= low_speed_mps and (carry_x > rolling or carry_y > rolling)
-    if held or limit_flags(p, fz, kappa, alpha, gamma, pressure_Pa) != 0:
+    beyond = speed >= low_speed_mps and (carry_x > rolling or carry_y > rolling)
+    if beyond or limit_flags(p, fz, kappa, alpha, gamma, pressure_Pa) != 0:
         limited = 1.0
     # Camber works by the path that the tread takes through the patch of a rolling tyre: at rest there is none.
     gamma *= 1.0 - fraction
