@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.controllers.loading import is_variant
+from activesteer.controllers.loading import is_variant, system_of
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup, CorrectorParameters
 from activesteer.controllers.variant import read_variant
 from activesteer.conventions import Array
@@ -40,7 +40,7 @@ class LinearController:
 
 def has_linear_form(given: Any) -> bool:
     """Whether `linear_controller` knows a controller."""
-    return isinstance(given, str) and (given in _SYSTEMS or is_variant(given))
+    return isinstance(given, str) and system_of(given) in _SYSTEMS
 
 
 def linear_controller(given: str, setup: ControllerSetup, speed_mps: float) -> LinearController:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from activesteer.config import Range
+from activesteer.controllers.family_parameters import LqrParameters, SideslipRearSteerParameters
 from activesteer.errors import ControllerError
 from activesteer.estimation import Estimator, EstimatorParameters, EstimatorSetup
 from activesteer.theory.single_track import SingleTrackParameters
@@ -75,6 +76,10 @@ class ControllerParameters:
     """Active rear steering."""
     afs: FrontSuperpositionParameters = FrontSuperpositionParameters()
     """Active front steering."""
+    ars_sideslip: SideslipRearSteerParameters = SideslipRearSteerParameters()
+    """Rear steering with a sideslip term."""
+    lqr: LqrParameters = LqrParameters()
+    """Both axles together."""
     estimator: EstimatorParameters = EstimatorParameters()
     """Speed, sideslip and friction, for controllers that ask for them."""
     interval_s: Annotated[float, Range(1e-4, 0.1)] | None = None

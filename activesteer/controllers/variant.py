@@ -13,12 +13,14 @@ from typing import Any, Final, Literal
 
 from activesteer.config import Source, build, field_path, leaf_keys, merged, read_toml, to_table
 from activesteer.controllers.front_superposition import FrontSuperposition
+from activesteer.controllers.lqr import Lqr
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
+from activesteer.controllers.sideslip_rear_steer import SideslipRearSteer
 from activesteer.errors import ControllerError
 from activesteer.resources import find_controller_variant
 
-_SYSTEMS: Final = {"ars": RearSteer, "afs": FrontSuperposition}
+_SYSTEMS: Final = {"ars": RearSteer, "afs": FrontSuperposition, "ars_sideslip": SideslipRearSteer, "lqr": Lqr}
 _OWN_KEYS: Final = ("name", "title", "system")
 
 
@@ -26,7 +28,7 @@ _OWN_KEYS: Final = ("name", "title", "system")
 class VariantFile(ControllerParameters):
     """The keys of a variant file: those of the table [controllers] of a vehicle file, and these."""
 
-    system: Literal["ars", "afs"]
+    system: Literal["ars", "afs", "ars_sideslip", "lqr"]
     """What it is a variant of."""
     name: str = ""
     """Short name, for tables; the file's name where not given."""
@@ -57,7 +59,12 @@ class Variant:
         """The file, to be kept with a recording."""
         return {f"controllers/{self.name}.toml": self.source.text.encode()}
 
-    def from_vehicle(self, setup: ControllerSetup) -> RearSteer | FrontSuperposition:
+    @property
+    def interval_s(self) -> float | None:
+        """Time between two calls that the system asks for [s]."""
+        return getattr(_SYSTEMS[self.system], "interval_s", None)
+
+    def from_vehicle(self, setup: ControllerSetup) -> Any:
         """Makes the controller for a car; raises as `gains_in` does."""
         return _SYSTEMS[self.system].from_vehicle(replace(setup, gains=self.gains_in(setup)))
 

@@ -221,7 +221,7 @@ def loop_margins(
         rolling = _rolling(scenario)
         for given, plugin in zip(controllers, plugins, strict=True):
             unit_s = interval_s(plugin, scenario.car.config.controllers, car.timestep_s)
-            setup = scenario.controller_setup(unit_s)
+            setup = _fully_active(scenario.controller_setup(unit_s))
             answer = _answer(given, plugin.label, setup, rolling, plugin.make(setup))
             returned = round_trip(car, answer, scenario, unit_s, FREQUENCIES_RADPS)
             stable = is_stable(returned)
@@ -239,6 +239,16 @@ def _rolling(scenario: Scenario) -> Measurement:
     front, rear = (0.5 * (a + b) for a, b in zip(left, right, strict=True))
     still = dict.fromkeys((*SIGNALS, "steering_wheel_rad"), 0.0)
     return rolling._replace(**still, ax_mps2=0.0, wheel_speed_radps=(front, front, rear, rear))
+
+
+def _fully_active(setup: ControllerSetup) -> ControllerSetup:
+    """The same with correctors that act at all errors."""
+    gains = setup.gains
+    acting = {
+        name: replace(system, corrector=replace(system.corrector, deadband_start_radps=0.0, deadband_end_radps=0.0))
+        for name, system in (("ars", gains.ars), ("afs", gains.afs))
+    }
+    return replace(setup, gains=replace(gains, **acting))
 
 
 def _ideal(scenario: Scenario) -> Any:

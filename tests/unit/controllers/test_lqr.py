@@ -1,0 +1,91 @@
+"""Both axles by one state feedback: its model, its gains, its signs and limits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from activesteer.controllers import load_controller
+from activesteer.controllers.family_parameters import LqrParameters
+from activesteer.controllers.lqr import SPEEDS_MPS, STATES, feedback, model, schedule
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.scenario import resolve
+from activesteer.theory.single_track import SingleTrack
+from tests.unit.controllers.cars import CAR, held, measured, steering
+
+INTERVAL_S = 0.005
+PARAMETERS = LqrParameters()
+
+
+@pytest.fixture(scope="module")
+def known():
+    return resolve("straight_line").controller_setup(INTERVAL_S)
+
+
+def first(known, command, measurement):
+    return load_controller("lqr", known).step(command, measurement)
+
+
+@pytest.mark.parametrize("speed_mps", [15.0, 40.0])
+def test_turn_without_sideslip_repeats_itself_in_the_model(speed_mps):
+    desired_radps = 0.1
+    row = schedule(CAR, PARAMETERS, INTERVAL_S)[SPEEDS_MPS.index(speed_mps)]
+    front, rear = (gain * desired_radps for gain in row[:2])
+    a, b = model(CAR, PARAMETERS, speed_mps, INTERVAL_S)
+    state = np.array([desired_radps, 0.0, *[front, rear] * 3])
+    assert a @ state + b @ (front, rear) == pytest.approx(state, abs=1e-12)
+
+
+def test_model_without_lags_is_the_single_track_model():
+    speed_mps = 25.0
+    quick = LqrParameters(actuator_lag_s=0.001, relaxation_length_m=0.01)
+    a, b = model(CAR, quick, speed_mps, INTERVAL_S)
+    state, angles = np.zeros(len(STATES)), np.array([0.01, 0.004])
+    for _ in range(2000):
+        state = a @ state + b @ angles
+    system, inputs = SingleTrack(CAR).matrices(speed_mps)
+    assert state[:2] == pytest.approx(np.linalg.solve(system, -inputs @ angles), rel=1e-6)
+
+
+def test_feedback_makes_the_model_settle_faster_at_every_speed():
+    for speed_mps in SPEEDS_MPS:
+        a, b = model(CAR, PARAMETERS, speed_mps, INTERVAL_S)
+        gain = feedback(CAR, PARAMETERS, speed_mps, INTERVAL_S)
+        assert np.abs(np.linalg.eigvals(a - b @ gain)).max() < np.abs(np.linalg.eigvals(a)).max()
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_car_that_turns_by_itself_gets_rear_wheels_with_the_turn_and_front_wheels_against_it(known, side):
+    answer = first(known, steering(0.0), measured(0.03 * side))
+    assert answer.rear_steer_demand_rad * side > 0.0
+    assert answer.superposition_demand_rad * side < 0.0
+
+
+def test_answers_are_mirrored(known):
+    left, right = (first(known, steering(side * 0.01), measured(side * 0.02)) for side in (1.0, -1.0))
+    assert left.rear_steer_demand_rad == pytest.approx(-right.rear_steer_demand_rad, rel=1e-9)
+    assert left.superposition_demand_rad == pytest.approx(-right.superposition_demand_rad, rel=1e-9)
+
+
+def test_angles_end_at_their_limits_and_say_so(known):
+    answer = first(known, steering(0.0), measured(1.0))
+    limit = known.gains.lqr.rear_limit_rad
+    assert answer.rear_steer_demand_rad == limit == math.radians(3.0)
+    assert answer.superposition_demand_rad == -known.gains.lqr.superposition_limit_rad
+    assert answer.saturated
+
+
+def test_desired_yaw_rate_is_the_cars_own_up_to_what_the_friction_gives(known):
+    speed_mps, gain = 25.0, SingleTrack(known.single_track).yaw_rate_gain(25.0)
+    small = held(load_controller("lqr", known), steering(0.01), measured(0.01 * gain, speed_mps))
+    assert small.yaw_rate_desired_radps == pytest.approx(0.01 * gain, rel=1e-6)
+    large = held(load_controller("lqr", known), steering(0.2), measured(0.2, speed_mps), 300)
+    most = known.gains.lqr.friction_share * GRAVITY_MPS2 / speed_mps
+    assert 0.3 * most < large.yaw_rate_desired_radps < 1.2 * most
+
+
+def test_at_rest_nothing_is_steered(known):
+    answer = first(known, steering(0.3), measured(0.0, 0.0))
+    assert answer.rear_steer_demand_rad == answer.superposition_demand_rad == 0.0

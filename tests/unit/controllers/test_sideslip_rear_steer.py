@@ -1,0 +1,50 @@
+"""The paper's rear steering with a sideslip term."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from activesteer.controllers.parameters import RearSteerParameters
+from activesteer.controllers.rear_steer import RearSteer
+from activesteer.controllers.sideslip_rear_steer import SideslipRearSteer
+from activesteer.signals import Estimate
+from tests.unit.controllers.cars import measured, setup, steering
+
+GAIN, LIMIT_RAD, SPEED_MPS = 0.5, RearSteerParameters().limit_rad, 25.0
+
+
+class Knows:
+    """An estimator that knows the sideslip."""
+
+    def __init__(self, sideslip_rad: float) -> None:
+        self.sideslip_rad = sideslip_rad
+
+    def step(self, measurement):
+        speed_mps = measurement.speed_mps
+        lateral_mps = speed_mps * self.sideslip_rad
+        return Estimate(speed_mps, lateral_mps, self.sideslip_rad, measurement.yaw_rate_radps, 0.9, *[0.0] * 5)
+
+
+def answer(sideslip_rad: float, speed_mps: float = SPEED_MPS):
+    knows: Any = Knows(sideslip_rad)
+    made = SideslipRearSteer(RearSteer.from_vehicle(setup()), knows, GAIN, LIMIT_RAD)
+    return made.step(steering(0.01), measured(0.05, speed_mps))
+
+
+@pytest.mark.parametrize("sideslip_rad", [-0.02, 0.01])
+def test_rear_wheels_turn_against_the_sideslip_beside_what_the_paper_asks(sideslip_rad):
+    paper = RearSteer.from_vehicle(setup()).step(steering(0.01), measured(0.05, SPEED_MPS))
+    found = answer(sideslip_rad)
+    assert found.rear_steer_demand_rad - paper.rear_steer_demand_rad == pytest.approx(-GAIN * sideslip_rad)
+    assert not found.saturated
+
+
+def test_angle_ends_at_its_limit():
+    assert answer(-0.5).rear_steer_demand_rad == LIMIT_RAD
+    assert answer(-0.5).saturated
+
+
+def test_at_walking_speed_it_rests():
+    assert answer(-0.5, 1.0).rear_steer_demand_rad == 0.0
