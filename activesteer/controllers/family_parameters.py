@@ -8,7 +8,7 @@ from typing import Annotated
 
 from activesteer.config import Range
 
-_Share = Annotated[float, Range(0.0, 1.0)]
+_Fraction = Annotated[float, Range(0.0, 1.0)]
 _Gain = Annotated[float, Range(0.0, 100.0)]
 _Scale = Annotated[float, Range(1e-4, 10.0)]
 _Limit = Annotated[float, Range(0.0, math.radians(10.0))]
@@ -39,8 +39,8 @@ class LqrParameters:
     """Angle added at the front, likewise [rad]."""
     reference_lag_s: _Lag = 0.03
     """Time constant at which the desired yaw rate follows the driver [s]."""
-    friction_share: _Share = 0.85
-    """Share of the estimated friction that the desired yaw rate may ask for [-]."""
+    friction_fraction: _Fraction = 0.85
+    """Part of the estimated friction that the desired yaw rate may ask for [-]."""
     actuator_lag_s: _Lag = 0.025
     """Lag of both actuators in the model [s]."""
     relaxation_length_m: _Length = 0.5
@@ -49,3 +49,25 @@ class LqrParameters:
     """Most rear angle demanded [rad]."""
     superposition_limit_rad: _Limit = math.radians(3.0)
     """Most angle added at the front [rad]."""
+
+
+@dataclass(frozen=True)
+class EscParameters:
+    """Stability control by the brakes (`esc`)."""
+
+    yaw_rate_band_radps: _Gain = math.radians(3.0)
+    """Error of the yaw rate that is left alone [rad/s]."""
+    sideslip_limit_rad: _Limit = math.radians(3.0)
+    """Sideslip that is left alone [rad]."""
+    yaw_rate_time_s: _Lag = 0.1
+    """T_r: time in which a moment takes back the error of the yaw rate [s]."""
+    sideslip_time_s: _Lag = 0.2
+    """T_b: half the time in which a moment turns the car back by the sideslip beyond its limit, without damping [s]."""
+    reference_lag_s: _Lag = 0.08
+    """Time constant at which the desired yaw rate follows the driver [s]."""
+    friction_fraction: _Fraction = 0.9
+    """Part of the estimated friction that the desired yaw rate may ask for [-]."""
+    torque_limit_Nm: Annotated[float, Range(0.0, 1e4)] = 2000.0
+    """Most brake torque of a wheel [Nm]."""
+    least_speed_mps: Annotated[float, Range(1.0, 20.0)] = 20.0 / 3.6
+    """Speed below which it rests [m/s]."""

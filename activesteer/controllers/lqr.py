@@ -34,7 +34,8 @@ from scipy.linalg import expm
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
 from activesteer.controllers.family_parameters import LqrParameters
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.conventions import GRAVITY_MPS2, Array
+from activesteer.controllers.turn_reference import TurnReference
+from activesteer.conventions import Array
 from activesteer.estimation import Estimator
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
@@ -67,10 +68,9 @@ class Lqr:
         """
         self._parameters, self._estimator = parameters, estimator
         self._rows = schedule(single_track, parameters, interval_s)
-        self._yaw_rate_gain = SingleTrack(single_track).yaw_rate_gain
+        p = parameters
+        self._reference = TurnReference(single_track, p.reference_lag_s, p.friction_fraction, interval_s)
         self._interval_s = interval_s
-        self._fraction = -math.expm1(-interval_s / parameters.reference_lag_s)
-        self._asked_rad = 0.0
         self._front_rad = self._rear_rad = 0.0
         self._before = 0.0, 0.0
 
@@ -88,13 +88,10 @@ class Lqr:
         """
         p, now = self._parameters, self._estimator.step(measurement)
         speed, driver = now.speed_mps, command.front_steer_demand_rad
-        self._asked_rad += self._fraction * (driver - self._asked_rad)
         if speed < MIN_SPEED_MPS:
             self._before = 0.0, 0.0
             return ActuatorCommand()
-        desired = self._yaw_rate_gain(speed) * self._asked_rad
-        limit = p.friction_share * now.friction * GRAVITY_MPS2 / speed
-        desired = min(max(desired, -limit), limit)
+        desired = self._reference.step(driver, speed, now.friction)
         front_gain, rear_gain, *gains = self._gains(speed)
         front, rear = front_gain * desired, rear_gain * desired
         added, turned = measurement.superposition_rad, measurement.rear_steer_rad

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 from activesteer.config import Source, build, field_path, leaf_keys, merged, read_toml, to_table
+from activesteer.controllers.esc import Esc
 from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.lqr import Lqr
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
@@ -20,7 +21,13 @@ from activesteer.controllers.sideslip_rear_steer import SideslipRearSteer
 from activesteer.errors import ControllerError
 from activesteer.resources import find_controller_variant
 
-_SYSTEMS: Final = {"ars": RearSteer, "afs": FrontSuperposition, "ars_sideslip": SideslipRearSteer, "lqr": Lqr}
+_SYSTEMS: Final = {
+    "ars": RearSteer,
+    "afs": FrontSuperposition,
+    "ars_sideslip": SideslipRearSteer,
+    "lqr": Lqr,
+    "esc": Esc,
+}
 _OWN_KEYS: Final = ("name", "title", "system")
 
 
@@ -28,7 +35,7 @@ _OWN_KEYS: Final = ("name", "title", "system")
 class VariantFile(ControllerParameters):
     """The keys of a variant file: those of the table [controllers] of a vehicle file, and these."""
 
-    system: Literal["ars", "afs", "ars_sideslip", "lqr"]
+    system: Literal["ars", "afs", "ars_sideslip", "lqr", "esc"]
     """What it is a variant of."""
     name: str = ""
     """Short name, for tables; the file's name where not given."""

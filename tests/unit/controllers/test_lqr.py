@@ -82,7 +82,7 @@ def test_desired_yaw_rate_is_the_cars_own_up_to_what_the_friction_gives(known):
     small = held(load_controller("lqr", known), steering(0.01), measured(0.01 * gain, speed_mps))
     assert small.yaw_rate_desired_radps == pytest.approx(0.01 * gain, rel=1e-6)
     large = held(load_controller("lqr", known), steering(0.2), measured(0.2, speed_mps), 300)
-    most = known.gains.lqr.friction_share * GRAVITY_MPS2 / speed_mps
+    most = known.gains.lqr.friction_fraction * GRAVITY_MPS2 / speed_mps
     assert 0.3 * most < large.yaw_rate_desired_radps < 1.2 * most
 
 

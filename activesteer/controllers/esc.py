@@ -1,0 +1,117 @@
+"""Electronic stability control by the brakes of single wheels, as FMVSS 126 defines such a system.
+
+S4 of the standard asks for brake torques at single wheels that make a yaw moment, for yaw rate and sideslip as inputs,
+for the driver's angle, and for work over the whole range of speed above 20 km/h. Here the moment is
+
+    M_z = J_z / T_r (error beyond its band) + J_z / T_b^2 (sideslip beyond its limit)
+
+the error being desired less actual yaw rate. A moment against the turn (oversteer) is made by the outer front wheel,
+whose side force it lowers too; a moment with the turn (understeer) by the inner rear one:
+
+    brake torque = |M_z| rolling radius / (half the track)
+
+Where it works, the drive is taken back by as much force as the brake makes. Locking is left to the anti-lock system.
+
+Sources: 49 CFR 571.126 S4; A. van Zanten, Bosch ESP Systems: 5 Years of Experience, SAE 2000-01-1633. Band, limit and
+times are chosen.
+"""
+
+from __future__ import annotations
+
+from activesteer.controllers.family_parameters import EscParameters
+from activesteer.controllers.parameters import ControllerSetup
+from activesteer.controllers.turn_reference import TurnReference
+from activesteer.estimation import Estimator
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+
+
+class Esc:
+    """Yaw moments by the brakes."""
+
+    interval_s = 0.005
+
+    def __init__(
+        self,
+        reference: TurnReference,
+        estimator: Estimator,
+        parameters: EscParameters,
+        yaw_inertia_kgm2: float,
+        levers: tuple[float, float],
+    ) -> None:
+        """Makes the controller of one run.
+
+        Args:
+            reference: Desired yaw rate.
+            estimator: Says speed, yaw rate, sideslip and friction.
+            parameters: Bands, times and limits.
+            yaw_inertia_kgm2: J_z [kg m2].
+            levers: Brake torque of one wheel per yaw moment, at the front and the rear axle [-].
+        """
+        self._reference, self._estimator, self._parameters = reference, estimator, parameters
+        self._yaw_inertia_kgm2, self._levers = yaw_inertia_kgm2, levers
+
+    @classmethod
+    def from_vehicle(cls, setup: ControllerSetup) -> Esc:
+        """Makes the controller for a car."""
+        p, estimator = setup.gains.esc, setup.estimator()
+        reference = TurnReference(setup.single_track, p.reference_lag_s, p.friction_fraction, setup.timestep_s)
+        return cls(reference, estimator, p, setup.single_track.yaw_inertia_kgm2, brake_levers(setup))
+
+    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
+        """Brake torques now.
+
+        Args:
+            command: What the driver does.
+            measurement: What the car's sensors say.
+        """
+        p, now = self._parameters, self._estimator.step(measurement)
+        if now.speed_mps < p.least_speed_mps:
+            return ActuatorCommand()
+        desired = self._reference.step(command.front_steer_demand_rad, now.speed_mps, now.friction)
+        error = _beyond(desired - now.yaw_rate_radps, p.yaw_rate_band_radps)
+        slide = _beyond(now.sideslip_rad, p.sideslip_limit_rad)
+        moment = self._yaw_inertia_kgm2 * (error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2)
+        torques = wheel_torques(moment, now.yaw_rate_radps, self._levers, p.torque_limit_Nm)
+        limited = max(torques) >= p.torque_limit_Nm
+        change = -min(max(command.drive_torque_demand_Nm, 0.0), sum(torques))
+        return ActuatorCommand(
+            yaw_rate_desired_radps=desired,
+            saturated=limited,
+            brake_torque_demand_Nm=torques,
+            drive_torque_change_Nm=change,
+        )
+
+
+def _beyond(value: float, band: float) -> float:
+    """What of a value lies beyond a band about 0."""
+    return value - band if value > band else value + band if value < -band else 0.0
+
+
+def brake_levers(setup: ControllerSetup) -> tuple[float, float]:
+    """Brake torque of one wheel per yaw moment: rolling radius over half the track, front and rear [-]."""
+    known = setup.estimation
+    assert known is not None  # there is an estimator
+    front_m, _, rear_m, _ = known.rolling_radius_m
+    return 2.0 * front_m / known.two_track.front_track_m, 2.0 * rear_m / known.two_track.rear_track_m
+
+
+def wheel_torques(
+    moment_Nm: float, yaw_rate_radps: float, levers: tuple[float, float], limit_Nm: float
+) -> tuple[float, float, float, float]:
+    """The wheel that makes a yaw moment.
+
+    Args:
+        moment_Nm: Yaw moment, left positive [Nm].
+        yaw_rate_radps: Yaw rate: a moment against it is for the outer front wheel, one with it for the inner rear one.
+        levers: As from `brake_levers`.
+        limit_Nm: Most torque of a wheel [Nm].
+
+    Returns:
+        Brake torques, order of `CORNERS` [Nm].
+    """
+    front = moment_Nm * yaw_rate_radps <= 0.0
+    torque = min(abs(moment_Nm) * levers[0 if front else 1], limit_Nm)
+    # A brake on the left turns the car to the left.
+    if moment_Nm > 0.0:
+        return (torque, 0.0, 0.0, 0.0) if front else (0.0, 0.0, torque, 0.0)
+    return (0.0, torque, 0.0, 0.0) if front else (0.0, 0.0, 0.0, torque)

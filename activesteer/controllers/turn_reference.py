@@ -1,0 +1,41 @@
+"""The turn that a driver asks for: the car's own steady yaw rate, no further than the friction gives."""
+
+from __future__ import annotations
+
+import math
+
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
+
+
+class TurnReference:
+    """Desired yaw rate, eqs. 3 and 6 with the estimated friction, behind a first-order lag of the driver's angle."""
+
+    def __init__(
+        self, single_track: SingleTrackParameters, lag_s: float, friction_fraction: float, interval_s: float
+    ) -> None:
+        """Computes the constants.
+
+        Args:
+            single_track: The car as it is known.
+            lag_s: Time constant at which the driver is followed [s].
+            friction_fraction: Part of the friction that may be asked for [-].
+            interval_s: Time between two steps [s].
+        """
+        self._gain = SingleTrack(single_track).yaw_rate_gain
+        self._share = -math.expm1(-interval_s / lag_s)
+        self._most_mps2 = friction_fraction * GRAVITY_MPS2
+        self._asked_rad = 0.0
+
+    def step(self, front_steer_rad: float, speed_mps: float, friction: float) -> float:
+        """The desired yaw rate now [rad/s].
+
+        Args:
+            front_steer_rad: The driver's angle at the road wheel [rad].
+            speed_mps: Speed > 0 [m/s].
+            friction: Friction of the road [-].
+        """
+        self._asked_rad += self._share * (front_steer_rad - self._asked_rad)
+        desired = self._gain(speed_mps) * self._asked_rad
+        limit = self._most_mps2 * friction / speed_mps
+        return min(max(desired, -limit), limit)
