@@ -130,7 +130,7 @@ def user_path(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Pa
     try:
         return Path(os.fsdecode(path)).expanduser()
     except RuntimeError as reason:
-        raise error(f"{shown_path(path)}: there is no such home folder") from reason
+        raise error(f"{shown_path(path)}: there is no such home folder", value=path) from reason
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
@@ -177,11 +177,13 @@ def read_bytes(path: str | os.PathLike[str], error: type[ActiveSteerError], max_
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             os.close(descriptor)
-            raise error(f"cannot read {shown_path(path)}: it {why_no_file(path)}")
+            raise error(f"cannot read {shown_path(path)}: it {why_no_file(path)}", value=path)
         with open(descriptor, "rb") as file:
             data = file.read(max_bytes + 1)
     if len(data) > max_bytes:
-        raise error(f"cannot read {shown_path(path)}: it is longer than {max_bytes} bytes")
+        raise error(
+            f"cannot read {shown_path(path)}: it is longer than {max_bytes} bytes", value=path, allowed=max_bytes
+        )
     return data
 
 
@@ -194,7 +196,9 @@ def read_text(
     try:
         text = read_bytes(path, error, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError as reason:
-        raise error(f"cannot read {shown_path(path)}: it is no text in UTF-8 (byte {reason.start})") from reason
+        raise error(
+            f"cannot read {shown_path(path)}: it is no text in UTF-8 (byte {reason.start})", value=path
+        ) from reason
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -266,8 +270,8 @@ def make_folder(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> 
 @contextmanager
 def _refused(doing: str, path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[None]:
     if "\0" in os.fspath(path):
-        raise error(f"cannot {doing} {shown_path(path)}: a path has no zero byte")
+        raise error(f"cannot {doing} {shown_path(path)}: a path has no zero byte", value=path)
     try:
         yield
     except OSError as reason:
-        raise error(f"cannot {doing} {shown_path(path)}: {reason.strerror or reason}") from reason
+        raise error(f"cannot {doing} {shown_path(path)}: {reason.strerror or reason}", value=path) from reason

@@ -33,7 +33,11 @@ def _data_dir(name: str, error: type[ActiveSteerError]) -> Path:
     for candidate in (inside, beside):
         if candidate.is_dir():
             return candidate
-    raise error(f"the {name} that belong to activesteer are missing: neither {inside} nor {beside} is a directory")
+    raise error(
+        f"the {name} that belong to activesteer are missing: neither {inside} nor {beside} is a directory",
+        value=name,
+        allowed=(inside, beside),
+    )
 
 
 def models_dir() -> Path:
@@ -164,7 +168,9 @@ def _vehicle_in(folder: Path) -> Path:
         return folder / f"{name}.toml"
     if len(names) == 1:
         return folder / f"{names[0]}.toml"
-    raise ParameterError(f"which vehicle file of {folder} is meant? There are: {', '.join(names) or 'none'}")
+    raise ParameterError(
+        f"which vehicle file of {folder} is meant? There are: {', '.join(names) or 'none'}", value=folder, allowed=names
+    )
 
 
 def check_own(file: Path) -> None:
@@ -177,7 +183,7 @@ def check_own(file: Path) -> None:
         ParameterError: it does.
     """
     if file.resolve().is_relative_to(_PACKAGE) or {"site-packages", "dist-packages"} & set(file.resolve().parts):
-        raise ParameterError(f"{file} belongs to an installed package; copy it to a place of your own")
+        raise ParameterError(f"{file} belongs to an installed package; copy it to a place of your own", value=file)
 
 
 def find_study(name_or_path: str | os.PathLike[str]) -> Path:

@@ -46,8 +46,8 @@ def from_file(text: str, kind: Kind) -> FromFile:
             such class or function.
     """
 
-    def fail(problem: str) -> Exception:
-        return kind.fail(text, problem, text)
+    def fail(problem: str, value: Any = text, allowed: Any = None) -> Exception:
+        return kind.fail(text, problem, value, allowed)
 
     form = _FORM.fullmatch(text)
     if form is None:
@@ -73,7 +73,8 @@ def from_file(text: str, kind: Kind) -> FromFile:
     found = getattr(module, form["name"], None)
     if found is None or not (callable(found) or hasattr(found, "step")):
         own = [key for key, value in vars(module).items() if getattr(value, "__module__", "") == name]
-        raise fail(f"{shown_path(path)} has no class {shown(form['name'])}; {nearest_names(form['name'], own)}")
+        problem = f"{shown_path(path)} has no class {shown(form['name'])}; {nearest_names(form['name'], own)}"
+        raise fail(problem, form["name"], own)
     return FromFile(path, content, found, _parameters(form["parameters"] or "", fail))
 
 
@@ -124,8 +125,8 @@ def _parameters(text: str, fail: Any) -> dict[str, Any]:
     for part in re.split(r"&(?=[A-Za-z_]\w*=)", text) if text else ():
         pair = _PARAMETER.fullmatch(part)
         if pair is None:
-            raise fail(f"{shown(part)} is no parameter; name=value is needed, as in ?gain=2&limit_rad=0.05")
+            raise fail(f"{shown(part)} is no parameter; name=value is needed, as in ?gain=2&limit_rad=0.05", part)
         if pair[1] in parameters:
-            raise fail(f"the parameter {pair[1]} is given twice")
+            raise fail(f"the parameter {pair[1]} is given twice", pair[1])
         parameters[pair[1]] = parse_value(pair[2])
     return parameters

@@ -126,9 +126,16 @@ def to_mat(recording: Exportable, path: str | os.PathLike[str]) -> Path:
     taken = {TIME, *MATLAB_TABLES}
     for name in (*recording.channels.names, *recording.metrics):
         if len(name) > MATLAB_NAME_LENGTH:
-            raise RecordingError(f"{name!r} has {len(name)} letters; MATLAB allows {MATLAB_NAME_LENGTH}")
+            raise RecordingError(
+                f"{name!r} has {len(name)} letters; MATLAB allows {MATLAB_NAME_LENGTH}",
+                value=name,
+                allowed=MATLAB_NAME_LENGTH,
+            )
     if clash := taken.intersection(recording.channels.names):
-        raise RecordingError(f"a channel is called {clash.pop()!r}, which is taken by what stands beside the channels")
+        name = clash.pop()
+        raise RecordingError(
+            f"a channel is called {name!r}, which is taken by what stands beside the channels", value=name
+        )
     variables: dict[str, Any] = {TIME: recording.time_s}
     variables |= {name: recording[name] for name in recording.channels.names}
     variables["units"] = {channel.name: channel.unit for channel in recording.channels}

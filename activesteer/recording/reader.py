@@ -186,18 +186,24 @@ def read_mcap(path: Path) -> Contents:
     try:
         size = os.fstat(descriptor).st_size
         if os.pread(descriptor, len(MCAP0_MAGIC), 0) != MCAP0_MAGIC:
-            raise RecordingError(f"{shown_path(path)} is not an MCAP file")
+            raise RecordingError(f"{shown_path(path)} is not an MCAP file", value=path)
         if size > MAX_FILE_BYTES:
-            raise RecordingError(f"{shown_path(path)} has {size} bytes, a recording at most {MAX_FILE_BYTES}")
+            raise RecordingError(
+                f"{shown_path(path)} has {size} bytes, a recording at most {MAX_FILE_BYTES}",
+                value=size,
+                allowed=MAX_FILE_BYTES,
+            )
         records = _records(descriptor, size)
         try:
             contents = _decode(descriptor, records)
         except RecordingError as error:
             damage = f" ({records.damage})" if records.damage else ""
-            raise RecordingError(f"{shown_path(path)}: {error}{damage}") from None
+            raise RecordingError(
+                f"{shown_path(path)}: {error}{damage}", value=error.value, allowed=error.allowed
+            ) from None
         kept = isinstance(contents.values, FileRows)
     except (*BROKEN, DecodeError, LookupError, TypeError, AttributeError) as error:
-        raise RecordingError(f"{shown_path(path)} is damaged: {_words(error)}") from None
+        raise RecordingError(f"{shown_path(path)} is damaged: {_words(error)}", value=path) from None
     finally:
         if not kept:
             os.close(descriptor)
@@ -214,7 +220,7 @@ def _opened(path: Path) -> int:
         return descriptor
     os.close(descriptor)
     what = "Is a directory" if stat.S_ISDIR(mode) else "it is no file, but a device or a pipe"
-    raise RecordingError(f"cannot read {shown_path(path)}: {what}")
+    raise RecordingError(f"cannot read {shown_path(path)}: {what}", value=path)
 
 
 def _records(descriptor: int, size: int) -> _Records:
@@ -366,7 +372,11 @@ def _metadata(records: _Records) -> tuple[dict[str, Any], dict[str, float]]:
     if found is None:
         raise RecordingError("no recording of activesteer, or cut off before its first row")
     if found > FORMAT_VERSION:
-        raise RecordingError(f"format version {found}; this version of activesteer reads up to {FORMAT_VERSION}")
+        raise RecordingError(
+            f"format version {found}; this version of activesteer reads up to {FORMAT_VERSION}",
+            value=found,
+            allowed=FORMAT_VERSION,
+        )
     metadata = {key: json.loads(text) for key, text in texts.items() if key != "metrics"}
     check_metadata(metadata)
     check_metrics(metrics)

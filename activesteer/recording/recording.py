@@ -115,7 +115,7 @@ class Recording:
                 message += f"The {rows} rows up to {contents.time_s[-1]:.3f} s can be read"
             else:
                 message += "Metadata and attachments can be read, but no rows"
-            raise RecordingError(message + ", with Recording.open(path, recover=True)")
+            raise RecordingError(message + ", with Recording.open(path, recover=True)", value=path)
         metadata = contents.metadata
         if contents.damage:
             metadata.setdefault("error", f"the file is damaged: {contents.damage}")
@@ -131,7 +131,7 @@ class Recording:
                 scene=contents.scene,
             )
         except RecordingError as error:
-            raise RecordingError(f"{path}: {error}") from None
+            raise RecordingError(f"{path}: {error}", value=error.value, allowed=error.allowed) from None
 
     def save(self, path: str | Path, *, overwrite: bool = True) -> None:
         """Write the recording to an MCAP file; channels with `single` are kept to 32 bit, all others exactly.

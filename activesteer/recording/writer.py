@@ -104,10 +104,13 @@ class McapWriter:
         self.body_names = tuple(body_names)
         if len({WORLD, *self.body_names}) != len(self.body_names) + 1:
             raise RecordingError(
-                f"body names must differ from each other and from {WORLD!r}: {', '.join(self.body_names)}"
+                f"body names must differ from each other and from {WORLD!r}: {', '.join(self.body_names)}",
+                value=self.body_names,
             )
         if len(self.channels) > MAX_CHANNELS:
-            raise RecordingError(f"{len(self.channels)} channels, a recording has at most {MAX_CHANNELS}")
+            raise RecordingError(
+                f"{len(self.channels)} channels, a recording has at most {MAX_CHANNELS}", allowed=MAX_CHANNELS
+            )
         check_names(self.body_names, "bodies", MAX_BODIES)
         check_names(list(attachments or {}), "attachments", MAX_OTHER_RECORDS)
         if (size := sum(map(len, (attachments or {}).values()))) > MAX_OTHER_BYTES // 2:
@@ -187,7 +190,7 @@ class McapWriter:
                 written.
         """
         if self._closed:
-            raise RecordingError(f"{self.path} is closed")
+            raise RecordingError(f"{self.path} is closed", value=self.path)
         row_ns = nanoseconds(time_s, "time_s", self._last_row_ns)
         pose_ns = nanoseconds(pose_time_s, "pose_time_s", self._last_pose_ns)
         rows, poses, bodies = len(row_ns), len(pose_ns), len(self.body_names)
@@ -260,7 +263,8 @@ class McapWriter:
             there = False
         if not there:
             raise RecordingError(
-                f"{shown_path(self.path)} was deleted or replaced while it was written: nothing is saved"
+                f"{shown_path(self.path)} was deleted or replaced while it was written: nothing is saved",
+                value=self.path,
             )
 
     def __enter__(self) -> Self:
@@ -296,7 +300,7 @@ class McapWriter:
 
     def _failure(self, error: OSError) -> RecordingError:
         saved = f"; saved up to {self._saved_ns * 1e-9:.3f} s" if self._saved_ns >= 0 else ""
-        return RecordingError(f"cannot write {self.path}: {error.strerror or error}{saved}")
+        return RecordingError(f"cannot write {self.path}: {error.strerror or error}{saved}", value=self.path)
 
     def _abandon(self) -> None:
         """Give up thread and file without ending the file properly."""
@@ -318,21 +322,22 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
     """
     path = Path(path)
     if not path.parent.is_dir():
-        raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist")
+        raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)
     if path.is_dir():
-        raise RecordingError(f"cannot write {path}: Is a directory")
+        raise RecordingError(f"cannot write {path}: Is a directory", value=path)
     if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise RecordingError(f"cannot write {path}: Permission denied")
+        raise RecordingError(f"cannot write {path}: Permission denied", value=path)
     if not path.is_file():  # nothing there, or a device
         return
     if not overwrite:
-        raise RecordingError(f"cannot write {path}: it exists already")
+        raise RecordingError(f"cannot write {path}: it exists already", value=path)
     with reading(path, RecordingError), path.open("rb") as stream:
         ours = is_recording_start(stream.read(_START_BYTES))
     if not ours:
         raise RecordingError(
             f"cannot write {path}: it exists already and is no recording of activesteer; delete it, or choose another "
-            "name"
+            "name",
+            value=path,
         )
 
 
@@ -361,6 +366,8 @@ def _lock(stream: BinaryIO, path: Path) -> None:
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise RecordingError(f"cannot write {shown_path(path)}: another run or program is writing it") from None
+        raise RecordingError(
+            f"cannot write {shown_path(path)}: another run or program is writing it", value=path
+        ) from None
     except OSError:
         return  # A file system without locks.

@@ -46,7 +46,7 @@ class Car:
 
     def __post_init__(self) -> None:
         if self.doors == 13:
-            raise ParameterError("doors: 13 bring bad luck")
+            raise ParameterError("13 bring bad luck", key="doors", value=13)
 
 
 TEXT = """\
@@ -121,9 +121,8 @@ def test_value_out_of_range_is_answered_in_its_own_unit(keys, key, value, allowe
 @pytest.mark.parametrize("key", ["yaw_rate_radps", "yaw_rate_degps", "limit_deg", "curve"])
 @pytest.mark.parametrize("value", [1e300, 10**300])
 def test_number_beyond_all_bounds_is_answered(key, value):
-    with pytest.raises(ParameterError, match="larger than anything of a car") as told:
+    with raises(ParameterError, key=key, value=value):
         car(**{key: [value] if key == "curve" else value})
-    assert (told.value.key, told.value.value) == (key, value)
 
 
 def test_both_ends_of_a_range_are_allowed():
@@ -246,7 +245,7 @@ def test_key_given_in_two_units_is_answered():
 
 
 def test_checks_of_the_class_itself_are_told_with_the_file():
-    with pytest.raises(ParameterError, match=r"^car\.toml: doors: 13 bring bad luck$"):
+    with raises(ParameterError, file="car.toml", key="doors", value=13):
         car(doors=13)
 
 
@@ -276,7 +275,7 @@ def test_file_that_is_no_toml_is_answered_with_path_and_line(tmp_path):
 def test_file_that_cannot_be_read_is_answered(tmp_path, make):
     path = tmp_path / "bad.toml"
     make(path)
-    with pytest.raises(ParameterError, match=r"cannot read .*bad\.toml: "):
+    with raises(ParameterError, value=path):
         read_toml(path)
 
 

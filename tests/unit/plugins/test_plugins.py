@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from activesteer import ActuatorCommand, DriverCommand, simulate
+from activesteer.config import Range
 from activesteer.controllers import find_controller
 from activesteer.driver import find_driver
 from activesteer.errors import ControllerError, DriverError
@@ -123,16 +124,16 @@ def test_parameters_of_a_file_are_typed_as_in_toml(gains, query, parameters):
 
 
 @pytest.mark.parametrize(
-    ("query", "said"),
+    ("query", "value", "allowed"),
     [
-        ("?gian=2", r"there is no parameter 'gian'; did you mean 'gain'\?"),
-        ("?zzzz=2", r"there is no parameter 'zzzz'; known are: gain, limits, side"),
-        ("?gain", r"'gain' is no parameter; name=value is needed"),
-        ("?gain=1&gain=2", r"the parameter gain is given twice"),
+        ("?gian=2", "gian", ("gain", "side", "limits")),
+        ("?zzzz=2", "zzzz", ("gain", "side", "limits")),
+        ("?gain", "gain", None),
+        ("?gain=1&gain=2", "gain", None),
     ],
 )
-def test_wrong_parameter_is_answered(gains, query, said):
-    with pytest.raises(ControllerError, match=said):
+def test_wrong_parameter_is_answered(gains, query, value, allowed):
+    with raises(ControllerError, value=value, allowed=allowed):
         find_controller(f"{gains}:Mine{query}")
 
 
@@ -151,7 +152,7 @@ def test_wrong_object_is_answered(given):
 
 @pytest.mark.parametrize("given", [int, dict, Path])
 def test_class_that_is_no_controller_is_answered(given):
-    with pytest.raises(ControllerError, match=rf"{given.__name__} has no method step\(command, measurement\)"):
+    with raises(ControllerError, value=given):
         find_controller(given)
 
 
@@ -174,7 +175,7 @@ def test_object_that_cannot_be_copied_is_answered(tmp_path):
 @pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo, lambda path: path.symlink_to("/dev/zero"), lambda path: None])
 def test_what_is_no_file_is_answered(tmp_path, make):
     make(tmp_path / "mine.py")
-    with pytest.raises(ControllerError, match=r"there is no file .*mine\.py: it (is|does) "):
+    with raises(ControllerError, value=f"{tmp_path}/mine.py:Mine"):
         find_controller(f"{tmp_path}/mine.py:Mine")
 
 
@@ -191,8 +192,9 @@ def test_name_that_no_file_can_have_is_answered(name):
 def test_file_that_does_not_run_is_answered(tmp_path, text):
     path = tmp_path / "mine.py"
     path.write_text(text)
-    with pytest.raises(ControllerError, match=r"mine\.py"):
+    with pytest.raises(ControllerError) as refused:
         find_controller(f"{path}:Mine")
+    assert refused.value.value in (path, f"{path}:Mine")
 
 
 def test_source_and_parameters_are_recorded():
@@ -243,23 +245,29 @@ def test_driver_on_a_path_is_given_the_path():
 
 
 @pytest.mark.parametrize(
-    ("expression", "said"),
+    ("expression", "value", "allowed"),
     [
-        ("None", r"step returned None; an activesteer\.DriverCommand is needed"),
-        ("ActuatorCommand()", r"an activesteer\.DriverCommand is needed"),
-        ("DriverCommand(float('nan'))", r"steering_wheel_demand_rad = nan; a finite angle"),
-        ("DriverCommand(90.0)", r"steering_wheel_demand_rad = 90\.0; .*radians, not degrees"),
-        ("DriverCommand(brake_pedal=1.5)", r"brake_pedal = 1\.5; a number from 0 to 1 is needed"),
-        ("DriverCommand(drive_torque_demand_Nm=float('inf'))", r"drive_torque_demand_Nm = inf; a number from"),
-        ("DriverCommand(saturated=None)", r"saturated = None; a number is needed"),
-        ("DriverCommand(wheel_torques=(1, 2, 3, 4))", r"wheel_torques = \(1, 2, 3, 4\); .*WheelTorques"),
-        ("DriverCommand(0.5, front_steer_demand_rad=0.5)", r"front_steer_demand_rad = 0\.5, .*leave it out"),
-        ("1 / 0", r"step raised ZeroDivisionError: .*\(mine\.py, line 5\)"),
+        ("None", "None", DriverCommand),
+        ("ActuatorCommand()", repr(ActuatorCommand()), DriverCommand),
+        ("DriverCommand(float('nan'))", "nan", Range(-50.0, 50.0)),
+        ("DriverCommand(90.0)", "90.0", Range(-50.0, 50.0)),
+        ("DriverCommand(brake_pedal=1.5)", "1.5", Range(0.0, 1.0)),
+        ("DriverCommand(drive_torque_demand_Nm=float('inf'))", "inf", Range(-1e6, 1e6)),
+        ("DriverCommand(saturated=None)", "None", None),
+        ("DriverCommand(wheel_torques=(1, 2, 3, 4))", "(1, 2, 3, 4)", None),
+        ("DriverCommand(0.5, front_steer_demand_rad=0.5)", "0.5", None),
     ],
 )
-def test_nonsense_of_a_driver_is_answered(write, expression, said):
+def test_nonsense_of_a_driver_is_answered(write, expression, value, allowed):
     path = write(f"class Mine:\n    def step(self, reference, measurement, motion):\n        return {expression}\n")
-    with pytest.raises(DriverError, match=rf"driver .*mine\.py:Mine: .*{said}"):
+    with raises(DriverError, key=f"driver {path}:Mine", allowed=allowed) as refused:
+        simulate("step_steer", driver=f"{path}:Mine", overrides=SHORT)
+    assert repr(refused.value.value) == value
+
+
+def test_error_in_the_step_of_a_driver_is_answered_with_its_line(write):
+    path = write("class Mine:\n    def step(self, reference, measurement, motion):\n        return 1 / 0\n")
+    with pytest.raises(DriverError, match=r"mine\.py:Mine: step raised ZeroDivisionError: .*\(mine\.py, line 3\)"):
         simulate("step_steer", driver=f"{path}:Mine", overrides=SHORT)
 
 

@@ -59,11 +59,11 @@ def test_a_file_that_is_no_recording_says_so(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with raises(RecordingError, cause=FileNotFoundError):
         Recording.open(path)
-    with pytest.raises(RecordingError, match=r"cannot read .*: Is a directory"):
+    with raises(RecordingError, value=tmp_path):
         Recording.open(tmp_path)
     for data in (b"", b"\x89MCAP", b"no MCAP at all, but text"):
         path.write_bytes(data)
-        with pytest.raises(RecordingError, match=r"run\.mcap is not an MCAP file"):
+        with raises(RecordingError, value=path):
             Recording.open(path)
 
 
@@ -80,7 +80,7 @@ def test_an_mcap_file_of_another_program_is_refused(tmp_path: Path) -> None:
 
 def test_a_later_format_is_refused(mcap_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("activesteer.recording.reader.FORMAT_VERSION", 0)
-    with pytest.raises(RecordingError, match="format version 1; this version of activesteer reads up to 0"):
+    with raises(RecordingError, value=1, allowed=0):
         Recording.open(mcap_file)
 
 

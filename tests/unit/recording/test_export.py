@@ -94,9 +94,9 @@ def test_matlab_names_are_kept_up_to_its_limit(tmp_path: Path) -> None:
     found = loadmat(path, simplify_cells=True)
     assert found[longest].tolist() == [1.0, 2.0]
     assert found["units"][longest] == "m"
-    with pytest.raises(RecordingError, match=r"'a+_m' has 64 letters; MATLAB allows 63"):
+    with raises(RecordingError, value="a" + longest, allowed=63):
         with_channel("a" + longest).to_mat(tmp_path / "run.mat")
-    with pytest.raises(RecordingError, match="a channel is called 'units', which is taken"):
+    with raises(RecordingError, value="units"):
         with_channel("units").to_mat(tmp_path / "run.mat")
 
 
@@ -109,7 +109,7 @@ def test_recording_without_metrics_or_rows_can_be_exported(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("method", ["to_csv", "to_parquet", "to_mat"])
 def test_file_that_cannot_be_written_is_answered(recording: Recording, tmp_path: Path, method: str) -> None:
-    with pytest.raises(RecordingError, match=r"cannot write .*nowhere.run\.x"):
+    with raises(RecordingError, cause=OSError, value=tmp_path / "nowhere" / "run.x"):
         getattr(recording, method)(tmp_path / "nowhere" / "run.x")
     with raises(RecordingError, cause=IsADirectoryError):
         getattr(recording, method)(tmp_path)
