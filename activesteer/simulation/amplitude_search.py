@@ -117,7 +117,8 @@ def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> f
     raise ManeuverError(
         f"{probe.name}: no steering wheel angle found that gives {wanted:.3g} m/s2 in the control-free car; the "
         f"closest was {np.degrees(best[0]):.1f} deg with {best[1]:.3g} m/s2: is the road too slippery "
-        f"(road.mu {probe.road.mu:g})?"
+        f"(road.mu {probe.road.mu:g})?",
+        value=wanted,
     )
 
 
@@ -151,7 +152,8 @@ def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> flo
         raise ManeuverError(
             f"{probe.name}: the control-free car reaches {ay.max():.3g} m/s2 with {np.degrees(wheel.max()):.0f} deg at "
             f"the steering wheel, but {high:.3g} m/s2 ({high / GRAVITY_MPS2:.3g} g) are needed: is the road too "
-            f"slippery (road.mu {probe.road.mu:g})? Give the amplitude instead (steering_wheel_deg)"
+            f"slippery (road.mu {probe.road.mu:g})? Give the amplitude instead (steering_wheel_deg)",
+            value=high,
         )
     return round(angle_at(wheel, ay, wanted) / _ROUNDED_RAD) * _ROUNDED_RAD
 

@@ -206,11 +206,13 @@ class Recorder:
         if wrong.any():
             row = int(np.argmax(wrong.any(axis=1)))
             column = int(np.argmax(wrong[row]))
-            time_s, what = (first + row) * self._timestep_s, f"{self.channels[column].name} is {values[row, column]:g}"
+            name, time_s = self.channels[column].name, (first + row) * self._timestep_s
+            problem = f"{name} is {values[row, column]:g}"
         else:
             pose, body = np.argwhere(~np.isfinite(poses.positions_m).all(axis=2))[0]
-            time_s, what = poses.time_s[pose], f"the position of {poses.names[body]} is not finite"
-        raise SimulationDiverged(f"{what} at {time_s:.3f} s")
+            name, time_s = poses.names[body], poses.time_s[pose]
+            problem = f"the position of {name} is not finite"
+        raise SimulationDiverged(f"{problem} at {time_s:.3f} s", value=name)
 
     def _times(self, first: int, last: int) -> NDArray[np.float64]:
         return np.asarray(np.arange(first, last) * self._timestep_s, dtype=np.float64)

@@ -175,7 +175,7 @@ class Simulation:
         loop, left = self.loop, self.steps - self.loop.step_count
         if self._failure is not None:
             problem = f"the run failed ({type(self._failure).__name__}); it goes on from a saved state only"
-            raise ManeuverError(f"{problem}: {self._failure}")
+            raise ManeuverError(f"{problem}: {self._failure}") from self._failure
         if isinstance(steps, bool) or not isinstance(steps, Integral) or steps < 0:
             raise ParameterError(f"is {shown(steps)}; a whole number of steps, 0 or more, is needed", key="steps")
         if steps > left:

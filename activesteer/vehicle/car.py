@@ -110,7 +110,7 @@ class Vehicle:
             if parameters.sensors.speed_from_wheels:
                 self._plan["wheel_radii_m"] = speed_radii(parameters.powertrain.front_fraction, radii_m)
         except ModelError as reason:
-            raise ModelError(str(reason), file=str(mjcf)) from reason
+            raise ModelError(str(reason), file=str(mjcf), value=reason.value, allowed=reason.allowed) from reason
 
     def _bind(self) -> None:
         """Looks up addresses once; the step uses nothing but integers and views."""
@@ -345,11 +345,11 @@ class Vehicle:
         for name in CARRIED_OUT:
             value = self._commands[COMMANDS.index(name)]
             if not math.isfinite(value):
-                raise SimulationDiverged(f"the command {name} is {value:g} at {data.time:.3f} s")
+                raise SimulationDiverged(f"the command {name} is {value:g} at {data.time:.3f} s", value=name)
         for kind, warning in enumerate(data.warning):
             if warning.number:
                 text = mujoco.mju_warningText(kind, warning.lastinfo)
-                raise SimulationDiverged(f"MuJoCo warns at {data.time:.3f} s: {text}")
+                raise SimulationDiverged(f"MuJoCo warns at {data.time:.3f} s: {text}", value=mujoco.mjtWarning(kind))
         if not np.isfinite(data.qpos).all() or not np.isfinite(data.qvel).all():
             bad = np.flatnonzero(~np.isfinite(data.qvel))
             joints = sorted({self.model.joint(int(self.model.dof_jntid[dof])).name for dof in bad})
@@ -363,7 +363,7 @@ class Vehicle:
             raise SimulationDiverged(f"the speed is {speed:g} m/s at {data.time:.3f} s")
         for name, live in zip(RawRows._fields, self._arrays_of(data), strict=False):
             if not np.isfinite(live).all():
-                raise SimulationDiverged(f"what is recorded of {name} is not finite at {data.time:.3f} s")
+                raise SimulationDiverged(f"what is recorded of {name} is not finite at {data.time:.3f} s", value=name)
 
     def raw_rows(self, count: int) -> RawRows:
         """Empty rows for `count` steps: `live_arrays`, one behind the other in one block, as `step` fills them."""

@@ -97,7 +97,8 @@ def _find(address: int, wanted: int, limit_bytes: int, what: str) -> int:
         if hits.size:
             return (start + int(hits[0])) * _WORD_BYTES
     raise ModelError(
-        f"MuJoCo {mujoco.__version__}: cannot locate {what} in its structures; this version is not supported"
+        f"MuJoCo {mujoco.__version__}: cannot locate {what} in its structures; this version is not supported",
+        value=what,
     )
 
 

@@ -74,7 +74,8 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
     joint = model.joint(int(model.dof_jntid[worst])).name
     raise ModelError(
         f"no static equilibrium found in {_ITERATIONS} iterations: {np.abs(residual).max():.3g} N (or N m) remain at "
-        f"joint {joint!r}; are the springs' free lengths right for the car's weight?"
+        f"joint {joint!r}; are the springs' free lengths right for the car's weight?",
+        value=joint,
     )
 
 

@@ -33,7 +33,7 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
     """
     chassis = spec.body("chassis")
     if chassis is None:
-        raise ModelError("there is no body 'chassis'")
+        raise ModelError("there is no body 'chassis'", value="chassis")
     load, factors = parameters.load, parameters.factors
     if load == Load() and factors == Factors():
         return

@@ -272,7 +272,8 @@ def _actuator(
     lag, rate = (float(value) for value in model.actuator_dynprm[index, :2])
     if lag <= 0.0 or rate <= 0.0:
         raise ModelError(
-            f"actuator {name!r}: dynprm is {lag:g} {rate:g}; a lag [s] and a rate limit [rad/s] above 0 are needed"
+            f"actuator {name!r}: dynprm is {lag:g} {rate:g}; a lag [s] and a rate limit [rad/s] above 0 are needed",
+            value=name,
         )
     low, high = (float(value) for value in model.actuator_ctrlrange[index])
     return (fb.KIND_SERVO, address, lag, rate, low, high)

@@ -24,7 +24,7 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
             mujoco.mjtObj.mjOBJ_ACTUATOR: model.nu,
         }[kind]
         names = [mujoco.mj_id2name(model, kind, number) or "" for number in range(count)]
-        raise ModelError(f"the model has no {word} {name!r}; {nearest_names(name, names)}", value=name)
+        raise ModelError(f"the model has no {word} {name!r}; {nearest_names(name, names)}", value=name, allowed=names)
     return index
 
 

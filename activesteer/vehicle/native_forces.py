@@ -437,7 +437,8 @@ def install_native_forces() -> None:
         if present is not None and not any(present is ours for ours in _installed):
             raise ModelError(
                 f"MuJoCo's {name} is already taken by {present!r}; there is one per process and the tyre forces need "
-                f"it: call mujoco.set_{name}(None) before using activesteer"
+                f"it: call mujoco.set_{name}(None) before using activesteer",
+                value=name,
             )
     if not _installed:
         compiled = _make_callbacks(engine_layout())

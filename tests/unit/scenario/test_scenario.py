@@ -171,23 +171,24 @@ def test_missing_model_is_answered_with_file_and_key(vehicle):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "name"),
     [
-        ("</mujoco>", "<no_such_thing/></mujoco>", "no_such_thing"),
-        ("</mujoco>", "", "XML"),
+        ("</mujoco>", "<no_such_thing/></mujoco>", None),
+        ("</mujoco>", "", None),
         ('name="chassis"', 'name="hull"', "chassis"),
-        ('name="cg_gyro"', 'name="cg_gyros"', r"no sensor 'cg_gyro'; did you mean 'cg_gyros'"),
+        ('name="cg_gyro"', 'name="cg_gyros"', "cg_gyro"),
     ],
 )
-def test_bad_model_is_answered_with_its_file(vehicle, tmp_path, old, new, told):
+def test_bad_model_is_answered_with_its_file(vehicle, tmp_path, old, new, name):
     folder = tmp_path / "car"
     shutil.copytree(models_dir() / "mjcf" / "compact", folder)
     model = folder / "compact.xml"
     text = model.read_text()
     assert old in text
     model.write_text(text.replace(old, new))
-    with pytest.raises(ModelError, match=rf"compact\.xml(.|\n)*{told}"):
+    with raises(ModelError, value=name) as refused:
         activesteer.simulate("standstill", vehicle=vehicle(("compact/compact.xml", str(model))))
+    assert refused.value.file.endswith("compact.xml")
 
 
 def test_bad_vehicle_file_is_answered_with_file_key_and_line(vehicle):

@@ -16,6 +16,7 @@ from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Mot
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.control_unit import ControlUnit
 from tests.physics.runs import STEP_DEG, go_on
+from tests.raising import raises
 
 SENSED = Measurement(0.0, 20.0, 0.1, 2.0, 0.0, 0.32, 0.0, 0.0, (60.0, 60.0, 60.0, 60.0))
 STEP = {"steer.steering_wheel_deg": STEP_DEG}
@@ -125,7 +126,7 @@ def test_a_slower_controller_behind_a_bus_still_steers_but_later() -> None:
 
 @pytest.mark.parametrize(("key", "value"), [("controllers.interval_s", 0.0015), ("controllers.bus_delay_s", 0.0005)])
 def test_what_is_no_whole_number_of_steps_is_refused(key: str, value: float) -> None:
-    with pytest.raises(ParameterError, match=f"{key}.*whole steps of the simulation"):
+    with raises(ParameterError, key=key, value=value):
         activesteer.simulate("step_steer", "ars", overrides=STEP | {key: value})
 
 

@@ -17,6 +17,7 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S, POSE_INTERVAL_S, Recorder
 from activesteer.simulation.runner import run_scenario
 from activesteer.vehicle.channels import ChannelMap
+from tests.raising import raises
 
 BLOCK_ROWS = round(BLOCK_INTERVAL_S / 0.001)
 KEYS = {"settle_s": 0.0, "duration_s": 5.0, "steer.start_s": 0.01, "steer.steering_wheel_deg": 40}
@@ -209,7 +210,7 @@ def test_recorded_value_that_is_not_finite_ends_the_run_with_its_name(tmp_path, 
 
     monkeypatch.setattr(ChannelMap, "evaluate", damaged)
     path = tmp_path / "run.mcap"
-    with pytest.raises(SimulationDiverged, match=r"rl_tyre_mz_Nm is nan at 1\.100 s") as caught:
+    with raises(SimulationDiverged, value="rl_tyre_mz_Nm") as caught:
         run_scenario(scenario, "ars", path=path)
     saved = Recording.open(path)
     assert len(saved) == len(caught.value.recording) == 3 * BLOCK_ROWS

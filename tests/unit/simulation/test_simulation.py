@@ -11,7 +11,6 @@ import pytest
 import activesteer
 from activesteer import ActuatorCommand, DriverCommand, Recording, Simulation
 from activesteer.errors import (
-    ActiveSteerError,
     ControllerError,
     DriverError,
     ManeuverError,
@@ -197,22 +196,22 @@ def test_steps_are_a_whole_number(steps: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("commands", "error", "message"),
+    ("commands", "error", "value"),
     [
-        ({"driver_command": DriverCommand(float("nan"))}, DriverError, "given steering_wheel_demand_rad = nan"),
-        ({"driver_command": DriverCommand(brake_pedal=1.5)}, DriverError, "given brake_pedal = 1.5"),
-        ({"driver_command": DriverCommand(front_steer_demand_rad=1.0)}, DriverError, "given front_steer_demand_rad"),
-        ({"driver_command": ActuatorCommand()}, DriverError, "DriverCommand is needed"),
-        ({"driver_command": 0.1}, DriverError, "given 0.1; an activesteer.DriverCommand"),
-        ({"actuator_command": ActuatorCommand(3.0)}, ControllerError, "given rear_steer_demand_rad = 3.0; .*degrees"),
-        ({"actuator_command": ActuatorCommand("left")}, ControllerError, "a number is needed"),  # pyright: ignore[reportArgumentType]
-        ({"actuator_command": [0.1]}, ControllerError, "ActuatorCommand is needed"),
+        ({"driver_command": DriverCommand(float("inf"))}, DriverError, float("inf")),
+        ({"driver_command": DriverCommand(brake_pedal=1.5)}, DriverError, 1.5),
+        ({"driver_command": DriverCommand(front_steer_demand_rad=1.0)}, DriverError, 1.0),
+        ({"driver_command": ActuatorCommand()}, DriverError, ActuatorCommand()),
+        ({"driver_command": 0.1}, DriverError, 0.1),
+        ({"actuator_command": ActuatorCommand(3.0)}, ControllerError, 3.0),
+        ({"actuator_command": ActuatorCommand("left")}, ControllerError, "left"),  # pyright: ignore[reportArgumentType]
+        ({"actuator_command": [0.1]}, ControllerError, [0.1]),
     ],
 )
-def test_a_wrong_command_is_refused_before_anything_is_driven(commands: Any, error: Any, message: str) -> None:
+def test_a_wrong_command_is_refused_before_anything_is_driven(commands: Any, error: Any, value: Any) -> None:
     simulation = made()
     simulation.advance(100)
-    with pytest.raises(error, match=r"Simulation\.step was.*" + message):
+    with raises(error, value=value):
         simulation.step(**commands)
     simulation.advance(100)
     plain = made()
@@ -262,10 +261,10 @@ def test_a_failed_run_keeps_its_rows_and_goes_on_from_a_saved_state_only() -> No
     simulation = made(controller=_Breaks())
     simulation.advance(100)
     state = simulation.save_state()
-    with pytest.raises(ControllerError, match="broken"):
+    with raises(ControllerError, cause=ValueError):
         simulation.run()
     assert not simulation.done
-    with pytest.raises(ActiveSteerError, match=r"failed \(ControllerError\).*saved state"):
+    with raises(ManeuverError, cause=ControllerError):
         simulation.step()
     recording = simulation.recording()
     assert len(recording) == 300
@@ -283,7 +282,7 @@ def test_an_interrupted_chunk_is_not_gone_on_with(monkeypatch: pytest.MonkeyPatc
     with pytest.raises(KeyboardInterrupt):
         simulation.step()
     monkeypatch.undo()
-    with pytest.raises(ActiveSteerError, match="KeyboardInterrupt"):
+    with raises(ManeuverError, cause=KeyboardInterrupt):
         simulation.step()
     assert len(simulation.recording()) == 100
 
@@ -291,7 +290,7 @@ def test_an_interrupted_chunk_is_not_gone_on_with(monkeypatch: pytest.MonkeyPatc
 def test_a_recorded_value_that_is_not_finite_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
     simulation = made()
     simulation.step(actuator_command=ActuatorCommand(correction_rad=float("nan")))
-    with pytest.raises(SimulationDiverged, match=r"correction_rad is nan at 0\.000 s"):
+    with raises(SimulationDiverged, value="correction_rad"):
         simulation.recording()
     assert simulation.recording().metadata["error"].startswith("SimulationDiverged: correction_rad")
 
@@ -301,7 +300,7 @@ def test_a_run_with_a_file_does_not_go_back(tmp_path: Any) -> None:
     with simulation.recorded_to(tmp_path / "run.mcap"):
         state = simulation.save_state()
         simulation.advance(10)
-        with pytest.raises(RecordingError, match="file"):
+        with pytest.raises(RecordingError):
             simulation.restore_state(state)
 
 

@@ -19,6 +19,7 @@ from activesteer.signals import Measurement, Motion
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.runner import run_scenario
 from activesteer.vehicle import Vehicle
+from tests.raising import raises
 
 SPOILED_S = 1.2345
 
@@ -82,7 +83,7 @@ def test_a_state_that_is_not_finite_ends_the_run(
 ) -> None:
     expected = good_run()
     spoil(change)
-    with pytest.raises(SimulationDiverged, match=r"at 1\.[23]\d* s") as caught:
+    with pytest.raises(SimulationDiverged) as caught:
         good_run()
     kept = caught.value.recording
     assert SPOILED_S - 0.002 < kept.time_s[-1] < SPOILED_S + 0.101
@@ -126,7 +127,7 @@ def test_a_warning_of_the_engine_ends_the_run() -> None:
     simulation = ClosedLoop(resolve("straight_line"))
     simulation.advance(10)
     simulation.vehicle.data.warning[mujoco.mjtWarning.mjWARN_INERTIA].number += 1
-    with pytest.raises(SimulationDiverged, match=r"MuJoCo warns at 0\.\d+ s: .*[Ii]nertia"):
+    with raises(SimulationDiverged, value=mujoco.mjtWarning.mjWARN_INERTIA):
         simulation.advance(10)
 
 
@@ -159,12 +160,12 @@ def test_command_that_is_no_number_ends_the_run_with_its_name(block, field, name
 
     loop = ClosedLoop(resolve("straight_line"), "ars")
     monkeypatch.setattr(block, "step", spoiled)
-    with pytest.raises(SimulationDiverged, match=rf"the command {name} is nan at 0\.001 s"):
+    with raises(SimulationDiverged, value=name):
         loop.advance(1)
 
 
 def test_part_of_a_command_that_is_only_recorded_has_to_be_a_number_too(monkeypatch):
     step = RearSteer.step
     monkeypatch.setattr(RearSteer, "step", lambda *inputs: step(*inputs)._replace(prediction_rad=np.nan))
-    with pytest.raises(SimulationDiverged, match=r"prediction_rad is nan at 0\.000 s"):
+    with raises(SimulationDiverged, value="prediction_rad"):
         run_scenario(resolve("straight_line", overrides={"duration_s": 0.1}), "ars")

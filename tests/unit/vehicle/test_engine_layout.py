@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ctypes
 
-import mujoco
 import numpy as np
 import pytest
 
 from activesteer.errors import ModelError
 from activesteer.vehicle import engine_layout
 from activesteer.vehicle.engine_layout import measure_engine_layout
+from tests.raising import raises
 from tests.unit.vehicle.cars import standing
 
 
@@ -44,7 +44,7 @@ def test_offsets_differ_and_are_aligned() -> None:
 
 def test_an_unknown_struct_is_an_error_that_names_the_member(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine_layout, "_DATA_BYTES", 64)
-    with pytest.raises(ModelError, match=rf"MuJoCo {mujoco.__version__}.*mjData\.qvel.*not supported"):
+    with raises(ModelError, value="mjData.qvel"):
         measure_engine_layout()
 
 

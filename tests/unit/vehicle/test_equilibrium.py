@@ -8,6 +8,7 @@ import pytest
 
 from activesteer.errors import ModelError
 from activesteer.vehicle.equilibrium import static_ride
+from tests.raising import raises
 from tests.unit.vehicle.cars import standing
 
 NOTHING = np.array([], dtype=np.intp)
@@ -36,7 +37,7 @@ def test_finds_it_through_a_hardening_spring() -> None:
 
 def test_a_mass_that_nothing_carries_is_an_error_that_names_the_joint() -> None:
     model, data = mass_on("")
-    with pytest.raises(ModelError, match=r"no static equilibrium.*20 N.*'heave'"):
+    with raises(ModelError, value="heave"):
         static_ride(model, data, NOTHING)
 
 
@@ -69,5 +70,5 @@ def test_a_car_in_the_air_has_none() -> None:
     mujoco.mj_resetData(model, data)
     data.qpos[2] = 5.0
     held = [0, 1, 5, *(int(model.joint(f"{corner}_spin").dofadr[0]) for corner in ("fl", "fr", "rl", "rr"))]
-    with pytest.raises(ModelError, match="no static equilibrium"):
+    with raises(ModelError, value="root"):
         static_ride(model, data, np.array(held))

@@ -13,50 +13,62 @@ from activesteer.errors import ModelError
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.vehicle import loading
+from tests.raising import raises
 from tests.unit.vehicle.cars import changed_model
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "name"),
+    [
+        ("compact.xml", '<body name="chassis">', '<body name="hull">', "chassis"),
+        ("compact.xml", '<gyro name="cg_gyro"', '<gyro name="cg_gyroscope"', "cg_gyro"),
+        ("compact.xml", 'name="chassis_orientation"', 'name="attitude"', "chassis_orientation"),
+        ("compact.xml", 'name="rl_wheel_speed"', 'name="rl_wheel_spin"', "rl_wheel_speed"),
+        ("compact.xml", 'name="steering_wheel_angle"', 'name="handwheel"', "steering_wheel_angle"),
+        ("compact.xml", '"fr_damper"', '"fr_shock"', "fr_damper"),
+        ("compact.xml", '<position name="steering_wheel"', '<position name="wheel"', "steering_wheel"),
+        ("compact.xml", '<general name="rr_steer"', '<general name="rr_hinge"', "rr_steer"),
+        ("compact.xml", '<general name="fl_slip_x"', '<general name="fl_kappa"', "fl_slip_x"),
+        ("compact.xml", '<motor name="fl_drive"', '<motor name="fl_shaft"', "fl_drive"),
+        ("compact.xml", 'dynprm="0.025 0.5"', 'dynprm="0 0.5"', "rl_steer"),
+        ("compact.xml", 'dynprm="0.025 8"', 'dynprm="0.025 0"', "superposition"),
+        ("compact.xml", '<freejoint name="root"/>', "", "root"),
+    ],
+)
+def test_a_wrong_model_is_an_error_with_file_and_name(tmp_path: Path, file: str, old: str, new: str, name: str) -> None:
+    model = changed_model(tmp_path, file, old, new)
+    with raises(ModelError, file=str(model), value=name):
+        dataclasses.replace(load_car(), mjcf=model).on()
 
 
 @pytest.mark.parametrize(
     ("file", "old", "new", "words"),
     [
-        ("compact.xml", '<body name="chassis">', '<body name="hull">', "chassis"),
         ("front_axle.xml", 'name="fl_spin"', 'name="fl_turn"', "fl_spin"),
-        ("compact.xml", '<gyro name="cg_gyro"', '<gyro name="cg_gyroscope"', "no sensor 'cg_gyro'.*'cg_gyroscope'"),
-        ("compact.xml", 'name="chassis_orientation"', 'name="attitude"', "no sensor 'chassis_orientation'"),
-        ("compact.xml", 'name="rl_wheel_speed"', 'name="rl_wheel_spin"', "no sensor 'rl_wheel_speed'"),
-        ("compact.xml", 'name="steering_wheel_angle"', 'name="handwheel"', "no sensor 'steering_wheel_angle'"),
-        ("compact.xml", '"fr_damper"', '"fr_shock"', "no tendon 'fr_damper'"),
-        ("compact.xml", '<position name="steering_wheel"', '<position name="wheel"', "no actuator 'steering_wheel'"),
-        ("compact.xml", '<general name="rr_steer"', '<general name="rr_hinge"', "no actuator 'rr_steer'"),
-        ("compact.xml", '<general name="fl_slip_x"', '<general name="fl_kappa"', "no actuator 'fl_slip_x'"),
-        ("compact.xml", '<motor name="fl_drive"', '<motor name="fl_shaft"', "no actuator 'fl_drive'"),
-        ("compact.xml", 'dynprm="0.025 0.5"', 'dynprm="0 0.5"', "rl_steer.*lag"),
-        ("compact.xml", 'dynprm="0.025 8"', 'dynprm="0.025 0"', "superposition.*rate"),
         ("compact.xml", "</mujoco>", "", "XML"),
-        ("compact.xml", '<freejoint name="root"/>', "", "root"),
         ("rear_axle.xml", 'mass="12.5"', 'mass="heavy"', "mass"),
     ],
 )
-def test_a_wrong_model_is_an_error_with_file_and_name(
+def test_what_the_engine_says_of_a_model_is_passed_on(
     tmp_path: Path, file: str, old: str, new: str, words: str
 ) -> None:
-    given = load_car()
-    broken = dataclasses.replace(given, mjcf=changed_model(tmp_path, file, old, new))
-    with pytest.raises(ModelError, match=rf"(?s)compact\.xml.*{words}"):
-        broken.on()
+    model = changed_model(tmp_path, file, old, new)
+    with pytest.raises(ModelError, match=rf"compact\.xml.*{words}"):
+        dataclasses.replace(load_car(), mjcf=model).on()
 
 
 def test_a_renamed_wheel_body_is_named(tmp_path: Path) -> None:
     path = changed_model(tmp_path, "rear_axle.xml", "rl_wheel", "rl_tire")
     main = path.read_text(encoding="utf-8").replace('objname="rl_wheel"', 'objname="rl_tire"')
     path.write_text(main.replace('site="rl_wheel_centre"', 'site="rl_tire_centre"'), encoding="utf-8")
-    with pytest.raises(ModelError, match=r"(?s)compact\.xml.*no body 'rl_wheel'; did you mean"):
+    with raises(ModelError, file=str(path), value="rl_wheel"):
         dataclasses.replace(load_car(), mjcf=path).on()
 
 
 def test_a_missing_file_is_an_error_that_names_it(tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match=r"absent\.xml"):
-        dataclasses.replace(load_car(), mjcf=tmp_path / "absent.xml").on()
+    path = tmp_path / "absent.xml"
+    with raises(ModelError, file=str(path)):
+        dataclasses.replace(load_car(), mjcf=path).on()
 
 
 def test_an_unchanged_copy_loads(tmp_path: Path) -> None:
