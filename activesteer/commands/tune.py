@@ -68,9 +68,18 @@ def _draw(result: Tuning, folder: Path) -> list[Path]:
     names = list(result.trials[0].objectives)
     x, y = names[:2] if len(names) > 1 else ("set", names[0])
     axes = figure.subplots()
-    for trials, colour, label in ((result.trials, "0.6", "tried"), (result.front, "C3", "best")):
+    kept = [trial for trial in result.trials if trial.violation == 0.0]
+    broken = [trial for trial in result.trials if trial.violation > 0.0]
+    front = sorted(result.front, key=lambda trial: trial.objectives[names[0]])
+    for trials, look, label in (
+        (broken, {"color": "0.6", "marker": "x"}, "breaks a constraint"),
+        (kept, {"color": "0.6", "marker": "o"}, "tried"),
+        (front, {"color": "C3", "marker": "o", "linestyle": "-", "drawstyle": "steps-post"}, "best"),
+    ):
         places = [trial.objectives.get(x, trial.number) for trial in trials]
-        axes.plot(places, [trial.objectives[y] for trial in trials], "o", color=colour, markersize=4, label=label)
+        values = [trial.objectives[y] for trial in trials]
+        if trials:
+            axes.plot(places, values, **{"linestyle": "none", "markersize": 4, "label": label, **look})
     axes.set_xlabel(f"{x} [-]")
     axes.set_ylabel(f"{y} [-]")
     axes.legend()

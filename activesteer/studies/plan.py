@@ -128,7 +128,7 @@ def _check(study: StudyFile, samples: Sequence[Samples], factor_values: FactorVa
                 if key in factor_values.overrides(*place, {key: values[0]}):
                     effective.add(key)
                 continue
-            described = [_leaves(_resolved(factor_values, place, {**first, key: value}, key)) for value in values]
+            described = _described(factor_values, place, samples[0], key, values)
             changed = {leaf for other in described for leaf in _differing(described[0], other)}
             if any(_is_read(leaf, base, study.controllers) for leaf in changed):
                 effective.add(key)
@@ -148,6 +148,23 @@ def _resolved(
     except ActiveSteerError as error:
         error.add_note(f"in {label_of(items[0])} with {label_of(items[1])}" + (f", factor {key}" if key else ""))
         raise
+
+
+def _described(
+    factor_values: FactorValues, place: tuple[int, int], samples: Samples, key: str, values: Sequence[Any]
+) -> list[dict[str, Any]]:
+    """What a run depends on at each value of a key, the others being as in the first sample where that is possible."""
+    first, cases = samples[0], factor_values.study.case_list
+    whole = []
+    if cases is not None:
+        rows = [cases[cases.columns[key].index(value)] for value in values]
+        whole = [_leaves(_resolved(factor_values, place, row, key)) for row in rows]
+    try:
+        return [_leaves(_resolved(factor_values, place, {**first, key: value}, key)) for value in values]
+    except ActiveSteerError:
+        if not whole:
+            raise
+        return whole  # the keys of a case may go together: alone, one of them makes no sense
 
 
 def _check_curves(study: StudyFile, scenario: Scenario) -> None:

@@ -156,7 +156,8 @@ def _of_group(
 def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
     together = np.concatenate(parts)
     low, high = float(together.min()), float(together.max())
-    if high - low <= 1e-12 * max(abs(low), abs(high), 1e-300):
+    # The page holds five digits: what differs by less is one value to it.
+    if high - low <= 1e-3 * max(abs(low), abs(high), 1e-300):
         low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
     edges = np.linspace(low, high, min(_BINS, max(5, int(np.sqrt(max(map(len, parts)))) + 1)) + 1)
     return {"edges": _json(edges), "counts": [np.histogram(part, edges)[0].tolist() for part in parts]}

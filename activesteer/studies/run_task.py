@@ -35,6 +35,7 @@ CURVE: Final = "curve_"
 """What the name of a column begins with that holds a channel over time."""
 CURVE_STEP_S: Final = 0.02
 """Time between two values of such a column [s]: enough for a picture."""
+_VERSION: Final = "version of "
 _engine = threading.Lock()
 """The engine's callbacks belong to the process: of a worker's threads, one drives at a time."""
 
@@ -118,7 +119,7 @@ def present_inputs(settings: Settings) -> dict[str, str]:
     Raises:
         ActiveSteerError: something is not found.
     """
-    found = {f"version of {key}": value for key, value in deciding_versions().items()}
+    found = {f"{_VERSION}{key}": value for key, value in deciding_versions().items()}
     for maneuver, maneuver_file in settings.maneuvers:
         for vehicle, vehicle_file in settings.vehicles:
             scenario = resolve(maneuver_file, vehicle_file, settings.overrides, settings.driver)
@@ -134,7 +135,11 @@ def differences(settings: Settings) -> str:
         here = present_inputs(settings)
     except ActiveSteerError as error:
         return str(error)
-    wrong = [key for key, value in settings.expected.items() if here.get(key) != value]
+    wrong = [
+        f"{key} ({here.get(key)}, there {value})" if key.startswith(_VERSION) else key
+        for key, value in settings.expected.items()
+        if here.get(key) != value
+    ]
     return f"not as where the study was begun: {', '.join(wrong)}" if wrong else ""
 
 

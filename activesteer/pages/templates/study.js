@@ -48,7 +48,7 @@ function frame(parent, width, height, x, y) {
   const sy = (v) => height - bottom - ((v - y0) / (y1 - y0)) * (height - top - bottom);
   element(svg, "rect", { x: left, y: top, width: width - left - right, height: height - top - bottom, fill: "none", stroke: "#888" });
   const marks = (axis, count) => axis.levels ? axis.levels.map((level, i) => [i, String(level)]) : ticks(...axis.range, count).map((v) => [v, short(v)]);
-  for (const [v, text] of marks(x, 5)) {
+  for (const [v, text] of marks(x, width < 320 ? 4 : 5)) {
     element(svg, "line", { x1: sx(v), x2: sx(v), y1: height - bottom, y2: height - bottom + 4, stroke: "#888" });
     element(svg, "text", { x: sx(v), y: height - bottom + 16, "text-anchor": "middle" }, text);
   }
@@ -107,20 +107,20 @@ function heat(parent, metric, found, keyed) {
     const f = frame(box, 400, 300, axes[0], axes[1]);
     map.forEach((line, i) => line.forEach((v, j) => {
       if (v === null) return;
-      const share = high > low ? (v - low) / (high - low) : 0.5;
-      element(f.svg, "rect", { x: f.sx(i - 0.5), y: f.sy(j + 0.5), width: f.sx(0.5) - f.sx(-0.5), height: f.sy(-0.5) - f.sy(0.5), fill: `hsl(${240 - 200 * share} 70% ${80 - 25 * share}%)` });
-      element(f.svg, "text", { x: f.sx(i), y: f.sy(j) + 4, "text-anchor": "middle" }, short(v));
+      const depth = high > low ? (v - low) / (high - low) : 0.5;
+      element(f.svg, "rect", { x: f.sx(i - 0.5), y: f.sy(j + 0.5), width: f.sx(0.5) - f.sx(-0.5), height: f.sy(-0.5) - f.sy(0.5), fill: `hsl(210 60% ${97 - 37 * depth}%)`, "shape-rendering": "crispEdges" });
+      if (map.length <= 12) element(f.svg, "text", { x: f.sx(i), y: f.sy(j) + 4, "text-anchor": "middle" }, short(v));
     }));
   });
 }
 
-function bars(parent, controller, found, metric) {
+function bars(parent, controller, found, metric, [bottom, top]) {
   const names = [...new Set(found.map((index) => index[1]))], factors = [...new Set(found.map((index) => index[0]))];
   const box = html(parent, "div");
   html(box, "div", data.controllers[controller]);
-  const top = Math.max(...found.map((index) => index[2] + (index[3] || 0)), 0), bottom = Math.min(...found.map((index) => index[2] - (index[3] || 0)), 0);
   const label = names[0] === "mu*" ? withUnit("mu*", metric.unit) : `${names.join(" (light), ")}${names.length > 1 ? " (dark)" : ""} [-]`;
   const f = frame(box, Math.max(300, 90 + 130 * factors.length), 240, { label: "factor", levels: factors }, { label, range: [bottom * 1.05, top * 1.05 || 1] });
+  element(f.svg, "line", { x1: f.sx(-0.5), x2: f.sx(factors.length - 0.5), y1: f.sy(0), y2: f.sy(0), stroke: "#888" });
   for (const [factor, name, value, confidence, spread] of found) {
     const n = names.indexOf(name), width = 0.6 / names.length, x = factors.indexOf(factor) - 0.3 + n * width;
     const bar = element(f.svg, "rect", { x: f.sx(x), width: f.sx(width) - f.sx(0), y: f.sy(Math.max(value, 0)), height: Math.abs(f.sy(value) - f.sy(0)), fill: data.colours[controller], "fill-opacity": n === 0 && names.length > 1 ? 0.45 : 0.85 });
@@ -147,7 +147,7 @@ function parallel(parent, metric, rows) {
     element(svg, "line", { x1: x(n), x2: x(n), y1: top, y2: height - bottom, stroke: "#444" });
     element(svg, "text", { x: x(n), y: 16, "text-anchor": "middle" }, axis.label);
     const marks = axis.levels ? axis.levels.map((level, i) => [i, String(level)]) : ticks(...axis.range, 5).map((v) => [v, short(v)]);
-    for (const [v, text] of marks) element(svg, "text", { x: x(n) - 5, y: y(axis, v) + 4, "text-anchor": "end" }, text);
+    for (const [v, text] of marks) element(svg, "text", { x: x(n) - 5, y: y(axis, v) + 4, "text-anchor": "end", class: "over" }, text);
   });
 }
 
@@ -194,12 +194,18 @@ function draw() {
     const first = new Map();
     for (const i of rows) if (data.rows.controller[i] === 0) first.set(data.rows.sample[i], values[i]);
     const pairs = rows.filter((i) => data.rows.controller[i] > 0 && values[i] !== null && first.get(data.rows.sample[i]) != null);
-    for (const factor of data.factors) scatter(at("paired"), factor, pairs.map((i) => ({ x: data.rows.factors[factor.key][i], y: values[i] - first.get(data.rows.sample[i]), c: data.rows.controller[i], run: data.rows.run[i] })), `less ${data.controllers[0]}: ${metricAxis(metric)}`);
-    tableOf(at("paired-table"), [`less ${data.controllers[0]}`, ...["5 %", "median", "95 %"].map((text) => withUnit(text, metric.unit)), "smaller in magnitude [%]"],
+    for (const factor of data.factors) scatter(at("paired"), factor, pairs.map((i) => ({ x: data.rows.factors[factor.key][i], y: values[i] - first.get(data.rows.sample[i]), c: data.rows.controller[i], run: data.rows.run[i] })), `difference to ${data.controllers[0]}: ${metricAxis(metric)}`);
+    tableOf(at("paired-table"), [`difference to ${data.controllers[0]}`, ...["5 %", "median", "95 %"].map((text) => withUnit(text, metric.unit)), "smaller in magnitude [%]"],
       found.paired.map((pair, n) => [data.controllers[n + 1], ...(pair ? [...pair.quantiles.map(number), short(100 * pair.smaller)] : ["-", "-", "-", "-"])]));
   }
   if (found.heat) { at("heat-part").hidden = false; heat(at("heat"), metric, found, keyed); }
-  if (found.indices.length) { at("indices-part").hidden = false; found.indices.forEach((part, c) => { if (part.length) bars(at("indices"), c, part, metric); }); }
+  if (found.indices.length) {
+    at("indices-part").hidden = false;
+    // One scale, so that controllers can be compared.
+    const ends = found.indices.flat().flatMap(([, , value, confidence]) => [value - (confidence || 0), value + (confidence || 0)]);
+    const scale = [Math.min(...ends, 0), Math.max(...ends, 0)];
+    found.indices.forEach((part, c) => { if (part.length) bars(at("indices"), c, part, metric, scale); });
+  }
   parallel(at("parallel"), metric, rows);
   tableOf(at("extremes"), ["controller", "run", metricAxis(metric), "to drive and replay it"],
     found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [data.controllers[c], String(run), short(value), replayLine(command)])));

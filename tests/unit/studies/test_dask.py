@@ -118,6 +118,35 @@ def _free_port() -> int:
         return here.getsockname()[1]
 
 
+class FakeClient:
+    """A cluster of one worker that says which versions it has; it does nothing."""
+
+    def __init__(self, **worker: str) -> None:
+        packages = {"python": "3.11.7.final.0", "distributed": "2026.1.0", "dask": "2026.1.0"}
+        here = {"packages": packages}
+        self.versions = {"client": here, "scheduler": here, "workers": {"tcp://w": {"packages": packages | worker}}}
+
+    def get_executor(self, **_: Any) -> Any:
+        return None
+
+    def wait_for_workers(self, *_: Any, **__: Any) -> None:
+        pass
+
+    def get_versions(self) -> dict[str, Any]:
+        return self.versions
+
+    def nthreads(self) -> dict[str, int]:
+        return {"tcp://w": 1}
+
+
+@pytest.mark.parametrize("worker", [{"distributed": "2025.1.0"}, {"python": "3.12.1.final.0"}])
+def test_a_worker_with_other_versions_is_told_before_the_first_run(tmp_path, worker):
+    with pytest.raises(StudyError, match=r"worker tcp://w has other versions: \S+ \S+, here \S+"):
+        study(short_study(*MU), output=tmp_path, client=FakeClient(**worker))
+    with workers_for(client=FakeClient()) as workers:
+        assert workers.in_flight >= 1
+
+
 @pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_told(tmp_path):
     with pytest.raises(StudyError, match="cannot be reached"):

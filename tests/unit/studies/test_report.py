@@ -123,3 +123,10 @@ def test_the_line_of_a_run_drives_it_again(tmp_path, monkeypatch, capsys):
 def test_a_study_without_rows_has_no_page(tmp_path):
     with pytest.raises(StudyError, match="holds no study"):
         write_report(tmp_path)
+
+
+def test_a_metric_that_hardly_varies_has_a_histogram_that_can_be_drawn(page):
+    _, data, _ = page
+    for group in data["by_group"]:
+        for found in group.values():
+            assert np.all(np.diff(found["histogram"]["edges"]) > 0.0)

@@ -111,6 +111,14 @@ def test_a_key_that_one_of_the_runs_reads_is_taken():
         assert len(Plan(read_study({**STEP, **change}))) >= 2
 
 
+def test_keys_of_cases_may_only_make_sense_together():
+    ends = [{"sweep.first_Hz": 0.1, "sweep.last_Hz": 0.5}, {"sweep.first_Hz": 1.0, "sweep.last_Hz": 4.0}]
+    assert len(Plan(read_study({"maneuvers": ["sine_sweep"], "design": {"cases": ends}}))) == 2
+    ends[1]["sweep.last_Hz"] = 0.9
+    with pytest.raises(ActiveSteerError, match="last_Hz"):
+        Plan(read_study({"maneuvers": ["sine_sweep"], "design": {"cases": ends}}))
+
+
 def test_the_runs_are_every_combination_and_samples_stay_together():
     plan = Plan(read_study({**STEP, "controllers": ["none", "ars"], "vehicles": ["compact", "sedan"]}))
     requests = plan.requests(range(len(plan)))
