@@ -86,11 +86,14 @@ def source_of(text: str) -> dict[str, bytes]:
 
     Returns:
         Path in the file's folder -> content; empty for anything that names no file, as a built-in one.
+
+    Raises:
+        ParameterError: a file cannot be read.
     """
     form = _FORM.fullmatch(text)
     path = None if form is None else user_path(form["path"], ParameterError)
     found: dict[str, bytes] = {}
-    waiting = [path] if path is not None and is_file(path) else []
+    waiting = [] if path is None else [path]
     while waiting:
         file = waiting.pop()
         name = file.relative_to(path.parent).as_posix() if path else file.name

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from activesteer.errors import ActiveSteerError
 from activesteer.scenario.model_files import model_files
 from activesteer.studies.factor_values import label_of
 from activesteer.studies.run_identity import controller_digest
@@ -52,3 +53,8 @@ def test_a_change_of_a_mesh_changes_the_files_of_a_model(tmp_path: Path):
 )
 def test_labels_have_no_folders_and_keep_what_is_given_to_a_controller(given: str, label: str):
     assert label_of(given) == label
+
+
+def test_a_controller_whose_file_is_missing_is_told_with_its_path(tmp_path):
+    with pytest.raises(ActiveSteerError, match=r"cannot read .*mine\.py: No such file"):
+        controller_digest(f"{tmp_path}/mine.py:Mine")
