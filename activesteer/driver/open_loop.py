@@ -14,6 +14,7 @@ class OpenLoopDriver:
     Attributes:
         speed_hold: The cruise control.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
+        steering_wheel_limit_rad: Lock angle [rad]; more cannot be turned.
     """
 
     def __init__(
@@ -33,7 +34,7 @@ class OpenLoopDriver:
         """
         self.speed_hold = speed_hold
         self.steering_ratio = steering_ratio
-        self._limit_rad = steering_wheel_limit_rad
+        self.steering_wheel_limit_rad = steering_wheel_limit_rad
         self._rack_per_steering_wheel_m = rack_per_steering_wheel_m
 
     @classmethod
@@ -77,10 +78,10 @@ class OpenLoopDriver:
             The command.
         """
         saturated = False
-        if angle > self._limit_rad:
-            angle, saturated = self._limit_rad, True
-        elif angle < -self._limit_rad:
-            angle, saturated = -self._limit_rad, True
+        if angle > self.steering_wheel_limit_rad:
+            angle, saturated = self.steering_wheel_limit_rad, True
+        elif angle < -self.steering_wheel_limit_rad:
+            angle, saturated = -self.steering_wheel_limit_rad, True
         if reference.hold_speed:
             torque = self.speed_hold.step(reference.speed_demand_mps, measurement)
             saturated = saturated or self.speed_hold.saturated

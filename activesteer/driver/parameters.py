@@ -17,11 +17,17 @@ class DriverParameters:
     title: str = ""
     """One line for lists."""
     preview_s: Annotated[float, Range(0.2, 5.0)]
-    """How far ahead the driver looks [s]."""
+    """How far ahead the driver looks [s]; behind it the path goes on straight, as far as he knows."""
     reaction_delay_s: Annotated[float, Range(0.0, 1.0)]
     """From seeing to acting, in steps of 10 ms, the time between two looks [s]."""
     neuromuscular_lag_s: Annotated[float, Range(0.0, 0.5)]
     """First-order lag of arms and hands [s]."""
+    return_time_s: Annotated[float, Range(0.0, 5.0)]
+    """How he comes back to a path: drifting off it is as unwelcome as the offset that it makes in this time. Where
+    steering costs nothing, the time constant with which an offset decays [s]."""
+    steering_rate_per_metre_radps: Annotated[float, Range(0.01, 100.0)]
+    """How tightly he follows: the rate of the steering wheel that is as unwelcome as being a metre off the path
+    [rad/s]."""
     steering_rate_limit_radps: Annotated[float, Range(0.1, 50.0)]
     """How fast the steering wheel is turned at most [rad/s]."""
     steering_torque_limit_Nm: Annotated[float, Range(0.5, 200.0)] | None = None

@@ -1,12 +1,12 @@
 """Driver, controller and car as one linear loop: crossover frequency, phase margin, damping.
 
 The loop is put together from the linearised car (`linearisation`), the controller's linear form with its corrector
-fully active (`controllers.linear_form`), and the driver's: his preview law about a straight path, decided every 10 ms,
-a reaction delay of whole decisions, and the lag of his arms. One period of 10 ms, which is ten steps of the engine,
-becomes one matrix; nothing is approximated but the motion, which is small.
+fully active (`controllers.linear_form`), and the driver's: his law about a straight path, decided every 10 ms, a
+reaction delay of whole decisions, which he knows, and the lag of his arms. One period of 10 ms, which is ten steps of
+the engine, becomes one matrix; nothing is approximated but the motion, which is small.
 
-The loop is opened where the driver has decided. Crossover frequency and phase margin are those of what comes back
-there. Its damping is that of the oscillation that is seen after a small step of the path.
+The loop is opened at the steering wheel, between the driver's arms and the car. Crossover frequency and phase margin
+are those of what comes back there. Its damping is that of the oscillation that is seen after a small step of the path.
 
 Source: D. T. McRuer and E. S. Krendel, Mathematical Models of Human Pilot Behavior, AGARDograph 188 (1974).
 """
@@ -44,28 +44,44 @@ _NOTICED: Final = 0.05
 
 @dataclass(frozen=True)
 class DriverLoop:
-    """The loop over one decision of the driver: x[k+1] = A x[k] + b d[k], d[k] = f x[k], d the angle decided on [rad].
+    """The loop over one period of the driver, from one decision to the next.
+
+    Opened at the steering wheel: x[k+1] = A x[k] + B w, where w are the angles that the car has at the steering wheel
+    in the steps of the period; those that the driver gives it are C x[k]. What he knows of his decisions stays in A.
 
     Attributes:
-        a: System matrix of the loop, opened at the decision, shape (n, n).
-        b: What a decision does, shape (n,).
-        f: What is decided, at the steering wheel, shape (n,).
+        a: System matrix of the open loop, shape (n, n).
+        b: What each step's angle does, shape (n, m) with m steps in a period.
+        c: The angle in each step, shape (m, n).
+        closed: System matrix of the closed loop, shape (n, n).
         offset: Place of the lateral offset from the path in the state.
-        interval_s: Time between two decisions [s].
+        timestep_s: Time between two steps [s].
     """
 
     a: Array
     b: Array
-    f: Array
+    c: Array
+    closed: Array
     offset: int
-    interval_s: float
+    timestep_s: float
 
     @cached_property
     def response(self) -> NDArray[np.complexfloating]:
-        """What comes back of a decision at `FREQUENCIES_RADPS`, complex; at -1 is the limit of stability."""
-        z = np.exp(1j * FREQUENCIES_RADPS * self.interval_s)
-        answers = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None])
-        return np.asarray(-(answers[..., 0] @ self.f), dtype=np.complex128)
+        """What comes back of an angle at `FREQUENCIES_RADPS`, complex; at -1 is the limit of stability."""
+        from scipy.linalg import schur, solve_triangular  # noqa: PLC0415 - slow to import
+
+        steps = len(self.c)
+        z = np.exp(1j * self.timestep_s * np.outer(FREQUENCIES_RADPS, np.arange(steps + 1)))
+        # Triangular, the system is solved at once for each frequency.
+        found: Any = schur(self.a, output="complex")
+        triangle, turned = found
+        forced, seen = z[:, :steps] @ (turned.conj().T @ self.b).T, self.c @ turned
+        unit = np.eye(len(self.a))
+        answers = [
+            seen @ solve_triangular(at[-1] * unit - triangle, force) for at, force in zip(z, forced, strict=True)
+        ]
+        # Of the angle within a period, the part at the frequency itself.
+        return np.asarray(-np.mean(z[:, :steps].conj() * answers, axis=1), dtype=np.complex128)
 
     def crossover(self) -> tuple[float, float]:
         """Crossover frequency [rad/s] and phase margin [rad]; the smaller margin where the gain passes 1 several times.
@@ -91,12 +107,12 @@ class DriverLoop:
         """
         from scipy.linalg import eig  # noqa: PLC0415 - slow to import
 
-        found: Any = eig(self.a + np.outer(self.b, self.f), left=True)
+        found: Any = eig(self.closed, left=True)
         values, left, right = found
         share = np.abs(right[self.offset] * left[self.offset].conj() / np.sum(left.conj() * right, axis=0))
         swings = share * (values.imag > 0.0)
         mode = int(np.argmax(swings if swings.max() > _NOTICED * share.max() else share))
-        s = np.log(complex(values[mode])) / self.interval_s
+        s = np.log(complex(values[mode])) / (len(self.c) * self.timestep_s)
         return float(-s.real / abs(s)), float(abs(s))
 
 
@@ -141,14 +157,25 @@ def driver_loop(
     rest[heading] += car.timestep_s * yaw_rate
     rest[offset] += car.timestep_s * car.speed_mps * sideslip
     rest[offset, heading] += car.timestep_s * car.speed_mps
-    period = np.linalg.matrix_power(rest @ arms, steps)
     # The decisions move up by one; the new one comes in at the beginning of the period.
-    moves = np.eye(size)
-    moves[newest:] = np.eye(size, k=-1)[newest:]
-    moves[newest] = 0.0
+    decides = np.eye(size)
+    decides[newest:] = np.eye(size, k=-1)[newest:]
+    ahead_s = PREVIEW_INTERVAL_S * np.arange(len(gains.per_path_radpm))
     decided = gains.per_yaw_rate_s * yaw_rate + gains.per_sideslip * sideslip
-    decided[offset], decided[heading] = gains.per_offset_radpm, gains.per_heading
-    return DriverLoop(period @ moves, period[:, newest], steering_ratio * decided, offset, steps * car.timestep_s)
+    decided[wheel], decided[newest : newest + waiting] = gains.per_angle, gains.per_waiting
+    decided[offset] = -gains.per_path_radpm.sum()
+    decided[heading] = -car.speed_mps * (gains.per_path_radpm @ ahead_s)
+    decides[newest] = decided
+    closed = np.linalg.matrix_power(rest @ arms, steps) @ decides
+    # Opened: the car has the angle w in place of that of the arms.
+    given = rest[:, wheel].copy()
+    given[wheel] = 0.0
+    rest[:, wheel] -= given
+    step = rest @ arms
+    powers = [np.linalg.matrix_power(step, count) for count in range(steps + 1)]
+    b = np.stack([power @ given for power in powers[steps - 1 :: -1]], axis=1)
+    c = np.stack([power[wheel] @ decides for power in powers[1:]])
+    return DriverLoop(powers[steps] @ decides, b, c, closed, offset, car.timestep_s)
 
 
 @dataclass(frozen=True)
@@ -209,7 +236,7 @@ def driver_loops(
     known = SingleTrack(setup.single_track)
     found = []
     for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides):
-        gains = steering_gains(car.speed_mps, known.matrices, who.preview_s)
+        gains = steering_gains(car.speed_mps, known.matrices, who, setup.steering_ratio)
         for name in controllers:
             linear = linear_controller(name, setup, car.speed_mps)
             loop = driver_loop(car, linear, who, gains, setup.steering_ratio)

@@ -13,6 +13,11 @@ DRIVE = Drive(ENGINE)
 def parameters(**changed: float) -> DriverParameters:
     """A driver of round numbers."""
     round_numbers = DriverParameters(
-        preview_s=1.3, reaction_delay_s=0.2, neuromuscular_lag_s=0.1, steering_rate_limit_radps=15.0
+        preview_s=1.3,
+        reaction_delay_s=0.2,
+        neuromuscular_lag_s=0.1,
+        return_time_s=1.0,
+        steering_rate_per_metre_radps=4.0,
+        steering_rate_limit_radps=15.0,
     )
     return replace(round_numbers, **changed)

@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from activesteer.driver import DriverParameters, OpenLoopDriver, PathPreviewDriver, SpeedHold
+from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, steering_gains
 from activesteer.road.path import Path
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 from tests.unit.driver.drives import DRIVE
@@ -82,8 +84,8 @@ def test_nothing_happens_within_the_reaction_delay() -> None:
     angles = np.array(answer_to(driver(parameters=known), seen(y_m=1.0), 0.6))
     assert not angles[:200].any()
     assert angles[200] != 0.0
-    # Behind the delay, a first-order lag: 63 % after its time constant.
-    assert angles[299] / angles[200:].min() == pytest.approx(1.0 - math.exp(-1.0), abs=0.02)
+    # Behind the delay, a first-order lag: of the first decision, which is that of the next 10 ms.
+    assert angles[209] / angles[200] == pytest.approx(math.expm1(-0.1) / math.expm1(-0.01), rel=1e-6)
 
 
 def test_the_rate_limit_is_kept_and_told() -> None:
@@ -117,6 +119,54 @@ def test_a_circle_is_followed() -> None:
 def test_almost_at_rest_he_holds_the_wheel() -> None:
     block = driver()
     answer_to(block, seen(y_m=1.0), 1.0)
-    slow = seen(y_m=-3.0, speed_mps=1.0)
-    held = command_of(block, slow).steering_wheel_demand_rad
-    assert answer_to(block, slow, 0.5)[-1] == pytest.approx(held, rel=1e-3)
+    # What he has decided before still comes.
+    held = answer_to(block, seen(y_m=-3.0, speed_mps=1.0), 1.2)
+    assert held[-1] == pytest.approx(held[-500], rel=1e-2)
+    assert held[-1] < 0.0
+
+
+def test_a_lane_change_of_a_tenth_of_g_is_followed_without_cutting_corners() -> None:
+    x = np.arange(0.0, 300.0, 2.0)
+    s = np.clip((x - 60.0) / 60.0, 0.0, 1.0)
+    lane_change = Path.through(x, 3.5 * (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5))
+    for preview_s in (1.2, 2.5):
+        rows = drive(lane_change, 13.0, 16.0, somebody(preview_s=preview_s))
+        off = np.interp(rows[:, 0], lane_change.x_m, lane_change.y_m) - rows[:, 1]
+        assert np.abs(off).max() < 0.1
+
+
+def test_gains_of_the_state_are_those_of_the_problem_with_the_waiting_decisions_as_states() -> None:
+    known = somebody(reaction_delay_s=0.03)
+    found = steering_gains(22.0, matrices, known, RATIO)
+    car, steered = matrices(22.0)
+    system = np.zeros((6, 6))
+    system[:2, :2], system[:2, 4] = car, steered[:, 0] / RATIO
+    system[2, 0], system[3, 1:3] = 1.0, 22.0
+    system[4, 4], system[4, 5] = -1.0 / known.neuromuscular_lag_s, 1.0 / known.neuromuscular_lag_s
+    period = expm(system * PREVIEW_INTERVAL_S)
+    a, b = np.zeros((8, 8)), np.zeros((8, 1))
+    a[:5, :5], a[:5, 7] = period[:5, :5], period[:5, 5]
+    a[6, 5] = a[7, 6] = b[5, 0] = 1.0
+    share = period[4, 5] / PREVIEW_INTERVAL_S
+    errors = np.zeros((3, 8))
+    errors[0, 3] = 1.0
+    errors[1, 1:3] = known.return_time_s * 22.0
+    errors[2, 4], errors[2, 7] = (value * share / known.steering_rate_per_metre_radps for value in (-1.0, 1.0))
+    cost, gain = np.eye(8), np.zeros((1, 8))
+    for _ in range(3000):
+        gain = np.linalg.solve(b.T @ cost @ b, b.T @ cost @ a)
+        cost = errors.T @ errors + a.T @ cost @ (a - b @ gain)
+    wanted = found.per_yaw_rate_s, found.per_sideslip, found.per_angle, *found.per_waiting
+    assert -gain[0, [0, 1, 4, 5, 6, 7]] == pytest.approx(np.array(wanted), rel=1e-4)
+    # A path that is moved aside or turned together with the car.
+    assert gain[0, 3] == pytest.approx(found.per_path_radpm.sum(), rel=1e-4)
+    looks = np.arange(len(found.per_path_radpm))
+    assert gain[0, 2] == pytest.approx(22.0 * PREVIEW_INTERVAL_S * (found.per_path_radpm @ looks), rel=1e-4)
+
+
+def test_gains_of_the_path_fade_with_the_distance_and_leave_nothing_to_the_road_behind() -> None:
+    gains = np.abs(steering_gains(22.0, matrices, somebody(preview_s=6.0), RATIO).per_path_radpm)
+    # What is decided now moves the car after the delay of 20 looks.
+    assert not gains[:21].any()
+    assert gains[21] > 0.0
+    assert gains[300:].max() < 0.01 * gains.max()

@@ -9,8 +9,7 @@ import pytest
 
 from activesteer.controllers import load_controller
 from activesteer.controllers.linear_form import LinearController, linear_controller
-from activesteer.driver import DriverParameters
-from activesteer.driver.path_preview import SteeringGains
+from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains
 from activesteer.errors import ControllerError, DriverError
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand
@@ -19,9 +18,10 @@ from activesteer.studies.driver_loop import DriverLoop, driver_loop, driver_loop
 from activesteer.studies.linearisation import LinearCar
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
+from tests.unit.driver.drives import parameters
 
 SPEED_MPS, YAW_GAIN_1PS, RATIO = 20.0, 5.0, 16.0
-GAINS = SteeringGains(per_offset_radpm=-0.02, per_heading=-0.5, per_yaw_rate_s=0.0, per_sideslip=0.0)
+BY_OFFSET_RADPM, BY_HEADING = 0.02 * RATIO, 0.5 * RATIO
 NOTHING = LinearController(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0)), np.zeros((2, 2)))
 STEP_S = 1e-3
 
@@ -37,10 +37,13 @@ def ideal_car() -> LinearCar:
 
 
 def loop(delay_s: float = 0.0, lag_s: float = 0.0) -> DriverLoop:
-    who = DriverParameters(
-        preview_s=1.0, reaction_delay_s=delay_s, neuromuscular_lag_s=lag_s, steering_rate_limit_radps=10.0
-    )
-    return driver_loop(ideal_car(), NOTHING, who, GAINS, RATIO)
+    """A driver without a picture of car, arms and delay, who sees the path at the car and a second ahead."""
+    far = BY_HEADING / SPEED_MPS
+    path = np.zeros(101)
+    path[0], path[100] = BY_OFFSET_RADPM - far, far
+    waiting = np.zeros(round(delay_s / PREVIEW_INTERVAL_S))
+    who = parameters(reaction_delay_s=delay_s, neuromuscular_lag_s=lag_s)
+    return driver_loop(ideal_car(), NOTHING, who, SteeringGains(0.0, 0.0, 0.0, waiting, path), RATIO)
 
 
 def by_hand() -> tuple[float, float, float, float]:
