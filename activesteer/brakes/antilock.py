@@ -61,6 +61,8 @@ def _wheel(setup, state, wheel, car_mps2):
     per_pressure = setup.torque_per_pressure_NmpPa[wheel]
     slip = (state.reference_mps - state.wheel_mps[wheel]) / state.reference_mps
     gain = state.wheel_mps2[wheel] - car_mps2
+    # A wheel that stands gains on a car that brakes, too, and yet does not come back.
+    regains = gain > _REGAINS_mps2 and (slip < setup.largest_slip or state.wheel_mps2[wheel] > 0.0)
     phase = state.phase[wheel]
     state.phase_s[wheel] += setup.interval_s
     if phase in (OFF, BUILD):
@@ -83,7 +85,7 @@ def _wheel(setup, state, wheel, car_mps2):
                 state.limit_Pa[wheel] = setup.full_pedal_pressure_Pa
                 _begin(state, wheel, OFF)
     elif phase == RELEASE:
-        if gain > _REGAINS_mps2:
+        if regains:
             state.regained_mps2[wheel] = gain
             _begin(state, wheel, RECOVER)
         elif state.phase_s[wheel] > _PATIENCE_S:
@@ -95,6 +97,8 @@ def _wheel(setup, state, wheel, car_mps2):
         if gain < max(_REGAINS_mps2, setup.rolls_fraction * state.regained_mps2[wheel]):
             state.limit_Pa[wheel] = setup.resume_fraction * state.borne_Nm[wheel] / per_pressure
             _begin(state, wheel, BUILD)
+        elif not regains:
+            _begin(state, wheel, RELEASE)
 
 
 @compiled

@@ -14,6 +14,7 @@ from activesteer.commands.arguments import (
     add_jobs,
     add_json,
     add_overrides,
+    add_scheduler,
     add_vehicle,
     overrides_of,
     pairs,
@@ -55,6 +56,7 @@ def add_to(commands: Any) -> None:
     )  # fmt: skip
     add_figures_folder(parser)
     add_jobs(parser)
+    add_scheduler(parser)
     add_json(parser)
     parser.set_defaults(action=_fault_map)
 
@@ -79,6 +81,7 @@ def _fault_map(options: argparse.Namespace) -> int:
             limits=build(Limits, limits, Source("--limit")),
             driver=options.driver,
             jobs=options.jobs,
+            scheduler=options.scheduler,
             progress=lambda done, total: bar(done / total, f"{done}/{total}"),
         )
     figures = []

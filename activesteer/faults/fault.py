@@ -32,6 +32,10 @@ class Actuator(NamedTuple):
         return self.unit == "Nm"
 
 
+ANGLE_SENSOR: Final = "steering_wheel_sensor"
+"""The sensor through which controllers know of the driver's demand, where it is not ideal."""
+
+
 class Sensor(NamedTuple):
     """A signal of `Measurement` as faults name it.
 
@@ -85,7 +89,7 @@ KINDS: Final = {
 }
 """Kind of fault -> what it does."""
 
-_SIZES: Final = ("size_rad", "size_radps", "size_mps", "size_mps2", "size_Nm")
+_SIZES: Final = ("size_rad", "size_radps", "size_mps", "size_mps2", "size_Nm", "size_Pa")
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,8 @@ class Fault:
     """The same of an acceleration sensor [m/s2]."""
     size_Nm: float | None = None
     """Offset of a brake [N m]."""
+    size_Pa: float | None = None
+    """The same of a brake pressure sensor [Pa]."""
     delay_s: Annotated[float, Range(0.001, 10.0)] | None = None
     """How late demand or reading come [s]."""
 

@@ -15,7 +15,7 @@ from activesteer.driver import Driver
 from activesteer.faults import Fault
 from activesteer.scenario import Scenario
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
-from activesteer.simulation.control_unit import control_unit
+from activesteer.simulation.control_unit import control_unit, told_by_sensor
 from activesteer.simulation.recorder import Recorder
 from activesteer.vehicle import engine_warnings_held
 from activesteer.vehicle.faults import Faults
@@ -93,7 +93,11 @@ class ClosedLoop:
         return round(self.maneuver.duration_s / self.vehicle.timestep_s)
 
     def fail(self, faults: Sequence[Fault]) -> None:
-        """From now on these faults act, each at its time, and no others."""
+        """From now on these faults act, each at its time, and no others.
+
+        Raises:
+            ManeuverError: one is of a part that this car does not have.
+        """
         self.faults.release()
         self.faults = Faults(self.vehicle, faults)
 
@@ -136,13 +140,14 @@ class ClosedLoop:
         timestep_s, measurement, motion = vehicle.timestep_s, self.measurement, self.motion
         tape_address = 0 if recorder is None else recorder.tape_address
         with engine_warnings_held():
-            for first, last, step_car in self.faults.stretches(self.step_count, self.step_count + steps):
+            for first, last, step_car, angle_fails in self.faults.stretches(self.step_count, self.step_count + steps):
                 stretch = range(first, last)
+                unit = told_by_sensor(controller, vehicle.parameters.steering.ratio) if angle_fails else controller
                 for block in (stretch,) if recorder is None else recorder.blocks(stretch):
                     for step in block:
                         reference = reference_at(step * timestep_s)
                         command = driver.step(reference, measurement, motion)
-                        asked = controller.step(command, measurement)
+                        asked = unit.step(command, measurement)
                         measurement, motion = step_car(command, asked, tape_address)
         self.step_count, self.commands = self.step_count + steps, (command, asked)
         self.measurement, self.motion = measurement, motion

@@ -68,6 +68,11 @@ class ControlUnit:
         self._on_bus.append(self._held)
         return self._on_bus[0]
 
+    @property
+    def uses_truth(self) -> bool:
+        """Whether the controller gets the truth in place of what sensors say."""
+        return self._truth is not None
+
     def _seen(self, command: DriverCommand, measurement: Measurement) -> DriverCommand:
         if self._steering_ratio is None:
             return command
@@ -128,6 +133,17 @@ def control_unit(controller: Any, scenario: Scenario, vehicle: Vehicle) -> tuple
         return setup, made
     truth = vehicle.truth if plugin.uses_truth else None
     return setup, ControlUnit(made, every, delay, steering_ratio=ratio, truth=truth)
+
+
+def told_by_sensor(controller: Any, steering_ratio: float) -> ControlUnit:
+    """A controller that knows the driver's demand through the steering angle sensor, whatever it did before.
+
+    Args:
+        controller: As `control_unit` returns it; what it remembers stays in it.
+        steering_ratio: Overall steering ratio.
+    """
+    by_truth = isinstance(controller, ControlUnit) and controller.uses_truth
+    return ControlUnit(controller, 1, 0, steering_ratio=None if by_truth else steering_ratio)
 
 
 def about(plugin: Plugin, parameters: ControllerParameters, timestep_s: float) -> dict[str, Any]:

@@ -153,6 +153,7 @@ def fault_map(
     limits: Limits | None = None,
     driver: Any = DEFAULT_DRIVER,
     jobs: int | None = None,
+    scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> FaultMap:
     """Drives every fault at every speed in every situation.
@@ -167,6 +168,7 @@ def fault_map(
         limits: What a fault may do.
         driver: Who drives.
         jobs: Processes; as many as there are processors where not given.
+        scheduler: Address of a Dask scheduler, or its scheduler file, that drives them instead.
         progress: Called after every pair of speed and situation with how many are done, and how many there are.
 
     Returns:
@@ -186,9 +188,8 @@ def fault_map(
             raise ParameterError(f"is {speed:g} km/h; allowed is 20 to 250", key="speed_kmh", value=speed)
     cells = [(name, speed) for name in situations for speed in speeds_kmh]
     drive = functools.partial(_cell, controller, driver, vehicle, dict(overrides or {}), chosen, limits)
-    done = in_parallel(
-        drive, cells, jobs, (lambda _, count: progress(count, len(cells))) if progress else lambda _, __: None
-    )
+    tell = (lambda _, count: progress(count, len(cells))) if progress else lambda _, __: None
+    done = in_parallel(drive, cells, jobs, tell, scheduler=scheduler)
     rows = [row for cell in done for row in cell]
     order = list(chosen)
     return FaultMap(limits, sorted(rows, key=lambda row: order.index(row["fault"])))

@@ -310,6 +310,8 @@ def in_parallel(
     arguments: Sequence[tuple[Any, ...]],
     jobs: int | None = None,
     report: Callable[[int, int], None] = lambda _place, _done: None,
+    *,
+    scheduler: str | None = None,
 ) -> list[Any]:
     """Calls a function with each set of arguments, spread over processes.
 
@@ -318,16 +320,18 @@ def in_parallel(
         arguments: Its arguments, one tuple a call.
         jobs: Number of processes; that of the processors where not given. With 1 all is done in this process.
         report: Called after each call with the place of its arguments and how many calls are done.
+        scheduler: Address of a Dask scheduler, or its scheduler file, that calls it instead.
 
     Returns:
         What it returned, in the order of the arguments.
 
     Raises:
         ParameterError: fewer than one job.
+        StudyError: see `workers_for`.
         BaseException: what a call raised.
     """
     results: dict[int, Any] = {}
-    with workers_for(jobs) as workers:
+    with workers_for(jobs, scheduler=scheduler) as workers:
         tasks = ((place, function, *each) for place, each in enumerate(arguments))
         for outcome in TaskQueue(workers).outcomes(tasks):
             results[outcome.key] = outcome.result()

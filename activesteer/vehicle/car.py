@@ -423,8 +423,20 @@ class Vehicle:
         maximum = 0.0 if torque_Nm is None else torque_Nm / felt
         self.model.actuator_forcerange[hands] = -maximum, maximum
 
+    def put_sensors_between(self, *, wanted: bool) -> None:
+        """Has brakes listen to sensors where these are ideal, as they must where a sensor may fail.
+
+        Args:
+            wanted: Whether they shall; else they are the truth again.
+        """
+        if self.parameters.sensors.is_ideal and wanted is (self._sensors is None):
+            self._sensors = SensorBlock(self.parameters.sensors, float(self.model.opt.timestep)) if wanted else None
+            native_step.read_through(self._plan, self._sensors)
+            if self._sensors is not None:
+                self._sensors.reset(self.truth()[0])
+
     def note_measurement(self, measurement: Measurement) -> None:
-        """Has recorded what faulty sensors say, where the measurement is recorded at all."""
+        """Has recorded what faulty sensors say, where the measurement is recorded at all, and tells it the brakes."""
         if self._sensors is not None:
             self._sensors.say(measurement)
 

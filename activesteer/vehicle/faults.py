@@ -16,7 +16,8 @@ from typing import Any, Final, NamedTuple
 import mujoco
 from numpy.typing import NDArray
 
-from activesteer.faults import ACTUATORS, SENSORS, Fault
+from activesteer.errors import ManeuverError
+from activesteer.faults import ACTUATORS, ANGLE_SENSOR, SENSORS, Fault
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.car import Vehicle
@@ -33,30 +34,39 @@ class Stretch(NamedTuple):
         first: The first one.
         last: The one behind the last.
         step: What steps the car in them.
+        angle_fails: Whether the steering angle sensor fails in them.
     """
 
     first: int
     last: int
     step: Step
+    angle_fails: bool = False
 
 
 class Faults:
     """The faults of a run."""
 
     def __init__(self, vehicle: Vehicle, faults: Sequence[Fault] = ()) -> None:
-        """Looks up what they act on; nothing is changed yet.
+        """Looks up what they act on; nothing is changed yet, but that brakes listen to sensors that may fail.
 
         Args:
             vehicle: The car.
             faults: What happens to it; times count from the start of the recording.
+
+        Raises:
+            ManeuverError: one is of a part that this car does not have.
         """
         self._vehicle = vehicle
         self._acting: list[_ActuatorFault | _SensorFault] = []
+        vehicle.put_sensors_between(wanted=any(fault.part in SENSORS for fault in faults))
         for fault in faults:
             if fault.part in SENSORS:
                 self._acting.append(_SensorFault(fault, vehicle.timestep_s))
             else:
                 members = ACTUATORS[fault.part].members
+                if fault.part in ("rear_left", "rear_right") and vehicle.parameters.rear_actuator.is_central:
+                    problem = "is no part of this car, whose rear_actuator.arrangement is 'central'; rear is"
+                    raise ManeuverError(f"{fault.part!r} {problem}", key="part", value=fault.part, allowed=["rear"])
                 self._acting += [_ActuatorFault(fault, name, vehicle) for name in members]
 
     def stretches(self, first: int, last: int) -> Iterator[Stretch]:
@@ -76,7 +86,8 @@ class Faults:
         for begin, end in pairwise(sorted({first, last, *(step for step in changes if first < step < last)})):
             self.act(begin)
             watching = [a for a in self._acting if a.watches and a.listens <= begin < a.ends]
-            yield Stretch(begin, end, self._watched(watching, begin) if watching else self._vehicle.step)
+            angle_fails = any(a.fault.part == ANGLE_SENSOR and a.begins <= begin for a in watching)
+            yield Stretch(begin, end, self._watched(watching, begin) if watching else self._vehicle.step, angle_fails)
 
     def act(self, step: int) -> None:
         """Puts into the model what acts from a step on, and takes out what does not."""

@@ -165,12 +165,23 @@ def step_plan(
         plan[name] = value
     plan["ratio"] = ratio
     plan["timestep_s"] = model.opt.timestep
-    if sensors is not None:
-        plan["n_sensors"], plan["sensors"] = len(sensors.chains), sensors.chains.ctypes.data
-        plan["sensor_memory"], plan["sensor_memory_size"] = sensors.memory.ctypes.data, sensors.memory.size
+    read_through(plan, sensors)
     plan["sources"] = [array.ctypes.data for array in recorded]
     plan["sizes"] = [array.size for array in recorded]
     return plan
+
+
+def read_through(plan: NDArray[Any], sensors: SensorBlock | None) -> None:
+    """Puts other sensors between the truth and the measurement.
+
+    Args:
+        plan: A `STEP_PLAN`, shape (1,).
+        sensors: The sensors; must outlive the plan. None for none.
+    """
+    plan["n_sensors"] = 0
+    if sensors is not None:
+        plan["n_sensors"], plan["sensors"] = len(sensors.chains), sensors.chains.ctypes.data
+        plan["sensor_memory"], plan["sensor_memory_size"] = sensors.memory.ctypes.data, sensors.memory.size
 
 
 @intrinsic

@@ -52,6 +52,11 @@ class RearActuator(ElectricActuator):
         """Whether screws move the toe links."""
         return self.preset != _HINGE
 
+    @property
+    def is_central(self) -> bool:
+        """Whether one screw in the middle moves both toe links."""
+        return self.is_screw and self.resolved().arrangement == "central"
+
     def smooth(self) -> Self:
         """The same without play, dry friction and tolerance of the position, within which slopes mean nothing."""
         if not self.is_screw:

@@ -9,6 +9,7 @@ import pytest
 
 import activesteer
 from activesteer import ActuatorCommand, Recording, Simulation
+from activesteer.errors import ManeuverError
 from activesteer.faults import fault_table
 
 AT_S = 1.0
@@ -173,8 +174,43 @@ def test_a_wheel_speed_sensor_is_one_of_four() -> None:
     assert min(speeds[-1][0], *speeds[-1][2:]) > 50.0
 
 
+def test_a_dead_wheel_speed_sensor_reaches_the_anti_lock_system_of_ideal_sensors_too() -> None:
+    """To it the wheel has locked: it takes the pressure away, and the car pulls to the other side."""
+    stop: dict[str, Any] = {"speed_kmh": 60.0, "duration_s": 1.2}
+    fault = {"fault": [fault_table(f"fl_wheel_speed_sensor:dropout@{AT_S}")]}
+    good = activesteer.simulate("straight_braking", overrides=stop)
+    failed = activesteer.simulate("straight_braking", overrides={**stop, **fault})
+    for name in ("x_m", "fl_brake_pressure_Pa", "rr_slip_ratio", "abs_speed_mps"):
+        np.testing.assert_array_equal(failed[name][:ROW], good[name][:ROW])
+    assert failed["fl_brake_pressure_Pa"][-1] < 0.1 * failed["fr_brake_pressure_Pa"][-1]
+    assert failed["yaw_rate_radps"][-1] < -0.05
+
+
+def test_a_steering_angle_sensor_s_fault_reaches_the_controller_of_ideal_sensors_too() -> None:
+    texts = (f"steering_wheel_sensor:dropout@{AT_S}-1.5",)
+    good, failed = driven(controller="ars"), driven(*texts, controller="ars")
+    np.testing.assert_array_equal(failed["prediction_rad"][:ROW], good["prediction_rad"][:ROW])
+    assert abs(good["prediction_rad"][1490]) > np.radians(0.5)
+    # The prediction is that of a driver who has let go; then it comes back.
+    assert abs(failed["prediction_rad"][1490]) < 0.05 * abs(good["prediction_rad"][1490])
+    assert failed["prediction_rad"][-1] == pytest.approx(good["prediction_rad"][-1], rel=0.05)
+    np.testing.assert_allclose(failed["steering_wheel_rad"], good["steering_wheel_rad"], atol=0.02)
+
+
+def test_one_wheel_of_a_screw_for_both_is_no_part() -> None:
+    central = {"rear_actuator.preset": "screw_10deg"}
+    with pytest.raises(ManeuverError, match=r"part: 'rear_left' is no part of this car.*'central'; rear is"):
+        driven(f"rear_left:stuck@{AT_S}", **central)
+
+
 def test_a_state_saved_in_the_midst_of_faults_goes_on_bit_by_bit() -> None:
-    texts = ("rear:delayed=0.08s@0.6", "yaw_rate_sensor:stuck@0.9-1.4", "superposition:offset=1deg@0.7-1.1")
+    texts = (
+        "rear:delayed=0.08s@0.6",
+        "yaw_rate_sensor:stuck@0.9-1.4",
+        "superposition:offset=1deg@0.7-1.1",
+        "steering_wheel_sensor:offset=5deg@0.8-1.2",
+        "rl_wheel_speed_sensor:dropout@0.5",
+    )
     overrides = {**STEP, "fault": [fault_table(text) for text in texts]}
     whole = activesteer.simulate("step_steer", "ars", overrides=overrides)
     simulation = Simulation("step_steer", "ars", overrides=overrides)

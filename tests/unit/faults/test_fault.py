@@ -24,6 +24,15 @@ def faults_of(*tables: dict[str, Any]) -> tuple[Fault, ...]:
             {"part": "rear", "kind": "offset", "start_s": 2.0, "end_s": 3.5, "size_deg": -1.5},
         ),
         ("rear_left:runaway=right@.5", {"part": "rear_left", "kind": "runaway", "start_s": 0.5, "side": "right"}),
+        (
+            "fl_brake_pressure_sensor:offset=5e5Pa@1",
+            {
+                "part": "fl_brake_pressure_sensor",
+                "kind": "offset",
+                "start_s": 1.0,
+                "size_Pa": 5e5,
+            },
+        ),
         ("ay_sensor:delayed=0.1s@1", {"part": "ay_sensor", "kind": "delayed", "start_s": 1.0, "delay_s": 0.1}),
     ],
 )
@@ -41,6 +50,12 @@ def test_a_unit_of_the_edge_fills_the_si_field() -> None:
     (fault,) = faults_of(fault_table("yaw_rate_sensor:offset=90degps@1"))
     assert fault.size_radps == pytest.approx(1.5708, abs=1e-4)
     assert fault.name == "yaw_rate_sensor:offset=1.5708radps"
+
+
+@pytest.mark.parametrize("part", SENSORS)
+def test_every_sensor_can_be_off(part: str) -> None:
+    (fault,) = faults_of({"part": part, "kind": "offset", "start_s": 1.0, f"size_{SENSORS[part].unit}": 0.5})
+    assert fault.size == 0.5
 
 
 def test_every_signal_that_a_controller_gets_can_fail() -> None:
