@@ -56,7 +56,7 @@ def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterEr
         try:
             figure.savefig(part, dpi=150)
         except ValueError as reason:  # an ending that is no format of matplotlib's
-            raise error(f"cannot write {shown_path(path)}: {reason}") from reason
+            raise error(f"cannot write {shown_path(path)}: {reason}", value=path) from reason
     return path
 
 

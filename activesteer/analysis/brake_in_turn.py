@@ -46,7 +46,8 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     if not pressed.any() or time_s[int(pressed.argmax())] - time_s[0] < BEFORE_S:
         raise RecordingError(
             "the recording holds no braking in a turn: the brake must be pressed, "
-            f"and not before {BEFORE_S:g} s after the start"
+            f"and not before {BEFORE_S:g} s after the start",
+            allowed=BEFORE_S,
         )
     begin = int(pressed.argmax())
     before = (time_s >= time_s[begin] - BEFORE_S) & (time_s < time_s[begin])
@@ -56,7 +57,9 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     if not abs(yaw_rate_radps) >= MIN_YAW_RATE_RADPS:
         raise RecordingError(
             f"the recording holds no braking in a turn: the yaw rate before the brake is "
-            f"{math.degrees(yaw_rate_radps):.3g} deg/s, at least {math.degrees(MIN_YAW_RATE_RADPS):.3g} are needed"
+            f"{math.degrees(yaw_rate_radps):.3g} deg/s, at least {math.degrees(MIN_YAW_RATE_RADPS):.3g} are needed",
+            value=yaw_rate_radps,
+            allowed=MIN_YAW_RATE_RADPS,
         )
     side, radius_m = math.copysign(1.0, yaw_rate_radps), abs(speed_mps / yaw_rate_radps)
     after_s = float(time_s[begin]) + AFTER_S

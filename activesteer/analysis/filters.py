@@ -38,14 +38,17 @@ def low_pass(values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float)
     if cut_off_Hz * timestep_s > 0.499:
         raise RecordingError(
             f"a filter of {cut_off_Hz:g} Hz needs samples less than {0.5 / cut_off_Hz:.3g} s apart; "
-            f"the recording has one every {timestep_s:.3g} s"
+            f"the recording has one every {timestep_s:.3g} s",
+            value=timestep_s,
+            allowed=0.5 / cut_off_Hz,
         )
     # The signal is continued at both ends, mirrored through its end points, until a pass has died away.
     ends = min(len(values) - 1, round(_ENDS_PERIODS / (cut_off_Hz * timestep_s)))
     if ends * timestep_s * cut_off_Hz < 1.0:
         raise RecordingError(
             f"{len(values)} samples are too few for a filter of {cut_off_Hz:g} Hz; "
-            f"it needs {1.0 / cut_off_Hz:.3g} s of signal"
+            f"it needs {1.0 / cut_off_Hz:.3g} s of signal",
+            value=len(values),
         )
     sections = butter(_ORDER, cut_off_Hz, fs=1.0 / timestep_s, output="sos")
     filtered = sosfiltfilt(sections, np.asarray(values, dtype=np.float64), padlen=ends)

@@ -77,7 +77,8 @@ def frequency_response(
     if places.min() <= HALF_BAND_LINES or places.max() + HALF_BAND_LINES >= len(lines_Hz):
         raise RecordingError(
             f"a run of {len(time_s) * step_s:.3g} s holds no response from {asked.min():.3g} to {asked.max():.3g} Hz; "
-            f"its spectrum ends at {lines_Hz[-1]:.3g} Hz, and {HALF_BAND_LINES + 1} lines at each end fall away"
+            f"its spectrum ends at {lines_Hz[-1]:.3g} Hz, and {HALF_BAND_LINES + 1} lines at each end fall away",
+            value=(float(asked.min()), float(asked.max())),
         )
     band = places[:, None] + np.arange(-HALF_BAND_LINES, HALF_BAND_LINES + 1)
     power_u = (np.abs(u[band]) ** 2).sum(axis=1)
@@ -88,7 +89,8 @@ def frequency_response(
     if missing.any():
         raise RecordingError(
             f"the steering ({input_channel}) does not contain {asked[missing][0]:.3g} Hz: "
-            "no response can be evaluated there"
+            "no response can be evaluated there",
+            value=float(asked[missing][0]),
         )
     with np.errstate(invalid="ignore"):
         coherence = np.abs(cross) ** 2 / (power_u * power_y)

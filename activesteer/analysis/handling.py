@@ -142,7 +142,9 @@ def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> Handli
     if smoothed[top] < FIT_MPS2[1] or fit.sum() < 10:
         raise RecordingError(
             f"the run reaches {smoothed[top]:.3g} m/s2 of lateral acceleration; gradients are fitted from "
-            f"{FIT_MPS2[0]:g} to {FIT_MPS2[1]:g} m/s2"
+            f"{FIT_MPS2[0]:g} to {FIT_MPS2[1]:g} m/s2",
+            value=float(smoothed[top]),
+            allowed=FIT_MPS2,
         )
     wheel = side * channel("steering_wheel_rad")
     steer = wheel / car.steering_ratio

@@ -63,7 +63,11 @@ def draw_bode(
     frequency_Hz = np.geomspace(*BODE_RANGE_Hz, 300)
     for (label, system), colour in zip(systems.items(), RUN_COLOURS[1:] * len(systems), strict=False):
         if input_name not in system.input_labels:
-            raise ParameterError(f"{label}: there is no input {input_name!r}; its inputs are {system.input_labels}")
+            raise ParameterError(
+                f"{label}: there is no input {input_name!r}; its inputs are {system.input_labels}",
+                value=input_name,
+                allowed=system.input_labels,
+            )
         response = system(2j * math.pi * frequency_Hz, squeeze=False)
         for row, output in enumerate(OUTPUTS):
             if output not in system.output_labels:
@@ -174,7 +178,8 @@ def draw_root_locus(
     """
     if not systems or len(systems) != len(speeds_mps):
         raise ParameterError(
-            f"{len(systems)} linear cars and {len(speeds_mps)} speeds given; as many of each are needed"
+            f"{len(systems)} linear cars and {len(speeds_mps)} speeds given; as many of each are needed",
+            value=(len(systems), len(speeds_mps)),
         )
     figure = new_figure(width_in=7.5, height_in=5.5)
     axis: Axes = figure.subplots()

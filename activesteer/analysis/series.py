@@ -155,13 +155,14 @@ def timestep(time_s: Array) -> float:
         RecordingError: fewer than two samples, or they are not equidistant within 1 % of a step.
     """
     if len(time_s) < 2:
-        raise RecordingError(f"{len(time_s)} samples are too few to analyse, at least 2 are needed")
+        raise RecordingError(f"{len(time_s)} samples are too few to analyse, at least 2 are needed", value=len(time_s))
     steps = np.diff(time_s)
     mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
     if mean_s <= 0.0 or float(np.abs(steps - mean_s).max()) > 0.01 * mean_s:
         raise RecordingError(
             f"the samples are not equidistant: steps between {steps.min():.6g} s and {steps.max():.6g} s; "
-            "metrics need a recording of every step"
+            "metrics need a recording of every step",
+            value=(float(steps.min()), float(steps.max())),
         )
     return mean_s
 

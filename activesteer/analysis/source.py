@@ -56,7 +56,8 @@ class Evaluable:
         if not usable.all():
             row = int(np.argmin(usable))
             raise RecordingError(
-                f"channel {name} is {values[row]:g} at {self.time_s[row]:.3f} s, and cannot be evaluated"
+                f"channel {name} is {values[row]:g} at {self.time_s[row]:.3f} s, and cannot be evaluated",
+                value=name,
             )
         return values
 

@@ -120,17 +120,22 @@ def _step_time(time_s: np.ndarray, steering_rad: np.ndarray) -> float:
     if not abs(final_rad) >= MIN_STEP_RAD:
         raise RecordingError(
             f"the recording holds no step steer: the steering wheel ends at {math.degrees(final_rad):.3g} deg, "
-            f"at least {math.degrees(MIN_STEP_RAD):.3g} deg to either side are needed"
+            f"at least {math.degrees(MIN_STEP_RAD):.3g} deg to either side are needed",
+            value=final_rad,
+            allowed=MIN_STEP_RAD,
         )
     step_time_s = crossing_time(time_s, math.copysign(1.0, final_rad) * steering_rad, 0.5 * abs(final_rad))
     if math.isnan(step_time_s):
         raise RecordingError(
             f"the step steer has no beginning: the steering wheel stands at {math.degrees(steering_rad[0]):.3g} deg "
-            f"from the first sample on and ends at {math.degrees(final_rad):.3g} deg"
+            f"from the first sample on and ends at {math.degrees(final_rad):.3g} deg",
+            value=float(steering_rad[0]),
         )
     if time_s[-1] - step_time_s < 2.0 * STEADY_WINDOW_S:
         raise RecordingError(
             f"the run ends {time_s[-1] - step_time_s:.3g} s after the step at {step_time_s:.3g} s; "
-            f"steady-state values need at least {2.0 * STEADY_WINDOW_S:.3g} s"
+            f"steady-state values need at least {2.0 * STEADY_WINDOW_S:.3g} s",
+            value=float(time_s[-1] - step_time_s),
+            allowed=2.0 * STEADY_WINDOW_S,
         )
     return step_time_s

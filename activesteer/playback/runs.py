@@ -76,7 +76,9 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
         recording = recordings[name]
         poses = np.flatnonzero(recording.poses.usable())
         if len(recording) == 0 or CHASSIS not in recording.poses.names or len(poses) == 0:
-            raise RecordingError(f"{name}: {recording!r} has nothing to play back: rows and poses of a car are needed")
+            raise RecordingError(
+                f"{name}: {recording!r} has nothing to play back: rows and poses of a car are needed", value=name
+            )
         path = re.sub(r"\W", "_", name, flags=re.ASCII)
         path = f"{number}_{path}" if len(ordered) > 1 else path
         colour = colours.get(name) or COLOURS[next(spare) % len(COLOURS)]

@@ -39,7 +39,7 @@ def save(runs: Sequence[Run], path: Path, *, compare: bool = False) -> None:
         PlaybackError: the name does not end in .rrd, or the file cannot be written.
     """
     if path.suffix.lower() != ".rrd":
-        raise PlaybackError(f"{shown_path(path)}: the name of a file for the viewer must end in .rrd")
+        raise PlaybackError(f"{shown_path(path)}: the name of a file for the viewer must end in .rrd", value=path)
     with replacing(path, PlaybackError) as part:
         part.touch()
         stream = new_stream(runs, compare=compare)
@@ -111,8 +111,8 @@ def _run_viewer(
                 process = subprocess.Popen([str(binary), *arguments, str(file)], stdout=output, stderr=output)
         except OSError as error:
             raise PlaybackError(
-                f"the viewer {binary} does not start: {error.strerror or error}; {_ELSEWHERE}"
-            ) from None
+                f"the viewer {binary} does not start: {error.strerror or error}; {_ELSEWHERE}", value=binary
+            ) from error
         try:
             while ready is not None and port is not None and process.poll() is None:
                 if _answers(port):

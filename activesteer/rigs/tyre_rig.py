@@ -233,7 +233,9 @@ class TyreRig:
         except ValueError as error:
             raise ParameterError(f"tyre rig: {error}") from error
         if points[0].ndim != 1:
-            raise ParameterError(f"tyre rig: the points have {points[0].ndim} dimensions, one is needed")
+            raise ParameterError(
+                f"tyre rig: the points have {points[0].ndim} dimensions, one is needed", value=points[0].ndim
+            )
         return stacked([self.steady(*point) for point in zip(*(array.tolist() for array in points), strict=True)])
 
     def transient(

@@ -59,13 +59,17 @@ class Path:
 
         x, y = np.asarray(x_m, dtype=np.float64), np.asarray(y_m, dtype=np.float64)
         if x.ndim != 1 or x.shape != y.shape or x.size < 2:
-            raise ManeuverError(f"a path needs as many x as y, at least 2 of each; there are {x.size} and {y.size}")
+            raise ManeuverError(
+                f"a path needs as many x as y, at least 2 of each; there are {x.size} and {y.size}",
+                value=(x.size, y.size),
+            )
         if bad := _first(~(np.isfinite(x) & np.isfinite(y))):
-            raise ManeuverError(f"point {bad} of the path is not finite: ({x[bad - 1]:g}, {y[bad - 1]:g})")
+            raise ManeuverError(f"point {bad} of the path is not finite: ({x[bad - 1]:g}, {y[bad - 1]:g})", value=bad)
         chords = np.hypot(np.diff(x), np.diff(y))
         if bad := _first(chords < MIN_CHORD_M):
             raise ManeuverError(
-                f"points {bad} and {bad + 1} of the path are the same: ({x[bad]:g}, {y[bad]:g}); leave one out"
+                f"points {bad} and {bad + 1} of the path are the same: ({x[bad]:g}, {y[bad]:g}); leave one out",
+                value=bad,
             )
         knots = np.concatenate([[0.0], np.cumsum(chords)])
         curve = CubicSpline(knots, np.column_stack([x, y]))

@@ -115,11 +115,15 @@ def connected(scheduler: str) -> Iterator[Any]:
     elif Path(scheduler).is_file():
         where = {"scheduler_file": scheduler}
     else:
-        raise StudyError(f"--scheduler {scheduler}: is no address, as tcp://host:8786, and no scheduler file")
+        raise StudyError(
+            "is no address, as tcp://host:8786, and no scheduler file", key=f"--scheduler {scheduler}", value=scheduler
+        )
     try:
         client = Client(**where, timeout=_CONNECT_S)
     except Exception as reason:  # whatever the network, the address or the file has against it
-        raise StudyError(f"--scheduler {scheduler}: cannot be reached: {_line(reason)}") from reason
+        raise StudyError(
+            f"cannot be reached: {_line(reason)}", key=f"--scheduler {scheduler}", value=scheduler
+        ) from reason
     with client:
         yield client
 

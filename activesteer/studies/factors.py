@@ -133,10 +133,10 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
             raise source.fail((*where, name), f"does not belong to {kind}; beside it may stand: {', '.join(allowed)}")
     nominal = table.get("nominal", "")
     if "nominal" in table and nominal not in NOMINAL:
-        raise source.fail((*where, "nominal"), f"{shown(nominal)} is none of {', '.join(NOMINAL)}")
+        raise source.fail((*where, "nominal"), f"{shown(nominal)} is none of {', '.join(NOMINAL)}", nominal, NOMINAL)
     maneuvers = table.get("maneuvers", [])
     if not isinstance(maneuvers, Sequence) or isinstance(maneuvers, str) or ("maneuvers" in table and not maneuvers):
-        raise source.fail((*where, "maneuvers"), f"{shown(maneuvers)} is no list of names")
+        raise source.fail((*where, "maneuvers"), f"{shown(maneuvers)} is no list of names", maneuvers)
     return replace(_read(key, kind, table, source), nominal=nominal, maneuvers=tuple(map(str, maneuvers)))
 
 

@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from activesteer.analysis.source import RecordingLike
+from activesteer.config import Range
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.scenario import FileOrTable, resolve
@@ -202,7 +203,12 @@ def linear_cars(
 
 def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, Any] | None) -> LinearCar:
     if not MIN_SPEED_MPS <= speed_mps < math.inf:
-        raise ParameterError(f"speed_mps is {speed_mps:g} m/s; a car can be linearised from {MIN_SPEED_MPS:g} m/s on")
+        raise ParameterError(
+            f"is {speed_mps:g} m/s; a car can be linearised from {MIN_SPEED_MPS:g} m/s on",
+            key="speed_mps",
+            value=speed_mps,
+            allowed=Range(MIN_SPEED_MPS),
+        )
     straight = {
         "kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0, "settle_s": _SETTLE_S,
     }  # fmt: skip

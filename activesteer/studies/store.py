@@ -222,14 +222,16 @@ def read_environment(folder: Path) -> dict[str, Any]:
     """
     path = folder / "environment.json"
     if not path.is_file():
-        raise StudyError(f"{folder} holds no study; make one with `activesteer study STUDY.toml -o {folder}`")
+        raise StudyError(
+            f"{folder} holds no study; make one with `activesteer study STUDY.toml -o {folder}`", value=folder
+        )
     with reading(path, StudyError):
         text = path.read_text(encoding="utf-8", errors="replace")
     try:
         about = json.loads(text)
         return {"digest": str(about["digest"]), "runs": int(about["runs"]), "versions": dict(about["versions"])}
     except (ValueError, KeyError, TypeError) as reason:
-        raise StudyError(f"{path}: is damaged: {reason}") from reason
+        raise StudyError(f"{path}: is damaged: {reason}", value=path) from reason
 
 
 def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
@@ -241,7 +243,7 @@ def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) ->
         if key in ("activesteer", "source", "mujoco") and stored["versions"].get(key) != value
     ]
     why = f" (made with {', '.join(changed)})" if changed else ": file, inputs or seed differ"
-    raise StudyError(f"{folder} holds another study{why}; use a new folder, or delete this one")
+    raise StudyError(f"{folder} holds another study{why}; use a new folder, or delete this one", value=folder)
 
 
 def _factor_column(values: Sequence[Any]) -> pa.Array:
@@ -288,7 +290,7 @@ def _refusing(path: Path) -> Iterator[None]:
         with reading(path, StudyError):
             yield
     except pa.ArrowException as reason:
-        raise StudyError(f"cannot read {path}: {reason}") from reason
+        raise StudyError(f"cannot read {path}: {reason}", value=path) from reason
 
 
 def _batched(tables: Iterable[pa.Table], rows: int) -> Iterator[pa.Table]:
@@ -316,7 +318,7 @@ def _locked(path: Path) -> Iterator[None]:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as reason:
-                raise StudyError(f"{path.parent}: another process works on this study") from reason
+                raise StudyError(f"{path.parent}: another process works on this study", value=path.parent) from reason
             except OSError:
                 pass
         yield

@@ -235,7 +235,7 @@ def _claim_folder(folder: Path, study: StudyFile, plan: Plan) -> None:
     path = folder / "tune.toml"
     text = f"# {plan.digest}\n{study.to_toml()}"
     if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
-        raise StudyError(f"{folder} holds another search; use a new folder")
+        raise StudyError(f"{folder} holds another search; use a new folder", value=folder)
     write_text(path, text, StudyError)
 
 

@@ -17,6 +17,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, 
 from multiprocessing import connection
 from typing import Any, Final, NamedTuple, Protocol
 
+from activesteer.config import Range
 from activesteer.errors import ParameterError, StudyError
 from activesteer.studies import dask_cluster
 
@@ -284,7 +285,7 @@ def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str |
         StudyError: there is no such scheduler, it has no workers, or `distributed` is not installed.
     """
     if jobs is not None and jobs < 1:
-        raise ParameterError(f"--jobs {jobs}: at least 1 is needed")
+        raise ParameterError("at least 1 is needed", key=f"--jobs {jobs}", value=jobs, allowed=Range(1))
     with contextlib.ExitStack() as stack:
         if client is None and scheduler is not None:
             client = stack.enter_context(dask_cluster.connected(scheduler))

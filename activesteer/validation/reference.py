@@ -58,9 +58,11 @@ class ReferenceData:
         folder = home / name
         names = [path.parent.name for path in home.glob("*/reference.toml")]
         if name not in names:
-            raise ParameterError(f"there is no reference named {shown(name)}; {nearest_names(name, names)}", value=name)
+            raise ParameterError(
+                f"there is no reference named {shown(name)}; {nearest_names(name, names)}", value=name, allowed=names
+            )
         if more is not None and not is_folder(more):
-            raise ParameterError(f"the folder of reference runs {shown_path(more)} does not exist")
+            raise ParameterError(f"the folder of reference runs {shown_path(more)} does not exist", value=more)
         table: dict[str, Any] = tomllib.loads((folder / "reference.toml").read_text(encoding="utf-8"))
         x, y, z = table["point_from_cg_m"]
         folders = (folder / "runs",) if more is None else (more, folder / "runs")

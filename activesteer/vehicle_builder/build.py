@@ -82,10 +82,14 @@ def new_vehicle(
         0
     """
     if not re.fullmatch(r"[A-Za-z][\w-]*", name):
-        raise ParameterError(f"{name!r} cannot be the name of a car: a letter first, then letters, digits, _ and -")
+        raise ParameterError(
+            f"{name!r} cannot be the name of a car: a letter first, then letters, digits, _ and -", value=name
+        )
     target, table_path = Path(folder) if folder is not None else Path("vehicles") / name, Path(table)
     if target.exists() and (not target.is_dir() or any(target.iterdir())) and not overwrite:
-        raise ParameterError(f"{target} is not empty; give another folder with -o, or --overwrite to replace its files")
+        raise ParameterError(
+            f"{target} is not empty; give another folder with -o, or --overwrite to replace its files", value=target
+        )
     raw, source = read_table(table_path)
     kinds = chosen_kinds(raw, front, rear)
     check_points(raw, kinds, source)

@@ -72,13 +72,15 @@ def check(path: Path, size: tuple[int, int]) -> None:
         raise ParameterError(f"a video's name must end in {' or '.join(FORMATS)}", file=str(path), allowed=FORMATS)
     if min(size) < 16 or max(size) > _SIDE_LIMIT:
         raise ParameterError(
-            f"a picture of {size[0]} x {size[1]} pixels cannot be made; each side must be 16 to {_SIDE_LIMIT}"
+            f"a picture of {size[0]} x {size[1]} pixels cannot be made; each side must be 16 to {_SIDE_LIMIT}",
+            value=size,
+            allowed=(16, _SIDE_LIMIT),
         )
     if not path.parent.is_dir():
-        raise PlaybackError(f"cannot write {path}: there is no folder {path.parent}")
+        raise PlaybackError(f"cannot write {path}: there is no folder {path.parent}", value=path.parent)
     if path.suffix.lower() == ".mp4":
         if size[0] % 2 or size[1] % 2:
-            raise ParameterError(f"{size[0]} x {size[1]} pixels: an MP4 needs an even width and height")
+            raise ParameterError(f"{size[0]} x {size[1]} pixels: an MP4 needs an even width and height", value=size)
         ffmpeg()
 
 

@@ -40,7 +40,7 @@ class Track:
         self.bodies = poses.names
         whole = poses.usable()
         if CHASSIS not in poses.names or not whole.any():
-            raise PlaybackError(f"{name} has no poses of a car, so there is nothing to draw")
+            raise PlaybackError(f"{name} has no poses of a car, so there is nothing to draw", value=name)
         self._time_s = poses.time_s[whole]
         self._positions_m = poses.positions_m[whole]
         self._quaternions = poses.quaternions[whole]
@@ -89,7 +89,9 @@ class Track:
         """
         body = f"{corner}_wheel"
         if body not in self.bodies:
-            raise PlaybackError(f"the recording has no body {body!r}; it has {', '.join(self.bodies)}")
+            raise PlaybackError(
+                f"the recording has no body {body!r}; it has {', '.join(self.bodies)}", value=body, allowed=self.bodies
+            )
         positions, _ = self.poses(self.start_s)
         x, y, z = positions[self.bodies.index(body)] - positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0)
         cos, sin = np.cos(self.heading(self.start_s)), np.sin(self.heading(self.start_s))

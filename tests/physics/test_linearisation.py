@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.frequency_response import frequency_response
+from activesteer.config import Range
 from activesteer.errors import ParameterError
 from activesteer.scenario import load_car, resolve
 from activesteer.signals import ActuatorCommand
@@ -24,6 +25,7 @@ from activesteer.studies.linearisation import (
     linear_response,
 )
 from tests.physics.runs import go_on, last, run
+from tests.raising import raises
 
 SPEED_MPS = 80.0 / 3.6
 TENTH_G_MPS2 = 0.981
@@ -147,5 +149,5 @@ def test_yaw_gain_is_largest_at_the_characteristic_speed():
 
 @pytest.mark.parametrize("speed_mps", [0.0, 2.9, -20.0, math.nan, math.inf])
 def test_speed_without_a_linear_car_is_an_error(speed_mps):
-    with pytest.raises(ParameterError, match=r"from 3 m/s on"):
+    with raises(ParameterError, key="speed_mps", allowed=Range(3.0)):
         linear_car("compact", speed_mps)

@@ -14,6 +14,7 @@ from activesteer.recording import Recording
 from activesteer.scenario import resolve
 from activesteer.simulation.closed_loop import ClosedLoop
 from tests.physics.runs import STEP_DEG, go_on, step_steer
+from tests.raising import raises
 
 PRODUCTION = {"steer.steering_wheel_deg": STEP_DEG, "sensors.preset": "production"}
 NOT_RANDOM = {
@@ -121,7 +122,7 @@ def test_what_a_faulty_sensor_says_is_recorded_and_the_truth_stays() -> None:
 
 
 def test_there_is_no_seed_without_chance() -> None:
-    with pytest.raises(ParameterError, match="seed"):
+    with raises(ParameterError, key="sensors.seed", value=7):
         resolve("step_steer", overrides=PRODUCTION | NOT_RANDOM | {"sensors.seed": 7})
 
 

@@ -14,6 +14,7 @@ from activesteer.errors import ParameterError
 from activesteer.faults import fault_table
 from activesteer.scenario import load_car
 from activesteer.vehicle.superposition_actuator import STRAIN_WAVE
+from tests.raising import raises
 
 GEARED = {"superposition_actuator.preset": "strain_wave"}
 STRAIGHT: dict[str, Any] = {"duration_s": 0.8, "settle_s": 0.5, "speed_kmh": 60.0}
@@ -98,5 +99,5 @@ def test_stuck_adds_nothing_more() -> None:
 
 
 def test_what_only_a_motor_has_is_an_error_at_the_servo() -> None:
-    with pytest.raises(ParameterError, match="lock_torque_Nm: has no effect on the servo"):
+    with raises(ParameterError, key="superposition_actuator.lock_torque_Nm", value=1.0):
         load_car("compact", {"superposition_actuator.lock_torque_Nm": 1.0})

@@ -14,6 +14,7 @@ from activesteer.validation import Validation, to_json, validate
 from activesteer.validation.motion import reference_columns
 from activesteer.validation.our_runs import compare_run
 from activesteer.validation.reference import ReferenceData
+from tests.raising import raises
 
 RUNS = ("coast_80", "sine_0p5Hz", "step_0p2g_L", "step_0p4g_L")
 KEPT_BACK = {"step_0p1g_L", "step_0p4g_R", "step_0p6g_L", "sine_1p0Hz", "swd_0p7Hz", "sis_15s", "brake_0p4g"}
@@ -128,9 +129,9 @@ def test_the_response_does_not_depend_on_the_step() -> None:
 
 
 def test_an_unknown_reference_names_those_that_exist(tmp_path) -> None:
-    with pytest.raises(ParameterError, match="sedan"):
+    with raises(ParameterError, value="sedam", allowed=["sedan"]):
         validate("sedam")
-    with pytest.raises(ParameterError, match="does not exist"):
+    with raises(ParameterError, value=tmp_path / "nowhere"):
         validate(more=tmp_path / "nowhere")
 
 

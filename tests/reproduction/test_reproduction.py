@@ -9,9 +9,11 @@ import pytest
 
 from activesteer.analysis.claims import SCENARIOS, STATEMENTS, SYSTEMS, not_reproduced
 from activesteer.cli import main
+from activesteer.config import Range
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.studies.reproduction import Reproduction, reproduce
+from tests.raising import raises
 
 Runs = dict[str, dict[str, Recording]]
 
@@ -75,7 +77,7 @@ def test_a_folder_without_runs_is_told(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 def test_the_number_of_processes_is_checked(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="--jobs 0: at least 1"):
+    with raises(ParameterError, value=0, allowed=Range(1)):
         reproduce(tmp_path, jobs=0)
 
 

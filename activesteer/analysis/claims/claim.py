@@ -107,5 +107,7 @@ def check_systems(runs: Mapping[str, object], what: str) -> None:
     """
     if missing := [system for system in SYSTEMS if system not in runs]:
         raise ParameterError(
-            f"the claims about the {what} need the runs {', '.join(SYSTEMS)}; missing: {', '.join(missing)}"
+            f"the claims about the {what} need the runs {', '.join(SYSTEMS)}; missing: {', '.join(missing)}",
+            value=missing,
+            allowed=SYSTEMS,
         )

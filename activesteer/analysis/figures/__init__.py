@@ -84,7 +84,9 @@ def draw_all(recordings: Mapping[str, Mapping[str, RecordingLike]], folder: str 
     """
     scenarios = {name: recordings[name] for name in BY_SCENARIO if recordings.get(name)}
     if not scenarios:
-        raise ParameterError(f"there is no recording to draw; figures are made of {', '.join(BY_SCENARIO)}")
+        raise ParameterError(
+            f"there is no recording to draw; figures are made of {', '.join(BY_SCENARIO)}", allowed=tuple(BY_SCENARIO)
+        )
     directory = make_folder(folder, ParameterError)
     any_run = next(iter(next(iter(scenarios.values())).values()))
     paths = []

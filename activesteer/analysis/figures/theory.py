@@ -104,7 +104,8 @@ def _parameters(recording: RecordingLike, *keys: str) -> Mapping[str, Any]:
     for key in keys:
         table = table.get(key) if isinstance(table, Mapping) else None
     if not isinstance(table, Mapping):
-        raise RecordingError(f"the metadata of the recording have no table 'vehicle.{'.'.join(keys)}'")
+        path = f"vehicle.{'.'.join(keys)}"
+        raise RecordingError(f"the metadata of the recording have no table {path!r}", value=path)
     return table
 
 

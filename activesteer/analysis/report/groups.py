@@ -69,7 +69,7 @@ def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
     recordings: dict[str, Recording] = {}
     for path in paths:
         if str(path) in recordings:
-            raise ParameterError(f"{path} is named twice")
+            raise ParameterError(f"{path} is named twice", value=path)
         recordings[str(path)] = Recording.open(Path(path), recover=True)
     return recordings
 
@@ -85,11 +85,11 @@ def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
         RecordingError: a recording has no rows.
     """
     if not 1 <= len(recordings) <= MAX_RUNS:
-        raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MAX_RUNS}")
+        raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MAX_RUNS}", allowed=MAX_RUNS)
     by_maneuver: dict[str, dict[str, Recording]] = {}
     for source, recording in recordings.items():
         if len(recording) == 0:
-            raise RecordingError(f"{source} has no rows: nothing was recorded before the run ended")
+            raise RecordingError(f"{source} has no rows: nothing was recorded before the run ended", value=source)
         by_maneuver.setdefault(entry(recording, "maneuver", "name") or "run", {})[source] = recording
     ordered = [name for name in SCENARIOS if name in by_maneuver]
     ordered += [name for name in by_maneuver if name not in SCENARIOS]

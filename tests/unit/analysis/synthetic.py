@@ -40,7 +40,7 @@ class SyntheticRun:
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self.channels:
-            raise RecordingError(f"no channel {name!r}")
+            raise RecordingError(f"no channel {name!r}", value=name)
         return self.channels[name]
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from activesteer.analysis.claims import SCENARIOS, STATEMENTS, claims_for
 from activesteer.errors import ParameterError, RecordingError
+from tests.raising import raises
 from tests.unit.analysis.good_runs import check, failing, good, runs_of
 from tests.unit.analysis.synthetic import along_path, second_order, step_steer
 
@@ -28,7 +29,7 @@ def test_every_statement_is_checked_once():
 def test_a_missing_run_is_named(scenario):
     arguments = good(scenario)
     del arguments["ars"]
-    with pytest.raises(ParameterError, match="need the runs none, ars, afs; missing: ars"):
+    with raises(ParameterError, value=["ars"], allowed=("none", "ars", "afs")):
         check(scenario, arguments)
 
 

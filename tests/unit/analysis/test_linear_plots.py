@@ -10,6 +10,7 @@ from activesteer.analysis.figures import figure_2
 from activesteer.analysis.frequency_response import OUTPUTS
 from activesteer.analysis.linear_plots import draw_bode, draw_root_locus
 from activesteer.errors import ParameterError
+from tests.raising import raises
 from tests.unit.analysis.synthetic import step_steer
 from tests.unit.analysis.test_frequency_response import sweep
 
@@ -45,11 +46,11 @@ def test_root_locus_has_the_poles_of_every_speed(figures, tmp_path):
 
 
 def test_what_cannot_be_drawn_is_an_error(tmp_path):
-    with pytest.raises(ParameterError, match="no linear car"):
+    with pytest.raises(ParameterError):
         draw_bode({}, tmp_path / "a.png")
-    with pytest.raises(ParameterError, match="no input 'wheel'"):
+    with raises(ParameterError, value="wheel", allowed=system().input_labels):
         draw_bode({"a": system()}, tmp_path / "a.png", input_name="wheel")
-    with pytest.raises(ParameterError, match="1 linear cars and 2 speeds"):
+    with raises(ParameterError, value=(1, 2)):
         draw_root_locus([system()], [10.0, 20.0], tmp_path / "a.png")
 
 

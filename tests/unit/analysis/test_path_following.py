@@ -10,6 +10,7 @@ import pytest
 from activesteer.analysis.metrics import metrics
 from activesteer.analysis.path_following import evaluate
 from activesteer.errors import RecordingError
+from tests.raising import raises
 from tests.unit.analysis.synthetic import SLALOM_CONES, SPEED_MPS, along_path, offset_track, slalom
 
 SINE_RMS = 1.0 / math.sqrt(2.0)
@@ -142,5 +143,5 @@ def test_a_small_amplitude_hits_the_cones():
 def test_a_missing_channel_is_an_error():
     run = along_path()
     del run.channels["fl_friction_utilisation"]
-    with pytest.raises(RecordingError, match="fl_friction_utilisation"):
+    with raises(RecordingError, value="fl_friction_utilisation"):
         metrics(run)

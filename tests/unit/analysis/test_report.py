@@ -12,7 +12,7 @@ import pytest
 
 from activesteer.analysis.report import open_all, report_page, write_report
 from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
-from activesteer.analysis.report.groups import groups_of
+from activesteer.analysis.report.groups import MAX_RUNS, groups_of
 from activesteer.analysis.report.judgement import judge
 from activesteer.analysis.report.parameter_table import rows
 from activesteer.errors import ParameterError, RecordingError
@@ -284,15 +284,15 @@ def test_run_that_did_not_end_properly_is_marked():
 
 
 def test_wrong_input_is_answered(tmp_path: Path):
-    with pytest.raises(ParameterError, match="0 recordings; a report is made of 1 to"):
+    with raises(ParameterError, allowed=MAX_RUNS):
         report_page({})
     empty = Recording([Channel("ay_mps2", "m/s2", "", "vehicle")], [], np.empty((0, 1)))
-    with pytest.raises(RecordingError, match=r"a\.mcap has no rows"):
+    with raises(RecordingError, value="a.mcap"):
         report_page({"a.mcap": empty})
     with raises(ParameterError, cause=FileNotFoundError):
         write_report(sines(), tmp_path / "nowhere" / "report.html")
     next(iter(sines().values())).save(tmp_path / "a.mcap")
-    with pytest.raises(ParameterError, match=r"a\.mcap is named twice"):
+    with raises(ParameterError, value=tmp_path / "a.mcap"):
         open_all([tmp_path / "a.mcap", tmp_path / "a.mcap"])
 
 

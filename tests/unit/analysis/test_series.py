@@ -10,6 +10,7 @@ from scipy.signal import savgol_filter
 
 from activesteer.analysis.series import crossing_time, lag, largest_rate, rate_rms, rms, smooth, step_response, timestep
 from activesteer.errors import RecordingError
+from tests.raising import raises
 from tests.unit.analysis.synthetic import first_order, second_order
 
 TIME_S = np.arange(6001) * 0.001
@@ -112,12 +113,12 @@ def test_steady_state_near_zero_gives_no_times():
 
 
 def test_unequal_steps_are_refused():
-    with pytest.raises(RecordingError, match="not equidistant"):
+    with raises(RecordingError, value=pytest.approx((0.001, 0.002))):
         timestep(np.array([0.0, 0.001, 0.003]))
 
 
 def test_one_sample_is_refused():
-    with pytest.raises(RecordingError, match="1 samples are too few"):
+    with raises(RecordingError, value=1):
         timestep(np.array([0.0]))
 
 

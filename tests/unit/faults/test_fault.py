@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 
-from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
+from activesteer.errors import ManeuverError, ParameterError
 from activesteer.faults import ACTUATORS, KINDS, SENSORS, Fault, fault_table
 from activesteer.scenario import resolve
+from tests.raising import raises
 
 
 def faults_of(*tables: dict[str, Any]) -> tuple[Fault, ...]:
@@ -42,7 +43,7 @@ def test_the_command_line_s_form_is_a_table(text: str, table: dict[str, Any]) ->
 
 @pytest.mark.parametrize("text", ["rear", "rear:stuck", "rear:stuck@", "rear:stuck@x", "rear:offset=1@2", "a:b@1-2-3"])
 def test_what_is_no_fault_is_said_with_the_form(text: str) -> None:
-    with pytest.raises(ParameterError, match=r"--fault: .*PART:KIND"):
+    with raises(ParameterError, key="--fault", value=text):
         fault_table(text)
 
 
@@ -66,33 +67,33 @@ def test_every_signal_that_a_controller_gets_can_fail() -> None:
 
 
 @pytest.mark.parametrize(
-    ("table", "message"),
+    ("table", "key", "value"),
     [
-        ({"part": "raer", "kind": "stuck", "start_s": 1.0}, r"fault\.0\.part: .*'rear'"),
-        ({"part": "rear", "kind": "broken", "start_s": 1.0}, r"fault\.0\.kind: .*stuck"),
-        ({"part": "rear", "kind": "stuck"}, r"fault\.0\.start_s: .*missing"),
-        ({"part": "rear", "kind": "stuck", "start_s": 1.0, "size_deg": 1.0}, r"size_rad: has no effect"),
-        ({"part": "rear", "kind": "offset", "start_s": 1.0}, r"size_rad: is needed"),
-        ({"part": "rear", "kind": "offset", "start_s": 1.0, "size_radps": 1.0}, r"size_radps: has no effect.*size_rad"),
-        ({"part": "rear", "kind": "offset", "start_s": 1.0, "size_deg": 0.0}, r"is 0, which has no effect"),
-        ({"part": "rear", "kind": "runaway", "start_s": 1.0, "side": "up"}, r"'left' and 'right'"),
-        ({"part": "rear", "kind": "stuck", "start_s": 2.0, "end_s": 1.0}, r"end_s: .*begins at 2 s"),
-        ({"part": "rear", "kind": "stuck", "start_s": 99.0}, r"start_s: is 99 s, but the run ends at 10 s"),
-        ({"part": "yaw_rate_sensor", "kind": "float", "start_s": 1.0}, r"dropout"),
-        ({"part": "fl_brake", "kind": "float", "start_s": 1.0}, r"dropout"),
-        ({"part": "fl_brake", "kind": "offset", "start_s": 1.0, "size_deg": 1.0}, r"size_rad: has no effect.*size_Nm"),
-        ({"part": "rear", "kind": "stuck", "start_s": 1.0, "tiem": 2.0}, r"fault\.0\.tiem: there is no such key"),
+        ({"part": "raer", "kind": "stuck", "start_s": 1.0}, "part", "raer"),
+        ({"part": "rear", "kind": "broken", "start_s": 1.0}, "kind", "broken"),
+        ({"part": "rear", "kind": "stuck"}, "start_s", None),
+        ({"part": "rear", "kind": "stuck", "start_s": 1.0, "size_deg": 1.0}, "size_rad", None),
+        ({"part": "rear", "kind": "offset", "start_s": 1.0}, "size_rad", None),
+        ({"part": "rear", "kind": "offset", "start_s": 1.0, "size_radps": 1.0}, "size_radps", None),
+        ({"part": "rear", "kind": "offset", "start_s": 1.0, "size_deg": 0.0}, "size_rad", 0.0),
+        ({"part": "rear", "kind": "runaway", "start_s": 1.0, "side": "up"}, "side", "up"),
+        ({"part": "rear", "kind": "stuck", "start_s": 2.0, "end_s": 1.0}, "end_s", 1.0),
+        ({"part": "rear", "kind": "stuck", "start_s": 99.0}, "start_s", 99.0),
+        ({"part": "yaw_rate_sensor", "kind": "float", "start_s": 1.0}, "kind", "float"),
+        ({"part": "fl_brake", "kind": "float", "start_s": 1.0}, "kind", "float"),
+        ({"part": "fl_brake", "kind": "offset", "start_s": 1.0, "size_deg": 1.0}, "size_rad", None),
+        ({"part": "rear", "kind": "stuck", "start_s": 1.0, "tiem": 2.0}, "tiem", None),
     ],
 )
-def test_what_cannot_be_or_has_no_effect_is_said(table: dict[str, Any], message: str) -> None:
-    with pytest.raises(ActiveSteerError, match=message) as caught:
+def test_what_cannot_be_or_has_no_effect_is_said(table: dict[str, Any], key: str, value: Any) -> None:
+    with raises(ManeuverError, key=f"fault.0.{key}", value=value) as caught:
         faults_of(table)
     assert "\n" not in str(caught.value)
 
 
 def test_one_part_has_one_fault_at_a_time() -> None:
     stuck = fault_table("rear:stuck@1-2")
-    with pytest.raises(ManeuverError, match="at the same time"):
+    with raises(ManeuverError, key="fault.1"):
         faults_of(stuck, fault_table("rear_left:float@1.5"))
     assert len(faults_of(stuck, fault_table("rear_left:float@2"), fault_table("superposition:stuck@1"))) == 2 + 1
 

@@ -10,6 +10,7 @@ from activesteer.errors import RecordingError
 from activesteer.playback import runs_of
 from activesteer.playback.runs import COLOURS
 from activesteer.recording import Poses, Recording
+from tests.raising import raises
 from tests.unit.playback.synthetic import circle
 
 
@@ -58,12 +59,12 @@ def test_poses_that_are_not_finite_are_left_out() -> None:
 
 def test_what_cannot_be_played_back_is_refused() -> None:
     recording = circle(0.1)
-    with pytest.raises(RecordingError, match="no recording to play back"):
+    with pytest.raises(RecordingError):
         runs_of({})
     for poses in (None, recording.poses._replace(names=tuple(f"body{i}" for i in range(5)))):
-        with pytest.raises(RecordingError, match=r"ars: .*rows and poses of a car are needed"):
+        with raises(RecordingError, value="ars"):
             runs_of({"ars": _with_poses(recording, poses)})
-    with pytest.raises(RecordingError, match="rows and poses"):
+    with raises(RecordingError, value="ars"):
         runs_of(
             {"ars": Recording(recording.channels, [], np.empty((0, len(recording.channels))), poses=recording.poses)}
         )

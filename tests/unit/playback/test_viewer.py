@@ -19,6 +19,7 @@ from activesteer.cli import main
 from activesteer.errors import PlaybackError
 from activesteer.playback import runs_of, show
 from activesteer.playback.viewer import viewer_binary
+from tests.raising import raises
 from tests.unit.playback.rrd import Rrd
 from tests.unit.playback.synthetic import circle
 
@@ -100,7 +101,7 @@ def test_a_viewer_that_does_not_start_is_named(monkeypatch: pytest.MonkeyPatch, 
     broken = tmp_path / "rerun"
     broken.write_text("not a program")
     monkeypatch.setattr("activesteer.playback.viewer.viewer_binary", lambda: broken)
-    with pytest.raises(PlaybackError, match=f"viewer {broken} does not start"):
+    with raises(PlaybackError, cause=PermissionError, value=broken):
         show(runs_of({"ars": circle(0.1)}))
 
 

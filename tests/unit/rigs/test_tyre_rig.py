@@ -116,7 +116,7 @@ def test_shapes_that_do_not_fit_are_errors() -> None:
     rig = TyreRig(tyre())
     with raises(ParameterError, cause=ValueError):
         rig.sweep(np.zeros(2), np.zeros(3), 0.0, 4000.0, 20.0)
-    with pytest.raises(ParameterError, match="2 dimensions"):
+    with raises(ParameterError, value=2):
         rig.sweep(np.zeros((2, 2)), 0.0, 0.0, 4000.0, 20.0)
     with raises(ParameterError, key="time_s"):
         rig.transient(np.linspace(0.0, 1.0, 11), (1.0, 0.0), 0.0, 0.29)
@@ -139,7 +139,7 @@ def test_a_callback_of_someone_else_is_reported() -> None:
     remove_native_forces()
     mujoco.set_mjcb_passive(lambda model, data: None)
     try:
-        with pytest.raises(ModelError, match="mjcb_passive is already taken"):
+        with raises(ModelError, value="mjcb_passive"):
             TyreRig(tyre())
     finally:
         mujoco.set_mjcb_passive(None)

@@ -10,6 +10,7 @@ import pytest
 from activesteer.errors import ManeuverError
 from activesteer.road.path import SPACING_M, Path
 from activesteer.road.path_search import PathSearch
+from tests.raising import raises
 
 
 def arc(radius_m: float, degrees: float, points: int = 60) -> Path:
@@ -60,14 +61,14 @@ def test_the_nearest_point_stays_on_its_own_branch() -> None:
 
 
 @pytest.mark.parametrize(
-    ("x_m", "y_m", "words"),
+    ("x_m", "y_m", "value"),
     [
-        ([0.0], [0.0], "at least 2"),
-        ([0.0, 1.0], [0.0], "as many x as y"),
-        ([0.0, 1.0, math.nan], [0.0, 0.0, 0.0], "point 3"),
-        ([0.0, 1.0, 1.0], [0.0, 0.0, 0.0], "points 2 and 3"),
+        ([0.0], [0.0], (1, 1)),
+        ([0.0, 1.0], [0.0], (2, 1)),
+        ([0.0, 1.0, math.nan], [0.0, 0.0, 0.0], 3),
+        ([0.0, 1.0, 1.0], [0.0, 0.0, 0.0], 2),
     ],
 )
-def test_what_is_no_path_is_told(x_m: list[float], y_m: list[float], words: str) -> None:
-    with pytest.raises(ManeuverError, match=words):
+def test_what_is_no_path_is_told(x_m: list[float], y_m: list[float], value: object) -> None:
+    with raises(ManeuverError, value=value):
         Path.through(x_m, y_m)

@@ -90,10 +90,12 @@ def test_cell_that_no_value_can_be_is_answered_with_file_and_line(tmp_path, cell
     assert len(str(told.value)) < 500
 
 
-@pytest.mark.parametrize("text", ["", "road.mu\n", "a,a\n1,2\n", "a,b\n1\n", ",b\n1,2\n"])
-def test_a_csv_file_without_cases_is_refused(tmp_path, text):
+@pytest.mark.parametrize(
+    ("text", "line"), [("", None), ("road.mu\n", None), ("a,a\n1,2\n", 1), ("a,b\n1\n", 2), (",b\n1,2\n", 1)]
+)
+def test_a_csv_file_without_cases_is_refused(tmp_path, text, line):
     (tmp_path / "cases.csv").write_text(text)
-    with pytest.raises(StudyError, match="cases"):
+    with raises(StudyError, file="cases.csv", line=line):
         read_cases(tmp_path / "cases.csv")
 
 

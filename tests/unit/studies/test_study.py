@@ -19,6 +19,7 @@ from activesteer import study
 from activesteer.errors import StudyError
 from activesteer.recording import Recording
 from activesteer.studies.store import Store
+from tests.raising import raises
 from tests.unit.studies.short import MANEUVER, RATIO, short_study, write_controller
 
 MU = (0.7, 0.8, 0.9, 1.0)
@@ -126,7 +127,7 @@ def test_a_run_without_metrics_is_a_row_that_says_so():
 
 def test_another_study_in_the_same_folder_is_refused(serial):
     for other in (short_study(*MU), short_study(*MU, **BOTH, seed=5), short_study(*MU[:2], **BOTH)):
-        with pytest.raises(StudyError, match="another study"):
+        with raises(StudyError, value=serial.parent):
             study(other, output=serial.parent, jobs=1)
 
 
@@ -137,7 +138,7 @@ def test_results_of_another_version_are_not_gone_on_with(tmp_path, monkeypatch):
 
     run_identity.versions.cache_clear()
     try:
-        with pytest.raises(StudyError, match="made with source"):
+        with raises(StudyError, value=tmp_path):
             study(short_study(*MU), output=tmp_path, jobs=1)
     finally:
         monkeypatch.undo()
@@ -145,7 +146,7 @@ def test_results_of_another_version_are_not_gone_on_with(tmp_path, monkeypatch):
 
 
 def test_two_processes_do_not_work_on_one_study(tmp_path):
-    with Store(tmp_path, ()).opened("", "x", 1), pytest.raises(StudyError, match="another process"):
+    with Store(tmp_path, ()).opened("", "x", 1), raises(StudyError, cause=BlockingIOError, value=tmp_path):
         study(short_study(*MU), output=tmp_path, jobs=1)
 
 
@@ -204,7 +205,7 @@ def test_a_full_disk_ends_the_study_and_keeps_what_is_finished(tmp_path, monkeyp
         written(table, path)
 
     monkeypatch.setattr("activesteer.studies.store.pq.write_table", full)
-    with pytest.raises(StudyError, match="No space left"):
+    with raises(StudyError, cause=OSError):
         study(short_study(*MANY), output=tmp_path, jobs=1)
     progress = Store(tmp_path, ()).progress()
     assert 0 < progress.done < progress.total
@@ -213,7 +214,7 @@ def test_a_full_disk_ends_the_study_and_keeps_what_is_finished(tmp_path, monkeyp
 
 def test_a_folder_that_cannot_be_written_is_told_before_anything_runs(tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(StudyError, match="cannot"):
+    with raises(StudyError, cause=NotADirectoryError):
         study(short_study(*MU), output=tmp_path / "file" / "study", jobs=1)
 
 
@@ -221,10 +222,10 @@ def test_damaged_files_are_told(tmp_path):
     study(short_study(*MU), output=tmp_path, jobs=1, limit=2)
     part = next((tmp_path / "parts").glob("*.parquet"))
     part.write_bytes(part.read_bytes()[:100])
-    with pytest.raises(StudyError, match="cannot read"):
+    with raises(StudyError, value=part):
         study(short_study(*MU), output=tmp_path, jobs=1)
     (tmp_path / "environment.json").write_text("{")
-    with pytest.raises(StudyError, match="damaged"):
+    with raises(StudyError, cause=json.JSONDecodeError, value=tmp_path / "environment.json"):
         study(short_study(*MU), output=tmp_path, jobs=1)
 
 

@@ -203,7 +203,7 @@ def test_a_tyre_beside_the_table_comes_along(tmp_path: Path) -> None:
 
 def test_files_of_an_earlier_car_are_not_replaced_unasked(tmp_path: Path) -> None:
     new_vehicle("again", COMPACT, tmp_path / "again")
-    with pytest.raises(ParameterError, match="is not empty"):
+    with raises(ParameterError, value=tmp_path / "again"):
         new_vehicle("again", COMPACT, tmp_path / "again")
     new_vehicle("again", COMPACT, tmp_path / "again", overwrite=True)
 

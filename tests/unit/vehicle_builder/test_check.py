@@ -173,5 +173,5 @@ def test_a_tyre_that_is_too_small(damaged: Damage, tmp_path: Path) -> None:
 def test_a_car_that_does_not_exist(tmp_path: Path) -> None:
     with raises(ParameterError, value="compakt"):
         check_vehicle("compakt")
-    with pytest.raises(ParameterError, match="which vehicle file"):
+    with raises(ParameterError, value=tmp_path, allowed=[]):
         check_vehicle(tmp_path)

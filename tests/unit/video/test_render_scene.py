@@ -116,15 +116,15 @@ def test_slippery_ground_looks_different():
 
 
 @pytest.mark.parametrize(
-    "more",
+    ("more", "key"),
     [
-        {"course": {"lanes": [], "cones": []}},
-        {"course": {**COURSE, "lanes": [{"name": "a"}]}},
-        {"maneuver": {"road": {"patches": [{"mu": 0.3}]}}},
+        ({"course": {"lanes": [], "cones": []}}, "course.path"),
+        ({"course": {**COURSE, "lanes": [{"name": "a"}]}}, "course.lanes.0.start_x_m"),
+        ({"maneuver": {"road": {"patches": [{"mu": 0.3}]}}}, "maneuver.road.patches.0.start_m"),
     ],
 )
-def test_a_recording_with_a_damaged_course_or_road_says_so(more):
-    with pytest.raises(RecordingError, match=r"course|road\.patches"):
+def test_a_recording_with_a_damaged_course_or_road_says_so(more, key):
+    with raises(RecordingError, key=key):
         Film({"circle": circle(metadata=more)}, Settings())
 
 

@@ -9,6 +9,7 @@ from activesteer.errors import PlaybackError
 from activesteer.recording import Poses, Recording
 from activesteer.signals import Channel
 from activesteer.video.track import Track
+from tests.raising import raises
 from tests.unit.playback.synthetic import RADIUS_M, SPEED_MPS, WHEELS, circle
 
 CHANNEL = [Channel("x_m", "m", "", "vehicle")]
@@ -70,7 +71,7 @@ def test_wheel_place_is_in_the_frame_of_the_car():
 
 
 def test_missing_wheel_is_named_with_the_bodies_there_are():
-    with pytest.raises(PlaybackError, match=r"no body 'fl_wheel'; it has chassis"):
+    with raises(PlaybackError, value="fl_wheel", allowed=("chassis",)):
         Track(turning(np.zeros(3)), "x").wheel_place("fl")
 
 
@@ -87,7 +88,7 @@ def test_poses_that_are_not_finite_are_left_out():
 @pytest.mark.parametrize("count", [0, 3])
 def test_recording_without_a_car_is_refused(count):
     poses = Poses(np.arange(count) * 0.01, ("table",), np.zeros((count, 1, 3)), np.ones((count, 1, 4)))
-    with pytest.raises(PlaybackError, match="mine has no poses of a car"):
+    with raises(PlaybackError, value="mine"):
         Track(Recording(CHANNEL, [0.0], [[0.0]], poses=poses), "mine")
 
 

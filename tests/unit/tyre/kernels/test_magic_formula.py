@@ -169,7 +169,7 @@ def test_arrays_broadcast_and_agree_with_the_scalar_kernel(compact: MagicFormula
 
 
 def test_inputs_that_do_not_fit_together_are_refused(compact: MagicFormula) -> None:
-    with pytest.raises(ParameterError, match=r"kappa \(2,\)"):
+    with raises(ParameterError, cause=ValueError):
         compact.evaluate([1.0, 2.0, 3.0], [0.0, 0.0], 0.0)
     with raises(ParameterError, key="alpha_rad"):
         compact.evaluate(4000.0, 0.0, np.nan)
