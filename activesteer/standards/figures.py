@@ -25,7 +25,7 @@ def draw(picture: Picture) -> Figure:
     Raises:
         ParameterError: matplotlib is not installed.
     """
-    columns = min(len(picture.panels), _BESIDE)
+    columns = 2 if len(picture.panels) == 4 else min(len(picture.panels), _BESIDE)
     rows = math.ceil(len(picture.panels) / columns)
     figure = new_figure(9.0, 2.7 * rows + 0.4, picture.title)
     axes = figure.subplots(rows, columns, squeeze=False)
@@ -60,7 +60,12 @@ def _fill(axis: Axes, panel: Panel) -> None:
     for value, label in panel.limits:
         axis.axhline(value, color=_LIMIT, lw=1.0, ls=(0, (4, 2)), label=label)
     if panel.log:
+        from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter  # noqa: PLC0415 - an extra
+
         axis.set_xscale("log")
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.xaxis.set_major_formatter(ScalarFormatter())
+        axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_title(panel.title, fontsize="small")
     axis.set_xlabel(panel.x_label, fontsize="small")
     axis.set_ylabel(panel.y_label, fontsize="small")

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from activesteer.conventions import Array
-from activesteer.quantities import display_unit
+from activesteer.errors import RecordingError
+from activesteer.quantities import display_unit, metric_label, metric_number
 
 if TYPE_CHECKING:
     from activesteer.scenario import FileOrTable, Scenario
@@ -22,8 +23,9 @@ CURVE_STEP_S: Final = 0.02
 _LEAD_S: Final = 0.2
 
 
-class Run(NamedTuple):
-    """A run that was driven.
+@dataclass(frozen=True)
+class Run:
+    """A run that was driven; the analysis reads it as it reads a recording.
 
     Attributes:
         case: What it was driven with beside the others of its series.
@@ -36,6 +38,36 @@ class Run(NamedTuple):
     metrics: Mapping[str, float]
     channels: Mapping[str, Array]
     error: str
+
+    @property
+    def time_s(self) -> Array:
+        """Time of the values of channels [s]."""
+        return np.arange(len(next(iter(self.channels.values()), ()))) * CURVE_STEP_S
+
+    @property
+    def metadata(self) -> Mapping[str, Any]:
+        """Nothing; the car is the proving ground's."""
+        return {}
+
+    def __getitem__(self, channel: str) -> Array:
+        """A channel over `time_s`.
+
+        Raises:
+            RecordingError: the run failed, or the channel was not kept.
+        """
+        if channel not in self.channels:
+            raise RecordingError(self.error or f"{channel} was not kept")
+        return self.channels[channel]
+
+    def at(self, channel: str, time_s: float) -> float:
+        """A channel at a time, interpolated; nan where the run has not got so far."""
+        values = self.channels.get(channel, np.empty(0))
+        return float(np.interp(time_s, self.time_s, values)) if len(values) and time_s <= self.time_s[-1] else math.nan
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Case and metrics, or why there are none, as JSON values."""
+        return {**self.case, **(dict(self.metrics) if not self.error else {"error": self.error})}
 
     def metric(self, name: str) -> float:
         """A metric; nan where the run has none."""
@@ -197,3 +229,43 @@ class Standard:
     implemented: Sequence[str]
     left_out: Sequence[str]
     examine: Callable[[Ground], Findings]
+
+
+def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
+    """Metrics of runs beside each other.
+
+    Args:
+        title: What they are.
+        runs: Head of a column -> metrics; a run without a metric has an empty cell.
+    """
+    names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
+    rows = [
+        [*metric_label(name)[:2], *(metric_number(name, metrics.get(name, math.nan)) for metrics in runs.values())]
+        for name in names
+    ]
+    return Table(title, ("", "unit", *runs), rows)
+
+
+def axis_label(name: str) -> str:
+    """Words and unit of a channel or metric, as they stand at an axis."""
+    words, unit, _ = metric_label(name)
+    return f"{words} [{unit}]"
+
+
+def time_panels(runs: Mapping[str, Run], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
+    """Channels of runs over time, a panel each.
+
+    Args:
+        runs: Label -> run.
+        channels: Channels.
+        begin_s: What time is counted from [s].
+        begin: What that is, in words.
+    """
+    return [
+        Panel(
+            f"time from {begin} [s]",
+            axis_label(channel),
+            [run.over_time(channel, begin_s=begin_s, label=label) for label, run in runs.items()],
+        )
+        for channel in channels
+    ]

@@ -1,0 +1,93 @@
+"""A loop of one signal over another, as an on-centre weave test draws it: gradient and dead bands.
+
+Source: ISO 13674-1, Road vehicles - Test method for the quantification of on-centre handling - Weave test.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from activesteer.analysis.series import Array
+from activesteer.errors import RecordingError
+
+AROUND: Final = 0.2
+"""Fraction of the largest abscissa around zero over which a gradient is taken."""
+
+
+class Loop(NamedTuple):
+    """A loop, as its branches pass through zero; means of all periods.
+
+    Attributes:
+        gradient: Slope of the ordinate over the abscissa around abscissa zero, of both branches.
+        ordinate_dead_band: Height of the loop at abscissa zero; positive where the ordinate comes after the abscissa.
+        abscissa_dead_band: Width of the loop at ordinate zero, likewise.
+    """
+
+    gradient: float
+    ordinate_dead_band: float
+    abscissa_dead_band: float
+
+
+def loop(x: Array, y: Array) -> Loop:
+    """Evaluates a loop.
+
+    Args:
+        x: Abscissa, that oscillates about zero, shape (n,).
+        y: Ordinate, shape (n,).
+
+    Returns:
+        Gradient and dead bands.
+
+    Raises:
+        RecordingError: one of the two does not pass through zero both upwards and downwards.
+    """
+    up, down = (crossings(x, y, rising=rising) for rising in (True, False))
+    right, left = (crossings(y, x, rising=rising) for rising in (True, False))
+    rate = np.gradient(x)
+    near = np.abs(x) < AROUND * float(np.abs(x).max())
+    slopes = [
+        float(np.polynomial.Polynomial.fit(x[part], y[part], 1).convert().coef[1])
+        for part in (near & (rate > 0.0), near & (rate < 0.0))
+    ]
+    return Loop(
+        gradient=0.5 * sum(slopes),
+        ordinate_dead_band=float(np.mean(down) - np.mean(up)),
+        abscissa_dead_band=float(np.mean(right) - np.mean(left)),
+    )
+
+
+def crossings(x: Array, y: Array, *, rising: bool) -> Array:
+    """Values of a signal where another passes through zero, interpolated.
+
+    Args:
+        x: The other signal, shape (n,).
+        y: The signal, shape (n,).
+        rising: Whether it passes upwards.
+
+    Returns:
+        A value for each passage.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    sign = 1.0 if rising else -1.0
+    places = np.flatnonzero((sign * x[:-1] < 0.0) & (sign * x[1:] >= 0.0))
+    if places.size == 0:
+        raise RecordingError("the signals make no loop: one of them does not pass through zero")
+    fraction = x[places] / (x[places] - x[places + 1])
+    return y[places] + fraction * (y[places + 1] - y[places])
+
+
+def slope_at_zero(x: Array, y: Array, within: float) -> float:
+    """Slope of a line through the points near abscissa zero; nan where there are fewer than three.
+
+    Args:
+        x: Abscissa, shape (n,).
+        y: Ordinate, shape (n,).
+        within: Largest magnitude of the abscissa that counts.
+    """
+    near = np.abs(x) <= within
+    return float(np.polynomial.Polynomial.fit(x[near], y[near], 1).convert().coef[1]) if near.sum() > 2 else math.nan

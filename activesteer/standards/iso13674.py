@@ -1,0 +1,199 @@
+"""ISO 13674: on-centre handling, weave test and transition test."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from activesteer.analysis.hysteresis import loop, slope_at_zero
+from activesteer.conventions import Array
+from activesteer.errors import RecordingError
+from activesteer.quantities import display_unit
+from activesteer.standards.standard import (
+    CURVE_STEP_S,
+    Curve,
+    Findings,
+    Ground,
+    Panel,
+    Picture,
+    Run,
+    Standard,
+    Table,
+    axis_label,
+)
+from activesteer.standards.steering_angle import steering_wheel_at
+
+SPEED_KMH: Final = 100.0
+"""Speed [km/h]."""
+AY_MPS2: Final = 2.0
+"""Lateral acceleration of the weave's peaks, and where the transition ends [m/s2]."""
+WEAVE_Hz: Final = 0.2
+"""Frequency of the weave [Hz]."""
+PERIODS: Final = 6
+_DROPPED: Final = 2
+"""Periods driven, and how many of them pass before the motion is periodic."""
+TRANSITION_DEGPS: Final = 5.0
+"""Rate of the steering wheel in the transition test [deg/s]."""
+_CENTRE_MPS2: Final = 0.5
+"""Lateral acceleration to either side over which a slope of the transition is taken [m/s2]."""
+_BEGIN_S: Final = 1.0
+_SAMPLE_S: Final = 0.02
+_CHANNELS: Final = ("steering_wheel_rad", "yaw_rate_radps", "ay_mps2", "hand_torque_Nm")
+_PLOTS: Final = (
+    ("steering_wheel_rad", "ay_mps2"),
+    ("steering_wheel_rad", "yaw_rate_radps"),
+    ("steering_wheel_rad", "hand_torque_Nm"),
+    ("ay_mps2", "hand_torque_Nm"),
+)
+"""Abscissa and ordinate of each cross-plot."""
+
+Signals = Mapping[str, Array]
+
+
+def weave_loops(signals: Signals) -> list[dict[str, Any]]:
+    """Gradient and dead bands of every cross-plot.
+
+    Args:
+        signals: Steering wheel angle, yaw rate, lateral acceleration, hand torque, over whole periods.
+
+    Returns:
+        For each `abscissa`, `ordinate`, and in the units that these are shown in `gradient`, `ordinate_dead_band`,
+        `abscissa_dead_band`; None where a signal does not pass through zero.
+    """
+    found = []
+    for abscissa, ordinate in _PLOTS:
+        x, y = (display_unit(name).factor * signals[name] for name in (abscissa, ordinate))
+        try:
+            values: dict[str, float | None] = loop(x, y)._asdict()
+        except RecordingError:
+            values = dict.fromkeys(("gradient", "ordinate_dead_band", "abscissa_dead_band"))
+        found.append({"abscissa": axis_label(abscissa), "ordinate": axis_label(ordinate), **values})
+    return found
+
+
+def _examine(ground: Ground) -> Findings:
+    angle_deg = steering_wheel_at(ground, SPEED_KMH, AY_MPS2)
+    [weave] = ground.drive("weave", _weave(angle_deg), [{"speed_kmh": SPEED_KMH}], curves=_CHANNELS)
+    transition = ground.drive(
+        "transition",
+        "slowly_increasing_steer",
+        [{"steer.rate_degps": sign * TRANSITION_DEGPS} for sign in (1.0, -1.0)],
+        {"speed_kmh": SPEED_KMH, "duration_s": 2.0 * angle_deg / TRANSITION_DEGPS + _BEGIN_S},
+        _CHANNELS,
+    )
+    failed = [run.error for run in (weave, *transition) if not run.channels]
+    if failed:
+        return Findings({"steering_wheel_deg": angle_deg}, f"no result: {failed[0]}")
+    first = round((_BEGIN_S + _DROPPED / WEAVE_Hz) / CURVE_STEP_S)
+    last = round((_BEGIN_S + PERIODS / WEAVE_Hz) / CURVE_STEP_S)
+    periodic = {name: weave[name][first:last] for name in _CHANNELS}
+    loops = weave_loops(periodic)
+    through = _through_centre(transition)
+    lines = transition_lines(through)
+    summary = (
+        f"weave: {loops[0]['gradient']:.3f} m/s² per deg of the steering wheel, the car comes "
+        f"{loops[0]['abscissa_dead_band']:.2f} deg after it; transition: {lines[0]['slope']:.3f} m/s² per deg"
+    )
+    tables = [
+        Table(
+            f"Weave, {WEAVE_Hz:g} Hz, {angle_deg:.1f} deg",
+            ("abscissa", "ordinate", "gradient", "ordinate dead band", "abscissa dead band"),
+            [(row["abscissa"], row["ordinate"], *(_number(row[key]) for key in list(row)[2:])) for row in loops],
+        ),
+        Table(
+            f"Transition through straight ahead, {TRANSITION_DEGPS:g} deg/s",
+            ("abscissa", "ordinate", "slope", "intercept"),
+            [(row["abscissa"], row["ordinate"], _number(row["slope"]), _number(row["intercept"])) for row in lines],
+        ),
+    ]
+    pictures = [Picture("Weave", _panels(periodic)), Picture("Transition", _panels(through))]
+    values = {"steering_wheel_deg": angle_deg, "weave": loops, "transition": lines}
+    return Findings(values, summary, tables, pictures)
+
+
+def _weave(angle_deg: float) -> dict[str, Any]:
+    """The manoeuvre: a second straight ahead, then the sine."""
+    length_s = PERIODS / WEAVE_Hz
+    times = np.arange(round(length_s / _SAMPLE_S) + 1) * _SAMPLE_S
+    angles = angle_deg * np.sin(2.0 * math.pi * WEAVE_Hz * times)
+    return {
+        "kind": "open_loop",
+        "name": "weave",
+        "speed_kmh": SPEED_KMH,
+        "duration_s": _BEGIN_S + length_s,
+        "steering": {
+            "time_s": [round(time, 6) for time in (times + _BEGIN_S).tolist()],
+            "steering_wheel_deg": [round(angle, 6) for angle in angles.tolist()],
+        },
+    }
+
+
+def _through_centre(runs: list[Run]) -> dict[str, Array]:
+    """Both transitions as one way from the right to the left, up to the lateral acceleration asked for."""
+    left, right = ({name: run[name] for name in _CHANNELS} for run in runs)
+    ends = [int(np.argmax(np.abs(side["ay_mps2"]) >= AY_MPS2)) or len(side["ay_mps2"]) for side in (left, right)]
+    return {name: np.concatenate([right[name][: ends[1]][::-1], left[name][: ends[0]]]) for name in _CHANNELS}
+
+
+def transition_lines(signals: Signals) -> list[dict[str, Any]]:
+    """Slope at the centre of what the car does, and the line beside the centre of what the hands feel.
+
+    Args:
+        signals: As for `weave_loops`, from one side through straight ahead to the other.
+
+    Returns:
+        For each `abscissa`, `ordinate`, `slope`, and of the hand torque `intercept`: where the line from 0.5 m/s² on
+        would begin, the friction of the steering.
+    """
+    ay = signals["ay_mps2"]
+    near = np.abs(ay) <= _CENTRE_MPS2
+    found = []
+    for abscissa, ordinate in _PLOTS:
+        x, y = (display_unit(name).factor * signals[name] for name in (abscissa, ordinate))
+        if ordinate == "hand_torque_Nm":
+            line = np.polynomial.Polynomial.fit(np.abs(x[~near]), (np.sign(x) * y)[~near], 1).convert().coef
+            intercept, slope = (float(value) for value in line)
+        else:
+            intercept, slope = None, slope_at_zero(x[near], y[near], math.inf)
+        found.append(
+            {"abscissa": axis_label(abscissa), "ordinate": axis_label(ordinate), "slope": slope, "intercept": intercept}
+        )
+    return found
+
+
+def _panels(signals: Signals) -> list[Panel]:
+    return [
+        Panel(
+            axis_label(abscissa),
+            axis_label(ordinate),
+            [Curve(*(display_unit(name).factor * signals[name] for name in (abscissa, ordinate)))],
+        )
+        for abscissa, ordinate in _PLOTS
+    ]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4f}"
+
+
+STANDARD: Final = Standard(
+    name="iso13674",
+    title="ISO 13674: on-centre handling, weave and transition test",
+    edition="ISO 13674-1:2010 and ISO 13674-2:2016, as they are known from the literature; no text was at hand.",
+    implemented=(
+        "Weave: 0.2 Hz at 100 km/h with peaks of 2 m/s² of lateral acceleration, six periods, of which the last four "
+        "are evaluated. Gradients around zero and dead bands of lateral acceleration, yaw rate and hand torque over "
+        "steering wheel angle, and of hand torque over lateral acceleration.",
+        "Transition: from straight ahead at 5 deg/s of the steering wheel to 2 m/s², left and right. Slopes of lateral "
+        "acceleration and yaw rate within 0.5 m/s² of the centre; lines of the hand torque beyond, where they begin.",
+    ),
+    left_out=(
+        "Polynomials that are fitted to measured loops. Deceleration, side wind, crown and unevenness of the road.",
+        "The power assist is a constant fraction of the column's torque; its boost curve is not modelled.",
+    ),
+    examine=_examine,
+)
+"""ISO 13674."""

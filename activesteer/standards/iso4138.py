@@ -1,0 +1,163 @@
+"""ISO 4138: steady-state circular driving behaviour, by its three methods."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from activesteer.analysis.handling import CarGeometry, Handling, evaluate
+from activesteer.conventions import Array
+from activesteer.errors import RecordingError
+from activesteer.quantities import display_unit
+from activesteer.standards.standard import (
+    Curve,
+    Findings,
+    Ground,
+    Panel,
+    Picture,
+    Run,
+    Standard,
+    axis_label,
+    metrics_table,
+)
+
+RADIUS_M: Final = 100.0
+"""Radius of the first method [m]."""
+FIXED_RADIUS_M: Final = 40.0
+"""Radius on which the second method begins [m]."""
+SPEED_KMH: Final = 80.0
+"""Speed of the third method [km/h]."""
+_SIDES: Final = {"left": 1.0, "right": -1.0}
+_CHANNELS: Final = (
+    "steering_wheel_rad", "ay_mps2", "vx_mps", "yaw_rate_radps", "sideslip_rad", "roll_rad",
+)  # fmt: skip
+_ENTRY_S: Final = 6.0
+_START_KMH: Final = 15.0
+_RISE_MPS2: Final = 0.4
+"""Rise of the speed of the second method [m/s2]."""
+_DURATION_S: Final = 90.0
+_RESULT: Final = "understeer_gradient_radpmps2"
+
+
+def _examine(ground: Ground) -> Findings:
+    config = ground.scenario("constant_radius").car.config
+    single_track = config.single_track
+    car = CarGeometry(single_track.cg_to_front_m, single_track.cg_to_rear_m, config.steering.ratio)
+    methods = {
+        f"constant radius {RADIUS_M:g} m": ground.drive(
+            "constant_radius",
+            "constant_radius",
+            [{"circle.radius_m": sign * RADIUS_M} for sign in _SIDES.values()],
+            curves=_CHANNELS,
+        ),
+        f"constant steering wheel angle, from {FIXED_RADIUS_M:g} m on": _fixed_angle(ground, car),
+        f"constant speed {SPEED_KMH:g} km/h": ground.drive(
+            "constant_speed",
+            "slowly_increasing_steer",
+            [{"steer.rate_degps": sign * 5.0} for sign in _SIDES.values()],
+            {"speed_kmh": SPEED_KMH},
+            _CHANNELS,
+        ),
+    }
+    tables, pictures, values, words = [], [], {}, []
+    for method, runs in methods.items():
+        found: dict[str, dict[str, float]] = {}
+        values[method] = []
+        for side, run in zip(_SIDES, runs, strict=True):
+            try:
+                found[side] = _defined(evaluate(run, car))
+                values[method].append({"direction": side, **found[side]})
+            except RecordingError as error:
+                values[method].append({"direction": side, "error": str(error)})
+        tables.append(metrics_table(method[0].upper() + method[1:], found))
+        pictures.append(_picture(method, dict(zip(_SIDES, runs, strict=True))))
+        words.append(f"{method}: {_words(found)}")
+    return Findings({"methods": values}, "; ".join(words), tables, pictures)
+
+
+def _fixed_angle(ground: Ground, car: CarGeometry) -> list[Run]:
+    """The steering wheel is turned to the Ackermann angle of the radius and held while the speed rises."""
+    angle_deg = math.degrees(car.steering_ratio * car.wheelbase_m / FIXED_RADIUS_M)
+    speed_mps = _START_KMH / 3.6
+    maneuver: dict[str, Any] = {
+        "kind": "open_loop",
+        "name": "constant_steering_wheel_angle",
+        "speed_mps": speed_mps,
+        "duration_s": _DURATION_S,
+        "hold_last": True,
+        "speed": {
+            "time_s": [0.0, _ENTRY_S, _DURATION_S],
+            "speed_mps": [speed_mps, speed_mps, speed_mps + _RISE_MPS2 * (_DURATION_S - _ENTRY_S)],
+        },
+    }
+    cases = [
+        {"steering": {"time_s": [0.0, 0.5 * _ENTRY_S], "steering_wheel_deg": [0.0, sign * angle_deg]}}
+        for sign in _SIDES.values()
+    ]
+    # A table is no value of a factor: the two sides are two series.
+    return [
+        ground.drive(f"constant_angle_{side}", {**maneuver, **case}, [{"speed_kmh": _START_KMH}], curves=_CHANNELS)[0]
+        for side, case in zip(_SIDES, cases, strict=True)
+    ]
+
+
+def _defined(found: Handling) -> dict[str, float]:
+    """The metrics that a method defines."""
+    return {name: value for name, value in found._asdict().items() if not math.isnan(value)}
+
+
+def _words(found: dict[str, dict[str, float]]) -> str:
+    if not found:
+        return "no result"
+    metrics = next(iter(found.values()))
+    gradient = display_unit(_RESULT).factor * metrics[_RESULT]
+    linear = metrics.get("linear_range_mps2")
+    return (
+        f"understeer gradient {gradient:.2f} deg/g, "
+        + ("" if linear is None else f"linear to {linear:.1f} m/s², ")
+        + f"up to {metrics['limit_acceleration_mps2']:.1f} m/s²"
+    )
+
+
+def _picture(method: str, runs: dict[str, Run]) -> Picture:
+    def panel(channel: str) -> Panel:
+        factor = display_unit(channel).factor
+        curves = []
+        for side, run in runs.items():
+            if run.error and not run.channels:
+                continue
+            ay = _smooth(run["ay_mps2"])
+            top = int(np.argmax(np.abs(ay))) + 1
+            curves.append(Curve(np.abs(ay[:top]), _SIDES[side] * factor * _smooth(run[channel])[:top], side))
+        return Panel("lateral acceleration [m/s²]", axis_label(channel), curves)
+
+    channels = ("steering_wheel_rad", "sideslip_rad", "roll_rad")
+    return Picture(method[0].upper() + method[1:], [panel(channel) for channel in channels])
+
+
+def _smooth(values: Array) -> Array:
+    """Mean over half a second, for the eye."""
+    width = 25
+    return np.convolve(values, np.full(width, 1.0 / width), mode="valid") if len(values) > width else values
+
+
+STANDARD: Final = Standard(
+    name="iso4138",
+    title="ISO 4138: steady-state circular driving behaviour",
+    edition="ISO 4138:2021, as it is known from the literature; the text itself was not at hand.",
+    implemented=(
+        f"Constant radius {RADIUS_M:g} m at slowly rising speed; constant steering wheel angle, that of Ackermann for "
+        f"{FIXED_RADIUS_M:g} m, at slowly rising speed; constant speed {SPEED_KMH:g} km/h at slowly rising steering "
+        "wheel angle. Each to the left and to the right, until the car can do no more.",
+        "Gradients of steering, understeer, sideslip and roll over lateral acceleration, from 0.5 to 2 m/s²; where the "
+        "steer angle is 5 % off the line, and the largest lateral acceleration.",
+    ),
+    left_out=(
+        "Discrete steady states: the speed or the angle rises slowly and without pause.",
+        "Steering wheel torque. Constant speed with constant radius (variation of the radius on fixed circles).",
+    ),
+    examine=_examine,
+)
+"""ISO 4138."""

@@ -1,0 +1,101 @@
+"""ISO 7975: braking in a turn, open loop."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from activesteer.quantities import display_unit
+from activesteer.standards.standard import (
+    Curve,
+    Findings,
+    Ground,
+    Panel,
+    Picture,
+    Run,
+    Standard,
+    axis_label,
+    metrics_table,
+    time_panels,
+)
+from activesteer.standards.steering_angle import steering_wheel_at
+
+SPEED_KMH: Final = 80.0
+AY_MPS2: Final = 5.0
+"""Steady state before the brake [km/h, m/s2]: a circle of 100 m."""
+PEDALS: Final = (0.12, 0.2, 0.28, 0.36, 0.44, 0.52, 0.6)
+"""Pedal positions of a series, from gentle to nearly full braking."""
+_SIDES: Final = {"left": 1.0, "right": -1.0}
+_SHOWN: Final = (
+    "yaw_rate_deviation_after_1000ms_radps", "path_deviation_after_1000ms_m", "sideslip_peak_abs_rad",
+)  # fmt: skip
+_CHANNELS: Final = ("yaw_rate_radps", "sideslip_rad", "speed_mps")
+_BEGIN_S: Final = 6.0
+_AFTER_S: Final = 2.2
+"""How long a run goes on: the car must not stand, where sideslip has no meaning [s]."""
+
+
+def _examine(ground: Ground) -> Findings:
+    angle_deg = steering_wheel_at(ground, SPEED_KMH, AY_MPS2)
+    cases = [
+        {"turn.steering_wheel_deg": sign * angle_deg, "brake.pedal": pedal}
+        for sign in _SIDES.values()
+        for pedal in PEDALS
+    ]
+    changes = {"speed_kmh": SPEED_KMH, "brake.start_s": _BEGIN_S, "duration_s": _BEGIN_S + _AFTER_S}
+    runs = ground.drive("brake_in_turn", "brake_in_turn", cases, changes, _CHANNELS)
+    by_side = {side: runs[len(PEDALS) * number :][: len(PEDALS)] for number, side in enumerate(_SIDES)}
+    done = [run for run in runs if not run.error]
+    summary = f"no result: {runs[0].error}"
+    if done:
+        worst = max(done, key=lambda run: abs(run.metric("yaw_rate_deviation_after_1000ms_radps")))
+        deviation = math.degrees(worst.metric("yaw_rate_deviation_after_1000ms_radps"))
+        summary = (
+            f"largest yaw rate deviation {deviation:+.1f} deg/s 1 s after the brake "
+            f"({'turns in' if deviation > 0.0 else 'runs wide'}), at {worst.metric('mean_deceleration_mps2'):.1f} m/s² "
+            f"of deceleration; {len(done)} of {len(runs)} runs evaluated"
+        )
+    tables = [
+        metrics_table(f"Turn to the {side}", {f"pedal {run.case['brake.pedal']:.2f}": run.metrics for run in group})
+        for side, group in by_side.items()
+    ]
+    hardest = {f"{side}, pedal {PEDALS[-1]:.2f}": group[-1] for side, group in by_side.items()}
+    pictures = [
+        Picture("Over the mean deceleration", [_over_deceleration(name, by_side) for name in _SHOWN]),
+        Picture("Hardest braking", time_panels(hardest, _CHANNELS, _BEGIN_S, "the brake")),
+    ]
+    values = {"steering_wheel_deg": angle_deg, "runs": [run.values for run in runs]}
+    return Findings(values, summary, tables, pictures)
+
+
+def _over_deceleration(name: str, by_side: dict[str, list[Run]]) -> Panel:
+    factor = display_unit(name).factor
+    curves = [
+        Curve(
+            [run.metric("mean_deceleration_mps2") for run in group],
+            [factor * run.metric(name) for run in group],
+            side,
+            marked=True,
+        )
+        for side, group in by_side.items()
+    ]
+    return Panel("mean deceleration [m/s²]", axis_label(name), curves)
+
+
+STANDARD: Final = Standard(
+    name="iso7975",
+    title="ISO 7975: braking in a turn, open loop",
+    edition="ISO 7975:2019, as it is known from the literature; the text itself was not at hand.",
+    implemented=(
+        "Steady state at 80 km/h and 5 m/s² (100 m), left and right; throttle released, brake pressed within 0.2 s, "
+        "steering wheel held. The angle is that at which the tested car reaches 5 m/s² in a slow ramp.",
+        "Series over the deceleration by the pedal. Yaw rate deviation and path deviation 1 s after the beginning of "
+        "braking against the steady circle, mean deceleration, peaks.",
+    ),
+    left_out=(
+        "Constant lateral acceleration at other radii. Single wheels that lock are not a limit of the series.",
+        "Repetitions: without noise every run is the same.",
+    ),
+    examine=_examine,
+)
+"""ISO 7975."""

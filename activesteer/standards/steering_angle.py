@@ -1,0 +1,47 @@
+"""The steering wheel angle at which the car that is tested reaches a lateral acceleration."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from activesteer.errors import ManeuverError
+from activesteer.standards.standard import Ground
+
+_RATE_DEGPS: Final = 5.0
+"""Rate of the ramp [deg/s]: the car lags behind by some 0.1 s, half a degree."""
+_LONGEST_S: Final = 30.0
+
+
+def steering_wheel_at(ground: Ground, speed_kmh: float, ay_mps2: float) -> float:
+    """The angle, from a slow ramp to the left at constant speed.
+
+    Args:
+        ground: Where the car is driven.
+        speed_kmh: Speed [km/h].
+        ay_mps2: Lateral acceleration [m/s2].
+
+    Returns:
+        Steering wheel angle, to 0.1 deg [deg].
+
+    Raises:
+        ManeuverError: the car does not reach the acceleration.
+    """
+    [run] = ground.drive(
+        f"ramp_{speed_kmh:g}kmh",
+        "slowly_increasing_steer",
+        [{"speed_kmh": speed_kmh}],
+        {"steer.rate_degps": _RATE_DEGPS, "duration_s": _LONGEST_S},
+        ("steering_wheel_rad", "ay_mps2"),
+    )
+    ay = run["ay_mps2"]
+    if ay.max() < ay_mps2:
+        raise ManeuverError(
+            f"the car reaches {ay.max():.3g} m/s2 at {speed_kmh:g} km/h; the test needs {ay_mps2:g} m/s2"
+        )
+    # Noise apart, the acceleration rises until it is reached.
+    end = int(np.argmax(ay >= ay_mps2))
+    rising = np.maximum.accumulate(ay[: end + 1])
+    return round(math.degrees(float(np.interp(ay_mps2, rising, run["steering_wheel_rad"][: end + 1]))), 1)

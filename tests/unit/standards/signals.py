@@ -1,0 +1,15 @@
+"""Runs whose channels are written down."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from activesteer.standards.standard import CURVE_STEP_S, Run
+
+
+def run_of(channels: dict[str, np.ndarray], **metrics: float) -> Run:
+    return Run({}, metrics, {name: np.asarray(values, dtype=float) for name, values in channels.items()}, "")
+
+
+def times(duration_s: float) -> np.ndarray:
+    return np.arange(round(duration_s / CURVE_STEP_S) + 1) * CURVE_STEP_S
