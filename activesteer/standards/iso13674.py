@@ -165,14 +165,8 @@ def transition_lines(signals: Signals) -> list[dict[str, Any]]:
 
 
 def _panels(signals: Signals) -> list[Panel]:
-    return [
-        Panel(
-            axis_label(abscissa),
-            axis_label(ordinate),
-            [Curve(*(display_unit(name).factor * signals[name] for name in (abscissa, ordinate)))],
-        )
-        for abscissa, ordinate in _PLOTS
-    ]
+    shown = {name: display_unit(name).factor * values for name, values in signals.items()}
+    return [Panel(axis_label(x), axis_label(y), [Curve(shown[x], shown[y])]) for x, y in _PLOTS]
 
 
 def _number(value: float | None) -> str:

@@ -42,7 +42,7 @@ class Run:
     @property
     def time_s(self) -> Array:
         """Time of the values of channels [s]."""
-        return np.arange(len(next(iter(self.channels.values()), ()))) * CURVE_STEP_S
+        return np.asarray(CURVE_STEP_S * np.arange(len(next(iter(self.channels.values()), ()))), dtype=np.float64)
 
     @property
     def metadata(self) -> Mapping[str, Any]:
