@@ -13,6 +13,8 @@ _Gain = Annotated[float, Range(0.0, 100.0)]
 _Scale = Annotated[float, Range(1e-4, 10.0)]
 _Limit = Annotated[float, Range(0.0, math.radians(10.0))]
 _Lag = Annotated[float, Range(0.001, 1.0)]
+_Size = Annotated[float, Range(1.0, 1e6)]
+_Rate = Annotated[float, Range(0.01, 100.0)]
 _Length = Annotated[float, Range(0.01, 5.0)]
 
 
@@ -71,3 +73,35 @@ class EscParameters:
     """Most brake torque of a wheel [Nm]."""
     least_speed_mps: Annotated[float, Range(1.0, 20.0)] = 20.0 / 3.6
     """Speed below which it rests [m/s]."""
+
+
+@dataclass(frozen=True)
+class IntegratedParameters:
+    """Allocation to steering and brakes (`integrated`); the feedback is that of [controllers.lqr]."""
+
+    yaw_rate_time_s: _Lag = 0.15
+    """T_r: time in which an error of the yaw rate is to fade [s]."""
+    sideslip_time_s: _Lag = 0.3
+    """T_b: time in which the sideslip is to fade [s]."""
+    moment_scale_Nm: _Size = 500.0
+    """Yaw moment that is missing and weighs as much as a force, an angle or a brake force of their scales [Nm]."""
+    force_scale_N: _Size = 2000.0
+    """Side force, likewise [N]."""
+    angle_scale_rad: _Scale = math.radians(0.05)
+    """s: difference from the angles of the feedback, likewise [rad]."""
+    brake_scale_N: _Size = 5000.0
+    """F_0: brake force of a wheel, likewise [N]."""
+    brake_threshold_Nm: _Size = 2500.0
+    """Yaw moment below which what is missing is left to the steering [Nm]."""
+    brake_fraction: _Fraction = 0.8
+    """Part of the friction under a wheel, standing still, that its brake may use [-]."""
+    ahead_s: _Lag = 0.1
+    """Time ahead for which the rates of the actuators count [s]."""
+    superposition_rate_radps: _Rate = math.radians(29.0)
+    """Rate of the superposition [rad/s]."""
+    rear_rate_radps: _Rate = math.radians(28.0)
+    """Rate of the rear steering [rad/s]."""
+    tolerance_rad: _Limit = math.radians(0.3)
+    """Distance of an actuator from its demand that is none [rad]."""
+    window_s: _Lag = 0.06
+    """Time in which an actuator must come nearer to its demand, and as long again until it counts as failed [s]."""

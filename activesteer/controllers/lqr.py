@@ -18,6 +18,9 @@ with the inverse squares of the errors and angles that are to weigh the same (Br
 speeds and taken linearly between. Yaw rate and sideslip are the estimator's, actuators are measured, f and g are
 followed by the model.
 
+Where one actuator is known not to work, its angle is given: f* or g* is then where it is, and the other and the
+sideslip beta* that cannot be helped solve 0 = A [r*, beta*] + B [f*, g*]; K is that of the other actuator alone.
+
 Sources: B. D. O. Anderson and J. B. Moore, Optimal Control: Linear Quadratic Methods, 1989; both axles for yaw rate and
 zero sideslip: M. Abe, Vehicle Handling Dynamics, 2009, chapter 8.
 """
@@ -26,7 +29,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
@@ -36,8 +39,7 @@ from activesteer.controllers.family_parameters import LqrParameters
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.turn_reference import TurnReference
 from activesteer.conventions import Array
-from activesteer.estimation import Estimator
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
 SPEED_STEP_MPS: Final = 5.0
@@ -46,8 +48,28 @@ SPEEDS_MPS: Final = tuple(SPEED_STEP_MPS * (number + 1) for number in range(14))
 STATES: Final = ("yaw_rate", "sideslip", "front", "rear", "superposition", "rear_actuator", "superposition_before",
                  "rear_before")  # fmt: skip
 """Of the model; the angles in pairs, front before rear."""
+BOTH: Final = (True, True)
+"""Both actuators work: superposition, rear steering."""
 _FULL_MPS: Final = 8.0
 """From here on the controller does all it does; below it fades out until `MIN_SPEED_MPS` [m/s]."""
+
+
+class Turn(NamedTuple):
+    """A turn and what leads to it; angles of superposition and rear wheels.
+
+    Attributes:
+        estimate: The motion.
+        desired_radps: Yaw rate asked for [rad/s].
+        sideslip_rad: Sideslip that belongs to it [rad].
+        steady_rad: Angles that hold it [rad].
+        demand_rad: Angles that the state feedback demands now, without any limit [rad].
+    """
+
+    estimate: Estimate
+    desired_radps: float
+    sideslip_rad: float
+    steady_rad: tuple[float, float]
+    demand_rad: tuple[float, float]
 
 
 class Lqr:
@@ -55,29 +77,23 @@ class Lqr:
 
     interval_s = 0.005
 
-    def __init__(
-        self, single_track: SingleTrackParameters, parameters: LqrParameters, estimator: Estimator, interval_s: float
-    ) -> None:
+    def __init__(self, setup: ControllerSetup) -> None:
         """Makes the controller of one run.
 
         Args:
-            single_track: The car as it is known.
-            parameters: Weights and limits.
-            estimator: Says yaw rate, sideslip and friction.
-            interval_s: Time between two calls [s].
+            setup: What it may know of the car.
         """
-        self._parameters, self._estimator = parameters, estimator
-        self._rows = schedule(single_track, parameters, interval_s)
-        p = parameters
-        self._reference = TurnReference(single_track, p.reference_lag_s, p.friction_fraction, interval_s)
-        self._interval_s = interval_s
+        p = self._parameters = setup.gains.lqr
+        self._estimator = setup.estimator()
+        self._car, self._interval_s = setup.single_track, setup.timestep_s
+        self._reference = TurnReference(self._car, p.reference_lag_s, p.friction_fraction, setup.timestep_s)
         self._front_rad = self._rear_rad = 0.0
         self._before = 0.0, 0.0
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> Lqr:
         """Makes the controller for a car."""
-        return cls(setup.single_track, setup.gains.lqr, setup.estimator(), setup.timestep_s)
+        return cls(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Both angles now.
@@ -86,73 +102,119 @@ class Lqr:
             command: What the driver does.
             measurement: What the car's sensors say.
         """
+        p, turn = self._parameters, self.turn(command, measurement)
+        speed_mps = turn.estimate.speed_mps
+        if speed_mps < MIN_SPEED_MPS:
+            self.apply(0.0, 0.0)
+            return ActuatorCommand()
+        fade = min((speed_mps - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
+        wished_added, wished_rear = (fade * angle for angle in turn.demand_rad)
+        added = min(max(wished_added, -p.superposition_limit_rad), p.superposition_limit_rad)
+        rear = min(max(wished_rear, -p.rear_limit_rad), p.rear_limit_rad)
+        self.apply(added, rear)
+        saturated = (added, rear) != (wished_added, wished_rear)
+        steady = turn.steady_rad[1]
+        return ActuatorCommand(rear, added, turn.desired_radps, steady, rear - steady, saturated)
+
+    def turn(self, command: DriverCommand, measurement: Measurement, works: tuple[bool, bool] = BOTH) -> Turn:
+        """The turn that is asked for, and what the state feedback demands for it; at walking speed none.
+
+        Args:
+            command: What the driver does.
+            measurement: What the car's sensors say.
+            works: Whether superposition and rear steering do.
+        """
         p, now = self._parameters, self._estimator.step(measurement)
         speed, driver = now.speed_mps, command.front_steer_demand_rad
         if speed < MIN_SPEED_MPS:
-            self._before = 0.0, 0.0
-            return ActuatorCommand()
+            return Turn(now, 0.0, 0.0, (0.0, 0.0), (0.0, 0.0))
         desired = self._reference.step(driver, speed, now.friction)
-        front_gain, rear_gain, *gains = self._gains(speed)
-        front, rear = front_gain * desired, rear_gain * desired
         added, turned = measurement.superposition_rad, measurement.rear_steer_rad
         # What the tyres answer to follows the angles over their relaxation length.
         share = -math.expm1(-self._interval_s * speed / p.relaxation_length_m)
         self._front_rad += share * (driver + added - self._front_rad)
         self._rear_rad += share * (turned - self._rear_rad)
-        added_desired = front - driver
+        given = 0.0 if works[0] and works[1] else driver + added if works[1] else turned
+        front_r, front_g, rear_r, rear_g, sideslip_r, sideslip_g, *gains = self._gains(works, speed)
+        front, rear = front_r * desired + front_g * given, rear_r * desired + rear_g * given
+        sideslip, steady_added = sideslip_r * desired + sideslip_g * given, front - driver
         errors = (
             now.yaw_rate_radps - desired,
-            now.sideslip_rad,
+            now.sideslip_rad - sideslip,
             self._front_rad - front,
             self._rear_rad - rear,
-            added - added_desired,
+            added - steady_added,
             turned - rear,
-            self._before[0] - added_desired,
+            self._before[0] - steady_added,
             self._before[1] - rear,
         )
         count = len(errors)
-        added_demand = added_desired - sum([gain * error for gain, error in zip(gains[:count], errors, strict=True)])
-        rear_demand = rear - sum([gain * error for gain, error in zip(gains[count:], errors, strict=True)])
-        fade = min((speed - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
-        added_limited = min(max(fade * added_demand, -p.superposition_limit_rad), p.superposition_limit_rad)
-        rear_limited = min(max(fade * rear_demand, -p.rear_limit_rad), p.rear_limit_rad)
-        self._before = added_limited, rear_limited
-        saturated = added_limited != fade * added_demand or rear_limited != fade * rear_demand
-        return ActuatorCommand(rear_limited, added_limited, desired, rear, rear_limited - rear, saturated)
+        demand = (
+            steady_added - sum([gain * error for gain, error in zip(gains[:count], errors, strict=True)]),
+            rear - sum([gain * error for gain, error in zip(gains[count:], errors, strict=True)]),
+        )
+        return Turn(now, desired, sideslip, (steady_added, rear), demand)
 
-    def _gains(self, speed_mps: float) -> list[float]:
+    def apply(self, superposition_rad: float, rear_rad: float) -> None:
+        """Says what was demanded of the actuators in the end; where one does not work, where it is."""
+        self._before = superposition_rad, rear_rad
+
+    def _gains(self, works: tuple[bool, bool], speed_mps: float) -> list[float]:
         """The row of the schedule at a speed."""
-        place = min(max(speed_mps / SPEED_STEP_MPS - 1.0, 0.0), len(self._rows) - 1.000001)
+        rows = schedule(self._car, self._parameters, self._interval_s, works)
+        place = min(max(speed_mps / SPEED_STEP_MPS - 1.0, 0.0), len(rows) - 1.000001)
         index = int(place)
         part = place - index
-        return [a + part * (b - a) for a, b in zip(self._rows[index], self._rows[index + 1], strict=True)]
+        return [a + part * (b - a) for a, b in zip(rows[index], rows[index + 1], strict=True)]
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def schedule(
-    single_track: SingleTrackParameters, parameters: LqrParameters, interval_s: float
+    car: SingleTrackParameters, parameters: LqrParameters, interval_s: float, works: tuple[bool, bool] = BOTH
 ) -> tuple[tuple[float, ...], ...]:
     """Gains at `SPEEDS_MPS`.
 
     Args:
-        single_track: The car as it is known.
+        car: The car as it is known.
         parameters: Weights and lags.
         interval_s: Time between two calls [s].
+        works: Whether superposition and rear steering do.
 
     Returns:
-        For each speed: front and rear angle per desired yaw rate [s], then the rows of K for superposition and rear
-        angle, in the order of `STATES`.
+        For each speed: front angle per desired yaw rate [s] and per given angle [-], the same of the rear angle and of
+        the sideslip; then the rows of K for superposition and rear angle, in the order of `STATES`.
     """
-    rows = []
-    for speed_mps in SPEEDS_MPS:
-        a, b = SingleTrack(single_track).matrices(speed_mps)
-        steady = np.linalg.solve(b, -a[:, 0])
-        rows.append((*steady.tolist(), *feedback(single_track, parameters, speed_mps, interval_s).ravel().tolist()))
-    return tuple(rows)
+    return tuple(
+        (
+            *steady_turn(car, speed_mps, works).ravel().tolist(),
+            *feedback(car, parameters, speed_mps, interval_s, works).ravel().tolist(),
+        )
+        for speed_mps in SPEEDS_MPS
+    )
+
+
+def steady_turn(car: SingleTrackParameters, speed_mps: float, works: tuple[bool, bool] = BOTH) -> Array:
+    """What belongs to a steady turn.
+
+    Returns:
+        Shape (3, 2): front angle, rear angle, sideslip, per yaw rate and per angle of an axle that is given; without
+        sideslip where both actuators work.
+    """
+    a, b = SingleTrack(car).matrices(speed_mps)
+    found = np.zeros((3, 2))
+    if works == BOTH:
+        found[:2, 0] = np.linalg.solve(b, -a[:, 0])
+        return found
+    axle = 0 if works[0] else 1
+    # Unknown are the angle of the axle that can still be steered, and the sideslip.
+    system = np.column_stack([b[:, axle], a[:, 1]])
+    found[[axle, 2]] = np.linalg.solve(system, -np.column_stack([a[:, 0], b[:, 1 - axle]]))
+    found[1 - axle, 1] = 1.0
+    return found
 
 
 def model(
-    single_track: SingleTrackParameters, parameters: LqrParameters, speed_mps: float, interval_s: float
+    car: SingleTrackParameters, parameters: LqrParameters, speed_mps: float, interval_s: float
 ) -> tuple[Array, Array]:
     """The model from one call to the next, for inputs that are held.
 
@@ -160,7 +222,7 @@ def model(
         System matrix, shape (8, 8) over `STATES`; input matrix, shape (8, 2), inputs superposition and rear angle.
     """
     inner, both = np.zeros((8, 8)), np.eye(2)
-    inner[:2, :2], inner[:2, 2:4] = SingleTrack(single_track).matrices(speed_mps)
+    inner[:2, :2], inner[:2, 2:4] = SingleTrack(car).matrices(speed_mps)
     tyre_1ps, actuator_1ps = speed_mps / parameters.relaxation_length_m, 1.0 / parameters.actuator_lag_s
     inner[2:4, 2:4], inner[2:4, 4:6] = -tyre_1ps * both, tyre_1ps * both
     inner[4:6, 4:6], inner[4:6, 6:] = -actuator_1ps * both, actuator_1ps * both
@@ -172,14 +234,20 @@ def model(
 
 
 def feedback(
-    single_track: SingleTrackParameters, parameters: LqrParameters, speed_mps: float, interval_s: float
+    car: SingleTrackParameters,
+    parameters: LqrParameters,
+    speed_mps: float,
+    interval_s: float,
+    works: tuple[bool, bool] = BOTH,
 ) -> Array:
-    """K at a speed, shape (2, 8): superposition and rear angle per deviation of `STATES`."""
+    """K at a speed, shape (2, 8): superposition and rear angle per deviation of `STATES`; 0 for what does not work."""
     import control  # noqa: PLC0415 - takes longer to import than a run takes to start
 
-    a, b = model(single_track, parameters, speed_mps, interval_s)
+    a, b = model(car, parameters, speed_mps, interval_s)
     q = np.zeros((8, 8))
     q[0, 0], q[1, 1] = parameters.yaw_rate_scale_radps**-2, parameters.sideslip_scale_rad**-2
-    r = np.diag([parameters.superposition_scale_rad**-2, parameters.rear_scale_rad**-2])
-    gain, _, _ = control.dlqr(a, b, q, r)
-    return np.asarray(gain, dtype=np.float64)
+    weights = np.array([parameters.superposition_scale_rad**-2, parameters.rear_scale_rad**-2])
+    found, used = np.zeros((2, 8)), [axle for axle in range(2) if works[axle]]
+    if used:
+        found[used], _, _ = control.dlqr(a, b[:, used], q, np.diag(weights[used]))
+    return found

@@ -7,7 +7,12 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from activesteer.config import Range
-from activesteer.controllers.family_parameters import EscParameters, LqrParameters, SideslipRearSteerParameters
+from activesteer.controllers.family_parameters import (
+    EscParameters,
+    IntegratedParameters,
+    LqrParameters,
+    SideslipRearSteerParameters,
+)
 from activesteer.errors import ControllerError
 from activesteer.estimation import Estimator, EstimatorParameters, EstimatorSetup
 from activesteer.theory.single_track import SingleTrackParameters
@@ -82,6 +87,8 @@ class ControllerParameters:
     """Both axles together."""
     esc: EscParameters = EscParameters()
     """Single brakes."""
+    integrated: IntegratedParameters = IntegratedParameters()
+    """Steering and brakes together."""
     estimator: EstimatorParameters = EstimatorParameters()
     """Speed, sideslip and friction, for controllers that ask for them."""
     interval_s: Annotated[float, Range(1e-4, 0.1)] | None = None

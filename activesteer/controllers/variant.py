@@ -14,6 +14,7 @@ from typing import Any, Final, Literal
 from activesteer.config import Source, build, field_path, leaf_keys, merged, read_toml, to_table
 from activesteer.controllers.esc import Esc
 from activesteer.controllers.front_superposition import FrontSuperposition
+from activesteer.controllers.integrated import Integrated
 from activesteer.controllers.lqr import Lqr
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
@@ -27,6 +28,7 @@ _SYSTEMS: Final = {
     "ars_sideslip": SideslipRearSteer,
     "lqr": Lqr,
     "esc": Esc,
+    "integrated": Integrated,
 }
 _OWN_KEYS: Final = ("name", "title", "system")
 
@@ -35,7 +37,7 @@ _OWN_KEYS: Final = ("name", "title", "system")
 class VariantFile(ControllerParameters):
     """The keys of a variant file: those of the table [controllers] of a vehicle file, and these."""
 
-    system: Literal["ars", "afs", "ars_sideslip", "lqr", "esc"]
+    system: Literal["ars", "afs", "ars_sideslip", "lqr", "esc", "integrated"]
     """What it is a variant of."""
     name: str = ""
     """Short name, for tables; the file's name where not given."""

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.controllers import load_controller
 from activesteer.controllers.family_parameters import LqrParameters
-from activesteer.controllers.lqr import SPEEDS_MPS, STATES, feedback, model, schedule
+from activesteer.controllers.lqr import SPEEDS_MPS, STATES, feedback, model, schedule, steady_turn
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.scenario import resolve
 from activesteer.theory.single_track import SingleTrack
@@ -32,10 +32,29 @@ def first(known, command, measurement):
 def test_turn_without_sideslip_repeats_itself_in_the_model(speed_mps):
     desired_radps = 0.1
     row = schedule(CAR, PARAMETERS, INTERVAL_S)[SPEEDS_MPS.index(speed_mps)]
-    front, rear = (gain * desired_radps for gain in row[:2])
+    front, rear = (gain * desired_radps for gain in (row[0], row[2]))
     a, b = model(CAR, PARAMETERS, speed_mps, INTERVAL_S)
     state = np.array([desired_radps, 0.0, *[front, rear] * 3])
     assert a @ state + b @ (front, rear) == pytest.approx(state, abs=1e-12)
+
+
+@pytest.mark.parametrize("works", [(True, False), (False, True)])
+def test_turn_with_one_axle_given_repeats_itself_too_with_the_sideslip_that_belongs_to_it(works):
+    desired_radps, given_rad = 0.1, 0.02
+    front, rear, sideslip = steady_turn(CAR, 20.0, works) @ (desired_radps, given_rad)
+    assert (rear if works[0] else front) == given_rad
+    assert sideslip != 0.0
+    a, b = model(CAR, PARAMETERS, 20.0, INTERVAL_S)
+    state = np.array([desired_radps, sideslip, *[front, rear] * 3])
+    assert a @ state + b @ (front, rear) == pytest.approx(state, abs=1e-12)
+
+
+def test_what_does_not_work_is_not_asked():
+    for axle, works in enumerate([(False, True), (True, False)]):
+        gain = feedback(CAR, PARAMETERS, 20.0, INTERVAL_S, works)
+        assert not gain[axle].any()
+        a, b = model(CAR, PARAMETERS, 20.0, INTERVAL_S)
+        assert np.abs(np.linalg.eigvals(a - b @ gain)).max() < 1.0
 
 
 def test_model_without_lags_is_the_single_track_model():

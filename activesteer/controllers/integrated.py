@@ -1,0 +1,162 @@
+"""One controller for rear steering, front superposition and four brakes: what is wished first, who does it second.
+
+What is wished is more yaw moment and more side force than there are now, so that errors fade in given times:
+
+    M_z = J_z (r* - r) / T_r,     F_y = -m v (beta - beta*) / T_b
+
+r* being the yaw rate that `lqr` asks for; a moment is wished no further than the steering demands of `lqr` would make
+it with tyres that never saturate, and what they make beyond it is welcome. Who makes it is decided anew in every call,
+by a quadratic programme over the angle a added at the front, the rear angle delta_H and the brake forces F_i:
+
+    minimise    |W (B (u - u now) - (M_z, F_y))|^2 + |(a, delta_H) - (u_a, u_H)|^2 / s^2 + |F|^2 / F_0^2 + c sum F_i
+    subject to  angles within their limits and within what their rates allow in a time ahead,
+                0 <= F_i <= a part of the friction under each wheel
+
+u_a and u_H are the demands of the state feedback `lqr` before any limit; s is small, so that the steering does what the
+feedback wants as long as it can. B has the slopes of the axles' curves at the present slip angles and friction, and the
+brakes' arms: where an axle slides or is at a limit, more angle gives no more force, and the brakes make what is
+missing. The cost c of a brake force is such that a moment below a threshold is not worth a brake.
+
+An actuator that does not follow its demand (`SupervisedActuator`) is from then on where it is: the state feedback is
+that of the other one alone, about the turn that can still be had, and its bounds here are its measured position. Nobody
+tells the controller of a fault.
+
+Left out of B is the side force that a wheel loses while it is braked.
+
+Sources: T. A. Johansen and T. I. Fossen, Control allocation - A survey, Automatica 49 (2013); M. Abe, Vehicle Handling
+Dynamics, 2009, on steering and moments together; D. Arnstrom, A. Bemporad, D. Axehill, A dual active-set solver for
+embedded quadratic programming using recursive LDL' updates, IEEE TAC 67 (2022).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from activesteer.controllers.axle_slopes import AxleSlopes
+from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
+from activesteer.controllers.lqr import Lqr
+from activesteer.controllers.parameters import ControllerSetup
+from activesteer.controllers.quadratic_programme import solver
+from activesteer.controllers.supervised_actuator import SupervisedActuator
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+
+_KILO = 1e3
+"""Brake forces are counted in kN, so that all unknowns are of like size."""
+
+
+class Integrated:
+    """State feedback, and allocation of its corrections to steering and brakes."""
+
+    interval_s = 0.005
+
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Makes the controller of one run.
+
+        Args:
+            setup: What it may know of the car.
+        """
+        self._lqr = Lqr.from_vehicle(setup)
+        self._parameters = p = setup.gains.integrated
+        self._limits_rad = np.array([setup.gains.lqr.superposition_limit_rad, setup.gains.lqr.rear_limit_rad])
+        self._reach_rad = p.ahead_s * np.array([p.superposition_rate_radps, p.rear_rate_radps])
+        self._car, self._slopes = setup.single_track, AxleSlopes(setup)
+        self._supervised = [SupervisedActuator(p.tolerance_rad, p.window_s, setup.timestep_s) for _ in range(2)]
+        self._solve = solver()
+        known = setup.estimation
+        assert known is not None  # there is an estimator
+        half_m = 0.5 * np.array([known.two_track.front_track_m, known.two_track.rear_track_m])
+        # A brake on the left turns the car to the left.
+        self._arms_m = np.repeat(half_m, 2) * (1.0, -1.0, 1.0, -1.0)
+        self._radii_m = np.array(known.rolling_radius_m)
+        self._loads_N = np.repeat(self._slopes.loads_N, 2)
+        self._weights = np.array([1.0 / p.moment_scale_Nm, 1.0 / p.force_scale_N])
+        self._brake_cost = _KILO * 2.0 * p.brake_threshold_Nm * half_m[0] * self._weights[0] ** 2
+        self._stay = np.diag([p.angle_scale_rad**-2] * 2 + [p.brake_scale_N**-2 * _KILO**2] * 4)
+        self._demand_rad = np.zeros(2)
+
+    @classmethod
+    def from_vehicle(cls, setup: ControllerSetup) -> Integrated:
+        """Makes the controller for a car."""
+        return cls(setup)
+
+    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
+        """Angles and brake torques now.
+
+        Args:
+            command: What the driver does.
+            measurement: What the car's sensors say.
+        """
+        p, at_rad = self._parameters, np.array([measurement.superposition_rad, measurement.rear_steer_rad])
+        added_works, rear_works = (
+            not actuator.step(demand, position)
+            for actuator, demand, position in zip(self._supervised, self._demand_rad, at_rad, strict=True)
+        )
+        works = added_works, rear_works
+        turn = self._lqr.turn(command, measurement, works)
+        now = turn.estimate
+        if now.speed_mps < MIN_SPEED_MPS:
+            self._demand_rad = np.zeros(2)
+            return ActuatorCommand()
+        slopes = self._slopes.at(
+            now, command.front_steer_demand_rad + measurement.superposition_rad, measurement.rear_steer_rad
+        )
+        car, wished_rad = self._car, np.array(turn.demand_rad)
+        moment = car.yaw_inertia_kgm2 * (turn.desired_radps - now.yaw_rate_radps) / p.yaw_rate_time_s
+        force = -car.mass_kg * now.speed_mps * (now.sideslip_rad - turn.sideslip_rad) / p.sideslip_time_s
+        lower = np.maximum(-self._limits_rad, at_rad - self._reach_rad)
+        upper = np.minimum(self._limits_rad, at_rad + self._reach_rad)
+        stuck = ~np.array(works)
+        lower[stuck] = upper[stuck] = at_rad[stuck]
+        effects = self._effects(*slopes)
+        within_rad = np.minimum(np.maximum(wished_rad, lower), upper)
+        reached = float(effects[0, :2] @ (within_rad - at_rad))
+        moment = _still_missing(moment, float(self._effects(1.0, 1.0)[0, :2] @ (wished_rad - at_rad)), reached)
+        effects = self._weights[:, None] * effects
+        target = self._weights * (reached + moment, force) + effects[:, :2] @ at_rad
+        hessian = 2.0 * (effects.T @ effects + self._stay)
+        gradient = -2.0 * (effects.T @ target)
+        gradient[:2] -= 2.0 * np.diag(self._stay)[:2] * wished_rad
+        gradient[2:] += self._brake_cost
+        most_kN = p.brake_fraction * now.friction * self._loads_N / _KILO
+        bounds = np.concatenate([lower, np.zeros(4)]), np.concatenate([upper, most_kN])
+        found = self._solve(hessian, gradient, np.zeros((0, 6)), *bounds)
+        self._demand_rad = found[:2]
+        added, rear = found[:2].tolist()
+        self._lqr.apply(added, rear)
+        fl, fr, rl, rr = (_KILO * found[2:] * self._radii_m).tolist()
+        return ActuatorCommand(
+            rear_steer_demand_rad=rear,
+            superposition_demand_rad=added,
+            yaw_rate_desired_radps=turn.desired_radps,
+            prediction_rad=turn.steady_rad[1],
+            correction_rad=rear - turn.steady_rad[1],
+            saturated=bool((np.abs(found[:2] - wished_rad) > p.tolerance_rad).any()),
+            brake_torque_demand_Nm=(fl, fr, rl, rr),
+            drive_torque_change_Nm=-min(max(command.drive_torque_demand_Nm, 0.0), fl + fr + rl + rr),
+        )
+
+    def _effects(self, front_slope: float, rear_slope: float) -> np.ndarray:
+        """Yaw moment [Nm] and side force [N] of both angles [rad] and the brake forces [kN], shape (2, 6)."""
+        car = self._car
+        front, rear = front_slope * car.front_stiffness_Nprad, rear_slope * car.rear_stiffness_Nprad
+        moments = front * car.cg_to_front_m, -rear * car.cg_to_rear_m, *(_KILO * self._arms_m)
+        return np.array([moments, (front, rear, 0.0, 0.0, 0.0, 0.0)])
+
+
+def _still_missing(wished_Nm: float, demanded_Nm: float, reached_Nm: float) -> float:
+    """What of a moment is missing.
+
+    Args:
+        wished_Nm: What fades the error.
+        demanded_Nm: What the state feedback would make with tyres that never saturate.
+        reached_Nm: What its angles make within their limits with the tyres as they are.
+
+    Returns:
+        Moment [Nm], of the sign of what is wished and demanded; 0 where they do not agree, or where it is reached.
+    """
+    if wished_Nm * demanded_Nm <= 0.0:
+        return 0.0
+    side = math.copysign(1.0, wished_Nm)
+    return side * max(min(side * wished_Nm, side * demanded_Nm) - side * reached_Nm, 0.0)

@@ -1,0 +1,114 @@
+"""Steering and brakes together: who does what is wished, and what happens where one of them cannot."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import pytest
+
+from activesteer.controllers import load_controller
+from activesteer.controllers.axle_slopes import LEAST, AxleSlopes
+from activesteer.controllers.quadratic_programme import solver
+from activesteer.controllers.supervised_actuator import SupervisedActuator
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.errors import ControllerError
+from activesteer.scenario import resolve
+from activesteer.signals import Estimate
+from tests.unit.controllers.cars import held, measured, steering
+
+pytest.importorskip("daqp")
+INTERVAL_S, SPEED_MPS = 0.005, 25.0
+
+
+@pytest.fixture(scope="module")
+def known():
+    return resolve("straight_line").controller_setup(INTERVAL_S)
+
+
+def moving(sideslip_rad: float = 0.0, friction: float = 0.9) -> Estimate:
+    return Estimate(SPEED_MPS, SPEED_MPS * sideslip_rad, sideslip_rad, 0.0, friction, *[0.0] * 5)
+
+
+def test_small_errors_are_left_to_the_steering_which_does_what_the_state_feedback_wants(known):
+    driver, yaw_rate = steering(0.002), measured(0.01, SPEED_MPS)
+    alone, together = (load_controller(name, known).step(driver, yaw_rate) for name in ("lqr", "integrated"))
+    assert together.rear_steer_demand_rad == pytest.approx(alone.rear_steer_demand_rad, abs=math.radians(0.02))
+    assert together.superposition_demand_rad == pytest.approx(alone.superposition_demand_rad, abs=math.radians(0.02))
+    assert not any(torque > 1.0 for torque in together.brake_torque_demand_Nm)
+
+
+def spinning(side: float, yaw_rate_radps: float = 0.6):
+    """A car whose wheels are at their limits and which turns on."""
+    most_rad = math.radians(3.0)
+    return measured(side * yaw_rate_radps, SPEED_MPS)._replace(
+        rear_steer_rad=side * most_rad, superposition_rad=-side * most_rad
+    )
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_spinning_car_gets_the_outer_brakes_where_the_steering_has_given_all(known, side):
+    answer = load_controller("integrated", known).step(steering(0.0), spinning(side))
+    fl, fr, rl, rr = answer.brake_torque_demand_Nm
+    outer, inner = ((fr, rr), (fl, rl)) if side > 0.0 else ((fl, rl), (fr, rr))
+    assert min(outer) > 100.0
+    assert max(inner) < 1.0
+    assert answer.rear_steer_demand_rad * side > 0.0 > answer.superposition_demand_rad * side
+    assert answer.saturated
+
+
+def test_steering_that_does_more_than_what_is_wished_is_not_braked_against(known):
+    answer = load_controller("integrated", known).step(steering(0.0), measured(0.6, SPEED_MPS))
+    assert max(answer.brake_torque_demand_Nm) < 1.0
+
+
+def test_brakes_use_no_more_than_their_part_of_the_friction(known):
+    answer = load_controller("integrated", known).step(steering(0.0), spinning(1.0, 5.0))
+    car = known.estimation
+    weight_N = known.single_track.mass_kg * GRAVITY_MPS2
+    most = known.gains.integrated.brake_fraction * 0.9 * 0.5 * weight_N * car.rolling_radius_m[0]
+    assert 0.3 * most < max(answer.brake_torque_demand_Nm) < most
+
+
+def test_stuck_rear_wheels_are_noticed_and_taken_as_they_are(known):
+    controller = load_controller("integrated", known)
+    stuck = measured(0.0, SPEED_MPS)._replace(rear_steer_rad=math.radians(1.0))
+    answer = controller.step(steering(0.0), stuck)
+    assert answer.rear_steer_demand_rad < math.radians(0.5)
+    assert held(controller, steering(0.0), stuck, 40).rear_steer_demand_rad == pytest.approx(stuck.rear_steer_rad)
+
+
+def test_actuator_that_lags_is_sound_and_one_that_stays_has_failed():
+    sound, stuck = (SupervisedActuator(0.005, 0.06, INTERVAL_S) for _ in range(2))
+    position_rad = 0.0
+    for call in range(400):
+        demand_rad = 0.04 * math.sin(2.0 * math.pi * 1.5 * call * INTERVAL_S)
+        position_rad += (1.0 - math.exp(-INTERVAL_S / 0.06)) * (demand_rad - position_rad)
+        assert not sound.step(demand_rad, position_rad)
+        stuck.step(demand_rad, 0.01)
+    assert stuck.failed
+
+
+def test_failed_actuator_stays_so():
+    actuator = SupervisedActuator(0.005, 0.06, INTERVAL_S)
+    for _ in range(30):
+        actuator.step(0.03, 0.0)
+    assert actuator.failed
+    assert actuator.step(0.03, 0.03)
+
+
+def test_slope_of_an_axle_falls_with_its_slip_angle_and_earlier_on_a_slippery_road(known):
+    slopes = AxleSlopes(known)
+    # The first interval of the curve is nearly straight.
+    assert slopes.at(moving(), 0.0, 0.0) == pytest.approx((1.0, 1.0))
+    some = [slopes.at(moving(), math.radians(angle), 0.0)[0] for angle in (1.0, 3.0, 6.0)]
+    assert 1.0 > some[0] > some[1] > some[2] >= LEAST
+    assert slopes.at(moving(friction=0.3), math.radians(1.0), 0.0)[0] < some[0]
+    # Sliding to the right at the rear, as in a left turn, the rear wheels turned left give no more.
+    assert slopes.at(moving(-0.2), 0.0, 0.0)[1] == pytest.approx(slopes.at(moving(0.2), 0.0, 0.0)[1])
+
+
+def test_missing_solver_is_told_with_how_to_get_it(known, monkeypatch):
+    monkeypatch.setitem(sys.modules, "daqp", None)
+    with pytest.raises(ControllerError, match=r"activesteer\[control\]"):
+        solver()
