@@ -22,6 +22,7 @@ from activesteer.simulation.preparation import prepared
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation
+from activesteer.studies.chassis_benchmark import DrivenStop
 from activesteer.tyre.benchmark import bench as tyre_bench
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
@@ -47,7 +48,9 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
         drives: its inputs played back in one native call), `path_engine_step_us` (the same in the slalom),
         `closed_loop_step_us` (the step steer with manoeuvre, driver, controller, every channel recorded in memory),
         `path_following_step_us` (the same in a slalom, with a driver who looks at a path), `with_file_step_us`
-        (the step steer written as MCAP), `sedan_step_us` (the second car, in memory); the ratios of the closed loops to
+        (the step steer written as MCAP), `sedan_step_us` (the second car, in memory), `production_step_us` (the step
+        steer in memory with the sensors of production cars); `sensors_and_brakes_us` (their share of a step: sensors,
+        brakes and the working anti-lock system, see `chassis_benchmark`); the ratios of the closed loops to
         `bare_step_us`, and to the engine alone on the same drive; real-time factors; `threads_2_speedup` (how much
         faster two simulations come to their ends in two threads of one process than one after the other);
         `step_steers_per_min` (whole runs, building the car included, by as many processes as there are processors); and
@@ -55,6 +58,8 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
     """
     scenario, along_path = prepared(resolve("step_steer")), resolve("slalom")
     sedan = prepared(resolve("step_steer", "sedan"))
+    sensed = prepared(resolve("step_steer", overrides={"sensors.preset": "production"}))
+    stop = DrivenStop()
     driven, along_path_driven = _Driven(scenario), _Driven(along_path)
     with tempfile.TemporaryDirectory() as folder:
         stages: dict[str, Callable[[], float]] = {
@@ -66,6 +71,8 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
             "path_following_step_us": lambda: _closed_loop(along_path),
             "with_file_step_us": lambda: _with_file(scenario, Path(folder) / "bench.mcap"),
             "sedan_step_us": lambda: _closed_loop(sedan),
+            "production_step_us": lambda: _closed_loop(sensed),
+            "sensors_and_brakes_us": stop.step_us,
             "two_threads_step_us": lambda: _in_threads(scenario, 2),
         }
         best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
@@ -74,6 +81,7 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
         engine = "path_engine" if stage == "path_following" else "engine"
         best[f"{stage}_to_bare_ratio"] = best[f"{stage}_step_us"] / best["bare_step_us"]
         best[f"{stage}_to_engine_ratio"] = best[f"{stage}_step_us"] / best[f"{engine}_step_us"]
+    best["production_to_ideal_ratio"] = best["production_step_us"] / best["closed_loop_step_us"]
     best["real_time_factor"] = step_us / best["closed_loop_step_us"]
     best["real_time_factor_with_file"] = step_us / best["with_file_step_us"]
     best["sedan_real_time_factor"] = step_us / best["sedan_step_us"]

@@ -423,6 +423,16 @@ class Vehicle:
         maximum = 0.0 if torque_Nm is None else torque_Nm / felt
         self.model.actuator_forcerange[hands] = -maximum, maximum
 
+    @property
+    def brakes(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """`BRAKE_SETUP` and `BRAKE_STATE` of the car, shape (1,) each; views, for looking at."""
+        return self._brake_setup, self._brake_state
+
+    @property
+    def sensors(self) -> SensorBlock | None:
+        """What is between the truth and the measurement; None where nothing is."""
+        return self._sensors
+
     def put_sensors_between(self, *, wanted: bool) -> None:
         """Has brakes listen to sensors where these are ideal, as they must where a sensor may fail.
 

@@ -11,6 +11,7 @@ import pytest
 import activesteer
 from activesteer.cli import main
 from activesteer.resources import list_maneuvers
+from activesteer.studies.chassis_benchmark import DrivenStop
 from activesteer.version import __version__
 
 KEYS = {
@@ -117,6 +118,9 @@ def test_bench_has_the_promised_keys(call):
     assert found["closed_loop_to_bare_ratio"] == pytest.approx(found["closed_loop_step_us"] / found["bare_step_us"])
     assert found["with_file_to_bare_ratio"] == pytest.approx(found["with_file_step_us"] / found["bare_step_us"])
     assert found["sedan_real_time_factor"] == pytest.approx(1000.0 / found["sedan_step_us"])
+    sensed = found["production_step_us"] / found["closed_loop_step_us"]
+    assert found["production_to_ideal_ratio"] == pytest.approx(sensed)
+    assert "sensors_and_brakes_us" in found
     engine = found["closed_loop_step_us"] / found["engine_step_us"]
     assert found["closed_loop_to_engine_ratio"] == pytest.approx(engine)
     engine = found["path_following_step_us"] / found["path_engine_step_us"]
@@ -124,6 +128,10 @@ def test_bench_has_the_promised_keys(call):
     assert {"threads_2_speedup", "step_steers_per_min", "path_following_to_bare_ratio"} <= set(found)
     assert found["real_time_factor"] == pytest.approx(1000.0 / found["closed_loop_step_us"])
     assert found["real_time_factor_with_file"] == pytest.approx(1000.0 / found["with_file_step_us"])
+
+
+def test_bench_s_stop_has_a_working_anti_lock_system():
+    assert DrivenStop().anti_lock_fraction > 0.5
 
 
 def test_bench_needs_a_round(call):

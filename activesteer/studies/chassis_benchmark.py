@@ -1,0 +1,85 @@
+"""What sensors, brakes and anti-lock system cost in a step: their native code alone, fed with a stop once driven."""
+
+from __future__ import annotations
+
+import time
+from typing import Final
+
+import numpy as np
+
+from activesteer.brakes.control_unit import step_brakes
+from activesteer.compilation import compiled
+from activesteer.conventions import CORNERS
+from activesteer.scenario import resolve
+from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
+from activesteer.simulation.closed_loop import ClosedLoop
+from activesteer.simulation.runner import run_scenario
+
+_STOP: Final = "straight_braking"
+_PRODUCTION: Final = {"sensors.preset": "production"}
+_SCALARS: Final = (
+    "speed_mps", "yaw_rate_radps", "ay_mps2", "ax_mps2", "steering_wheel_rad", "rear_steer_rad", "superposition_rad",
+)  # fmt: skip
+_WHEELS: Final = 1 + len(_SCALARS)
+_PEDAL: Final = _WHEELS + len(CORNERS)
+
+
+class DrivenStop:
+    """A stop from 100 km/h with a working anti-lock system and the sensors of production cars."""
+
+    def __init__(self) -> None:
+        """Drives it."""
+        scenario = resolve(_STOP, overrides=_PRODUCTION)
+        recording = run_scenario(scenario)
+        speeds = [recording[f"{corner}_wheel_speed_radps"] for corner in CORNERS]
+        scalars = [recording[name] for name in _SCALARS]
+        self._rows = np.column_stack([recording.time_s, *scalars, *speeds, recording["brake_pedal"]])
+        # As it stands at the beginning of the recording, so that the brakes decide as they did.
+        self._vehicle = ClosedLoop(scenario).vehicle
+        self.anti_lock_fraction = self._drive()[1] / len(self._rows)
+
+    def _drive(self) -> tuple[float, int]:
+        """Duration of the work [s], and in how many steps the anti-lock system holds pressure back."""
+        (setup, state), sensors = self._vehicle.brakes, self._vehicle.sensors
+        assert sensors is not None
+        work = (
+            self._rows, sensors.chains, sensors.memory.copy(), setup["rolling_radius_m"][0] / len(CORNERS),
+            self._vehicle.timestep_s, *(record.copy().view(np.recarray)[0] for record in (setup, state)),
+        )  # fmt: skip
+        start = time.perf_counter()
+        held = _sense_and_brake(*work)
+        return time.perf_counter() - start, held
+
+    def step_us(self) -> float:
+        """Microseconds of sensors, brakes and anti-lock system together in a step of the stop."""
+        return 1e6 * self._drive()[0] / len(self._rows)
+
+
+@compiled
+def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
+    """The part of each step that `native_step.step` has of sensors and brakes.
+
+    Args:
+        rows: Of each step the true members of `Measurement` without the pressures, one behind the other, and the pedal.
+        chains: See `SensorBlock`; so the next one.
+        memory: Likewise.
+        radii_m: See `measured`.
+        timestep_s: Step [s].
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`.
+
+    Returns:
+        In how many steps the anti-lock system holds pressure back.
+    """
+    asked_Nm, held = np.zeros(4), 0
+    for row in rows:
+        speeds = memory[WHEEL_SPEEDS : WHEEL_SPEEDS + 4]
+        step_brakes(setup, state, speeds, memory[AX], row[_PEDAL], 0.0, asked_Nm)
+        held += state.allowed_Pa[0] < state.demand_Pa[0]
+        wheels, p = row[_WHEELS:_PEDAL], state.pressure_Pa
+        truth = (
+            row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7],
+            (wheels[0], wheels[1], wheels[2], wheels[3]), (p[0], p[1], p[2], p[3]),
+        )  # fmt: skip
+        measured(chains, memory, radii_m, timestep_s, truth)
+    return held
