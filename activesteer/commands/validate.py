@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from activesteer.commands.arguments import add_jobs, add_json, add_output
+from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 
@@ -30,6 +30,7 @@ def add_to(commands: Any) -> None:
     )  # fmt: skip
     parser.add_argument("--timestep", type=float, default=0.001, metavar="S", help="our step [s] (default: 0.001)")
     add_jobs(parser)
+    add_scheduler(parser)
     add_json(parser)
     parser.set_defaults(action=_validate)
 
@@ -46,10 +47,11 @@ def _validate(options: argparse.Namespace) -> int:
             more=options.reference,
             timestep_s=options.timestep,
             jobs=options.jobs,
+            scheduler=options.scheduler,
             unknown_runs=options.output is not None,
             progress=bar,
         )
-    tables = _study(result.reference, options.jobs, quiet=options.json) if options.study else {}
+    tables = _study(result.reference, options) if options.study else {}
     files: list[Path] = []
     if options.output is not None:
         files = [
@@ -75,14 +77,14 @@ def _validate(options: argparse.Namespace) -> int:
     return status
 
 
-def _study(data: ReferenceData, jobs: int | None, *, quiet: bool) -> dict[str, list[Response]]:
+def _study(data: ReferenceData, options: argparse.Namespace) -> dict[str, list[Response]]:
     from activesteer.validation.study import conventions, step_sizes
 
-    run = data.study_run
-    with ProgressBar("study", quiet=quiet) as bar:
+    run, jobs, scheduler = data.study_run, options.jobs, options.scheduler
+    with ProgressBar("study", quiet=options.json) as bar:
         return {
-            "conventions": conventions(data, run, lambda what: bar(0.0, what), jobs),
-            "step_sizes": step_sizes(data, run, lambda what: bar(0.5, what), jobs),
+            "conventions": conventions(data, run, lambda what: bar(0.0, what), jobs, scheduler=scheduler),
+            "step_sizes": step_sizes(data, run, lambda what: bar(0.5, what), jobs, scheduler=scheduler),
         }
 
 

@@ -65,6 +65,7 @@ def validate(
     timestep_s: float = DEFAULT_TIMESTEP_S,
     unknown_runs: bool = True,
     jobs: int | None = None,
+    scheduler: str | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> Validation:
     """Compares a car with the same car in another multibody code.
@@ -75,6 +76,7 @@ def validate(
         timestep_s: Step of our simulation [s].
         unknown_runs: Whether runs are driven whose reference is not known.
         jobs: Number of processes; that of the processors where not given.
+        scheduler: See `in_parallel`.
         progress: Called with the fraction that is done and what comes next.
 
     Returns:
@@ -99,7 +101,11 @@ def validate(
     comparisons = [*compare_static(vehicle, data), *rows, *compare_tyre(car.tyres[0], data)]
     runs = {}
     found = in_parallel(
-        _columns, [(data, run, timestep_s) for run in driven], jobs, lambda place, done: report(done + 2, driven[place])
+        _columns,
+        [(data, run, timestep_s) for run in driven],
+        jobs,
+        lambda place, done: report(done + 2, driven[place]),
+        scheduler=scheduler,
     )
     for run, columns in zip(driven, found, strict=True):
         runs[run] = columns

@@ -57,7 +57,12 @@ class Response(NamedTuple):
 
 
 def step_sizes(
-    data: ReferenceData, run: str, report: Callable[[str], None] = lambda _: None, jobs: int | None = None
+    data: ReferenceData,
+    run: str,
+    report: Callable[[str], None] = lambda _: None,
+    jobs: int | None = None,
+    *,
+    scheduler: str | None = None,
 ) -> list[Response]:
     """The same step steer at several steps of the engine, the shortest first.
 
@@ -66,17 +71,25 @@ def step_sizes(
         run: A step steer of it.
         report: Called with what is done.
         jobs: Number of processes; that of the processors where not given.
+        scheduler: See `in_parallel`.
 
     Returns:
         A response for each step.
     """
     names = [f"{1e3 * step_s:g} ms" for step_s in _STEPS_S]
     tasks = [(data, run, name, {}, step_s) for name, step_s in zip(names, _STEPS_S, strict=True)]
-    return in_parallel(_response, tasks, jobs, lambda place, _: report(f"step size {names[place]}"))
+    return in_parallel(
+        _response, tasks, jobs, lambda place, _: report(f"step size {names[place]}"), scheduler=scheduler
+    )
 
 
 def conventions(
-    data: ReferenceData, run: str, report: Callable[[str], None] = lambda _: None, jobs: int | None = None
+    data: ReferenceData,
+    run: str,
+    report: Callable[[str], None] = lambda _: None,
+    jobs: int | None = None,
+    *,
+    scheduler: str | None = None,
 ) -> list[Response]:
     """The same step steer with the tyre evaluated as the other code does, and less so.
 
@@ -85,12 +98,13 @@ def conventions(
         run: A step steer of it.
         report: Called with what is done.
         jobs: Number of processes; that of the processors where not given.
+        scheduler: See `in_parallel`.
 
     Returns:
         A response for each of `VARIANTS`.
     """
     tasks = [(data, run, name, overrides, DEFAULT_TIMESTEP_S) for name, overrides in VARIANTS.items()]
-    return in_parallel(_response, tasks, jobs, lambda place, _: report(tasks[place][2]))
+    return in_parallel(_response, tasks, jobs, lambda place, _: report(tasks[place][2]), scheduler=scheduler)
 
 
 def _response(data: ReferenceData, run: str, name: str, overrides: Mapping[str, Any], step_s: float) -> Response:
