@@ -90,5 +90,6 @@ def _numbers(text: str | None, option: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")] if text else []
     except ValueError as reason:
-        problem = f"is {text!r}; numbers with commas between are needed, as 60,100"
-        raise ParameterError(problem, key=option, value=text) from reason
+        raise ParameterError(
+            f"is {text!r}; numbers with commas between are needed, as 60,100", key=option, value=text
+        ) from reason

@@ -66,8 +66,11 @@ def _fault_map(options: argparse.Namespace) -> int:
     from activesteer.studies.fault_map import PRESETS, Limits, fault_map
 
     if options.preset not in PRESETS:
-        problem = f"there is no preset {options.preset!r}; {nearest_names(options.preset, PRESETS)}"
-        raise ParameterError(problem, key="--preset", value=options.preset)
+        raise ParameterError(
+            f"there is no preset {options.preset!r}; {nearest_names(options.preset, PRESETS)}",
+            key="--preset",
+            value=options.preset,
+        )
     preset = PRESETS[options.preset]
     limits = pairs(options.limits, "--limit", "ay_mps2=2")
     with ProgressBar("fault map", quiet=options.json) as bar:
@@ -114,5 +117,6 @@ def _speeds(text: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]
     except ValueError as reason:
-        problem = f"is {text!r}; numbers with commas between are needed, as 60,100"
-        raise ParameterError(problem, key="--speeds-kmh", value=text) from reason
+        raise ParameterError(
+            f"is {text!r}; numbers with commas between are needed, as 60,100", key="--speeds-kmh", value=text
+        ) from reason

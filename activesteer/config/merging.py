@@ -56,8 +56,9 @@ def merged(
         if not isinstance(branch, Mapping):
             raise source.fail(where, f"is {shown(branch)}, which is no table", branch)
         if rest[0] not in branch or len(rest) == 1:
-            problem = f"there is no such key; {nearest_names(rest[0], branch)}"
-            raise source.fail((*where, *rest), problem, rest[0], sorted(branch))
+            raise source.fail(
+                (*where, *rest), f"there is no such key; {nearest_names(rest[0], branch)}", rest[0], sorted(branch)
+            )
         below = merged(item, branch[rest[0]], rest[1:], value, source, (*where, rest[0]))
         result[key] = {**branch, rest[0]: below}
     else:
@@ -75,8 +76,9 @@ def _merged_list(
     numbers = [str(number) for number in range(len(elements))]
     if rest[0] not in numbers:
         known = f"0 to {len(elements) - 1}" if elements else "none: the list is empty"
-        problem = f"there is no element {shown(rest[0])} of {where[-1]}; there are {known}"
-        raise source.fail((*where, *rest), problem, rest[0], numbers)
+        raise source.fail(
+            (*where, *rest), f"there is no element {shown(rest[0])} of {where[-1]}; there are {known}", rest[0], numbers
+        )
     number = int(rest[0])
     below = (*where, rest[0])
     elements[number] = merged(element, elements[number], rest[1:], value, source, below) if rest[1:] else value

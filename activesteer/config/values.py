@@ -124,8 +124,9 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
     if not finite:
         raise source.fail(path, f"{shown(raw)} is not finite", raw, limits)
     if abs(value) > MAX_NUMBER:
-        problem = f"{shown(raw)} is larger than anything of a car; allowed is at most {MAX_NUMBER:g}"
-        raise source.fail(path, problem, raw, limits)
+        raise source.fail(
+            path, f"{shown(raw)} is larger than anything of a car; allowed is at most {MAX_NUMBER:g}", raw, limits
+        )
     if not limits.low <= value <= limits.high:
         allowed = Range(limits.low / factor, limits.high / factor)
         raise source.fail(path, f"{shown(raw)} is out of range; allowed is {allowed}", raw, allowed)

@@ -124,6 +124,8 @@ class ControllerSetup:
             ControllerError: the vehicle file does not say what it needs.
         """
         if self.estimation is None:
-            problem = "an estimator needs the table [two_track] in the vehicle file: `activesteer identify --write`"
-            raise ControllerError(problem, key="two_track")
+            raise ControllerError(
+                "an estimator needs the table [two_track] in the vehicle file: `activesteer identify --write`",
+                key="two_track",
+            )
         return Estimator(self.estimation, self.gains.estimator, self.timestep_s)

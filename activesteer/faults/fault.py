@@ -130,20 +130,29 @@ class Fault:
         """
         if self.part not in ACTUATORS and self.part not in SENSORS:
             names = [*ACTUATORS, *SENSORS]
-            problem = f"there is no part {self.part!r}; {nearest_names(self.part, names)}"
-            raise ManeuverError(problem, key="part", value=self.part, allowed=names)
+            raise ManeuverError(
+                f"there is no part {self.part!r}; {nearest_names(self.part, names)}",
+                key="part",
+                value=self.part,
+                allowed=names,
+            )
         if self.kind not in KINDS:
-            problem = f"there is no kind of fault {self.kind!r}; {nearest_names(self.kind, KINDS)}"
-            raise ManeuverError(problem, key="kind", value=self.kind, allowed=list(KINDS))
+            raise ManeuverError(
+                f"there is no kind of fault {self.kind!r}; {nearest_names(self.kind, KINDS)}",
+                key="kind",
+                value=self.kind,
+                allowed=list(KINDS),
+            )
         if self.kind == "float" and self.part in SENSORS:
-            problem = "a sensor has nothing that could move freely; a broken wire is a dropout"
-            raise ManeuverError(problem, key="kind", value=self.kind)
+            raise ManeuverError(
+                "a sensor has nothing that could move freely; a broken wire is a dropout", key="kind", value=self.kind
+            )
         if self.kind in ("float", "reversed") and self._is_brake:
-            problem = "a brake can do neither; a dropout leaves it open"
-            raise ManeuverError(problem, key="kind", value=self.kind)
+            raise ManeuverError("a brake can do neither; a dropout leaves it open", key="kind", value=self.kind)
         if self.end_s is not None and self.end_s <= self.start_s:
-            problem = f"is {self.end_s:g} s; the fault begins at {self.start_s:g} s (start_s)"
-            raise ManeuverError(problem, key="end_s", value=self.end_s)
+            raise ManeuverError(
+                f"is {self.end_s:g} s; the fault begins at {self.start_s:g} s (start_s)", key="end_s", value=self.end_s
+            )
         needed = self._needed
         given = [name for name in ("side", *_SIZES, "delay_s") if getattr(self, name) is not None]
         for name in given:
@@ -206,10 +215,15 @@ def check_faults(faults: Sequence[Fault], duration_s: float, fail: Any) -> None:
     """
     for number, fault in enumerate(faults):
         if fault.start_s >= duration_s:
-            problem = f"is {fault.start_s:g} s, but the run ends at {duration_s:g} s (duration_s): it has no effect"
-            raise fail(("fault", str(number), "start_s"), problem, fault.start_s)
+            raise fail(
+                ("fault", str(number), "start_s"),
+                f"is {fault.start_s:g} s, but the run ends at {duration_s:g} s (duration_s): it has no effect",
+                fault.start_s,
+            )
     for (number, one), (later, other) in combinations(enumerate(faults), 2):
         apart = any(a.end_s is not None and a.end_s <= b.start_s for a, b in ((one, other), (other, one)))
         if one.shares_a_part_with(other) and not apart:
-            problem = f"{other.part} has fault {number} at the same time, {one.name}; one part has one fault at a time"
-            raise fail(("fault", str(later)), problem)
+            raise fail(
+                ("fault", str(later)),
+                f"{other.part} has fault {number} at the same time, {one.name}; one part has one fault at a time",
+            )

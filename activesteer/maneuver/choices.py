@@ -27,5 +27,6 @@ def check_choice(key: str, value: str, allowed: Iterable[str]) -> None:
     words = list(allowed)
     if value not in words:
         known = ", ".join(repr(word) for word in words[:-1])
-        problem = f"is {shown(value)}; allowed are {known} and {words[-1]!r}"
-        raise ManeuverError(problem, key=key, value=value, allowed=words)
+        raise ManeuverError(
+            f"is {shown(value)}; allowed are {known} and {words[-1]!r}", key=key, value=value, allowed=words
+        )

@@ -32,8 +32,9 @@ def find_csv(name: str, own: Path | None, source: Source, key: Sequence[str]) ->
             return candidate
     folder = own or Path.cwd()
     present = [path.name for path in folder.iterdir() if path.suffix == ".csv"]
-    problem = f"there is no file {shown(name)} in {shown(folder)}; {nearest_names(name, present)}"
-    raise source.fail(key, problem, name, present)
+    raise source.fail(
+        key, f"there is no file {shown(name)} in {shown(folder)}; {nearest_names(name, present)}", name, present
+    )
 
 
 def read_columns(
@@ -65,17 +66,29 @@ def read_columns(
         if name is None:
             continue
         if name in places:
-            problem = f"{places[name][1]} and {given} are the same column; leave one out"
-            raise ManeuverError(problem, file=path.name, line=header.line, key=given)
+            raise ManeuverError(
+                f"{places[name][1]} and {given} are the same column; leave one out",
+                file=path.name,
+                line=header.line,
+                key=given,
+            )
         places[name] = place, given, factor
     for row in rows:
         if any(row.cells[len(header.cells) :]):
-            problem = f"has {len(row.cells)} cells, the first line {len(header.cells)}; decimal commas need semicolons"
-            raise ManeuverError(problem, file=path.name, line=row.line)
+            raise ManeuverError(
+                f"has {len(row.cells)} cells, the first line {len(header.cells)}; decimal commas need semicolons",
+                file=path.name,
+                line=row.line,
+            )
     for name in required:
         if name not in places:
-            problem = f"must name the columns {' and '.join(required)}; {name} is missing"
-            raise ManeuverError(problem, file=path.name, line=header.line, key=name, allowed=(*required, *optional))
+            raise ManeuverError(
+                f"must name the columns {' and '.join(required)}; {name} is missing",
+                file=path.name,
+                line=header.line,
+                key=name,
+                allowed=(*required, *optional),
+            )
     columns: dict[str, list[float]] = {
         name: [_number(row.cells, place, path.name, row.line, given) * factor for row in rows]
         for name, (place, given, factor) in places.items()

@@ -167,10 +167,16 @@ def with_tables(table: Mapping[str, Any], own: Path | None, source: Source) -> t
 def _read(file: Path, columns: Sequence[str]) -> dict[str, list[float]]:
     values, lines = read_columns(file, ("time_s",), columns)
     if len(values) == 1:
-        problem = f"must name at least one of the columns {', '.join(columns)}"
-        raise ManeuverError(problem, file=file.name, line=1, allowed=columns)
+        raise ManeuverError(
+            f"must name at least one of the columns {', '.join(columns)}", file=file.name, line=1, allowed=columns
+        )
     for number, (earlier, later) in enumerate(pairwise(values["time_s"]), 1):
         if later <= earlier:
-            problem = f"does not increase from {earlier:g} to {later:g} s"
-            raise ManeuverError(problem, file=file.name, line=lines[number], key="time_s", value=later)
+            raise ManeuverError(
+                f"does not increase from {earlier:g} to {later:g} s",
+                file=file.name,
+                line=lines[number],
+                key="time_s",
+                value=later,
+            )
     return values

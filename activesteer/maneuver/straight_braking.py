@@ -35,12 +35,19 @@ class StraightBraking(Maneuver):
         """
         if self.speed_mps < _MIN_SPEED_MPS:
             min_kmh = 3.6 * _MIN_SPEED_MPS
-            problem = f"is {3.6 * self.speed_mps:g} km/h; braking begins at {min_kmh:g} km/h or more, forwards"
-            raise ManeuverError(problem, key="speed_kmh", value=3.6 * self.speed_mps, allowed=Range(min_kmh))
+            raise ManeuverError(
+                f"is {3.6 * self.speed_mps:g} km/h; braking begins at {min_kmh:g} km/h or more, forwards",
+                key="speed_kmh",
+                value=3.6 * self.speed_mps,
+                allowed=Range(min_kmh),
+            )
         pressed_s = self.brake.start_s + self.brake.rise_s
         if pressed_s >= self.duration_s:
-            problem = f"the brake is pressed down at {pressed_s:g} s, but the run ends at {self.duration_s:g} s"
-            raise ManeuverError(problem, key="brake.start_s", value=self.brake.start_s)
+            raise ManeuverError(
+                f"the brake is pressed down at {pressed_s:g} s, but the run ends at {self.duration_s:g} s",
+                key="brake.start_s",
+                value=self.brake.start_s,
+            )
 
     @property
     def course(self) -> Course | None:

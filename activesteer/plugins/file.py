@@ -52,8 +52,11 @@ def from_file(text: str, kind: Kind) -> FromFile:
     form = _FORM.fullmatch(text)
     if form is None:
         hint = nearest_names(text, kind.names())
-        problem = f"there is no {kind.word} {shown(text)}; {hint} Your own is given as {kind.example}"
-        raise kind.error(problem, value=text, allowed=tuple(kind.names()))
+        raise kind.error(
+            f"there is no {kind.word} {shown(text)}; {hint} Your own is given as {kind.example}",
+            value=text,
+            allowed=tuple(kind.names()),
+        )
     if not form["name"].isidentifier():
         raise fail(f"{shown(form['name'])} cannot be the name of a class; your own is given as {kind.example}")
     path = user_path(form["path"], kind.error)
@@ -73,8 +76,11 @@ def from_file(text: str, kind: Kind) -> FromFile:
     found = getattr(module, form["name"], None)
     if found is None or not (callable(found) or hasattr(found, "step")):
         own = [key for key, value in vars(module).items() if getattr(value, "__module__", "") == name]
-        problem = f"{shown_path(path)} has no class {shown(form['name'])}; {nearest_names(form['name'], own)}"
-        raise fail(problem, form["name"], own)
+        raise fail(
+            f"{shown_path(path)} has no class {shown(form['name'])}; {nearest_names(form['name'], own)}",
+            form["name"],
+            own,
+        )
     return FromFile(path, content, found, _parameters(form["parameters"] or "", fail))
 
 

@@ -153,8 +153,9 @@ def find(given: Any, kind: Kind) -> Plugin:
     if not is_instance(given) and not callable(given):
         names = ", ".join(kind.names())
         needed = f"a name ({names}), a file ({kind.example}), a class, an object with the method step({kind.inputs})"
-        problem = f"is {shown(given)}; {needed}, or a function that makes one is needed"
-        raise kind.fail("", problem, given, tuple(kind.names()))
+        raise kind.fail(
+            "", f"is {shown(given)}; {needed}, or a function that makes one is needed", given, tuple(kind.names())
+        )
     return _from_object(given, kind)
 
 

@@ -30,8 +30,11 @@ def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.
     if (steps <= 0).any():
         row = int(np.argmax(steps <= 0))
         before_s = (result[row] - steps[row]) * 1e-9
-        problem = f"must increase: row {row} is at {times[row]} s, the one before it at {before_s} s"
-        raise RecordingError(problem, key=what, value=float(times[row]))
+        raise RecordingError(
+            f"must increase: row {row} is at {times[row]} s, the one before it at {before_s} s",
+            key=what,
+            value=float(times[row]),
+        )
     return result.astype(np.uint64)
 
 

@@ -134,8 +134,9 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
 
 def _add_link(update: Any, link: Link) -> None:
     if link.kind not in LINK_KINDS:
-        problem = f"link of kind {link.kind!r}, known are: {', '.join(LINK_KINDS)}"
-        raise RecordingError(problem, key=link.name, value=link.kind)
+        raise RecordingError(
+            f"link of kind {link.kind!r}, known are: {', '.join(LINK_KINDS)}", key=link.name, value=link.kind
+        )
     try:
         text = json.dumps(_link_table(link))
         _link_of(json.loads(text))

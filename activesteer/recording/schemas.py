@@ -141,8 +141,7 @@ def state_fields(schema: bytes, schema_name: str) -> tuple[list[str], FixedMessa
         for message in file.message_type:
             if f"{file.package}.{message.name}" == schema_name:
                 return [field.name for field in message.field], _layout(message)
-    problem = f"the schema of {schema_name} does not define it"
-    raise RecordingError(problem)
+    raise RecordingError(f"the schema of {schema_name} does not define it")
 
 
 def _layout(message: DescriptorProto) -> FixedMessage:
@@ -150,8 +149,7 @@ def _layout(message: DescriptorProto) -> FixedMessage:
     kinds = {FieldDescriptorProto.TYPE_FLOAT: "<f4", FieldDescriptorProto.TYPE_DOUBLE: "<f8"}
     for field in message.field:
         if field.type not in kinds or field.label == FieldDescriptorProto.LABEL_REPEATED:
-            problem = f"field {field.name} of {message.name} is neither float nor double"
-            raise RecordingError(problem)
+            raise RecordingError(f"field {field.name} of {message.name} is neither float nor double")
         layout.number(field.number, kinds[field.type])
     return layout
 

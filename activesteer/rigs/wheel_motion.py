@@ -51,10 +51,6 @@ class RigForces:
     limited: Vector
     """1 where the tyre was outside its file's range of validity."""
 
-    def in_wheel_frame(self) -> tuple[Vector, Vector]:
-        """Force [N] and moment [Nm] in ISO-W axes: x along the heading in the road, z up."""
-        return turned(self.force_N, -self.heading_rad), turned(self.moment_Nm, -self.heading_rad)
-
 
 def turned(vectors: Vector, angle_rad: Vector) -> Vector:
     """Vectors, shape (..., 3), turned about z."""

@@ -190,5 +190,9 @@ def _find_file(
             return candidate
     suffix = Path(name).suffix
     present = [str(path.relative_to(folder)) for path in folder.rglob("*") if not suffix or path.suffix == suffix]
-    problem = f"there is no file {shown(name)} in {folder.parent.name}/{folder.name}; {nearest_names(name, present)}"
-    raise replace(source, error=error).fail(key, problem, name, present)
+    raise replace(source, error=error).fail(
+        key,
+        f"there is no file {shown(name)} in {folder.parent.name}/{folder.name}; {nearest_names(name, present)}",
+        name,
+        present,
+    )

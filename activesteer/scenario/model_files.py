@@ -78,8 +78,10 @@ def model_files(mjcf: Path) -> dict[str, bytes]:
         for element, copies, depth in _walk(root):
             elements += 1
             if elements > _MAX_ELEMENTS or depth > _MAX_DEPTH or len(files) > _MAX_FILES:
-                problem = f"the model has more than {_MAX_ELEMENTS} elements, {_MAX_DEPTH} levels or {_MAX_FILES} files"
-                raise ModelError(problem, file=name)
+                raise ModelError(
+                    f"the model has more than {_MAX_ELEMENTS} elements, {_MAX_DEPTH} levels or {_MAX_FILES} files",
+                    file=name,
+                )
             if element.tag == "include":
                 waiting.append(_included(element, path, mjcf, name))
             else:

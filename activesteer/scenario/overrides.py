@@ -63,8 +63,12 @@ def applied(
     for (one, above), (other, below) in combinations(zip(overrides, paths, strict=True), 2):
         shorter = min(len(above), len(below))
         if above[:shorter] == below[:shorter]:
-            problem = f"replaces what {one.given} gives; leave one of the two out"
-            raise ParameterError(problem, key=other.given, value=other.value, overridden=True)
+            raise ParameterError(
+                f"replaces what {one.given} gives; leave one of the two out",
+                key=other.given,
+                value=other.value,
+                overridden=True,
+            )
     changed = frozenset(".".join(override.path) for override in overrides)
     for override in overrides:
         given = Source("", error=ParameterError, overridden=frozenset({".".join(override.path)}))

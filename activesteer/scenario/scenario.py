@@ -132,13 +132,15 @@ def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
     if len(holders) == 1:
         return holders[0], [first, *rest]
     if holders:
-        problem = f"both manoeuvre and vehicle have this key; say maneuver.{key} or vehicle.{key}"
-        raise ParameterError(problem, key=key, overridden=True)
+        raise ParameterError(
+            f"both manoeuvre and vehicle have this key; say maneuver.{key} or vehicle.{key}", key=key, overridden=True
+        )
     known = [f"{part}.{path}" for part in paths for path in paths[part]] + paths["maneuver"] + paths["vehicle"]
     known += [f"driver.{path}" for path in key_paths(DriverParameters)]
     help_ = key_hint(kind, key) or key_hint(VehicleConfig, key) or nearest_names(key, known)
-    problem = f"neither manoeuvre nor vehicle nor driver has such a key; {help_}"
-    raise ParameterError(problem, key=key, allowed=known, overridden=True)
+    raise ParameterError(
+        f"neither manoeuvre nor vehicle nor driver has such a key; {help_}", key=key, allowed=known, overridden=True
+    )
 
 
 def value_of(scenario: Scenario, key: str) -> Any:

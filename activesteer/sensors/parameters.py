@@ -70,8 +70,11 @@ class Sensors:
         if random and self.seed is None:
             object.__setattr__(self, "seed", 0)
         elif self.seed is not None and not random:
-            problem = f"has no effect: with preset = {self.preset!r} no sensor has noise, bias or drift"
-            raise ParameterError(problem, key="seed", value=self.seed)
+            raise ParameterError(
+                f"has no effect: with preset = {self.preset!r} no sensor has noise, bias or drift",
+                key="seed",
+                value=self.seed,
+            )
 
     def all(self) -> dict[str, Sensor]:
         """The sensors by name."""

@@ -157,6 +157,9 @@ def _steps(key: str, value: Any, timestep_s: float, minimum: int) -> int:
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     steps = round(value / timestep_s) if number and 0.0 <= value <= 0.1 else -1
     if steps < minimum or abs(steps * timestep_s - value) > 1e-9:
-        problem = f"is {value!r} s; 0.1 s at most, and whole steps of the simulation ({timestep_s:g} s), are needed"
-        raise ParameterError(problem, key=key, value=value)
+        raise ParameterError(
+            f"is {value!r} s; 0.1 s at most, and whole steps of the simulation ({timestep_s:g} s), are needed",
+            key=key,
+            value=value,
+        )
     return steps

@@ -68,8 +68,9 @@ class DaskCluster:
         try:
             self._client.wait_for_workers(1, timeout=_WORKERS_S)
         except Exception as reason:
-            problem = "the scheduler or its workers are gone; what is finished is kept, start the study again to go on"
-            raise StudyError(problem) from reason
+            raise StudyError(
+                "the scheduler or its workers are gone; what is finished is kept, start the study again to go on"
+            ) from reason
         self._count()
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:

@@ -90,7 +90,8 @@ class FactorValues:
             }
             for key, value in relative.items():
                 if not isinstance(value, int | float) or isinstance(value, bool):
-                    problem = f"is {shown(value)} in {label}: nothing can be relative to it"
-                    raise study.source.fail(("factors", key, "nominal"), problem)
+                    raise study.source.fail(
+                        ("factors", key, "nominal"), f"is {shown(value)} in {label}: nothing can be relative to it"
+                    )
             self._nominal[place] = relative
         return self._nominal[place]

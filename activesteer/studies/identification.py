@@ -32,8 +32,6 @@ from activesteer.simulation.single_track_search import (
     body_of,
     fitted,
     handling_in,
-    linear_tests,
-    single_track_of,
 )
 from activesteer.theory.single_track import SingleTrack
 
@@ -122,21 +120,6 @@ def identify(
         tests[name] = handling_in(scenario, body, run_scenario)
     found = fitted(body, [tests[name] for name in CONSTANT_SPEED_TESTS])
     return Identification(scenarios[RADIUS_TEST].car.name, tests, found)
-
-
-def identify_single_track(
-    vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | None = None
-) -> SingleTrackParameters:
-    """The single-track model alone, as `identify` finds it, from tests that end behind the linear range.
-
-    Args:
-        vehicle: Name, path, or table of a vehicle.
-        overrides: As for `identify`.
-
-    Raises:
-        ActiveSteerError: as for `identify`.
-    """
-    return single_track_of(linear_tests(vehicle, overrides), run_scenario)
 
 
 def single_track_lines(parameters: SingleTrackParameters) -> dict[str, str]:

@@ -17,7 +17,6 @@ from activesteer.errors import StudyError
 from activesteer.studies.design import FOR_INDICES, MORRIS_LEVELS
 from activesteer.studies.factors import Factor
 
-CONFIDENCE: Final = 0.95
 MAX_SAMPLES: Final = 16384
 """Rows that are enough: more move the indices less than their confidence intervals are wide."""
 _MAX_RBD_SAMPLES: Final = 4096

@@ -171,8 +171,12 @@ def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
             raise ParameterError(f"is {value:g}; must be greater than 0", file=source, key=key, value=value)
     for low, high in _RANGES:
         if not values[low] < values[high]:
-            problem = f"is {values[low]:g}; must be less than {high}, {values[high]:g}"
-            raise ParameterError(problem, file=source, key=low, value=values[low])
+            raise ParameterError(
+                f"is {values[low]:g}; must be less than {high}, {values[high]:g}",
+                file=source,
+                key=low,
+                value=values[low],
+            )
     for key in ("VXLOW", "FZMIN"):
         if (value := values[key]) < 0.0:
             raise ParameterError(f"is {value:g}; must not be negative", file=source, key=key, value=value)

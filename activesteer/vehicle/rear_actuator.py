@@ -44,8 +44,11 @@ class RearActuator(ElectricActuator):
         """
         given = [item.name for item in fields(self) if item.name != "preset" and getattr(self, item.name) is not None]
         if self.preset == _HINGE and given:
-            problem = "has no effect on the hinge, whose numbers are in the model; preset screw_3deg is a screw"
-            raise ParameterError(problem, key=given[0], value=getattr(self, given[0]))
+            raise ParameterError(
+                "has no effect on the hinge, whose numbers are in the model; preset screw_3deg is a screw",
+                key=given[0],
+                value=getattr(self, given[0]),
+            )
 
     @property
     def is_screw(self) -> bool:

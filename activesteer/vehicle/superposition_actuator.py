@@ -43,8 +43,11 @@ class SuperpositionActuator(ElectricActuator):
         """
         given = [item.name for item in fields(self) if item.name != "preset" and getattr(self, item.name) is not None]
         if not self.is_geared and given:
-            problem = "has no effect on the servo, whose numbers are in the model; preset strain_wave has a motor"
-            raise ParameterError(problem, key=given[0], value=getattr(self, given[0]))
+            raise ParameterError(
+                "has no effect on the servo, whose numbers are in the model; preset strain_wave has a motor",
+                key=given[0],
+                value=getattr(self, given[0]),
+            )
 
     @property
     def is_geared(self) -> bool:

@@ -138,5 +138,9 @@ def _tyre(axle: str, table: CarTable, beside: Path, log: Log) -> tuple[str, Tyre
     if is_file(shipped):
         return name, load_tir(shipped), None
     present = [path.name for path in (models_dir() / "tyres").glob("*.tir")]
-    problem = f"there is no file {shown(name)} beside the table or in models/tyres; {nearest_names(name, present)}"
-    raise TyreFileError(problem, key=f"{axle}.tyre", value=name, allowed=present)
+    raise TyreFileError(
+        f"there is no file {shown(name)} beside the table or in models/tyres; {nearest_names(name, present)}",
+        key=f"{axle}.tyre",
+        value=name,
+        allowed=present,
+    )

@@ -19,14 +19,12 @@ class CornerMotion:
     """One corner.
 
     Attributes:
-        freedoms: Degrees of freedom without spin and rear steering.
         links: Names of its links.
         firmness: Least singular value of the links' directions: how far they are from holding the wheel in one way less
             (0: two links do the same); 0.05 to 0.5 in cars.
         per_travel: Tendon -> shortening per wheel travel in bump, rigid links.
     """
 
-    freedoms: int
     links: tuple[str, ...]
     firmness: float
     per_travel: dict[str, float]
@@ -65,7 +63,7 @@ def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
             "the links let the wheel move, but not up and down; are two of their points exchanged?", key=corner
         )
     per_travel = {name: -float(row @ direction) / rise for name, row in rows.items()}
-    return CornerMotion(len(dofs), links, float(values[-1]), per_travel)
+    return CornerMotion(links, float(values[-1]), per_travel)
 
 
 def _freedoms(model: mujoco.MjModel, corner: str) -> tuple[list[int], Array]:

@@ -191,8 +191,6 @@ class CarTable:
 
 
 POINT_FIELDS: Final = {"knuckle_cg", "carrier_cg", "strut_cg", "chassis_cg", "axis_lower", "axis_upper"}
-_MIDDLE: Final = {"chassis_cg"}
-"""Points that lie in the middle of the car, not on its left side."""
 
 
 def read_table(path: Path) -> tuple[CarTable, Source]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.rigs.tyre_rig import RigForces, TyreRig
+from activesteer.rigs.wheel_motion import turned as to_heading
 from activesteer.tyre import TyreForces, TyreParameters, load_tir
 from tests.reference.tyre_tables import read_coefficients
 
@@ -46,7 +47,8 @@ def _tyre(name: str) -> TyreParameters:
 
 
 def _measured(forces: RigForces) -> np.ndarray:
-    return np.hstack(forces.in_wheel_frame())
+    """Force and moment in ISO-W axes: x along the heading in the road, z up."""
+    return np.hstack([to_heading(vectors, -forces.heading_rad) for vectors in (forces.force_N, forces.moment_Nm)])
 
 
 def _expected(forces: TyreForces, load_N: np.ndarray) -> np.ndarray:

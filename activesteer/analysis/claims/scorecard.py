@@ -183,11 +183,16 @@ def not_reproduced(vehicle: str, text: str | None = None) -> dict[str, str]:
             raise ParameterError(f"is {entries!r}; claims and reasons are needed", file=FILE, key=name, value=entries)
         for number, reason in entries.items():
             if number not in STATEMENTS:
-                problem = f"no such claim; {nearest_names(number, STATEMENTS)}"
-                raise ParameterError(problem, file=FILE, key=f"{name}.{number}", allowed=tuple(STATEMENTS))
+                raise ParameterError(
+                    f"no such claim; {nearest_names(number, STATEMENTS)}",
+                    file=FILE,
+                    key=f"{name}.{number}",
+                    allowed=tuple(STATEMENTS),
+                )
             if not isinstance(reason, str) or not reason.strip():
-                problem = f"is {reason!r}; the reason in words is needed"
-                raise ParameterError(problem, file=FILE, key=f"{name}.{number}", value=reason)
+                raise ParameterError(
+                    f"is {reason!r}; the reason in words is needed", file=FILE, key=f"{name}.{number}", value=reason
+                )
     return dict(table.get(vehicle, {}))
 
 

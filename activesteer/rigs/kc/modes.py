@@ -14,7 +14,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.tyre_stiffness import TyreStiffness
 from activesteer.vehicle import Vehicle
@@ -246,8 +246,3 @@ def _pitch_gradient(linear: _Linear, vehicle: Vehicle) -> float:
     force = linear.mass @ forwards + linear.at_contacts(push)[linear.free]
     moved = np.linalg.lstsq(linear.stiffness, force, rcond=1e-13)[0]
     return float(moved[linear.root + 4])
-
-
-def per_g(gradient_radps2pm: float) -> float:
-    """A gradient in degrees per g."""
-    return math.degrees(gradient_radps2pm) * GRAVITY_MPS2

@@ -124,7 +124,8 @@ def parse(text: str, source: str) -> Syntax:
         if any(value is None for value in row):
             # Before the first key it may be any file, whose content is not ours to print.
             what = repr(line[:60]) if entries else "this"
-            problem = f"{what} is neither KEY = value, [SECTION], {{heading}} nor a row of numbers"
-            raise TyreFileError(problem, file=source, line=count)
+            raise TyreFileError(
+                f"{what} is neither KEY = value, [SECTION], {{heading}} nor a row of numbers", file=source, line=count
+            )
         tables.setdefault(section, []).append(tuple(value for value in row if value is not None))
     return Syntax(tuple(entries), {name: tuple(rows) for name, rows in tables.items()})

@@ -114,8 +114,13 @@ def _place(lines: dict[str, Entry], name: str, entry: Entry, source: Path) -> No
     home = BY_NAME[name].section
     at_home = (before.section == home, entry.section == home)
     if at_home[0] == at_home[1]:
-        problem = f"is {entry.value} and contradicts line {before.line}, where it is {before.value}"
-        raise TyreFileError(problem, file=str(source), line=entry.line, key=entry.key, value=entry.value)
+        raise TyreFileError(
+            f"is {entry.value} and contradicts line {before.line}, where it is {before.value}",
+            file=str(source),
+            line=entry.line,
+            key=entry.key,
+            value=entry.value,
+        )
     if at_home[1]:
         lines[name] = entry
 
@@ -129,8 +134,13 @@ def _units(entries: tuple[Entry, ...], source: Path) -> dict[str, float]:
         known = BASE_UNITS[entry.key]
         word = str(entry.value).lower()
         if word not in known:
-            problem = f"is {str(entry.value)[:60]!r} in [UNITS]; allowed are {', '.join(known)}"
-            raise TyreFileError(problem, file=str(source), line=entry.line, key=entry.key, value=entry.value)
+            raise TyreFileError(
+                f"is {str(entry.value)[:60]!r} in [UNITS]; allowed are {', '.join(known)}",
+                file=str(source),
+                line=entry.line,
+                key=entry.key,
+                value=entry.value,
+            )
         sizes[entry.key] = known[word]
     return sizes
 
@@ -155,6 +165,10 @@ def _side(words: Mapping[str, str], source: Path) -> Side:
     if side == "RIGHT":
         return "RIGHT"
     if side not in ("LEFT", "SYMMETRIC", "SYM", "UNKNOWN", ""):
-        problem = f"is {side[:60]!r}; allowed are 'LEFT', 'RIGHT' and 'SYMMETRIC'"
-        raise TyreFileError(problem, file=str(source), key="TYRESIDE", value=side)
+        raise TyreFileError(
+            f"is {side[:60]!r}; allowed are 'LEFT', 'RIGHT' and 'SYMMETRIC'",
+            file=str(source),
+            key="TYRESIDE",
+            value=side,
+        )
     return "LEFT"

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final, Literal
 
 Level = Literal["ok", "warning", "error"]
-LEVELS: Final[tuple[Level, ...]] = ("ok", "warning", "error")
 _ROUNDING: Final = 1e-7
 """What is smaller is printed as 0."""
 

@@ -14,7 +14,8 @@ from activesteer.errors import ManeuverError
 from activesteer.maneuver import BrakeInTurn, SineWithDwell
 from activesteer.scenario import describe, resolve
 from activesteer.simulation.preparation import prepared
-from activesteer.studies.identification import identify_single_track
+from activesteer.simulation.runner import run_scenario
+from activesteer.simulation.single_track_search import linear_tests, single_track_of
 from tests.raising import raises
 
 
@@ -31,7 +32,7 @@ def dwell_deg(factor: float = 1.0, **overrides: Any) -> float:
 def expected_deg() -> float:
     """A from the understeer gradient: ratio times (wheelbase over radius, and characteristic speed's share of it)."""
     scenario = resolve("sine_with_dwell")
-    car, speed = identify_single_track(), scenario.maneuver.speed_mps
+    car, speed = single_track_of(linear_tests("compact"), run_scenario), scenario.maneuver.speed_mps
     assert car.characteristic_speed_mps is not None
     ackermann = (car.cg_to_front_m + car.cg_to_rear_m) * 0.3 * 9.81 / speed**2
     understeer = 1.0 + (speed / car.characteristic_speed_mps) ** 2
