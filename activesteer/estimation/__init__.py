@@ -2,6 +2,6 @@
 
 from activesteer.estimation.estimator import Estimator
 from activesteer.estimation.parameters import EstimatorParameters
-from activesteer.estimation.setup import EstimatorSetup, LateralForces
+from activesteer.estimation.setup import EstimatorSetup, KnownTyre
 
-__all__ = ["Estimator", "EstimatorParameters", "EstimatorSetup", "LateralForces"]
+__all__ = ["Estimator", "EstimatorParameters", "EstimatorSetup", "KnownTyre"]

@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 
+from activesteer.estimation.advance import advance
 from activesteer.estimation.parameters import EstimatorParameters
+from activesteer.estimation.records import MEMORY, SAID, known_of
 from activesteer.estimation.setup import EstimatorSetup
 from activesteer.signals import Estimate, Measurement
-from activesteer.theory.single_track import SingleTrack
 
-_LOWEST_MPS = 2.0
-"""Below this speed the sideslip angle is taken for zero [m/s]."""
+_pack_into = struct.Struct(f"{len(SAID)}d").pack_into
 
 
 class Estimator:
-    """Speed, sideslip, yaw rate and friction from what the sensors say."""
+    """Speed, sideslip, yaw rate and friction from what the sensors say.
+
+    Example:
+        >>> import activesteer
+        >>> class Watching:
+        ...     def __init__(self, setup):
+        ...         self.estimator = setup.estimator()
+        ...
+        ...     def step(self, command, measurement):
+        ...         estimate = self.estimator.step(measurement)
+        ...         return activesteer.ActuatorCommand(rear_steer_demand_rad=-0.2 * estimate.sideslip_rad)
+        >>> recording = activesteer.simulate("step_steer", Watching, overrides={"sensors.preset": "production"})
+    """
 
     def __init__(self, setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> None:
         """Makes the estimator of one run.
@@ -24,9 +38,17 @@ class Estimator:
             parameters: How far it trusts its model.
             timestep_s: Time between two steps [s].
         """
-        self._setup, self._parameters, self._timestep_s = setup, parameters, timestep_s
-        self._model = SingleTrack(setup.single_track)
-        self._sideslip_rad = 0.0
+        self._known = known_of(setup, parameters, timestep_s)
+        self._tyres = np.array([tyre.lateral_force_N for tyre in setup.tyres])
+        self._memory, self._said = np.zeros(1, MEMORY), np.zeros(len(SAID))
+        self._estimate = self._memory["estimate"][0]
+        # As many calls as what the inertial sensors say is old, and this one.
+        self._line = np.zeros((round(float(self._known["age_s"][0]) / timestep_s) + 2, len(SAID)))
+
+    @property
+    def innovation(self) -> float:
+        """Squared error of yaw rate and lateral acceleration as last measured, over its expected covariance."""
+        return float(self._memory["innovation"][0])
 
     def step(self, measurement: Measurement) -> Estimate:
         """What the car does now.
@@ -34,17 +56,14 @@ class Estimator:
         Args:
             measurement: What the car's sensors say.
         """
-        setup, speed_mps, yaw_rate_radps = self._setup, measurement.speed_mps, measurement.yaw_rate_radps
-        if speed_mps < _LOWEST_MPS:
-            self._sideslip_rad = 0.0
-        else:
-            a, b = self._model.matrices(speed_mps)
-            front_rad = measurement.steering_wheel_rad / setup.steering_ratio + measurement.superposition_rad
-            inputs = np.array([front_rad, measurement.rear_steer_rad])
-            rate_radps = a[1] @ np.array([yaw_rate_radps, self._sideslip_rad]) + b[1] @ inputs
-            self._sideslip_rad += self._timestep_s * float(rate_radps)
-        sideslip_rad, parameters = self._sideslip_rad, self._parameters
-        return Estimate(
-            speed_mps, speed_mps * sideslip_rad, sideslip_rad, yaw_rate_radps, parameters.friction,
-            0.01 * speed_mps, 0.02 * speed_mps, 0.02, 0.005, parameters.friction_std,
-        )  # fmt: skip
+        _, _, yaw_rate, ay, ax, steering_wheel, rear, superposition, spins, pressures = measurement
+        _pack_into(self._said, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
+        advance(self._known, self._tyres, self._memory, self._said, self._line)
+        return tuple.__new__(Estimate, self._estimate.tolist())
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Estimator:
+        other = object.__new__(Estimator)
+        other._known, other._tyres = self._known, self._tyres
+        other._memory, other._said, other._line = self._memory.copy(), self._said.copy(), self._line.copy()
+        other._estimate = other._memory["estimate"][0]
+        return other

@@ -7,15 +7,15 @@ from typing import Final
 import numpy as np
 
 from activesteer.conventions import GRAVITY_MPS2
-from activesteer.estimation import EstimatorSetup, LateralForces
+from activesteer.estimation import EstimatorSetup, KnownTyre
 from activesteer.scenario.car import Car
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 
-_SLIP_ANGLES: Final = 81
+_SLIP_ANGLES: Final = 41
 _LARGEST_SLIP_ANGLE_RAD: Final = np.radians(20.0)
 """Beyond it the force is taken for that at it [rad]."""
-_LOADS: Final = 13
+_LOADS: Final = 10
 _LARGEST_LOAD: Final = 3.0
 """Largest load of the grid, over that of standing still; beyond it the force is taken for that at it."""
 _SPEED_MPS: Final = 20.0
@@ -30,17 +30,18 @@ def estimator_setup(car: Car) -> EstimatorSetup | None:
     wheelbase_m = body.cg_to_front_m + body.cg_to_rear_m
     per_metre = 0.5 * body.mass_kg * GRAVITY_MPS2 / wheelbase_m
     loads_N = per_metre * body.cg_to_rear_m, per_metre * body.cg_to_front_m
-    (front, front_m), (rear, rear_m) = (_tyre(*pair) for pair in zip(car.new_tyres, loads_N, strict=True))
+    front, rear = (_known(*pair) for pair in zip(car.new_tyres, loads_N, strict=True))
     pressure_Pa = config.brakes.hydraulics.full_pedal_pressure_Pa
     fl, fr, rl, rr = (torque_Nm / pressure_Pa for torque_Nm in config.brakes.torques_Nm)
+    air = config.aerodynamics
     return EstimatorSetup(
-        body, config.two_track, config.steering.ratio, (front, rear), (front_m, front_m, rear_m, rear_m),
-        config.powertrain.wheel_fractions, (fl, fr, rl, rr), config.aerodynamics.drag_area_m2, config.sensors,
+        body, config.two_track, config.steering.ratio, (front, rear), config.powertrain.wheel_fractions, (fl, fr, rl, rr),
+        0.5 * air.air_density_kgpm3 * air.drag_area_m2, config.sensors,
     )  # fmt: skip
 
 
-def _tyre(parameters: TyreParameters, load_N: float) -> tuple[LateralForces, float]:
-    """Lateral forces of a tyre, and its rolling radius under a load [m]."""
+def _known(parameters: TyreParameters, load_N: float) -> KnownTyre:
+    """What is known of a tyre that carries a load when the car stands."""
     tyre = MagicFormula(parameters)
     angles_rad = np.linspace(0.0, _LARGEST_SLIP_ANGLE_RAD, _SLIP_ANGLES)
     loads_N = np.linspace(0.0, _LARGEST_LOAD * load_N, _LOADS)
@@ -49,4 +50,7 @@ def _tyre(parameters: TyreParameters, load_N: float) -> tuple[LateralForces, flo
     )
     force_N = tuple(map(tuple, (0.5 * (left - right)).tolist()))
     standing = tyre.evaluate(load_N, 0.0, 0.0, vx_mps=_SPEED_MPS)
-    return LateralForces(float(angles_rad[1]), float(loads_N[1]), force_N), float(standing.effective_radius_m)
+    return KnownTyre(
+        float(angles_rad[1]), float(loads_N[1]), force_N, float(standing.relaxation_length_y_m),
+        float(standing.slip_stiffness_N) / load_N, float(standing.effective_radius_m),
+    )  # fmt: skip

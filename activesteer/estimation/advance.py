@@ -1,0 +1,142 @@
+"""One step of the estimator, compiled: what is new goes into the filters, and they say what is now.
+
+The inertial sensors say what was a while ago (their delay and low-pass). The filters live at that time: angles, wheel
+speeds and pressures are kept until it. From there the model alone goes on to the present, with the angles since.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from activesteer.compilation import compiled, inlined
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.estimation.kalman_filter import begin, correct, predict
+from activesteer.estimation.records import (
+    FRICTION,
+    LATERAL_SPEED,
+    N_STATES,
+    SAID_AX,
+    SAID_AY,
+    SAID_RATE,
+    SAID_REAR,
+    SAID_SPINS,
+    SAID_SUPERPOSITION,
+    SAID_WHEEL,
+    YAW_RATE,
+)
+from activesteer.estimation.speed_filter import correct_speed, predict_speed, start_speed
+from activesteer.estimation.two_track_model import SLOWEST_MPS, follow, follow_roll, forces_of
+from activesteer.estimation.wheels import read_wheels
+
+_SHORTEST_S: Final = 0.004
+"""What is new is not taken in more often than this, and the model goes to the present in such steps [s]."""
+_USED_FRACTION: Final = 0.85
+"""Share of the acceleration, in g, that the friction is not below ..."""
+_USED_S: Final = 0.2
+"""... and the time constant with which it is smoothed: a car rocks when it stops [s]."""
+
+
+@inlined
+def _steer(known, memory, steering, actuators):
+    """Takes the angles of the wheels from what was said of them."""
+    memory.front_angle_rad = steering[SAID_WHEEL] / known.steering_ratio + actuators[SAID_SUPERPOSITION]
+    memory.rear_angle_rad = actuators[SAID_REAR]
+
+
+@compiled
+def _start(known, memory, said, line):
+    """The first call: the car drives straight on, at the speed that its wheels say."""
+    rolled_mps = 0.0
+    for wheel in range(4):
+        memory.last_spin_radps[wheel] = said[SAID_SPINS + wheel]
+        rolled_mps += 0.25 * known.rolling_radius_m[wheel] * said[SAID_SPINS + wheel]
+    for place in range(len(line)):
+        line[place] = said
+    begin(known, memory)
+    start_speed(known, memory, rolled_mps)
+
+
+@compiled
+def _filter(known, tyres, memory, said, line):
+    """Steps both filters to the time of what the inertial sensors say."""
+    duration_s, state, count, length = memory.waited_s, memory.state, memory.calls, len(line)
+    _steer(known, memory, line[(count - known.steering_age) % length], line[(count - known.actuator_age) % length])
+    memory.ax_mps2 = (said[SAID_AX] - memory.ax_offset_mps2) / (1.0 + known.pitch_gain)
+    rate_mps2 = said[SAID_AX] / (1.0 + known.pitch_gain) + state[YAW_RATE] * state[LATERAL_SPEED]
+    predict_speed(known, memory, rate_mps2, duration_s)
+    read_wheels(known, memory, line[(count - known.wheel_age) % length], duration_s)
+    predict(known, tyres, memory, duration_s)
+    front_N, rear_N = forces_of(known, tyres, memory, state)
+    follow_roll(known, memory, (front_N + rear_N) / known.mass_kg, duration_s)
+    memory.innovation = correct(known, tyres, memory, said[SAID_RATE], said[SAID_AY])
+    used = math.hypot(memory.ax_mps2, memory.loading_mps2) / GRAVITY_MPS2
+    memory.friction_used += duration_s / (duration_s + _USED_S) * (used - memory.friction_used)
+    state[FRICTION] = max(state[FRICTION], _USED_FRACTION * memory.friction_used)
+    memory.left_out = correct_speed(known, memory, duration_s)
+
+
+@compiled
+def _go_to_now(known, tyres, memory, line):
+    """The model alone from the filters' time to now, with the angles that came since."""
+    now, count, length = memory.now, memory.calls, len(line)
+    for index in range(N_STATES):
+        now[index] = memory.state[index]
+    back, stride = round(known.age_s / known.call_s), max(1, round(_SHORTEST_S / known.call_s))
+    while back > 0:
+        row = line[(count - min(back, length - 1)) % length]
+        _steer(known, memory, row, row)
+        follow(known, tyres, memory, now, min(stride, back) * known.call_s, now)
+        back -= stride
+
+
+@compiled
+def _say(known, memory):
+    """Writes the members of `Estimate`."""
+    now, covariance, out = memory.now, memory.covariance, memory.estimate
+    ahead_s = known.age_s + memory.waited_s
+    speed = memory.speed_mps + ahead_s * (memory.ax_mps2 + now[YAW_RATE] * now[LATERAL_SPEED])
+    # On the way from the filters' time to now the error of the forces is added.
+    wrong_N = known.force_std_N + known.force_fraction * known.mass_kg * abs(memory.loading_mps2)
+    lever_m = 0.5 * (known.cg_to_front_m + known.cg_to_rear_m)
+    lateral_std = math.hypot(math.sqrt(covariance[LATERAL_SPEED, LATERAL_SPEED]), wrong_N / known.mass_kg * ahead_s)
+    turning_radps = lever_m * wrong_N / known.yaw_inertia_kgm2 * ahead_s
+    rolls = speed > SLOWEST_MPS
+    out[0], out[1] = speed, now[LATERAL_SPEED]
+    out[2] = math.atan2(now[LATERAL_SPEED], speed) if rolls else 0.0
+    out[3], out[4] = now[YAW_RATE], now[FRICTION]
+    out[5] = math.hypot(math.sqrt(memory.speed_variance), known.radius_std * speed)
+    out[6] = lateral_std
+    out[7] = math.atan2(lateral_std, max(speed, 0.0))
+    out[8] = math.hypot(math.sqrt(covariance[YAW_RATE, YAW_RATE]), turning_radps)
+    out[9] = math.sqrt(covariance[FRICTION, FRICTION])
+
+
+@compiled
+def advance(known, tyres, memory, said, line):
+    """Takes in what the sensors say now, and makes the estimate.
+
+    Args:
+        known: A record of `KNOWN`, shape (1,).
+        tyres: Grids of front and rear tyres' lateral force, shape (2, loads, slip angles) [N].
+        memory: A record of `MEMORY`, shape (1,); changed.
+        said: What the sensors say; see `SAID`.
+        line: What they said in the last calls, one behind the other in a ring; changed.
+    """
+    k, m = known[0], memory[0]
+    first = m.calls == 0
+    if first:
+        _start(k, m, said, line)
+    line[m.calls % len(line)] = said
+    m.waited_s += k.call_s
+    new = said[SAID_RATE] != m.last[0] or said[SAID_AY] != m.last[1] or said[SAID_AX] != m.last[2]
+    if first or (new and m.waited_s > _SHORTEST_S) or m.waited_s >= k.longest_s - 1e-9:
+        m.last[0], m.last[1], m.last[2] = said[SAID_RATE], said[SAID_AY], said[SAID_AX]
+        _filter(k, tyres, m, said, line)
+        m.waited_s = 0.0
+        _go_to_now(k, tyres, m, line)
+    else:
+        _steer(k, m, said, said)
+        follow(k, tyres, m, m.now, k.call_s, m.now)
+    _say(k, m)
+    m.calls += 1

@@ -1,0 +1,205 @@
+"""What an estimator knows and remembers, as records that compiled code reads."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.estimation.parameters import EstimatorParameters
+from activesteer.estimation.setup import EstimatorSetup
+from activesteer.sensors.sensor_kinds import Sensor
+
+LATERAL_SPEED, YAW_RATE, FRONT_SLIP, REAR_SLIP, FRONT_ERROR, REAR_ERROR, RATE_OFFSET, AY_OFFSET, FRICTION = range(9)
+"""Places of the states: v_y, r, a_f, a_r, e_f, e_r, b_r, b_y, m; see `two_track_model` and `kalman_filter`."""
+N_STATES: Final = 9
+SAID: Final = (
+    "yaw_rate_radps", "ay_mps2", "ax_mps2", "steering_wheel_rad", "rear_steer_rad", "superposition_rad",
+    *(f"{corner}_spin_radps" for corner in ("fl", "fr", "rl", "rr")),
+    *(f"{corner}_pressure_Pa" for corner in ("fl", "fr", "rl", "rr")),
+)  # fmt: skip
+"""What the sensors say, in the order of a row."""
+SAID_RATE, SAID_AY, SAID_AX, SAID_WHEEL, SAID_REAR, SAID_SUPERPOSITION, SAID_SPINS, SAID_PRESSURES = *range(7), 10
+"""Places in such a row; of wheel speeds and pressures the first one."""
+
+_CAR: Final = (
+    "mass_kg", "yaw_inertia_kgm2", "cg_to_front_m", "cg_to_rear_m", "front_compliance_radpN", "rear_compliance_radpN",
+    "front_load_N", "rear_load_N", "front_load_kg", "rear_load_kg", "along_load_kg", "front_relaxation_m",
+    "rear_relaxation_m", "angle_step_rad", "front_load_step_N", "rear_load_step_N", "roll_gradient_radpmps2",
+    "roll_speed_radps", "roll_damping", "roll_arm_m", "pitch_gain", "drag_kgpm", "wheel_inertia_kgm2", "steering_ratio",
+)  # fmt: skip
+_UNKNOWN: Final = (
+    "slip_angle_std_rad", "slip_angle_fraction", "slip_angle_s", "ay_offset_std_mps2", "ay_offset_s", "friction",
+    "friction_std", "friction_s", "rate_offset_std_radps", "rate_walk_rad2ps3", "lateral_density_m2ps3",
+    "yaw_density_rad2ps3", "force_std_N", "force_fraction", "force_s", "along_fraction", "rate_variance_rad2ps2",
+    "rate_fraction", "ay_variance_m2ps4", "ay_fraction", "ax_density_m2ps3", "ax_fraction", "ax_offset_std_mps2",
+    "ax_offset_density_m2ps5", "wheel_variance_m2ps2", "use_std", "use_s", "radius_std",
+)  # fmt: skip
+_TIMES: Final = ("call_s", "longest_s", "age_s")
+_CALLS: Final = ("wheel_age", "steering_age", "actuator_age")
+_WHEELS: Final = (
+    "half_track_m", "to_axle_m", "left_m", "rolling_radius_m", "drive_fraction", "torque_per_pressure_NmpPa",
+    "slip_stiffness",
+)  # fmt: skip
+KNOWN: Final = np.dtype(
+    (
+        np.record,
+        [
+            *((name, np.float64) for name in (*_CAR, *_UNKNOWN, *_TIMES)),
+            *((name, np.intp) for name in _CALLS),
+            *((name, np.float64, (4,)) for name in _WHEELS),
+        ],
+    )
+)
+"""The car: of each axle compliance, load of a wheel, its change per lateral acceleration (and per longitudinal one),
+relaxation length, steps of the tyre's grid; the body's roll and what an accelerometer feels of its pitch. What is not
+known: the members of `EstimatorParameters` with what the data sheets say. Time between two calls, the longest that the
+filters wait for something new, and the age of what the inertial sensors say; by how many calls the others are younger.
+Of each wheel its place (left positive), rolling radius, share of the drive, brake and slip stiffness per load."""
+
+MEMORY: Final = np.dtype(
+    (
+        np.record,
+        [
+            ("estimate", np.float64, (10,)),
+            ("calls", np.intp),
+            *((name, np.float64) for name in ("waited_s", "innovation", "left_out", "friction_used")),
+            ("last", np.float64, (3,)),
+            ("last_spin_radps", np.float64, (4,)),
+            *((name, np.float64) for name in ("speed_mps", "ax_offset_mps2")),
+            *((name, np.float64) for name in ("speed_variance", "speed_offset_covariance", "offset_variance")),
+            ("state", np.float64, (N_STATES,)),
+            ("covariance", np.float64, (N_STATES, N_STATES)),
+            ("now", np.float64, (N_STATES,)),
+            *((name, np.float64) for name in ("front_angle_rad", "rear_angle_rad", "ax_mps2")),
+            *((name, np.float64) for name in ("front_along_N", "moment_Nm", "loading_mps2", "rolling_mps")),
+            *((name, np.float64) for name in ("roll_rad", "roll_rate_radps")),
+            *((name, np.float64, (4,)) for name in ("along_N", "load_N", "by_wheel_mps")),
+        ],
+    )
+)
+"""The estimate; how often it was made; time since the filters' last step, squared error of what was then measured over
+its expected covariance, wheels left out, smoothed use of the friction; what was new then. The filters' states and
+covariances; the state now. Inputs of the model: steer angles, longitudinal acceleration, longitudinal force of the
+front axle and moment of all, lateral acceleration that loads the wheels, lateral speed of the roll axis beside v_y; roll; of
+each wheel its longitudinal force, load, and the speed of the car that it speaks for."""
+
+_RATE_FLOOR_RADPS: Final = math.radians(0.02)
+_AY_FLOOR_MPS2: Final = 0.03
+"""Least standard deviations of a measurement, where a data sheet says less."""
+_ENGINE_STEP_S: Final = 0.001
+"""A controller that is called as often as this sees at once what is new [s]."""
+_SHORTEST_WAIT_S: Final = 0.005
+"""The filters are not stepped more often, whatever the sensors do [s]: the tyres follow in some 20 ms."""
+
+
+def known_of(setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> NDArray[Any]:
+    """What an estimator knows: a record of `KNOWN`, shape (1,).
+
+    Args:
+        setup: The car and its sensors.
+        parameters: How far the model is trusted.
+        timestep_s: Time between two calls [s].
+    """
+    known = np.zeros(1, KNOWN)
+    for values in (_car(setup), _unknown(setup, parameters), _times(setup, timestep_s), _wheels(setup)):
+        for name, value in values.items():
+            known[name] = value
+    return known
+
+
+def _car(setup: EstimatorSetup) -> dict[str, float]:
+    body, more, (front, rear) = setup.single_track, setup.two_track, setup.tyres
+    wheelbase_m = body.cg_to_front_m + body.cg_to_rear_m
+    per_metre = 0.5 * body.mass_kg * GRAVITY_MPS2 / wheelbase_m
+    front_N, rear_N = per_metre * body.cg_to_rear_m, per_metre * body.cg_to_front_m
+    transfer_kgm, fraction = body.mass_kg * more.load_height_m, more.front_load_transfer_fraction
+    return {
+        "mass_kg": body.mass_kg,
+        "yaw_inertia_kgm2": body.yaw_inertia_kgm2,
+        "cg_to_front_m": body.cg_to_front_m,
+        "cg_to_rear_m": body.cg_to_rear_m,
+        "front_compliance_radpN": 1.0 / body.front_stiffness_Nprad - 0.5 / front.stiffness_at(front_N),
+        "rear_compliance_radpN": 1.0 / body.rear_stiffness_Nprad - 0.5 / rear.stiffness_at(rear_N),
+        "front_load_N": front_N,
+        "rear_load_N": rear_N,
+        "front_load_kg": transfer_kgm * fraction / more.front_track_m,
+        "rear_load_kg": transfer_kgm * (1.0 - fraction) / more.rear_track_m,
+        "along_load_kg": 0.5 * transfer_kgm / wheelbase_m,
+        "front_relaxation_m": front.relaxation_length_m,
+        "rear_relaxation_m": rear.relaxation_length_m,
+        "angle_step_rad": front.slip_angle_step_rad,
+        "front_load_step_N": front.load_step_N,
+        "rear_load_step_N": rear.load_step_N,
+        "roll_gradient_radpmps2": more.roll_gradient_radpmps2,
+        "roll_speed_radps": 2.0 * math.pi * more.roll_frequency_Hz,
+        "roll_damping": more.roll_damping,
+        "roll_arm_m": more.roll_arm_m,
+        "pitch_gain": GRAVITY_MPS2 * more.pitch_gradient_radpmps2,
+        "drag_kgpm": setup.drag_per_speed2_kgpm,
+        "wheel_inertia_kgm2": more.wheel_inertia_kgm2,
+        "steering_ratio": setup.steering_ratio,
+    }
+
+
+def _unknown(setup: EstimatorSetup, parameters: EstimatorParameters) -> dict[str, float]:
+    """The parameters, with what the data sheets say of the sensors beside."""
+    sensors, p = setup.sensors, parameters
+    wheel_noise_mps = setup.tyres[0].rolling_radius_m * sensors.wheel_speed.amount("noise")
+    own = {name: value for name, value in vars(p).items() if name in _UNKNOWN}
+    return own | {
+        "ay_offset_std_mps2": math.hypot(sensors.ay.amount("bias"), p.bank_std_mps2),
+        "ay_offset_s": p.bank_s,
+        "rate_offset_std_radps": sensors.yaw_rate.amount("bias"),
+        "rate_walk_rad2ps3": sensors.yaw_rate.amount("drift") ** 2 / 60.0,
+        "rate_variance_rad2ps2": sensors.yaw_rate.amount("noise") ** 2 + _RATE_FLOOR_RADPS**2,
+        "ay_variance_m2ps4": sensors.ay.amount("noise") ** 2 + _AY_FLOOR_MPS2**2,
+        "ax_offset_std_mps2": math.hypot(sensors.ax.amount("bias"), p.slope_std_mps2),
+        "ax_offset_density_m2ps5": p.slope_density_m2ps5,
+        "wheel_variance_m2ps2": wheel_noise_mps**2 + p.wheel_std_mps**2,
+    }
+
+
+def _times(setup: EstimatorSetup, timestep_s: float) -> dict[str, float]:
+    sensors = setup.sensors
+    age_s = max(_age_s(sensors.yaw_rate), _age_s(sensors.ay)) + 0.5 * max(timestep_s - _ENGINE_STEP_S, 0.0)
+
+    def younger(sensor: Sensor, held_s: float = 0.0) -> int:
+        return max(round((age_s - _age_s(sensor) - held_s) / timestep_s), 0)
+
+    # A wheel's speed is a mean over the time since the last one.
+    held_s = 0.5 * max((sensors.wheel_speed.sample_time_s or 0.0) - timestep_s, 0.0)
+    return {
+        "call_s": timestep_s,
+        "longest_s": max(timestep_s, sensors.yaw_rate.sample_time_s or 0.0, _SHORTEST_WAIT_S),
+        "age_s": age_s,
+        "wheel_age": younger(sensors.wheel_speed, held_s),
+        "steering_age": younger(sensors.steering_wheel),
+        "actuator_age": younger(sensors.rear_steer),
+    }
+
+
+def _age_s(sensor: Sensor) -> float:
+    """How old what a sensor says is when it is new: delay and low-pass [s]."""
+    return (sensor.delay_s or 0.0) + (0.5 / math.pi / sensor.bandwidth_Hz if sensor.bandwidth_Hz else 0.0)
+
+
+def _wheels(setup: EstimatorSetup) -> dict[str, Any]:
+    body, more, (front, rear) = setup.single_track, setup.two_track, setup.tyres
+
+    def of(front_value: float, rear_value: float) -> NDArray[np.float64]:
+        return np.repeat([front_value, rear_value], 2)
+
+    half_m = 0.5 * of(more.front_track_m, more.rear_track_m)
+    return {
+        "half_track_m": half_m,
+        "to_axle_m": of(body.cg_to_front_m, -body.cg_to_rear_m),
+        "left_m": half_m * (1.0, -1.0, 1.0, -1.0),
+        "rolling_radius_m": of(front.rolling_radius_m, rear.rolling_radius_m),
+        "drive_fraction": setup.drive_fractions,
+        "torque_per_pressure_NmpPa": setup.brake_torque_per_pressure_NmpPa,
+        "slip_stiffness": of(front.slip_stiffness, rear.slip_stiffness),
+    }

@@ -1,0 +1,191 @@
+"""The two-track model that the estimator goes by: lateral motion, axle forces, and what is not known of them; compiled.
+
+Per axle i = f, r where there are two:
+
+    m (v_y' + r v_x) = F_f cos d_f + F_r cos d_r + X_f sin d_f
+    J_z r'           = l_f (F_f cos d_f + X_f sin d_f) - l_r F_r cos d_r + M_x
+    s_i / v_x a_i'   = d_i - (v_y + h p' +- l_i r) / v_x - c_i F_i + e_i - a_i
+    F_i              = sum over the axle's wheels of u F_y(a_i / u, F_z)
+    p'' + 2 D w p' + w^2 p = w^2 k a_y
+
+with the steer angles d, the longitudinal forces X and their moment M_x, slip angles a that build up over the relaxation
+lengths s, the car's own tyre F_y under the wheel's load, and the friction u of the road by similarity. Beside a
+longitudinal force there is left what a circle of friction leaves. The body rolls by p as a mass on a spring: about an
+axis that lies h below the centre of gravity, so that the axles move sideways by h p' beside it; its springs and dampers load
+the wheels. The compliance c_i is what the identified cornering stiffness of the axle has beyond the tyres':
+
+    c_i = 1 / C_i - 1 / (2 C_tyre)
+
+Roll steer, elastokinematics and steering column are in it. The slip angle error e_i is what is not known of tyre and
+axle; like offsets of sensors and the friction it is a state of its own.
+
+Sources:
+    Kiencke and Nielsen, Automotive Control Systems, 2nd ed. 2005, chapters 8 and 9 (two-track model in observers).
+    Doumiati, Charara, Victorino, Lechner, Vehicle Dynamics Estimation using Kalman Filtering, 2013, chapter 4
+        (load transfer, relaxation).
+    Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, sections 4.2 (similarity) and 7.2 (relaxation of the slip angle).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from activesteer.compilation import compiled, inlined
+from activesteer.estimation.records import (
+    FRICTION,
+    FRONT_ERROR,
+    FRONT_SLIP,
+    LATERAL_SPEED,
+    N_STATES,
+    REAR_ERROR,
+    REAR_SLIP,
+    YAW_RATE,
+)
+
+LEAST_FRICTION: Final = 0.05
+LARGEST_FRICTION: Final = 1.5
+"""Friction is not taken for less or more."""
+SLOWEST_MPS: Final = 3.0
+"""Slower than this, the car is taken to roll without slip angles [m/s]: the sensors cannot tell them."""
+_LEAST_LEFT: Final = 0.3
+"""Share of the lateral force that a wheel keeps whatever its longitudinal force is said to be."""
+_CREEP_S: Final = 0.3
+"""Time in which a car that hardly moves turns as its wheels are steered [s]."""
+_LONGEST_STEP_S: Final = 0.005
+"""Longest step of the integration [s]: the tyres follow in some 20 ms."""
+
+
+@inlined
+def _between(forces_N, angle_step_rad, load_step_N, angle_rad, load_N):
+    """Lateral force of a tyre between the points of its grid, at an angle from 0 on."""
+    rows, columns = forces_N.shape
+    across = min(angle_rad / angle_step_rad, columns - 1.000001)
+    down = min(max(load_N / load_step_N, 0.0), rows - 1.000001)
+    column, row = int(across), int(down)
+    right, below = across - column, down - row
+    upper = forces_N[row, column] + right * (forces_N[row, column + 1] - forces_N[row, column])
+    lower = forces_N[row + 1, column] + right * (forces_N[row + 1, column + 1] - forces_N[row + 1, column])
+    return upper + below * (lower - upper)
+
+
+@compiled
+def axle_force(forces_N, angle_step_rad, load_step_N, angle_rad, load_N, shift_N, left_N, right_N, friction):
+    """Lateral force of both tyres of an axle [N].
+
+    Args:
+        forces_N: The tyre's grid.
+        angle_step_rad: Its step.
+        load_step_N: Likewise.
+        angle_rad: Slip angle, positive gives a positive force.
+        load_N: Mean load of the two.
+        shift_N: What the right one has more, and the left one less.
+        left_N: Longitudinal force of the left one.
+        right_N: Of the right one.
+        friction: Friction of the road.
+    """
+    size_rad, total_N = abs(angle_rad) / friction, 0.0
+    for sign, along_N in ((-1.0, left_N), (1.0, right_N)):
+        own_N = max(load_N + sign * shift_N, 0.0)
+        used = along_N / (friction * own_N + 1.0)
+        left = math.sqrt(max(1.0 - used * used, _LEAST_LEFT * _LEAST_LEFT))
+        total_N += left * _between(forces_N, angle_step_rad, load_step_N, size_rad, own_N)
+    return math.copysign(friction * total_N, angle_rad)
+
+
+@compiled
+def forces_of(known, tyres, memory, state):
+    """Lateral forces of both axles, across their wheels [N].
+
+    Args:
+        known: Record of `KNOWN`.
+        tyres: Grids of front and rear tyres' lateral force [N].
+        memory: Record of `MEMORY`: the inputs.
+        state: The states.
+    """
+    friction = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
+    forward_N, along_N = known.along_load_kg * memory.ax_mps2, memory.along_N
+    front_N = axle_force(
+        tyres[0], known.angle_step_rad, known.front_load_step_N, state[FRONT_SLIP], known.front_load_N - forward_N,
+        known.front_load_kg * memory.loading_mps2, along_N[0], along_N[1], friction,
+    )  # fmt: skip
+    rear_N = axle_force(
+        tyres[1], known.angle_step_rad, known.rear_load_step_N, state[REAR_SLIP], known.rear_load_N + forward_N,
+        known.rear_load_kg * memory.loading_mps2, along_N[2], along_N[3], friction,
+    )  # fmt: skip
+    return front_N, rear_N
+
+
+@inlined
+def slip_angles(known, memory, state, vx_mps):
+    """Slip angles of both axles by the motion of the car alone [rad]."""
+    across_mps = state[LATERAL_SPEED] + memory.rolling_mps
+    front_rad = memory.front_angle_rad - (across_mps + known.cg_to_front_m * state[YAW_RATE]) / vx_mps
+    rear_rad = memory.rear_angle_rad - (across_mps - known.cg_to_rear_m * state[YAW_RATE]) / vx_mps
+    return front_rad, rear_rad
+
+
+@compiled
+def follow(known, tyres, memory, state, duration_s, out):
+    """The state after a while, the inputs staying as they are.
+
+    Args:
+        known: Record of `KNOWN`.
+        tyres: Grids of front and rear tyres' lateral force [N].
+        memory: Record of `MEMORY`: the inputs.
+        state: The states.
+        duration_s: Time to go on [s].
+        out: The states then; may be `state`.
+    """
+    for index in range(N_STATES):
+        out[index] = state[index]
+    vx = memory.speed_mps
+    df, dr = memory.front_angle_rad, memory.rear_angle_rad
+    if vx < SLOWEST_MPS:
+        # Rolling without slip angles: the rear axle's middle goes where its wheels point.
+        turned = vx * (df - dr) / (known.cg_to_front_m + known.cg_to_rear_m)
+        out[YAW_RATE] += (1.0 - math.exp(-duration_s / _CREEP_S)) * (turned - out[YAW_RATE])
+        out[LATERAL_SPEED] = known.cg_to_rear_m * out[YAW_RATE] + vx * dr
+        out[FRONT_SLIP] = out[REAR_SLIP] = 0.0
+        return
+    steps = max(1, math.ceil(duration_s / _LONGEST_STEP_S - 1e-9))
+    dt = duration_s / steps
+    follow_front = 1.0 - math.exp(-dt * vx / known.front_relaxation_m)
+    follow_rear = 1.0 - math.exp(-dt * vx / known.rear_relaxation_m)
+    cos_f, sin_f, cos_r = math.cos(df), math.sin(df), math.cos(dr)
+    for _ in range(steps):
+        front_N, rear_N = forces_of(known, tyres, memory, out)
+        front_rad, rear_rad = slip_angles(known, memory, out, vx)
+        front_rad += out[FRONT_ERROR] - known.front_compliance_radpN * front_N
+        rear_rad += out[REAR_ERROR] - known.rear_compliance_radpN * rear_N
+        out[FRONT_SLIP] += follow_front * (front_rad - out[FRONT_SLIP])
+        out[REAR_SLIP] += follow_rear * (rear_rad - out[REAR_SLIP])
+        across_N, behind_N = front_N * cos_f + memory.front_along_N * sin_f, rear_N * cos_r
+        turning_Nm = known.cg_to_front_m * across_N - known.cg_to_rear_m * behind_N + memory.moment_Nm
+        out[LATERAL_SPEED] += dt * ((across_N + behind_N) / known.mass_kg - out[YAW_RATE] * vx)
+        out[YAW_RATE] += dt * turning_Nm / known.yaw_inertia_kgm2
+
+
+@compiled
+def follow_roll(known, memory, ay_mps2, duration_s):
+    """The body's roll after a while, and what it does to the wheels.
+
+    Springs and dampers carry (p + 2 D p' / w) / k in place of a_y.
+
+    Args:
+        known: Record of `KNOWN`.
+        memory: Record of `MEMORY`; roll, `loading_mps2` and `rolling_mps` are changed.
+        ay_mps2: Lateral acceleration [m/s2].
+        duration_s: Time to go on [s].
+    """
+    speed, damping, gradient = known.roll_speed_radps, known.roll_damping, known.roll_gradient_radpmps2
+    steps = max(1, math.ceil(duration_s / _LONGEST_STEP_S - 1e-9))
+    dt = duration_s / steps
+    for _ in range(steps):
+        pull = speed * (gradient * ay_mps2 - memory.roll_rad) - 2.0 * damping * memory.roll_rate_radps
+        memory.roll_rate_radps += dt * speed * pull
+        memory.roll_rad += dt * memory.roll_rate_radps
+    memory.rolling_mps = known.roll_arm_m * memory.roll_rate_radps
+    # A body that does not roll loads the wheels at once.
+    carried = memory.roll_rad + 2.0 * damping / speed * memory.roll_rate_radps
+    memory.loading_mps2 = carried / gradient if gradient > 0.0 else ay_mps2

@@ -1,0 +1,69 @@
+"""Loads and longitudinal forces of the wheels from what the sensors say, and the speed of the car by each; compiled.
+
+    F_z = load at rest -+ share of the longitudinal acceleration -+ share of the lateral one
+    X   = (drive - brake - J w') / R
+
+The brake follows from the pressure. Nobody says what the engine does: while no brake works, the drive is what
+accelerates the car and what its drag takes, by the shares of the driven wheels.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from activesteer.compilation import compiled
+from activesteer.estimation.records import (
+    FRICTION,
+    LATERAL_SPEED,
+    SAID_PRESSURES,
+    SAID_SPINS,
+    YAW_RATE,
+)
+
+_BRAKING_NM: Final = 100.0
+"""Brake torque of all wheels from which the engine is taken to do nothing [N m]."""
+
+
+@compiled
+def read_wheels(known, memory, said, duration_s):
+    """Loads, forces and speeds of the wheels.
+
+    Args:
+        known: Record of `KNOWN`.
+        memory: Record of `MEMORY`; what it has of the wheels, their forces and moment is changed.
+        said: What the sensors said at the filters' time.
+        duration_s: Time since this was last read [s].
+    """
+    state, along_N = memory.state, memory.along_N
+    friction, braking_Nm = state[FRICTION], 0.0
+    for wheel in range(4):
+        spin = said[SAID_SPINS + wheel]
+        brake_Nm = known.torque_per_pressure_NmpPa[wheel] * max(said[SAID_PRESSURES + wheel], 0.0)
+        spun_up_Nm = known.wheel_inertia_kgm2 * (spin - memory.last_spin_radps[wheel]) / duration_s
+        # A brake holds a wheel that stands, whatever its pressure is.
+        along_N[wheel] = -((brake_Nm if spin > 0.0 else 0.0) + spun_up_Nm) / known.rolling_radius_m[wheel]
+        braking_Nm += brake_Nm
+        memory.last_spin_radps[wheel] = spin
+    drive_N = 0.0
+    if braking_Nm < _BRAKING_NM:
+        drive_N = known.mass_kg * memory.ax_mps2 + known.drag_kgpm * memory.speed_mps**2
+    memory.moment_Nm = 0.0
+    for wheel in range(4):
+        front, side = wheel < 2, math.copysign(1.0, known.left_m[wheel])
+        angle_rad = memory.front_angle_rad if front else memory.rear_angle_rad
+        if front:
+            load_N = known.front_load_N - known.along_load_kg * memory.ax_mps2
+            load_N -= side * known.front_load_kg * memory.loading_mps2
+        else:
+            load_N = known.rear_load_N + known.along_load_kg * memory.ax_mps2
+            load_N -= side * known.rear_load_kg * memory.loading_mps2
+        memory.load_N[wheel] = load_N
+        most_N = friction * max(load_N, 0.0)
+        along_N[wheel] = min(max(along_N[wheel] + known.drive_fraction[wheel] * drive_N, -most_N), most_N)
+        memory.moment_Nm -= known.left_m[wheel] * along_N[wheel]
+        across_mps = state[LATERAL_SPEED] + known.to_axle_m[wheel] * state[YAW_RATE]
+        rolled_mps = known.rolling_radius_m[wheel] * said[SAID_SPINS + wheel]
+        memory.by_wheel_mps[wheel] = (rolled_mps - across_mps * math.sin(angle_rad)) / math.cos(angle_rad)
+        memory.by_wheel_mps[wheel] += known.left_m[wheel] * state[YAW_RATE]
+    memory.front_along_N = along_N[0] + along_N[1]
