@@ -32,7 +32,7 @@ from activesteer.estimation.wheels import read_wheels
 _SHORTEST_S: Final = 0.004
 """What is new is not taken in more often than this, and the model goes to the present in such steps [s]."""
 _USED_FRACTION: Final = 0.85
-"""Share of the acceleration, in g, that the friction is not below ..."""
+"""Fraction of the acceleration, in g, that the friction is not below ..."""
 _USED_S: Final = 0.2
 """... and the time constant with which it is smoothed: a car rocks when it stops [s]."""
 

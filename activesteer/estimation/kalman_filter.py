@@ -48,7 +48,7 @@ from activesteer.estimation.two_track_model import (
 _DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 0.01])
 """Steps of the differences, in the units of the states."""
 _MOST_BRAKED: Final = 0.5
-"""Share of the front axle's friction beyond which lateral forces say nothing of the friction."""
+"""Fraction of the front axle's friction beyond which lateral forces say nothing of the friction."""
 _CREEP_MPS: Final = 0.05
 """Standard deviation of the lateral speed of a car that hardly moves [m/s]."""
 _CREEP_DENSITY: Final = 0.05

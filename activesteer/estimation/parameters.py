@@ -59,7 +59,7 @@ class EstimatorParameters:
     wheel_std_mps: _Positive = 0.03
     """Standard deviation of the speed of a wheel's centre, as seen from the car's [m/s]: suspension, yaw rate."""
     use_std: _NotNegative = 0.1
-    """Standard deviation of the share of the friction that a wheel uses, as a share of it: brake pads."""
+    """Standard deviation of the fraction of the friction that a wheel uses, as a fraction of it: brake pads."""
     use_s: _Positive = 0.1
     """How long what is wrong with that stays so [s]."""
     radius_std: _NotNegative = 0.003

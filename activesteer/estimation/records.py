@@ -58,7 +58,7 @@ KNOWN: Final = np.dtype(
 relaxation length, steps of the tyre's grid; the body's roll and what an accelerometer feels of its pitch. What is not
 known: the members of `EstimatorParameters` with what the data sheets say. Time between two calls, the longest that the
 filters wait for something new, and the age of what the inertial sensors say; by how many calls the others are younger.
-Of each wheel its place (left positive), rolling radius, share of the drive, brake and slip stiffness per load."""
+Of each wheel its place (left positive), rolling radius, fraction of the drive, brake and slip stiffness per load."""
 
 MEMORY: Final = np.dtype(
     (
@@ -84,8 +84,8 @@ MEMORY: Final = np.dtype(
 """The estimate; how often it was made; time since the filters' last step, squared error of what was then measured over
 its expected covariance, wheels left out, smoothed use of the friction; what was new then. The filters' states and
 covariances; the state now. Inputs of the model: steer angles, longitudinal acceleration, longitudinal force of the
-front axle and moment of all, lateral acceleration that loads the wheels, lateral speed of the roll axis beside v_y; roll; of
-each wheel its longitudinal force, load, and the speed of the car that it speaks for."""
+front axle and moment of all, lateral acceleration that loads the wheels, lateral speed of the roll axis beside v_y;
+roll; of each wheel its longitudinal force, load, and the speed of the car that it speaks for."""
 
 _RATE_FLOOR_RADPS: Final = math.radians(0.02)
 _AY_FLOOR_MPS2: Final = 0.03

@@ -11,7 +11,8 @@ its centre and through its slip, which follows from the longitudinal force by th
     s   = 3 m / c (1 - (1 - u)^(1/3)),  u = |X| / (m F_z)
 
 c is the tyre's slip stiffness per load and m the friction. How far a wheel is trusted is the slope ds/du: little near
-the limit. A braked wheel that turns more slowly than that slips, and a driven one that turns faster spins: it is left out.
+the limit. A braked wheel that turns more slowly than that slips, and a driven one that turns faster spins: it is
+left out.
 
 Sources:
     Kiencke and Nielsen, Automotive Control Systems, 2nd ed. 2005, section 8.2 (speed from weighted wheels).
@@ -33,9 +34,9 @@ from activesteer.estimation.records import FRICTION
 _GATE: Final = 3.0
 """Standard deviations by which a wheel may slip more than expected before it is left out."""
 _FREE: Final = 0.02
-"""Share of the friction below which a wheel is taken to roll freely."""
+"""Fraction of the friction below which a wheel is taken to roll freely."""
 _MOST_USED: Final = 0.98
-"""Share of the friction beyond which the brush model says no slip."""
+"""Fraction of the friction beyond which the brush model says no slip."""
 _STANDING_MPS: Final = 0.5
 """Slower than this, wheels that stand still are a car that stands still [m/s]."""
 
@@ -73,7 +74,7 @@ def predict_speed(known, memory, rate_mps2, duration_s):
 
 @inlined
 def brush_slip(along_N, load_N, friction, slip_stiffness):
-    """Slip of a wheel, its derivative by the share of the friction that is used, and that share."""
+    """Slip of a wheel, its derivative by the fraction of the friction that is used, and that fraction."""
     used = abs(along_N) / (friction * max(load_N, 1.0))
     root = (1.0 - min(used, _MOST_USED)) ** (1.0 / 3.0)
     slip = 3.0 * friction / slip_stiffness * (1.0 - root)

@@ -11,8 +11,8 @@ Per axle i = f, r where there are two:
 with the steer angles d, the longitudinal forces X and their moment M_x, slip angles a that build up over the relaxation
 lengths s, the car's own tyre F_y under the wheel's load, and the friction u of the road by similarity. Beside a
 longitudinal force there is left what a circle of friction leaves. The body rolls by p as a mass on a spring: about an
-axis that lies h below the centre of gravity, so that the axles move sideways by h p' beside it; its springs and dampers load
-the wheels. The compliance c_i is what the identified cornering stiffness of the axle has beyond the tyres':
+axis that lies h below the centre of gravity, so that the axles move sideways by h p' beside it; its springs and dampers
+load the wheels. The compliance c_i is what the identified cornering stiffness of the axle has beyond the tyres':
 
     c_i = 1 / C_i - 1 / (2 C_tyre)
 
@@ -49,7 +49,7 @@ LARGEST_FRICTION: Final = 1.5
 SLOWEST_MPS: Final = 3.0
 """Slower than this, the car is taken to roll without slip angles [m/s]: the sensors cannot tell them."""
 _LEAST_LEFT: Final = 0.3
-"""Share of the lateral force that a wheel keeps whatever its longitudinal force is said to be."""
+"""Fraction of the lateral force that a wheel keeps whatever its longitudinal force is said to be."""
 _CREEP_S: Final = 0.3
 """Time in which a car that hardly moves turns as its wheels are steered [s]."""
 _LONGEST_STEP_S: Final = 0.005

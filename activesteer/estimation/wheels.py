@@ -1,10 +1,10 @@
 """Loads and longitudinal forces of the wheels from what the sensors say, and the speed of the car by each; compiled.
 
-    F_z = load at rest -+ share of the longitudinal acceleration -+ share of the lateral one
+    F_z = load at rest -+ fraction of the longitudinal acceleration -+ fraction of the lateral one
     X   = (drive - brake - J w') / R
 
 The brake follows from the pressure. Nobody says what the engine does: while no brake works, the drive is what
-accelerates the car and what its drag takes, by the shares of the driven wheels.
+accelerates the car and what its drag takes, by the fractions of the driven wheels.
 """
 
 from __future__ import annotations

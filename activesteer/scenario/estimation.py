@@ -35,8 +35,8 @@ def estimator_setup(car: Car) -> EstimatorSetup | None:
     fl, fr, rl, rr = (torque_Nm / pressure_Pa for torque_Nm in config.brakes.torques_Nm)
     air = config.aerodynamics
     return EstimatorSetup(
-        body, config.two_track, config.steering.ratio, (front, rear), config.powertrain.wheel_fractions, (fl, fr, rl, rr),
-        0.5 * air.air_density_kgpm3 * air.drag_area_m2, config.sensors,
+        body, config.two_track, config.steering.ratio, (front, rear), config.powertrain.wheel_fractions,
+        (fl, fr, rl, rr), 0.5 * air.air_density_kgpm3 * air.drag_area_m2, config.sensors,
     )  # fmt: skip
 
 
