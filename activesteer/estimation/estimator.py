@@ -39,8 +39,9 @@ class Estimator:
             timestep_s: Time between two steps [s].
         """
         self._known = known_of(setup, parameters, timestep_s)
-        self._tyres = np.array([tyre.lateral_force_N for tyre in setup.tyres])
+        self._tyres = np.array([tyre.force_N for tyre in setup.tyres])
         self._memory, self._said = np.zeros(1, MEMORY), np.zeros(len(SAID))
+        self._row = self._said.data
         self._estimate = self._memory["estimate"][0]
         # As many calls as what the inertial sensors say is old, and this one.
         self._line = np.zeros((round(float(self._known["age_s"][0]) / timestep_s) + 2, len(SAID)))
@@ -57,7 +58,7 @@ class Estimator:
             measurement: What the car's sensors say.
         """
         _, _, yaw_rate, ay, ax, steering_wheel, rear, superposition, spins, pressures = measurement
-        _pack_into(self._said, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
+        _pack_into(self._row, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
         advance(self._known, self._tyres, self._memory, self._said, self._line)
         return tuple.__new__(Estimate, self._estimate.tolist())
 
@@ -65,5 +66,5 @@ class Estimator:
         other = object.__new__(Estimator)
         other._known, other._tyres = self._known, self._tyres
         other._memory, other._said, other._line = self._memory.copy(), self._said.copy(), self._line.copy()
-        other._estimate = other._memory["estimate"][0]
+        other._row, other._estimate = other._said.data, other._memory["estimate"][0]
         return other

@@ -198,7 +198,7 @@ def _wheels(setup: EstimatorSetup) -> dict[str, Any]:
         "half_track_m": half_m,
         "to_axle_m": of(body.cg_to_front_m, -body.cg_to_rear_m),
         "left_m": half_m * (1.0, -1.0, 1.0, -1.0),
-        "rolling_radius_m": of(front.rolling_radius_m, rear.rolling_radius_m),
+        "rolling_radius_m": setup.rolling_radius_m,
         "drive_fraction": setup.drive_fractions,
         "torque_per_pressure_NmpPa": setup.brake_torque_per_pressure_NmpPa,
         "slip_stiffness": of(front.slip_stiffness, rear.slip_stiffness),

@@ -18,7 +18,7 @@ class KnownTyre:
     Attributes:
         slip_angle_step_rad: Distance of the slip angles of the grid, from 0 [rad].
         load_step_N: Distance of its loads, from 0 [N].
-        lateral_force_N: Size of the lateral force, mean of both directions, for each load at each slip angle [N].
+        force_N: Size of the lateral force, mean of both directions, for each load at each slip angle [N].
         relaxation_length_m: Relaxation length of the slip angle under the load of standing still [m].
         slip_stiffness: Longitudinal force per slip and load, likewise.
         rolling_radius_m: Effective rolling radius, likewise [m].
@@ -26,15 +26,15 @@ class KnownTyre:
 
     slip_angle_step_rad: float
     load_step_N: float
-    lateral_force_N: tuple[tuple[float, ...], ...]
+    force_N: tuple[tuple[float, ...], ...]
     relaxation_length_m: float
     slip_stiffness: float
     rolling_radius_m: float
 
     def stiffness_at(self, load_N: float) -> float:
         """Cornering stiffness [N/rad] under a load [N]."""
-        loads_N = self.load_step_N * np.arange(len(self.lateral_force_N))
-        return float(np.interp(load_N, loads_N, np.array(self.lateral_force_N)[:, 1])) / self.slip_angle_step_rad
+        loads_N = self.load_step_N * np.arange(len(self.force_N))
+        return float(np.interp(load_N, loads_N, np.array(self.force_N)[:, 1])) / self.slip_angle_step_rad
 
 
 @dataclass(frozen=True)
@@ -60,3 +60,9 @@ class EstimatorSetup:
     brake_torque_per_pressure_NmpPa: tuple[float, float, float, float]
     drag_per_speed2_kgpm: float
     sensors: Sensors
+
+    @property
+    def rolling_radius_m(self) -> tuple[float, float, float, float]:
+        """Rolling radius of each wheel [m], order of `CORNERS`."""
+        front, rear = self.tyres
+        return front.rolling_radius_m, front.rolling_radius_m, rear.rolling_radius_m, rear.rolling_radius_m
