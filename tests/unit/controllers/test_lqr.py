@@ -99,7 +99,8 @@ def test_angles_end_at_their_limits_and_say_so(known):
 def test_desired_yaw_rate_is_the_cars_own_up_to_what_the_friction_gives(known):
     speed_mps, gain = 25.0, SingleTrack(known.single_track).yaw_rate_gain(25.0)
     small = held(load_controller("lqr", known), steering(0.01), measured(0.01 * gain, speed_mps))
-    assert small.yaw_rate_desired_radps == pytest.approx(0.01 * gain, rel=1e-6)
+    # The speed is the estimated one.
+    assert small.yaw_rate_desired_radps == pytest.approx(0.01 * gain, rel=1e-3)
     large = held(load_controller("lqr", known), steering(0.2), measured(0.2, speed_mps), 300)
     most = known.gains.lqr.friction_fraction * GRAVITY_MPS2 / speed_mps
     assert 0.3 * most < large.yaw_rate_desired_radps < 1.2 * most
