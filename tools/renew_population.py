@@ -23,6 +23,8 @@ from activesteer.studies.population import STUDY, population
 from activesteer.studies.population_store import store_population
 
 PAGE: Final = Path(__file__).resolve().parent.parent / "docs" / "population.md"
+PRODUCTION: Final = "sensors.preset = production"
+"""The share of the samples behind sensors of production cars."""
 _HEAD: Final = """# The population
 
 `activesteer reproduce --population {samples} --seed {seed}` drives {samples} variations of the {vehicle}, its road, its
@@ -42,12 +44,13 @@ A Sobol' sequence over the ranges below, the same for the three systems. Control
 ## In which share each claim holds
 
 *Holds* is said where the 95 % interval (Wilson) lies above 80 %, *does not hold* where it lies below 20 %, and else
-*depends*. The last column is the factor that explains most of the verdict by regression on every factor and its square,
-and how much of its variance; it is empty where none explains more than chance would. A claim without the driver is one
-about the open-loop manoeuvres, where the steering wheel follows a table.
+*depends*. Half of the samples have ideal sensors, half those of a production car; the share among the latter stands
+behind the verdict. The last column is the factor that explains most of the verdict by regression on every factor and
+its square, and how much of its variance; it is empty where none explains more than chance would. A claim without the
+driver is one about the open-loop manoeuvres, where the steering wheel follows a table.
 
-| | what is claimed | driver | nominal | holds in | 95 % interval | verdict | more often |
-|---|---|---|---|---|---|---|---|
+| | what is claimed | driver | nominal | holds in | 95 % interval | verdict | with production sensors | more often |
+|---|---|---|---|---|---|---|---|---|
 """
 _SYSTEMS: Final = """
 ## What each system does
@@ -76,6 +79,7 @@ def _claims(found: Population) -> list[str]:
         f"| {claim.id} | {STATEMENTS[claim.id].text} | {'yes' if STATEMENTS[claim.id].kind is Kind.DRIVER else ''} | "
         f"{'passes' if claim.passed else 'fails'} | {percent(claim.share)} % | {percent(claim.low)} to "
         f"{percent(claim.high)} % | **{claim.verdict.value}** | "
+        f"{f'{percent(claim.at[PRODUCTION])} %' if PRODUCTION in claim.at else ''} | "
         f"{f'{claim.words}, {percent(claim.explained)} %' if claim.words else ''} |"
         for claim in found.claims
     ]

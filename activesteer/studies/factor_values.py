@@ -37,7 +37,7 @@ class FactorValues:
             study: The study.
 
         Raises:
-            StudyError: a factor is for a manoeuvre that the study does not have.
+            StudyError: a factor is for a manoeuvre, or for a value of another factor, that the study does not have.
         """
         self.study = study
         self._factors = {factor.key: factor for factor in study.factors}
@@ -48,6 +48,14 @@ class FactorValues:
                 if name not in labels:
                     place = ("factors", factor.key, "maneuvers")
                     raise study.source.fail(place, nearest_names(name, labels), name)
+            for other, value in factor.when.items():
+                place = ("factors", factor.key, "when", other)
+                if other not in self._factors:
+                    raise study.source.fail(
+                        place, f"is no other factor; {nearest_names(other, list(self._factors))}", other
+                    )
+                if value not in self._factors[other].values:
+                    raise study.source.fail(place, f"{shown(value)} is no value of that factor", value)
 
     def overrides(self, maneuver: int, vehicle: int, values: Mapping[str, Any]) -> dict[str, Any]:
         """The overrides of a run.
@@ -68,6 +76,8 @@ class FactorValues:
         for key, value in values.items():
             factor = self._factors.get(key)
             if value is None or (factor is not None and factor.maneuvers and label not in factor.maneuvers):
+                continue
+            if factor is not None and any(values.get(other) != needed for other, needed in factor.when.items()):
                 continue
             if factor is not None and factor.nominal:
                 nominal = self._nominal_of(maneuver, vehicle)[key]

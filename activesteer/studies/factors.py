@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -17,7 +17,7 @@ from activesteer.errors import nearest_names, shown
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
 """The one of these keys that a factor's table must have."""
 _OPTIONS: Final = {"choice": ("weights",), "normal": ("truncate",)}
-_ANYWHERE: Final = ("nominal", "maneuvers")
+_ANYWHERE: Final = ("nominal", "maneuvers", "when")
 """Keys that may stand beside any of them."""
 NOMINAL: Final = ("times", "plus")
 """How a factor may be relative to what the files say."""
@@ -43,6 +43,7 @@ class Factor:
         deviation: Standard deviation of that.
         nominal: One of `NOMINAL` where the values are factors on what the files say, or are added to it; else empty.
         maneuvers: Names of the manoeuvres in which it is varied; all where empty.
+        when: Values of other factors with which it is varied; all where empty.
     """
 
     key: str
@@ -55,6 +56,7 @@ class Factor:
     deviation: float = 0.0
     nominal: str = ""
     maneuvers: tuple[str, ...] = ()
+    when: Mapping[str, Value] = field(default_factory=dict)
 
     def from_unit(self, unit: NDArray[np.float64]) -> list[Value]:
         """Values at cumulative probabilities: what turns a sample of the unit cube into one of the study.
@@ -95,6 +97,8 @@ class Factor:
             table["nominal"] = self.nominal
         if self.maneuvers:
             table["maneuvers"] = list(self.maneuvers)
+        if self.when:
+            table["when"] = dict(self.when)
         return table
 
 
@@ -107,7 +111,8 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
             `{ log_uniform = [low, high] }` or `{ normal = [mean, deviation], truncate = [low, high] }`; a normal
             distribution is cut off at three standard deviations where no bounds are given. With `nominal = "times"`
             the values are factors on what the files say, with `nominal = "plus"` they are added to it; with
-            `maneuvers = ["slalom"]` the key is varied in these only.
+            `maneuvers = ["slalom"]` the key is varied in these only, and with
+            `when = { "sensors.preset" = "production" }` where another factor has that value.
         source: For error messages.
 
     Returns:
@@ -137,7 +142,11 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
     maneuvers = table.get("maneuvers", [])
     if not isinstance(maneuvers, Sequence) or isinstance(maneuvers, str) or ("maneuvers" in table and not maneuvers):
         raise source.fail((*where, "maneuvers"), f"{shown(maneuvers)} is no list of names", maneuvers)
-    return replace(_read(key, kind, table, source), nominal=nominal, maneuvers=tuple(map(str, maneuvers)))
+    when = table.get("when", {})
+    if not isinstance(when, Mapping) or ("when" in table and not when):
+        raise source.fail((*where, "when"), f"{shown(when)} is no table of other factors and their values", when)
+    names = tuple(map(str, maneuvers))
+    return replace(_read(key, kind, table, source), nominal=nominal, maneuvers=names, when=dict(when))
 
 
 def _read(key: str, kind: str, table: Mapping[str, Any], source: Source) -> Factor:

@@ -154,7 +154,9 @@ def _described(
     factor_values: FactorValues, place: tuple[int, int], samples: Samples, key: str, values: Sequence[Any]
 ) -> list[dict[str, Any]]:
     """What a run depends on at each value of a key, the others being as in the first sample where that is possible."""
-    first, cases = samples[0], factor_values.study.case_list
+    study = factor_values.study
+    needed = next((factor.when for factor in study.factors if factor.key == key), {})
+    first, cases = {**samples[0], **needed}, study.case_list
     whole = []
     if cases is not None:
         rows = [cases[cases.columns[key].index(value)] for value in values]

@@ -121,15 +121,31 @@ def _share(name: str, passed: bool, rows: Sequence[Mapping[str, Any]], factors: 
     judged = [row for row in rows if row.get(column) is not None]
     held = [row[column] == 1.0 for row in judged]
     low, high = wilson_interval(sum(held), len(held))
-    varied = {
-        factor.key: [row[factor.key] for row in judged]
+    varied = [
+        factor
         for factor in factors
-        if judged and (not factor.maneuvers or judged[0]["maneuver"] in factor.maneuvers)
+        if judged and not factor.when and (not factor.maneuvers or judged[0]["maneuver"] in factor.maneuvers)
+    ]
+    at = {
+        f"{factor.key} = {value}": _fraction(
+            [one for row, one in zip(judged, held, strict=True) if row[factor.key] == value]
+        )
+        for factor in varied
+        for value in factor.values
     }
-    share = sum(held) / len(held) if held else float("nan")
-    found = strongest(varied, held)
+    # A choice of two counts as 0 and 1.
+    found = strongest({factor.key: _numbers(factor, judged) for factor in varied}, held)
     depends = (NONE, 0.0, 0) if found is None else found
-    return ClaimShare(name, passed, len(held), share, low, high, *depends)
+    return ClaimShare(name, passed, len(held), _fraction(held), low, high, *depends, at)
+
+
+def _numbers(factor: Factor, rows: Sequence[Mapping[str, Any]]) -> list[float]:
+    values = [row[factor.key] for row in rows]
+    return [factor.values.index(value) for value in values] if factor.values else values
+
+
+def _fraction(held: Sequence[bool]) -> float:
+    return sum(held) / len(held) if held else float("nan")
 
 
 def _effects(rows: Sequence[Mapping[str, Any]]) -> list[SystemEffect]:

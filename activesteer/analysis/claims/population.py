@@ -10,7 +10,7 @@ import functools
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 from activesteer.errors import StudyError
@@ -37,6 +37,7 @@ class ClaimShare:
         depends_on: Key of the factor that it depends on most; `none` where no factor is significant.
         explained: Share of the variance that this factor explains.
         direction: 1 where the claim holds more often with more of it, -1 with less, 0 in the middle or at the ends.
+        at: Factor and value, as `sensors.preset = ideal` -> share of the samples with it, of factors that are a choice.
     """
 
     id: str
@@ -48,6 +49,7 @@ class ClaimShare:
     depends_on: str = NONE
     explained: float = 0.0
     direction: int = 0
+    at: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def verdict(self) -> ShareVerdict:
@@ -63,6 +65,9 @@ class ClaimShare:
         """The factor in words; empty where there is none."""
         if self.depends_on == NONE:
             return ""
+        choices = {name: share for name, share in self.at.items() if name.startswith(f"{self.depends_on} = ")}
+        if choices:
+            return f"with {max(choices, key=lambda name: choices[name])}"
         return f"{('in the middle or at the ends of', 'with more', 'with less')[self.direction]} {self.depends_on}"
 
 

@@ -37,6 +37,19 @@ def test_a_relative_factor_starts_from_each_manoeuvre() -> None:
     assert values.overrides(1, 0, sample) == {"speed_kmh": pytest.approx(66.0), "road.mu": pytest.approx(0.6)}
 
 
+def test_a_factor_of_a_value_of_another_leaves_all_other_samples_alone() -> None:
+    sensors = {
+        "sensors.preset": {"choice": ["ideal", "production"]},
+        "sensors.seed": {"choice": [1, 2], "when": {"sensors.preset": "production"}},
+    }
+    studied = read_study(table(**sensors))
+    values = FactorValues(studied)
+    assert values.overrides(0, 0, {"sensors.preset": "ideal", "sensors.seed": 2}) == {"sensors.preset": "ideal"}
+    production = {"sensors.preset": "production", "sensors.seed": 2}
+    assert values.overrides(0, 0, production) == production
+    assert len(Plan(read_study(studied.to_table()))) == 8  # also where the first sample has ideal sensors
+
+
 def test_runs_are_driven_with_the_values_and_rows_keep_the_sample() -> None:
     rows = study(
         table(speed_kmh={"uniform": [0.9, 1.1], "nominal": "times"}) | {"curves": ["speed_mps"]}, jobs=1
@@ -69,6 +82,15 @@ def test_what_a_scenario_says_behind_a_key() -> None:
             None,
         ),
         ({"road.mu": {"uniform": [0.8, 1.0], "nominal": "times", "maneuvers": []}}, "road.mu.maneuvers", []),
+        ({"road.mu": {"uniform": [0.8, 1.0], "when": {"speed_kmh": 80}}}, "road.mu.when.speed_kmh", "speed_kmh"),
+        (
+            {
+                "road.mu": {"uniform": [0.8, 1.0], "when": {"sensors.preset": "best"}},
+                "sensors.preset": {"choice": ["ideal", "production"]},
+            },
+            "road.mu.when.sensors.preset",
+            "best",
+        ),
     ],
 )
 def test_what_cannot_be_is_told_before_anything_runs(factors: dict[str, object], key: str, value: object) -> None:

@@ -94,6 +94,7 @@ def made_up(planned: StudyFile, outcomes: dict[str, list[tuple[float | None, flo
                 "run": len(rows), "sample": sample, "maneuver": "slalom", "vehicle": "compact", "controller": system,
                 **samples[sample], "sideslip_peak_abs_rad": peak_rad, CONES_MISSED: missed,
                 "claim_Z1": 1.0 if samples[sample]["speed_kmh"] > 1.0 else 0.0, "claim_Z2": 1.0,
+                "claim_Z3": 1.0 if samples[sample]["sensors.preset"] == "ideal" else 0.0,
             })  # fmt: skip
     return pa.Table.from_pylist(rows)
 
@@ -128,6 +129,15 @@ def test_the_factor_that_decides_is_named() -> None:
     assert (speed.depends_on, speed.direction, speed.verdict) == ("speed_kmh", 1, ShareVerdict.DEPENDS)
     assert (always.depends_on, always.verdict) == (NONE, ShareVerdict.HOLDS)
     assert speed.words == "with more speed_kmh"
+
+
+def test_a_choice_that_decides_is_named_with_its_value_and_shares() -> None:
+    planned = population_study(128)
+    table = made_up(planned, dict.fromkeys(("none", "ars", "afs"), [(0.1, 0.0)] * 128))
+    [ideal] = summarise(table, planned, nominal(Z3=True)).claims
+    assert ideal.share == 0.5
+    assert ideal.at == {"sensors.preset = ideal": 1.0, "sensors.preset = production": 0.0}
+    assert ideal.words == "with sensors.preset = ideal"
 
 
 def test_what_is_stored_is_what_was_found(serial: Path) -> None:
