@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from activesteer.commands.arguments import (
@@ -20,6 +21,12 @@ def add_to(commands: Any) -> None:
     add_vehicle(parser)
     add_overrides(parser)
     add_figures_folder(parser)
+    parser.add_argument(
+        "--tables",
+        type=Path,
+        metavar="DIR",
+        help="write all curves as CSV, and the car's own table: what vehicle new --kc reads",
+    )
     add_json(parser)
     parser.set_defaults(action=_kc)
 
@@ -29,6 +36,18 @@ def _kc(options: argparse.Namespace) -> int:
 
     result = kinematics_compliance(options.vehicle, overrides_of(options))
     print(result.to_json() if options.json else result.table())
+    if options.tables is not None:
+        from activesteer.errors import ParameterError
+        from activesteer.files import write_text
+        from activesteer.rigs.kc.tables import write_tables
+        from activesteer.scenario import load_car
+        from activesteer.vehicle_builder.car_table import car_table
+
+        written = write_tables(result, options.tables)
+        text = car_table(load_car(options.vehicle, overrides_of(options)), result)
+        written.append(write_text(options.tables / "car.toml", text, ParameterError))
+        if not options.json:
+            print(f"tables: {len(written)} files in {options.tables}")
     if options.output is not None:
         from activesteer.rigs.kc import draw
 

@@ -16,10 +16,18 @@ def add_to(commands: Any) -> None:
 
     new = actions.add_parser("new", help="make a car from a table of hardpoints, masses, springs and bushings")
     new.add_argument("name", metavar="NAME", help="name of the car")
-    new.add_argument("--table", required=True, type=Path, metavar="FILE", help=".toml or .csv; see docs/own_car.md")
+    new.add_argument(
+        "--table",
+        type=Path,
+        metavar="FILE",
+        help=".toml or .csv; see docs/own_car.md (default with --kc: its car.toml)",
+    )
+    new.add_argument("--kc", type=Path, metavar="DIR", help="measurements of a K&C rig, for axles of the kind curves")
     add_output(new, "DIR", "folder for its files (default: vehicles/NAME)")
-    new.add_argument("--front", metavar="KIND", help="mcpherson, double_wishbone; default: what the table says")
-    new.add_argument("--rear", metavar="KIND", help="five_link, multilink, double_wishbone; default: the table's")
+    new.add_argument("--front", metavar="KIND", help="mcpherson, double_wishbone, curves; default: what the table says")
+    new.add_argument(
+        "--rear", metavar="KIND", help="five_link, multilink, double_wishbone, curves; default: the table's"
+    )
     new.add_argument("--overwrite", action="store_true", help="replace the files of an earlier car in that folder")
     add_json(new)
     new.set_defaults(action=_new)
@@ -43,12 +51,19 @@ def _new(options: argparse.Namespace) -> int:
     from activesteer.vehicle_builder import new_vehicle
 
     made = new_vehicle(
-        options.name, options.table, options.output, options.front, options.rear, overwrite=options.overwrite
+        options.name,
+        options.table,
+        options.output,
+        options.front,
+        options.rear,
+        kc=options.kc,
+        overwrite=options.overwrite,
     )
     if options.json:
         print_json({
             "folder": str(made.folder),
             "vehicle_file": str(made.vehicle_file),
+            "questions": list(made.questions),
             "assumptions": [
                 {"key": item.key, "value": item.value, "rule": item.rule} for item in made.assumptions
             ],
@@ -61,6 +76,8 @@ def _new(options: argparse.Namespace) -> int:
         print(f"  {axle} springs {1e-3 * part.spring_rate_Npm:.1f} N/mm, {part.spring_force_N:.0f} N as it stands")
     print(f"  steering ratio {found.ratio:.2f}, chassis {found.chassis.mass_kg:.0f} kg")
     print(f"  {len(made.assumptions)} values were not given and assumed by a rule: {made.folder / 'README.md'}")
+    for line in made.questions:
+        print(f"  unusual: {line}")
     print(f"next: activesteer vehicle check {made.vehicle_file}")
     return 0
 

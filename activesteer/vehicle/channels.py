@@ -16,6 +16,7 @@ from activesteer.sensors.block import MEASURED
 from activesteer.signals import Channel
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.command_row import COMMAND_CHANNELS
+from activesteer.vehicle.guide_model import GUIDE
 from activesteer.vehicle.named_parts import find
 from activesteer.vehicle.native_channels import (
     Actuator,
@@ -304,6 +305,9 @@ class ChannelMap:
         signals = []
         for index in range(model.ntendon):
             if model.tendon_stiffness[index] == 0.0 and not model.tendon_stiffnesspoly[index].any():
+                continue
+            if model.tendon(index).name.endswith(GUIDE):
+                # Five springs that stand for all links of a wheel; none of them is a part of the car.
                 continue
             # What a damper's tendon has of a spring are the stops at both ends of its travel.
             name = model.tendon(index).name.replace("_damper", "_stop")

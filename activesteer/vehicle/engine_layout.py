@@ -38,6 +38,7 @@ _DATA_ARRAYS: Final = (
     "qfrc_passive",
     "ten_length",
     "sensordata",
+    "qpos",
 )
 
 
@@ -61,6 +62,7 @@ class EngineLayout(NamedTuple):
     d_qfrc_passive: int
     d_ten_length: int
     d_sensordata: int
+    d_qpos: int
     d_time: int
 
 

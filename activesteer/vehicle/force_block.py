@@ -26,8 +26,9 @@ TRAILER_SIZE: Final = 2
     CHASSIS_BODY, CHASSIS_ROOT, CHASSIS_N_DOFS, DRAG_Ns2pm2, AERO_X_m, AERO_Y_m, AERO_Z_m,
     WHEELS_START, DAMPERS_START, ACTUATORS_START, N_AREAS, AREAS_START, AREAS_FELT,
     ENGINE_TORQUE_Nm, ENGINE_POWER_W, ENGINE_LIMIT_radps, ENGINE_DRAG_Nm, GEAR, CHASSIS_DOFS, SCREWS_START,
-    SCREW_SENSORS, N_SCREW_SENSORS, HEADER_SIZE,
-) = range(32)  # fmt: skip
+    SCREW_SENSORS, N_SCREW_SENSORS, N_GUIDES, GUIDES_START, N_COORDINATES,
+    HEADER_SIZE,
+) = range(35)  # fmt: skip
 
 MAX_CHAIN: Final = 32
 """Most degrees of freedom between the world and a wheel."""
@@ -77,6 +78,21 @@ LINK_SIZE: Final = L_ANGLE + POWERS
     S_COLUMN_REST_m, S_COLUMN_ARM_m, S_TRAVEL,
 ) = range(26)  # fmt: skip
 SCREW_SIZE: Final = S_TRAVEL + POWERS
+
+# One record per wheel that curves guide (`native_guide`): addresses, sign of its side, where the tables of its curves
+# begin, counted from the first record; stiffness and damping, row by row, what hardens beside them, slopes of the
+# curves in the design position. Behind the records ...
+(
+    G_QPOS, G_DOF, G_SIDE, G_RACK, G_RACK_DOF, G_TRAVEL_TABLE, G_RACK_TABLE, G_STIFFNESS,
+) = range(8)  # fmt: skip
+G_DAMPING: Final = G_STIFFNESS + 25
+G_SQUARE: Final = G_DAMPING + 25
+G_HARDENING: Final = G_SQUARE + 2
+G_TRAVEL_SLOPE: Final = G_HARDENING + 10
+G_RACK_SLOPE: Final = G_TRAVEL_SLOPE + 5
+GUIDE_SIZE: Final = G_RACK_SLOPE + 5
+# ... stand the tables: the curves as cubics on even intervals.
+T_START, T_PER_m, T_INTERVALS, T_COUNT, T_CURVES = range(5)
 
 # What the callback writes into mjData.userdata: one record per wheel, then the force of each damper, then what the
 # sensors of screws say (L_OUT, S_OUT). Behind that stands what it does not write: how many faults act.
@@ -134,6 +150,8 @@ class ForceBlock:
         areas: Areas of the road, as in their records; the later one counts where they overlap.
         screws: Records of screws, one behind the other.
         screw_sensors: Where in `sensordata` their sensors begin, and how many numbers these have.
+        guides: Records and tables of wheels that curves guide.
+        n_guides: How many wheels these are.
     """
 
     model: mujoco.MjModel
@@ -148,6 +166,8 @@ class ForceBlock:
     areas: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     screws: list[float] = field(default_factory=list)
     screw_sensors: tuple[int, int] = (0, 0)
+    guides: list[float] = field(default_factory=list)
+    n_guides: int = 0
 
     def wheel_start(self, index: int) -> int:
         """Where the record of a wheel begins, counted from the start of the block."""
@@ -160,7 +180,8 @@ class ForceBlock:
         actuators_start = dampers_start + len(self.dampers) * DAMPER_SIZE
         areas_start = actuators_start + len(self.actuators) * ACTUATOR_SIZE
         screws_start = areas_start + len(self.areas) * AREA_SIZE
-        tyres_start = screws_start + len(self.screws)
+        guides_start = screws_start + len(self.screws)
+        tyres_start = guides_start + len(self.guides)
         tyres = [np.atleast_1d(wheel.tyre).view(np.float64) for wheel in self.wheels]
         block = np.zeros(tyres_start + sum(tyre.size for tyre in tyres))
         model = self.model
@@ -170,7 +191,14 @@ class ForceBlock:
             len(self.chassis_chain), self.drag_Ns2pm2, *self.aero_point_m, wheels_start, dampers_start, actuators_start,
             len(self.areas), areas_start, 0.0, *self.engine,
         )  # fmt: skip
-        block[CHASSIS_DOFS:HEADER_SIZE] = HEADER_SIZE, screws_start, *self.screw_sensors
+        block[CHASSIS_DOFS:HEADER_SIZE] = (
+            HEADER_SIZE,
+            screws_start,
+            *self.screw_sensors,
+            self.n_guides,
+            guides_start,
+            model.nq,
+        )
         block[HEADER_SIZE : HEADER_SIZE + len(self.chassis_chain)] = self.chassis_chain
         tyre_start = tyres_start
         for index, wheel in enumerate(self.wheels):
@@ -196,7 +224,8 @@ class ForceBlock:
             block[actuators_start:areas_start] = np.asarray(records, float).ravel()
         if self.areas:
             block[areas_start:screws_start] = np.asarray(self.areas, float).ravel()
-        block[screws_start:tyres_start] = self.screws
+        block[screws_start:guides_start] = self.screws
+        block[guides_start:tyres_start] = self.guides
         return block
 
 

@@ -17,6 +17,7 @@ from activesteer.errors import ModelError
 from activesteer.road.road import Road
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.guide_model import fit_guides, guide_records
 from activesteer.vehicle.load import apply_load
 from activesteer.vehicle.named_parts import find
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, DamperCurve, VehicleParameters
@@ -89,6 +90,7 @@ def _compile(
             fit_screws(spec, parameters.rear_actuator.resolved())
         if parameters.superposition_actuator.is_geared:
             fit_motor(spec)
+        fit_guides(spec, parameters.curves)
         _fit_actuators(spec, parameters)
         apply_load(spec, parameters)
         block = _force_block(spec.compile(), parameters, tyres, road).to_array()
@@ -177,6 +179,8 @@ def _force_block(
         places |= {NAME: (fb.KIND_SCREW, int(start)), NAME + MOTOR: (fb.KIND_MOTOR, int(start))}
         block.screws.extend(motor_record(model, parameters.superposition_actuator.resolved()))
     block.screw_sensors = sensor_range(model)
+    block.guides = guide_records(model, parameters.curves)
+    block.n_guides = sum(parameters.curves.axle(corner) is not None for corner in CORNERS)
     for index in range(model.nu):
         if (place := places.get(model.actuator(index).name)) is None:
             block.actuators.append(_actuator(model, index, parameters))

@@ -1,4 +1,4 @@
-"""The native callbacks: tyres, dampers and drag as passive forces, and the dynamics of our actuators.
+"""The native callbacks: tyres, dampers, drag and axles of curves as passive forces, and the dynamics of our actuators.
 
 Compiled once by numba, cached on disk, called by the engine without any Python. They are pure functions of the state:
 what they leave in `userdata` is scratch for the recorder, written anew at every evaluation. Models without our block
@@ -23,6 +23,7 @@ from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.dry_friction import friction_rate
 from activesteer.vehicle.engine_layout import EngineLayout, engine_layout
+from activesteer.vehicle.native_guide import guides
 from activesteer.vehicle.native_memory import array_at, f64_pointer, pointer_to, word
 from activesteer.vehicle.powertrain import CLUTCH_OPEN, drive_limits
 
@@ -345,7 +346,7 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:
     """
     (
         m_count, m_timestep, m_numbers, d_qvel, d_act, d_ctrl, d_userdata, d_xpos, d_xmat, d_com, d_cdof, d_ten_j,
-        d_ten_velocity, d_cvel, d_qfrc, d_ten_length, d_sensordata, _,
+        d_ten_velocity, d_cvel, d_qfrc, d_ten_length, d_sensordata, d_qpos, _,
     ) = layout  # fmt: skip
 
     @compiled_callback(types.void, types.intp, types.intp)
@@ -365,10 +366,12 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:
         userdata = array_at(data, d_userdata, int(block[fb.N_USERDATA]))
         qfrc = array_at(data, d_qfrc, dofs)
         _wheels(block, timestep_s, xpos, xmat, com, cvel, cdof, act, userdata, qfrc)
-        ten_velocity = array_at(data, d_ten_velocity, int(block[fb.N_TENDONS]))
         jacobian = array_at(data, d_ten_j, int(block[fb.N_TENDON_JACOBIAN]))
-        _dampers(block, ten_velocity, jacobian, userdata, qfrc)
+        _dampers(block, array_at(data, d_ten_velocity, int(block[fb.N_TENDONS])), jacobian, userdata, qfrc)
         _drag(block, xpos, xmat, com, cvel, cdof, qfrc)
+        guides(
+            block, array_at(data, d_qpos, int(block[fb.N_COORDINATES])), array_at(data, d_qvel, dofs), qfrc
+        )  # fmt: skip
 
     @compiled_callback(types.double, types.intp, types.intp, types.intc)
     def actuator_rate(model, data, actuator):

@@ -12,6 +12,7 @@ from activesteer.errors import ParameterError
 from activesteer.sensors.parameters import Sensors
 from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle.axle_curves import Curves
 from activesteer.vehicle.force_block import MAX_CURVE_POINTS
 from activesteer.vehicle.rear_actuator import RearActuator
 from activesteer.vehicle.superposition_actuator import SuperpositionActuator
@@ -268,6 +269,8 @@ class VehicleParameters:
     """The model's servo where not given."""
     friction: Friction = Friction()
     """None where not given."""
+    curves: Curves = Curves()
+    """Axles that curves guide instead of links; none where not given."""
     sensors: Sensors = Sensors()
     """Ideal where not given."""
     load: Load = Load()

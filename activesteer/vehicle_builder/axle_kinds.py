@@ -36,8 +36,8 @@ class AxleKind:
         axles: Where it can be used, `front` or `rear`.
         links: Its links.
         points: Points that are needed beside the ends of the links.
-        carriers: What can carry a spring or damper: `strut`, `knuckle`, or an arm (name -> its inner points) that is a
-            link or the two links of an arm.
+        carriers: What can carry a spring or damper: `strut`, `knuckle`, the `travel` of the wheel itself, or an arm
+            (name -> its inner points) that is a link or the two links of an arm.
         spring_on: Which of these does where the table does not say.
     """
 
@@ -52,6 +52,11 @@ class AxleKind:
     def strut(self) -> bool:
         """Whether the knuckle slides on a strut."""
         return self.spring_on == "strut"
+
+    @property
+    def guided(self) -> bool:
+        """Whether curves guide the wheel."""
+        return self.spring_on == "travel"
 
     @property
     def needed(self) -> tuple[str, ...]:
@@ -144,7 +149,10 @@ MULTILINK: Final = AxleKind(
     "knuckle",
 )
 
-KINDS: Final = (MCPHERSON, DOUBLE_WISHBONE, DOUBLE_WISHBONE_REAR, FIVE_LINK, MULTILINK)
+CURVES: Final = AxleKind("curves", ("front", "rear"), (), ("wheel_centre",), {"travel": ()}, "travel")
+"""Not links but what a K&C rig has measured guides the wheel; springs and dampers act along its travel."""
+
+KINDS: Final = (MCPHERSON, DOUBLE_WISHBONE, DOUBLE_WISHBONE_REAR, FIVE_LINK, MULTILINK, CURVES)
 DEFAULTS: Final = {"front": "mcpherson", "rear": "five_link"}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import re
 import shutil
@@ -16,8 +17,10 @@ from activesteer.files import is_file, user_path, writing
 from activesteer.resources import models_dir
 from activesteer.tyre.file.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle_builder.axle_kinds import AxleKind
 from activesteer.vehicle_builder.completion import DEFAULT_TYRE, check_origin, complete
 from activesteer.vehicle_builder.design import Assumption, Car, Log
+from activesteer.vehicle_builder.kc_tables import KcTables, read_kc
 from activesteer.vehicle_builder.keyframe import keyframe_xml
 from activesteer.vehicle_builder.mjcf import mjcf_files
 from activesteer.vehicle_builder.readme import readme_text
@@ -37,31 +40,35 @@ class NewVehicle:
         vehicle_file: What `--vehicle` takes.
         assumptions: The values that the table does not give.
         trimmed: What was found by letting it stand.
+        questions: What is unusual in measurements that it was made of.
     """
 
     folder: Path
     vehicle_file: Path
     assumptions: tuple[Assumption, ...]
     trimmed: Trimmed
+    questions: tuple[str, ...] = ()
 
 
 def new_vehicle(
     name: str,
-    table: str | os.PathLike[str],
+    table: str | os.PathLike[str] | None = None,
     folder: str | os.PathLike[str] | None = None,
     front: str | None = None,
     rear: str | None = None,
     *,
+    kc: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
 ) -> NewVehicle:
-    """Makes a car from a table of hardpoints, masses, springs and bushings.
+    """Makes a car from a table of hardpoints, masses, springs and bushings, or of what a K&C rig has measured.
 
     Args:
         name: Name of the car: letters, digits, `_` and `-`.
-        table: The table, .toml or .csv.
+        table: The table, .toml or .csv; `car.toml` in the folder of measurements where not given.
         folder: Where its files go; `vehicles/NAME` in the current folder where not given.
         front: Kind of the front suspension; what the table says where not given.
         rear: Kind of the rear suspension.
+        kc: Folder with the measurements of axles whose kind is `curves`.
         overwrite: Replace files of an earlier car in that folder.
 
     Returns:
@@ -85,7 +92,10 @@ def new_vehicle(
         raise ParameterError(
             f"{name!r} cannot be the name of a car: a letter first, then letters, digits, _ and -", value=name
         )
-    target, table_path = Path(folder) if folder is not None else Path("vehicles") / name, Path(table)
+    if table is None and kc is None:
+        raise ParameterError("a table of the car or a folder of K&C measurements is needed (--table, --kc)")
+    target = Path(folder) if folder is not None else Path("vehicles") / name
+    table_path = Path(table) if table is not None else Path(kc or "") / "car.toml"
     if target.exists() and (not target.is_dir() or any(target.iterdir())) and not overwrite:
         raise ParameterError(
             f"{target} is not empty; give another folder with -o, or --overwrite to replace its files", value=target
@@ -93,10 +103,16 @@ def new_vehicle(
     raw, source = read_table(table_path)
     kinds = chosen_kinds(raw, front, rear)
     check_points(raw, kinds, source)
+    tables = _measurements(kinds, kc)
     log = Log()
     tyres = {axle: _tyre(axle, raw, table_path.parent, log) for axle in ("front", "rear")}
     given = in_vehicle_axes(raw)
-    car = complete(name, given, kinds, {axle: (file, parameters) for axle, (file, parameters, _) in tyres.items()}, log)
+    if tables is not None and given.steering.ratio is None and given.steering.pinion_radius_m is None:
+        pinion = tables.rack_per_steering_wheel_m
+        given = dataclasses.replace(given, steering=dataclasses.replace(given.steering, pinion_radius_m=pinion))
+    car = complete(
+        name, given, kinds, {axle: (file, parameters) for axle, (file, parameters, _) in tyres.items()}, log, tables
+    )
     check_origin(car, raw)
     # Everything is made in a folder of its own: a car that cannot stand leaves nothing behind.
     with tempfile.TemporaryDirectory() as scratch:
@@ -113,7 +129,19 @@ def new_vehicle(
         (made / "README.md").write_text(readme, encoding="utf-8")
         with writing(target, ParameterError):
             shutil.copytree(made, target, dirs_exist_ok=True)
-    return NewVehicle(target, target / f"{name}.toml", tuple(car.assumptions), trimmed)
+    return NewVehicle(target, target / f"{name}.toml", tuple(car.assumptions), trimmed, car.questions)
+
+
+def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None) -> KcTables | None:
+    guided = [axle for axle, kind in kinds.items() if kind.guided]
+    if guided and kc is None:
+        raise ParameterError(f"the {guided[0]} axle is of curves: the folder of its measurements is needed (--kc)")
+    if kc is not None and not guided:
+        raise ParameterError(
+            'no axle of the table is of the type "curves", so the measurements would have no effect; --front curves '
+            "and --rear curves make them so"
+        )
+    return None if kc is None else read_kc(Path(kc), guided)
 
 
 def _write(folder: Path, car: Car, trimmed: Trimmed, *, final: bool = False) -> Path:

@@ -14,6 +14,8 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind
 from activesteer.vehicle_builder.design import Axle, Car, Link, Log, Solid
+from activesteer.vehicle_builder.kc_fit import MeasuredAxle, measured_axle
+from activesteer.vehicle_builder.kc_tables import KcTables
 from activesteer.vehicle_builder.levers import mount
 from activesteer.vehicle_builder.table import UNITS, AxleTable, CarTable, LinkTable
 
@@ -25,8 +27,22 @@ _DAMPING: Final = ((3e6, 3000.0), (6e5, 2000.0), (0.0, 1500.0))
 """Stiffness of a link from which on it has this damping [N/m, N s/m]: 10 to 35 % of critical, as in the compact."""
 
 
+_SERVO_NMPRAD: Final = 1e5
+"""Rear steering of the compact."""
+_DRAWN: Final = {
+    "spring_inner": (0.0, -0.16, 0.45), "spring_outer": (0.0, -0.12, 0.05), "damper_inner": (-0.06, -0.16, 0.5),
+    "damper_outer": (-0.06, -0.12, 0.0), "tie_rod_inner": (-0.13, -0.4, -0.04),
+}  # fmt: skip
+"""Points of an axle of curves that are only drawn, from the wheel centre [m]: such an axle has none."""
+
+
 def complete(
-    name: str, table: CarTable, kinds: dict[str, AxleKind], tyres: dict[str, tuple[str, TyreParameters]], log: Log
+    name: str,
+    table: CarTable,
+    kinds: dict[str, AxleKind],
+    tyres: dict[str, tuple[str, TyreParameters]],
+    log: Log,
+    tables: KcTables | None = None,
 ) -> Car:
     """Makes a car of a table in vehicle coordinates.
 
@@ -36,6 +52,7 @@ def complete(
         kinds: Suspension of each axle.
         tyres: Tyre of each axle: name of its file, and its parameters.
         log: Where assumptions go.
+        tables: What a K&C rig has measured, for axles of curves.
 
     Returns:
         The car, with everything but what `trim` finds.
@@ -43,8 +60,17 @@ def complete(
     Raises:
         ParameterError: something is geometrically impossible.
     """
-    front, rear = (_axle(axle, table.axle(axle), kinds[axle], *tyres[axle], log) for axle in ("front", "rear"))
     steering, brakes = table.steering, table.brakes
+    column_Npm = log.take(
+        "steering.column_stiffness_Npm", steering.column_stiffness_Npm, 4e6, "the compact's: torsion bar and assist",
+        "N/m",
+    )  # fmt: skip
+    servo_Nmprad = table.rear_steering.stiffness_Nmprad or _SERVO_NMPRAD
+    kingpin_m = _kingpin(table, np.array(table.rear.points["wheel_centre"]), log)
+    front, rear = (
+        _axle(axle, table.axle(axle), kinds[axle], *tyres[axle], log, (tables, kingpin_m, (column_Npm, servo_Nmprad)))
+        for axle in ("front", "rear")
+    )
     if brakes is None:
         brakes = Brakes(front_torque_Nm=2200.0, rear_torque_Nm=700.0, drag_torque_Nm=1.5)
         log.note("brakes", "2200 and 700 N m per wheel", "the compact's: 1.35 g of a car of 1430 kg, 76 % in front")
@@ -60,7 +86,6 @@ def complete(
         aero = Aerodynamics(drag_area_m2=0.65, pressure_point_m=(round(middle, 3), 0.0, 0.6))
         log.note("aerodynamics", "0.65 m2", "a car of the compact's class; acts between the axles, 0.6 m high")
     track = 2.0 * max(front.wheel_centre_m[1], rear.wheel_centre_m[1])
-    rack_points = front.points["tie_rod_inner"], front.points["tie_rod_outer"]
     return Car(
         name,
         table,
@@ -70,13 +95,11 @@ def complete(
         log.take("steering.rack_mass_kg", steering.rack_mass_kg, 3.0, "rack bar and half of the tie rods", "kg"),
         log.take("steering.rack_limit_m", steering.rack_limit_m, _rack_limit(front), "36 deg of steer angle", "m"),
         log.take("steering.rack_friction_N", steering.rack_friction_N, 150.0, "the compact's, electric assist", "N"),
-        _rack_sign(_steering_axis(front), *rack_points),
-        log.take(
-            "steering.column_stiffness_Npm", steering.column_stiffness_Npm, 4e6,
-            "the compact's: torsion bar and assist", "N/m",
-        ),
-        _kingpin(table, rear, log),
+        _rack_sign(front),
+        column_Npm,
+        kingpin_m,
         log.angle("rear_steering.limit_deg", table.rear_steering.limit_rad, 3.0, "the compact's"),
+        servo_Nmprad,
         brakes,
         powertrain,
         aero,
@@ -85,8 +108,14 @@ def complete(
 
 
 def _axle(
-    axle: str, table: AxleTable, kind: AxleKind, tyre: str, parameters: TyreParameters, log: Log
-) -> Axle:  # fmt: skip
+    axle: str,
+    table: AxleTable,
+    kind: AxleKind,
+    tyre: str,
+    parameters: TyreParameters,
+    log: Log,
+    rig: tuple[KcTables | None, tuple[Array, Array], tuple[float, float]],
+) -> Axle:
     points = {name: np.array(point) for name, point in table.points.items()}
     front = axle == "front"
     centre, radius = points["wheel_centre"], float(parameters["UNLOADED_RADIUS"])
@@ -94,7 +123,9 @@ def _axle(
         f"{axle}.wheel_mass_kg", table.wheel_mass_kg, round(18.5 * (radius / 0.316) ** 2, 1),
         "18.5 kg at a tyre radius of 0.316 m, as its square", "kg",
     )  # fmt: skip
-    outer = np.mean([points[link.outer] for link in kind.links], axis=0)
+    if kind.guided:
+        points |= {name: centre + np.array(beside) for name, beside in _DRAWN.items()}
+    outer = np.mean([points[link.outer] for link in kind.links] or [points["damper_outer"]], axis=0)
     knuckle = _solid(
         f"{axle}.knuckle", table.knuckle_mass_kg, table.knuckle_cg, table.knuckle_inertia_kgm2,
         (20.5 if kind.strut else 18.0) if front else 12.5, 0.5 * (centre + outer), (0.3, 0.28, 0.16), 20.5,
@@ -128,17 +159,22 @@ def _axle(
             key=f"{axle}.wheel_spin_inertia_kgm2",
             value=spin,
         )
+    measured = None
+    if kind.guided and rig[0] is not None:
+        measured = measured_axle(axle, rig[0], centre, rig[1], rig[2])
     toe, camber = (0.05, -0.5) if front else (0.1, -1.0)
     spring_on = table.spring_on
     if spring_on is None:
         spring_on = kind.spring_on
-        if not kind.strut:
+        if not kind.strut and not kind.guided:
             log.note(f"{axle}.spring_on", spring_on, f"usual for a {kind.name} axle")
     damper_on = table.damper_on or spring_on
-    if table.damper_on is None and not kind.strut:
+    if table.damper_on is None and not kind.strut and not kind.guided:
         log.note(f"{axle}.damper_on", damper_on, "as the spring")
     frequency = table.ride_frequency_Hz
-    if table.spring_rate_Npm is None and table.wheel_rate_Npm is None and frequency is None:
+    if measured is not None and measured.wheel_rate_Npm is not None:
+        pass
+    elif table.spring_rate_Npm is None and table.wheel_rate_Npm is None and frequency is None:
         frequency = 1.2 if front else 1.4
         log.note(f"{axle}.ride_frequency_Hz", f"{frequency:g} Hz", "passenger car; the rear faster, against pitch")
     damping = table.damping_ratio
@@ -153,17 +189,18 @@ def _axle(
         table,
         tyre,
         parameters,
-        log.angle(f"{axle}.toe_deg", table.toe_rad, toe, "passenger car, toe-in"),
-        log.angle(f"{axle}.camber_deg", table.camber_rad, camber, "passenger car"),
+        0.0 if measured else log.angle(f"{axle}.toe_deg", table.toe_rad, toe, "passenger car, toe-in"),
+        0.0 if measured else log.angle(f"{axle}.camber_deg", table.camber_rad, camber, "passenger car"),
         wheel_kg,
         spin,
         across,
         knuckle,
         strut,
         carrier,
-        mount(axle, "spring", spring_on, kind, points),
-        mount(axle, "damper", damper_on, kind, points),
-        _anti_roll_bar(axle, table, float(centre[1]), log),
+        mount(axle, "spring", spring_on, kind, points, table.spring_ratio or 1.0),
+        mount(axle, "damper", damper_on, kind, points, _damper_ratio(axle, table, measured, log)),
+        _anti_roll_bar(axle, table, measured, float(centre[1]), log),
+        measured,
         frequency,
         damping,
     )  # fmt: skip
@@ -228,10 +265,21 @@ def _link(axle: str, kind: LinkKind, table: LinkTable | None, log: Log) -> Link:
     return Link(kind.name, kind.inner, kind.outer, stiffness, hardening or 0.0, damping, remark)
 
 
-def _anti_roll_bar(axle: str, table: AxleTable, half_track: float, log: Log) -> float:
+def _damper_ratio(axle: str, table: AxleTable, measured: MeasuredAxle | None, log: Log) -> float:
+    if measured is None:
+        return 1.0
+    given = table.damper_ratio if table.damper_ratio is not None else measured.damper_ratio
+    return log.take(f"{axle}.damper_ratio", given, 1.0, "damper and stops as they act at the wheel")
+
+
+def _anti_roll_bar(
+    axle: str, table: AxleTable, measured: MeasuredAxle | None, half_track: float, log: Log
+) -> float:  # fmt: skip
     if table.anti_roll_bar_Nmprad is not None:
         # Both wheels carry k (z_l - z_r) = k t phi at an arm of t/2 each: K = k t2.
         return table.anti_roll_bar_Nmprad / (2.0 * half_track) ** 2
+    if table.anti_roll_bar_Npm is None and measured is not None and measured.anti_roll_bar_Npm is not None:
+        return measured.anti_roll_bar_Npm
     return log.take(f"{axle}.anti_roll_bar_Npm", table.anti_roll_bar_Npm, 0.0, "no anti-roll bar", "N/m")
 
 
@@ -241,9 +289,15 @@ def _steering_axis(front: Axle) -> tuple[Array, Array]:
     return front.points["lca_outer"], upper
 
 
-def _rack_sign(axis: tuple[Array, Array], inner: Array, outer: Array) -> float:
-    """Sign of the rack's y when the left wheel steers left."""
-    return math.copysign(1.0, _rack_per_steer(axis, inner, outer))
+def _rack_sign(front: Axle) -> float:
+    """Sign of the rack's y when the left wheel steers left; that of tie rods behind the axle where there are none."""
+    if front.kind.guided:
+        return -1.0
+    return math.copysign(1.0, _rack_per_steer(_steering_axis(front), *_tie_rod(front)))
+
+
+def _tie_rod(front: Axle) -> tuple[Array, Array]:
+    return front.points["tie_rod_inner"], front.points["tie_rod_outer"]
 
 
 def _rack_per_steer(axis: tuple[Array, Array], inner: Array, outer: Array) -> float:
@@ -267,19 +321,24 @@ def _rack_per_steer(axis: tuple[Array, Array], inner: Array, outer: Array) -> fl
 
 def rack_per_steer_m(front: Axle) -> float:
     """Rack travel per steer angle around straight ahead, positive [m/rad], rigid links."""
-    return abs(_rack_per_steer(_steering_axis(front), front.points["tie_rod_inner"], front.points["tie_rod_outer"]))
+    if front.measured is not None:
+        rack, steer = front.measured.curves.rack_m, front.measured.curves.rack_steer_rad
+        near = np.argsort(np.abs(rack))[:5]
+        return 1.0 / float(np.polyfit(np.array(rack)[near], np.array(steer)[near], 1)[0])
+    return abs(_rack_per_steer(_steering_axis(front), *_tie_rod(front)))
 
 
 def _rack_limit(front: Axle) -> float:
+    if front.measured is not None:
+        return min(-front.measured.curves.rack_m[0], front.measured.curves.rack_m[-1])
     return round(0.92 * rack_per_steer_m(front) * math.sin(math.radians(36.0)), 4)
 
 
-def _kingpin(table: CarTable, rear: Axle, log: Log) -> tuple[Array, Array]:
+def _kingpin(table: CarTable, centre: Array, log: Log) -> tuple[Array, Array]:
     """Lower and upper point of the rear steering axis."""
     lower, upper = table.rear_steering.axis_lower, table.rear_steering.axis_upper
     if lower is not None and upper is not None:
         return np.array(lower), np.array(upper)
-    centre = rear.wheel_centre_m
     # The compact's: caster 2 deg, inclination 4 deg, 21 mm inside and 4 mm behind the wheel centre.
     first = centre + np.array([0.0, -0.013, -0.1129])
     second = centre + np.array([-0.008, -0.029, 0.1171])

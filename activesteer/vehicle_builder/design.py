@@ -10,6 +10,7 @@ from activesteer.conventions import Array
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind
+from activesteer.vehicle_builder.kc_fit import MeasuredAxle
 from activesteer.vehicle_builder.levers import Mount
 from activesteer.vehicle_builder.table import AxleTable, CarTable
 
@@ -67,6 +68,8 @@ class Axle:
     spring: Mount
     damper: Mount
     anti_roll_bar_Npm: float
+    measured: MeasuredAxle | None
+    """Of an axle of curves: what it is asked to do."""
     ride_frequency_Hz: float | None
     damping_ratio: float | None
 
@@ -103,6 +106,7 @@ class Car:
     column_stiffness_Npm: float
     kingpin_m: tuple[Array, Array]
     rear_limit_rad: float
+    rear_stiffness_Nmprad: float
     brakes: Brakes
     powertrain: Powertrain
     aerodynamics: Aerodynamics
@@ -112,6 +116,11 @@ class Car:
     def axles(self) -> tuple[Axle, Axle]:
         """Front and rear."""
         return self.front, self.rear
+
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """What is unusual in measurements that it is made of."""
+        return tuple(line for axle in self.axles if axle.measured is not None for line in axle.measured.questions)
 
     @property
     def wheelbase_m(self) -> float:

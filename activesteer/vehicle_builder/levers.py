@@ -27,9 +27,9 @@ class Mount:
 
     Attributes:
         carrier: What carries its lower end.
-        lever: Force at the arm's outer joint per force of the spring; 1 on the knuckle.
+        lever: Force at the arm's outer joint, or along the wheel's travel, per force of the spring; 1 on the knuckle.
         outer: Site at which the tendon ends, without the corner.
-        start_m: Where the tendon begins on the chassis; None where it lies along a strut.
+        start_m: Where the tendon begins on the chassis; None where it lies along a strut or acts along the travel.
         length_m: Its length in the design position; 0 along a strut.
     """
 
@@ -40,7 +40,7 @@ class Mount:
     length_m: float
 
 
-def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, Array]) -> Mount:
+def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, Array], ratio: float = 1.0) -> Mount:
     """Attaches a spring or damper.
 
     Args:
@@ -49,12 +49,13 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
         carrier: What carries its lower end, one of the kind's carriers.
         kind: The suspension.
         points: Its points.
+        ratio: Shortening per wheel travel, where it acts along that.
 
     Raises:
         ParameterError: the arm cannot carry it there.
     """
-    if carrier == "strut":
-        return Mount(carrier, 1.0, "", None, 0.0)
+    if carrier in ("strut", "travel"):
+        return Mount(carrier, 1.0 if carrier == "strut" else ratio, "", None, 0.0)
     upper, lower = points[f"{part}_inner"], points[f"{part}_outer"]
     length = float(np.linalg.norm(upper - lower))
     if length < 0.02:

@@ -11,6 +11,13 @@ from activesteer.vehicle_builder.numbers import num, sig, vec
 from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
 
 _ON_RACK = "tie_rod"
+_LINKED = """  <!-- {words} {axle} axle, a fragment of the chassis body. Every position is a
+       hardpoint in vehicle coordinates: origin on the road below the front axle, x forward, y left,
+       z up, design position. Links are tendons; an arm is two links that share their outer point. -->"""
+_GUIDED = """  <!-- {words} guide the {axle} axle, a fragment of the chassis body: the travel z is free,
+       the other joints follow the curves of the vehicle file and give way about them. Vehicle coordinates: origin on
+       the road below the front axle, x forward, y left, z up, design position. Sites of springs and dampers are only
+       drawn. -->"""
 
 
 def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
@@ -24,9 +31,7 @@ def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
     words = axle.kind.name.replace("_", " ")
     lines = [
         "<mujocoinclude>",
-        f"  <!-- {words.capitalize()} {axle.name} axle, a fragment of the chassis body. Every position is a",
-        "       hardpoint in vehicle coordinates: origin on the road below the front axle, x forward, y left,",
-        "       z up, design position. Links are tendons; an arm is two links that share their outer point. -->",
+        *(_GUIDED if axle.kind.guided else _LINKED).format(words=words.capitalize(), axle=axle.name).splitlines(),
         "",
         "  <!-- Chassis side of links, springs and dampers"
         + ("; the tie rods start at the rack (steering.xml). -->" if axle.name == "front" else ". -->"),
@@ -91,12 +96,19 @@ def _corner(car: Car, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[str
             *inner,
             "  </body>",
         ]
+    centre = _at(axle.wheel_centre_m, side)
     joints = [
         f'<joint name="{corner}_x" class="knuckle_slide" axis="1 0 0"/>',
         f'<joint name="{corner}_y" class="knuckle_slide" axis="0 1 0"/>',
         f'<joint name="{corner}_z" class="knuckle_slide" axis="0 0 1"/>',
-        f'<joint name="{corner}_rot" class="knuckle_ball" pos="{_at(axle.wheel_centre_m, side)}"/>',
     ]
+    if axle.kind.guided:
+        about = {"toe": "0 0 1", "camber": "1 0 0", "caster": "0 1 0"}
+        joints += [
+            f'<joint name="{corner}_{name}" type="hinge" axis="{axis}" pos="{centre}"/>' for name, axis in about.items()
+        ]
+    else:
+        joints.append(f'<joint name="{corner}_rot" class="knuckle_ball" pos="{centre}"/>')
     return _knuckle(axle, trimmed, side, "  ", joints, _carrier(car, axle, trimmed, side) if axle.carrier else None)
 
 
@@ -131,7 +143,7 @@ def _knuckle(
 
 def _carrier(car: Car, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[str]:
     corner, indent, inside = corner_name(axle, side), "    ", "      "
-    lower, upper = car.kingpin_m
+    lower, upper = (_in_design(axle, point) for point in car.kingpin_m)
     axis = (upper - lower) / np.linalg.norm(upper - lower)
     middle = lower + axis * (axle.wheel_centre_m[2] - lower[2]) / axis[2]
     solid = axle.carrier
@@ -143,6 +155,17 @@ def _carrier(car: Car, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[st
         *_wheel(axle, trimmed, side, inside),
         f"{indent}</body>",
     ]
+
+
+def _in_design(axle: Axle, point: Array) -> Array:
+    """A point of the knuckle where its joints are zero; curves turn it by the static angles as the car stands."""
+    if axle.measured is None:
+        return point
+    curves = axle.measured.curves
+    camber, toe = (-float(np.interp(0.0, curves.travel_m, over)) for over in (curves.camber_rad, curves.toe_rad))
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, np.cos(camber), -np.sin(camber)], [0.0, np.sin(camber), np.cos(camber)]])
+    about_z = np.array([[np.cos(toe), -np.sin(toe), 0.0], [np.sin(toe), np.cos(toe), 0.0], [0.0, 0.0, 1.0]])
+    return axle.wheel_centre_m + (about_z @ about_x).T @ (point - axle.wheel_centre_m)
 
 
 def _wheel(axle: Axle, trimmed: TrimmedAxle, side: float, indent: str) -> list[str]:
@@ -221,7 +244,12 @@ def part_tendons(car: Car, part: str) -> str:
             corner = corner_name(axle, side)
             start = f'    <{{}} name="{corner}_{part}" class="{axle.name}_{part}">'
             if mount.start_m is None:
-                lines.append(start.format("fixed") + f'<joint joint="{corner}_jounce" coef="-1"/></fixed>')
+                travel = "jounce" if axle.kind.strut else "z"
+                coef = num(-mount.lever)
+                lifted = rack_joint(axle, side * mount.lever)
+                lines.append(
+                    start.format("fixed") + f'<joint joint="{corner}_{travel}" coef="{coef}"/>{lifted}</fixed>'
+                )
             elif mount.lever == 1.0:
                 sites = f'<site site="{corner}_{part}_inner"/><site site="{corner}_{part}_outer"/>'
                 lines.append(start.format("spatial") + f"{sites}</spatial>")
@@ -231,6 +259,12 @@ def part_tendons(car: Car, part: str) -> str:
                 pulley = f'<pulley divisor="{num(1.0 / mount.lever)}"/>'
                 lines.append(start.format("spatial") + f"{pulley}{sites}</spatial>")
     return "\n".join(lines)
+
+
+def rack_joint(axle: Axle, lever: float) -> str:
+    """What makes a spring of a guided axle longer as the rack raises its wheel without it."""
+    lift = 0.0 if axle.measured is None else axle.measured.rack_lift
+    return f'<joint joint="rack" coef="{num(lever * lift)}"/>' if lift else ""
 
 
 def viewer_springs(car: Car) -> str:

@@ -44,6 +44,10 @@ def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
     mujoco.mj_fwdPosition(model, data)
     dofs, scale = _freedoms(model, corner)
     rows = {name: row[dofs] for name, row in _tendon_rows(model, data, corner).items()}
+    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_camber") >= 0:
+        # Curves guide it: springs and dampers act along the travel, and everything else follows.
+        travel = dofs.index(int(model.joint(f"{corner}_z").dofadr[0]))
+        return CornerMotion((), 1.0, {name: -float(row[travel]) for name, row in rows.items()})
     links = tuple(name for name in rows if not name.endswith(("_spring", "_damper")))
     jacobian = np.array([rows[name] for name in links]).reshape(len(links), len(dofs)) / scale
     lengths = np.linalg.norm(jacobian, axis=1, keepdims=True)

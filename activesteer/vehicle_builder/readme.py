@@ -36,8 +36,24 @@ def readme_text(car: Car, trimmed: Trimmed, table_name: str) -> str:
         chassis=num(trimmed.chassis.mass_kg, 1),
         cg_x=num(trimmed.cg_m[0], 3),
         cg_height=num(trimmed.cg_m[1], 3),
+        measured=_measured(car),
         open=_open(rows),
     )
+
+
+def _measured(car: Car) -> str:
+    """What was read from the K&C rig, how rough it was, and what is unusual in it."""
+    lines = []
+    for axle in car.axles:
+        if axle.measured is None:
+            continue
+        rough = max(axle.measured.roughness.items(), key=lambda item: item[1], default=("", 0.0))
+        lines += [
+            f"- {axle.name}: cubic splines by least squares, one interval for each two points and at most 16; greatest "
+            f"distance of a sample {rough[1]:.2g} m or rad ({rough[0]}). Compliance: {axle.measured.stiffness_remark}.",
+            *(f"- **{line}**" for line in axle.measured.questions),
+        ]
+    return "\n".join(["## Measured", "", *lines, "", ""]) if lines else ""
 
 
 def _open(rows: list[str]) -> str:

@@ -68,6 +68,10 @@ class AxleTable:
     """What carries the lower end of the spring."""
     damper_on: str | None = None
     """What carries the lower end of the damper."""
+    spring_ratio: Annotated[float, Range(0.15, 1.6)] | None = None
+    """Axle of curves: shortening of the spring per wheel travel."""
+    damper_ratio: Annotated[float, Range(0.15, 1.6)] | None = None
+    """Axle of curves: shortening of the damper, and of the stops, per wheel travel."""
     damper_velocity_mps: tuple[float, ...] | None = None
     """Compression velocities of the damper's curve [m/s]."""
     damper_force_N: tuple[float, ...] | None = None
@@ -162,6 +166,8 @@ class RearSteeringTable:
     """A higher point of its axis."""
     limit_rad: Annotated[float, Range(1e-3, 0.3)] | None = None
     """Mechanical stop [rad]."""
+    stiffness_Nmprad: Annotated[float, Range(1e4, 1e8)] | None = None
+    """Screw, housing and carrier bushings about the axis [N m/rad]."""
 
 
 @dataclass(frozen=True)

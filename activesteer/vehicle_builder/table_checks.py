@@ -74,6 +74,12 @@ def _name_problems(table: CarTable, kinds: Mapping[str, AxleKind]) -> Iterator[s
         for name in given.points:
             if name not in kind.needed:
                 yield f"{axle}.points.{name}: a {kind.name} axle has no such point; {nearest_names(name, kind.needed)}"
+        for key in ("spring_ratio", "damper_ratio"):
+            if getattr(given, key) is not None and not kind.guided:
+                yield f"{axle}.{key}: follows from the hardpoints of a {kind.name} axle"
+        for key in ("toe_rad", "camber_rad", "spring_on", "damper_on", "wheel_rate_Npm", "ride_frequency_Hz"):
+            if getattr(given, key) is not None and kind.guided:
+                yield f"{axle}.{key.replace('_rad', '_deg')}: an axle of curves has it from its measurements"
         missing = [name for name in kind.needed if name not in given.points]
         if missing:
             yield f"{axle}.points: a {kind.name} axle also needs {', '.join(missing)}"

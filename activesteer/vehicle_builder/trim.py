@@ -26,6 +26,7 @@ from activesteer.vehicle import Vehicle
 from activesteer.vehicle.mass_properties import mass_properties
 from activesteer.vehicle.parameters import Friction
 from activesteer.vehicle_builder.completion import rack_per_steer_m
+from activesteer.vehicle_builder.curve_match import NEAR_ENOUGH, match_steering, match_travel
 from activesteer.vehicle_builder.design import Axle, Car, Log
 from activesteer.vehicle_builder.masses import chassis_of
 from activesteer.vehicle_builder.motion import corner_motion
@@ -35,6 +36,7 @@ Write = Callable[[Trimmed], Path]
 """Writes the car's files and returns the vehicle file."""
 
 _ROUNDS: Final = 25
+_MATCHES: Final = 8
 _TRAVEL_M: Final = 1e-5
 _ANGLE_RAD: Final = 2e-6
 _RATE_FRACTION: Final = 1e-4
@@ -77,7 +79,11 @@ def trim(car: Car, write: Write, log: Log) -> Trimmed:
     Raises:
         ActiveSteerError: the car cannot stand.
     """
+    guided = tuple(axle for axle in car.axles if axle.measured is not None)
     trimmed = Trimmed(pinion_radius_m=car.table.steering.pinion_radius_m or rack_per_steer_m(car.front) / _RATIO)
+    for axle in guided:
+        assert axle.measured is not None
+        trimmed.axle(axle.name).curves = axle.measured.curves
     mjcf = write(trimmed).with_suffix(".xml")
     model = _compiled(mjcf)
     trimmed.chassis = chassis_of(car, model, log)
@@ -112,6 +118,9 @@ def trim(car: Car, write: Write, log: Log) -> Trimmed:
         rates[axle.name] = _wanted_rate(axle, loads[axle.name], sprung[axle.name])
         _first_guess(axle, trimmed.axle(axle.name), ratios[axle.name], rates[axle.name], sprung[axle.name], log)
     wheel_rates = _let_stand(car, trimmed, write, ratios, rates)
+    if guided:
+        _match_curves(car, guided, trimmed, write)
+        wheel_rates = _let_stand(car, trimmed, write, ratios, rates)
     _fit_steering(car, trimmed, write, log)
     for axle in car.axles:
         tyre = tyre_rate_Npm(axle.tyre_parameters, loads[axle.name])
@@ -138,6 +147,8 @@ def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
 
 def _wanted_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
     """Wheel rate that the table asks for, by itself or by the ride frequency; None where it gives the spring's rate."""
+    if axle.measured is not None and axle.measured.wheel_load_N is not None:
+        return None
     if axle.table.wheel_rate_Npm is not None or axle.ride_frequency_Hz is None:
         return axle.table.wheel_rate_Npm
     ride = sprung_kg * (2.0 * math.pi * axle.ride_frequency_Hz) ** 2
@@ -156,9 +167,11 @@ def _first_guess(
     axle: Axle, found: TrimmedAxle, ratios: tuple[float, float], rate: float | None, sprung_kg: float, log: Log
 ) -> None:
     spring, damper = ratios
-    found.spring_rate_Npm = axle.table.spring_rate_Npm or (rate or 24000.0) / spring**2
+    measured = None if axle.measured is None else axle.measured.wheel_rate_Npm
+    found.spring_rate_Npm = axle.table.spring_rate_Npm or (measured or rate or 24000.0) / spring**2
     found.spring_force_N = sprung_kg * GRAVITY_MPS2 / spring
-    found.wheel_x_rad, found.wheel_z_rad = -axle.camber_rad, -axle.toe_rad
+    if found.curves is None:
+        found.wheel_x_rad, found.wheel_z_rad = -axle.camber_rad, -axle.toe_rad
     if axle.kind.strut and axle.table.anti_roll_bar_Nmprad is not None:
         # The bar acts along the strut, whose travel is less than the wheel's.
         axle.anti_roll_bar_Npm /= damper**2
@@ -167,7 +180,10 @@ def _first_guess(
     found.rebound_stop_m = log.take(
         f"{axle.name}.rebound_stop_m", rebound, _STOPS_M[1] * damper, "65 mm at the wheel", "m"
     )
-    if axle.table.stop_stiffness is None:
+    if measured is not None and axle.table.stop_stiffness is None:
+        # They are in the measured wheel load.
+        found.stop_stiffness = (0.0, 0.0, 0.0)
+    elif axle.table.stop_stiffness is None:
         # The force at the wheel is r F(r z): a stop that the wheel feels as the compact's is harder by r2, r3, r4.
         found.stop_stiffness = tuple(
             float(f"{value / damper ** (power + 2):.3g}") for power, value in enumerate(_STOP_AT_WHEEL)
@@ -229,6 +245,9 @@ def _let_stand(
             toe = float(stand.toe_rad[index : index + 2].mean()) - axle.toe_rad
             camber = float(stand.camber_rad[index : index + 2].mean()) - axle.camber_rad
             off = 0.0 if rate is None else rates[axle.name] / rate - 1.0
+            if found.curves is not None:
+                # Its curves are matched as a whole.
+                toe = camber = 0.0
             done &= abs(travel) < _TRAVEL_M and max(abs(toe), abs(camber)) < _ANGLE_RAD and abs(off) < _RATE_FRACTION
             stiffness = max(rates[axle.name], 0.3 * found.spring_rate_Npm * ratio**2)
             found.spring_force_N += travel * stiffness / ratio
@@ -247,6 +266,22 @@ def _let_stand(
     raise ModelError(
         f"the car does not come to stand in its design position within {_ROUNDS} rounds: wheels at {where} mm of "
         "travel; are spring rates and stops possible?"
+    )
+
+
+def _match_curves(car: Car, guided: tuple[Axle, ...], trimmed: Trimmed, write: Write) -> None:
+    """Curves that give the measured ones under load."""
+    left = 0.0
+    for _ in range(_MATCHES):
+        held = _stand(write(trimmed)).held
+        left = match_travel(guided, {axle.name: trimmed.axle(axle.name) for axle in guided}, held)
+        if car.front in guided:
+            left = max(left, match_steering(car.front, trimmed.front, held, trimmed.pinion_radius_m))
+        if left < NEAR_ENOUGH:
+            return
+    raise ModelError(
+        f"the curves do not settle within {_MATCHES} rounds: {1e3 * left:.3g} mrad or mm are left; is the compliance "
+        "so large that the wheel load bends the axle by more than its curves?"
     )
 
 

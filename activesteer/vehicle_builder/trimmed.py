@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from activesteer.vehicle.axle_curves import AxleCurves
 from activesteer.vehicle_builder.design import Solid
 
 
@@ -29,6 +30,8 @@ class TrimmedAxle:
     """Dry friction of the damper."""
     damper_velocity_mps: tuple[float, ...] = (-1.0, 0.0, 1.0)
     damper_force_N: tuple[float, ...] = (-1900.0, 0.0, 1900.0)
+    curves: AxleCurves | None = None
+    """Of an axle of curves: those that give the measured ones on the rig, under load."""
 
 
 @dataclass

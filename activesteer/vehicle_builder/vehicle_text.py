@@ -19,6 +19,11 @@ _LEFT_OF_STIFFNESS: Final = {"front": 0.6, "rear": 1.05}
 """Effective cornering stiffness of an axle over that of its tyres, in the compact: compliance and roll steer."""
 _REMARKS: Final = {
     "dampers.front": "Compression positive.",
+    "curves.front": (
+        "Cubic splines through the points; toe-in, camber with the top outwards, caster with the top to the rear,\n"
+        "bump and a rack that steers left are positive. The unloaded guide's: the loaded car has the measured ones."
+    ),
+    "curves.rear": "As in front; no rack steers it.",
     "friction": "Dry friction; vibration as in the compact's file (a road of class A at 80 km/h).",
     "brakes": "Torque per wheel at full pedal.",
     "powertrain": "At the wheels: torques in first gear, power, rev limit in top gear.",
@@ -76,12 +81,27 @@ def _table(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> dict[str
             "vibration_mps": compact["friction"]["vibration_mps"],
             "rack_N": round(car.rack_friction_N, 1),
         },
+        **_curves(car, trimmed),
         "brakes": to_table(car.brakes, defaults=False),
         "powertrain": to_table(car.powertrain, defaults=False),
         "aerodynamics": to_table(car.aerodynamics, defaults=False),
         "single_track": _single_track(car, model),
         "controllers": compact["controllers"],
     }
+
+
+def _curves(car: Car, trimmed: Trimmed) -> dict[str, Any]:
+    """Tables [curves.front] and [curves.rear], angles in degrees; none where links guide both axles."""
+    guided = {axle.name: curves for axle in car.axles if (curves := trimmed.axle(axle.name).curves) is not None}
+    tables = {}
+    for name, curves in guided.items():
+        tables[name] = {
+            key.removesuffix("_rad") + "_deg" if key.endswith("_rad") else key: [
+                float(f"{math.degrees(value) if key.endswith('_rad') else value:.7g}") for value in values
+            ]
+            for key, values in to_table(curves, defaults=False).items()
+        }
+    return {"curves": tables} if tables else {}
 
 
 def _single_track(car: Car, model: mujoco.MjModel | None) -> dict[str, float]:

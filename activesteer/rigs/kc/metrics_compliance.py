@@ -9,6 +9,7 @@ import numpy as np
 
 from activesteer.rigs.kc.definitions import SMALL_FORCE_N, SMALL_MOMENT_NM, Axle, metric
 from activesteer.rigs.kc.metrics_kinematics import outer_sign
+from activesteer.vehicle.guide_model import GUIDE
 
 _TRAIL_M: Final = 0.03
 
@@ -129,14 +130,14 @@ def aligning_camber(axle: Axle) -> float:
 
 
 def _bushes_Npmm(axle: Axle) -> np.ndarray:
-    """Stiffness of one bush of each link [N/mm], both bushes alike and in series, at the length of the standing car."""
+    """Stiffness of one bush of each link [N/mm], both alike and in series, unloaded; nan of an axle without links."""
     model = axle.measured.vehicle.model
     rates = []
     for index in range(model.ntendon):
         name = model.tendon(index).name
-        if name.startswith(f"{axle.name[0]}l_") and not name.endswith(("_spring", "_damper")):
+        if name.startswith(f"{axle.name[0]}l_") and not name.endswith(("_spring", "_damper", GUIDE)):
             rates.append(2e-3 * float(model.tendon_stiffness[index]))
-    return np.array(rates)
+    return np.array(rates or [np.nan])
 
 
 @metric("kN/mm")

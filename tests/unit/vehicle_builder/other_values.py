@@ -7,12 +7,15 @@ import typing
 from typing import Any, Final
 
 from activesteer.config import Range, dataclass_in
+from tests.unit.vehicle_builder.other_curves import other_curves
 
 _WORDS: Final = {
     "combined_slip": "friction_ellipse", "friction_scales": "peaks", "slip_velocity": "wheel_centre",
     "rolling_radius": "third_of_deflection", "trail_load": "scaled", "source": "identified",
 }  # fmt: skip
 """Texts that are one of some words."""
+_WHOLE: Final = {"curves": other_curves()}
+"""Tables whose values belong together."""
 
 
 def all_changed(cls: type, given: Any) -> Any:
@@ -24,7 +27,9 @@ def all_changed(cls: type, given: Any) -> Any:
     """
     hints = typing.get_type_hints(cls, include_extras=True)
     values = {
-        field.name: _WORDS.get(field.name) or _other(hints[field.name], getattr(given, field.name, None))
+        field.name: _WHOLE.get(field.name)
+        or _WORDS.get(field.name)
+        or _other(hints[field.name], getattr(given, field.name, None))
         for field in dataclasses.fields(cls)
     }
     assert all(value != getattr(given, name, None) for name, value in values.items())

@@ -1,0 +1,267 @@
+"""From samples of a K&C rig to the curves and the compliance that an axle is asked to have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from activesteer.conventions import Array
+from activesteer.errors import ParameterError
+from activesteer.vehicle.axle_curves import AxleCurves, upper_triangle
+from activesteer.vehicle_builder.kc_checks import check_signs, unusual
+from activesteer.vehicle_builder.kc_compliance import Load, fitted
+from activesteer.vehicle_builder.kc_tables import KcTables, Samples, smoothed
+
+_POINTS: Final = 33
+"""Points of a curve in the vehicle file."""
+_NEAR_M: Final = 0.015
+"""Travel within which a rate counts, as the rig's metrics have it."""
+_DIGITS: Final = 7
+
+
+@dataclass(frozen=True)
+class MeasuredAxle:
+    """What was measured of an axle, as one wheel sees it.
+
+    Attributes:
+        curves: Its curves as measured, and the stiffness.
+        wheel_load_N: Load over `curves.travel_m`, from the standing car's [N]; None where it was not measured.
+        anti_roll_bar_Npm: From opposite and parallel travel; None where that cannot be told.
+        damper_ratio: Shortening of the damper per wheel travel; None where it was not measured.
+        rack_lift: Rise of the left wheel centre per travel of the rack to the left, the spring's length fixed: the work
+            of the wheel load as caster raises one wheel and lowers the other.
+        roughness: Channel -> greatest distance of a sample from the curve through all of them, in SI units.
+        stiffness_remark: What the elastic part rests on.
+        questions: What is unusual in the measurements.
+    """
+
+    curves: AxleCurves
+    wheel_load_N: tuple[float, ...] | None
+    anti_roll_bar_Npm: float | None
+    damper_ratio: float | None
+    rack_lift: float
+    roughness: dict[str, float]
+    stiffness_remark: str
+    questions: tuple[str, ...]
+
+    @property
+    def wheel_rate_Npm(self) -> float | None:
+        """Slope of the wheel load about the standing car."""
+        if self.wheel_load_N is None:
+            return None
+        travel = np.array(self.curves.travel_m)
+        near = np.abs(travel) <= 1.01 * _NEAR_M
+        return float(np.polyfit(travel[near], np.array(self.wheel_load_N)[near], 1)[0])
+
+
+def measured_axle(
+    axle: str,
+    tables: KcTables,
+    wheel_centre_m: Array,
+    kingpin_m: tuple[Array, Array],
+    in_series: tuple[float, float],
+) -> MeasuredAxle:
+    """Curves and compliance of an axle.
+
+    Args:
+        axle: `front` or `rear`.
+        tables: All tests.
+        wheel_centre_m: Left wheel centre in the standing car; its height is the arm of forces on the road [m].
+        kingpin_m: Lower and upper point of the rear steering axis.
+        in_series: What lies in series with the compliance of the wheel: stiffness of the steering column at the rack
+            [N/m], and of the rear steering servo [N m/rad].
+
+    Returns:
+        What was measured.
+
+    Raises:
+        ParameterError: a channel that is needed was not measured, or the compliance holds no wheel.
+    """
+    tests, rolling_radius_m = tables.tests[axle], float(wheel_centre_m[2])
+    check_signs(tests)
+    rough: dict[str, float] = {}
+    travel, over_travel = _over_travel(tests["parallel_travel"], rolling_radius_m, rough)
+    rack = _over_rack(tests["steering"], rolling_radius_m, over_travel, travel, rough) if "steering" in tests else {}
+    if axle == "front" and not rack:
+        raise ParameterError("front_steering.csv (or .toml) is needed: how the rack steers the wheels")
+    fields: dict[str, Any] = {**over_travel, **rack, "stiffness": upper_triangle(1e5 * np.eye(5))}
+    placeholder = AxleCurves(**fields)
+    column_Npm, servo_Nmprad = in_series
+    beside = (
+        _rack_compliance(placeholder, column_Npm)
+        if axle == "front"
+        else _servo(wheel_centre_m, kingpin_m) / servo_Nmprad
+    )
+    elastic = fitted(_loads(axle, tests, rolling_radius_m, beside))
+    load = tests["parallel_travel"].moved("load")
+    wheel_load = None if load is None else smoothed(tests["parallel_travel"].x, load, travel)
+    curves = replace(
+        placeholder,
+        stiffness=elastic.stiffness,
+        hardening=elastic.hardening,
+        hardening_square=elastic.hardening_square,
+    )
+    return MeasuredAxle(
+        curves,
+        None if wheel_load is None else _listed(wheel_load),
+        _anti_roll_bar(tests, travel, wheel_load),
+        _damper_ratio(tests["parallel_travel"]),
+        _rack_lift(tests),
+        rough,
+        elastic.remark,
+        tuple(unusual(axle, tests)),
+    )
+
+
+def _listed(values: Array) -> tuple[float, ...]:
+    return tuple(float(f"{value:.{_DIGITS}g}") for value in values)
+
+
+def _curve(samples: Samples, values: Array | None, at: Array, name: str, rough: dict[str, float]) -> Array:
+    if values is None:
+        return np.zeros(len(at))
+    rough[f"{name} over {samples.file}"] = float(np.abs(smoothed(samples.x, values, samples.x) - values).max())
+    return smoothed(samples.x, values, at)
+
+
+def _wheel_paths(samples: Samples, radius_m: float) -> tuple[Array | None, Array | None]:
+    """Way of the wheel centre outwards and forwards; from the contact point's where the centre was not measured."""
+    outwards, forward = samples.moved("centre_outwards"), samples.moved("centre_forward")
+    contact = samples.moved("contact_outwards")
+    if outwards is None and contact is not None:
+        camber = samples.moved("camber")
+        # The contact point lies below the centre in the wheel plane: more camber (top outwards) takes it inwards.
+        outwards = contact if camber is None else contact + radius_m * camber
+    if forward is None:
+        forward = samples.moved("contact_forward")
+    return outwards, forward
+
+
+def _over_travel(
+    samples: Samples, radius_m: float, rough: dict[str, float]
+) -> tuple[Array, dict[str, tuple[float, ...]]]:
+    for needed in ("toe", "camber"):
+        if needed not in samples.channels:
+            raise ParameterError(f"the {needed} of the wheels was not measured", file=samples.file)
+    travel = np.round(np.linspace(samples.x.min(), samples.x.max(), _POINTS), 5)
+    outwards, forward = _wheel_paths(samples, radius_m)
+    values = {
+        "toe_rad": samples.channels["toe"],
+        "camber_rad": samples.channels["camber"],
+        "outwards_m": outwards,
+        "forward_m": forward,
+        "caster_rad": samples.moved("caster"),
+    }
+    curves = {key: _listed(_curve(samples, value, travel, key, rough)) for key, value in values.items()}
+    return travel, {"travel_m": _listed(travel), **curves, "load_N": (0.0,) * _POINTS}
+
+
+def _over_rack(
+    samples: Samples, radius_m: float, over_travel: dict[str, tuple[float, ...]], travel: Array, rough: dict[str, float]
+) -> dict[str, tuple[float, ...]]:
+    """Curves over the rack, less what the wheel's own travel during the sweep has made of them."""
+    rack = np.round(np.linspace(samples.x.min(), samples.x.max(), _POINTS), 6)
+    lifted = samples.moved("travel")
+
+    def by_travel(key: str) -> Array:
+        if lifted is None:
+            return np.zeros(len(samples.x))
+        values = np.array(over_travel[key])
+        return np.interp(lifted, travel, values) - np.interp(0.0, travel, values)
+
+    outwards, forward = _wheel_paths(samples, radius_m)
+    toe, camber, caster = (samples.moved(name) for name in ("toe", "camber", "caster"))
+    if toe is None:
+        raise ParameterError("the toe of the wheels was not measured", file=samples.file)
+    values = {
+        "rack_steer_rad": -(toe - by_travel("toe_rad")),
+        "rack_camber_rad": None if camber is None else camber - by_travel("camber_rad"),
+        "rack_outwards_m": None if outwards is None else outwards - by_travel("outwards_m"),
+        "rack_forward_m": None if forward is None else forward - by_travel("forward_m"),
+        "rack_caster_rad": None if caster is None else caster - by_travel("caster_rad"),
+    }
+    curves = {}
+    for key, value in values.items():
+        curve = _curve(samples, value, rack, key, rough)
+        curves[key] = _listed(curve - smoothed(rack, curve, np.zeros(1))[0])
+    return {"rack_m": _listed(rack), **curves}
+
+
+def _loads(axle: str, tests: dict[str, Samples], radius_m: float, in_series: Array) -> list[Load]:
+    """The tests of compliance: load at the wheel centre per unit of what was swept, and what moved."""
+    per_unit = {
+        "side_force": (0.0, 1.0, radius_m, 0.0, 0.0),
+        "side_force_opposed": (0.0, 1.0, radius_m, 0.0, 0.0),
+        "braking_force": (1.0, 0.0, 0.0, -radius_m, 0.0),
+        "drive_force": (1.0, 0.0, 0.0, 0.0, 0.0),
+        "aligning_moment": (0.0, 0.0, 0.0, 0.0, 1.0),
+        "aligning_moment_opposed": (0.0, 0.0, 0.0, 0.0, 1.0),
+    }
+    loads = []
+    for name, direction in per_unit.items():
+        if name not in tests:
+            continue
+        if f"{name}_opposed" in tests:
+            # Both say the same of a wheel; out of phase, the rack has no part in it.
+            continue
+        samples = tests[name]
+        outwards, forward = _wheel_paths(samples, radius_m)
+        moved = {"x": forward, "y": outwards}
+        for coordinate in ("camber", "caster", "toe"):
+            value = samples.moved(coordinate)
+            moved[coordinate] = None if value is None else -value
+        pushes_rack = name in ("side_force", "aligning_moment")
+        beside = in_series if axle == "rear" or pushes_rack else np.zeros((5, 5))
+        loads.append(Load(name, np.array(direction), samples.x, moved, beside))
+    return loads
+
+
+def _rack_compliance(curves: AxleCurves, column_Npm: float) -> Array:
+    """What a wheel moves by as the column lets the rack give way under both wheels, loaded alike, shape (5, 5)."""
+    rack, over = np.array(curves.rack_m), curves.over_rack()
+    near = np.argsort(np.abs(rack))[:5]
+    slopes = np.array([np.polyfit(rack[near], row[near], 1)[0] for row in over])
+    return 2.0 * np.outer(slopes, slopes) / column_Npm
+
+
+def _servo(wheel_centre_m: Array, kingpin_m: tuple[Array, Array]) -> Array:
+    """What a rear wheel moves by as its steering servo gives way, per compliance of that, shape (5, 5)."""
+    axis = kingpin_m[1] - kingpin_m[0]
+    axis = axis / np.linalg.norm(axis)
+    way = np.cross(axis, wheel_centre_m - kingpin_m[0])
+    motion = np.array([way[0], way[1], *axis])
+    return np.outer(motion, motion)
+
+
+def _anti_roll_bar(tests: dict[str, Samples], travel: Array, parallel: Array | None) -> float | None:
+    """Half of what opposite travel is stiffer than parallel travel: force at a wheel per difference of travel."""
+    if parallel is None or "opposite_travel" not in tests or (load := tests["opposite_travel"].moved("load")) is None:
+        return None
+    x = tests["opposite_travel"].x
+    near, about = np.abs(x) <= 1.01 * _NEAR_M, np.abs(travel) <= 1.01 * _NEAR_M
+    opposite = float(np.polyfit(x[near], load[near], 1)[0])
+    return max(0.0, 0.5 * (opposite - float(np.polyfit(travel[about], parallel[about], 1)[0])))
+
+
+def _rack_lift(tests: dict[str, Samples]) -> float:
+    """From the change of wheel load as the wheels are steered; 0 where it was not measured."""
+    steered, opposite = tests.get("steering"), tests.get("opposite_travel")
+    if steered is None or opposite is None:
+        return 0.0
+    load, lifted, sprung = steered.moved("load"), steered.moved("travel"), opposite.moved("load")
+    if load is None or lifted is None or sprung is None:
+        return 0.0
+    near, small = np.abs(opposite.x) <= 1.01 * _NEAR_M, np.abs(steered.x) <= 0.4 * np.abs(steered.x).max()
+    rate = float(np.polyfit(opposite.x[near], sprung[near], 1)[0])
+    rise, push = (float(np.polyfit(steered.x[small], value[small], 2)[1]) for value in (lifted, load))
+    return float(f"{rise - push / rate:.6g}")
+
+
+def _damper_ratio(samples: Samples) -> float | None:
+    length = samples.moved("damper")
+    if length is None:
+        return None
+    near = np.abs(samples.x) <= 1.01 * _NEAR_M
+    return abs(float(np.polyfit(samples.x[near], length[near], 1)[0]))

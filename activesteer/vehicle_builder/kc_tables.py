@@ -1,0 +1,252 @@
+"""Reads a folder of K&C tables: files, units and names of a laboratory become samples of one wheel, the left one.
+
+Each file is AXLE_TEST.csv, or AXLE_TEST.toml with the columns as lists (`rigs.kc.tables.TESTS` names the tests). The
+right wheel is mirrored and joins the left one; up and down of a loop stand beside each other and are averaged by the
+curve that is laid through them. `names.toml` says what a laboratory calls the channels and which of its signs differ:
+
+    [names]
+    "Toe_FL_deg" = "left_toe [deg]"
+    [signs]
+    toe = -1
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from scipy.interpolate import make_lsq_spline
+
+from activesteer.config import read_toml
+from activesteer.conventions import Array
+from activesteer.errors import ParameterError, nearest_names
+from activesteer.files import is_file, is_folder, read_csv
+from activesteer.rigs.kc.tables import CHANNELS, OF_THE_AXLE, TESTS, UNITS
+
+_HEAD: Final = re.compile(r"(?P<name>[\w ]+?)\s*\[\s*(?P<unit>[\w/]+)\s*\]")
+_SIDES: Final = ("left", "right")
+_MOST_INTERVALS: Final = 16
+"""Of the smoothing spline: over +-80 mm of travel one for each 10 mm."""
+NAMES_FILE: Final = "names.toml"
+_LEAST_POINTS: Final = 5
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One test as the left wheel sees it, SI units.
+
+    Attributes:
+        x: What was swept: travel, rack to the left, force forwards or to the left, moment to the left; shape (n,).
+        channels: Channel -> samples, shape (n,).
+        file: Where they come from.
+    """
+
+    x: Array
+    channels: dict[str, Array]
+    file: str
+
+    def moved(self, name: str) -> Array | None:
+        """A channel less its value at x = 0, which need not be among the samples; None where it was not measured."""
+        if name not in self.channels:
+            return None
+        return self.channels[name] - smoothed(self.x, self.channels[name], np.zeros(1))
+
+
+def smoothed(x: Array, y: Array, at: Array) -> Array:
+    """A least-squares cubic spline through samples, both branches of a loop alike.
+
+    Knots lie evenly, one for each two different places at most, so that noise and hysteresis are averaged.
+
+    Args:
+        x: Places, in any order.
+        y: Samples.
+        at: Where it is wanted; beyond the samples it goes on straight.
+    """
+    places = len(np.unique(np.round(x / np.ptp(x), 3)))
+    intervals = int(np.clip(places // 2, 1, _MOST_INTERVALS))
+    low, high = float(x.min()), float(x.max())
+    knots = np.concatenate([[low] * 3, np.linspace(low, high, intervals + 1), [high] * 3])
+    order = np.argsort(x, kind="stable")
+    # Samples at one place count as their mean: the fit asks for increasing places.
+    spots, where = np.unique(x[order], return_inverse=True)
+    weight = np.bincount(where)
+    mean = np.bincount(where, y[order]) / weight
+    spline = make_lsq_spline(spots, mean, knots, 3, w=np.sqrt(weight))
+    inside = np.clip(at, low, high)
+    return np.asarray(spline(inside) + (at - inside) * spline(inside, 1), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class KcTables:
+    """All tests of a car: axle -> test -> samples; and the ratio of its steering where it was measured."""
+
+    tests: dict[str, dict[str, Samples]] = field(default_factory=dict)
+    rack_per_steering_wheel_m: float | None = None
+    """Rack travel per angle of the steering wheel [m/rad]."""
+
+
+def read_kc(folder: Path, axles: list[str]) -> KcTables:
+    """Reads a folder.
+
+    Args:
+        folder: With the files.
+        axles: Which are needed.
+
+    Returns:
+        The tests of both axles.
+
+    Raises:
+        ParameterError: there is no such folder, no table in it, or something in one that is not understood.
+    """
+    if not is_folder(folder):
+        raise ParameterError(f"there is no folder {folder}")
+    names, signs = _translation(folder)
+    tests: dict[str, dict[str, Samples]] = {axle: {} for axle in axles}
+    pinion = None
+    for axle, found in tests.items():
+        for name in TESTS:
+            file = next((path for end in ("csv", "toml") if is_file(path := folder / f"{axle}_{name}.{end}")), None)
+            if file is None:
+                continue
+            columns = _columns(file, names, signs)
+            if name == "steering":
+                pinion = _complete_rack(columns, file)
+            found[name] = _left_wheel(columns, name, file)
+        if "parallel_travel" not in found:
+            present = sorted(path.name for path in folder.iterdir())
+            words = nearest_names(f"{axle}_parallel_travel.csv", present)
+            raise ParameterError(f"{folder}: {axle}_parallel_travel.csv (or .toml) is needed; {words}")
+    return KcTables(tests, pinion)
+
+
+def _translation(folder: Path) -> tuple[dict[str, str], dict[str, float]]:
+    file = folder / NAMES_FILE
+    if not is_file(file):
+        return {}, {}
+    raw, source = read_toml(file)
+    for key in raw:
+        if key not in ("names", "signs"):
+            raise source.fail((key,), f"there is no such table; {nearest_names(key, ('names', 'signs'))}")
+    signs: dict[str, float] = {}
+    for channel, sign in raw.get("signs", {}).items():
+        if channel not in CHANNELS:
+            raise source.fail(("signs", channel), f"no channel is named so; {nearest_names(channel, CHANNELS)}")
+        if sign not in (1, -1):
+            raise source.fail(("signs", channel), f"{sign!r} is no sign; 1 and -1 are")
+        signs[channel] = float(sign)
+    return dict(raw.get("names", {})), signs
+
+
+def _columns(file: Path, names: Mapping[str, str], signs: Mapping[str, float]) -> dict[str, Array]:
+    """Channel (with its side) -> values in SI units and our signs."""
+    columns: dict[str, Array] = {}
+    for head, values in _raw_columns(file).items():
+        channel, factor = _channel(file, head, names.get(head, head))
+        if channel in columns:
+            raise ParameterError(f"two columns are {channel}", file=file.name, key=head)
+        bare = channel.removeprefix("left_").removeprefix("right_")
+        columns[channel] = factor * signs.get(bare, 1.0) * values
+    lengths = {len(values) for values in columns.values()}
+    if len(lengths) > 1 or min(lengths) < _LEAST_POINTS:
+        raise ParameterError(
+            f"columns of {_LEAST_POINTS} rows or more, all of the same length, are needed", file=file.name
+        )
+    return columns
+
+
+def _raw_columns(file: Path) -> dict[str, Array]:
+    if file.suffix == ".toml":
+        table, source = read_toml(file)
+        return {key: _numbers(file, key, value, source.name) for key, value in table.items()}
+    rows = read_csv(file, ParameterError)
+    heads = rows[0].cells if rows else []
+    for row in rows[1:]:
+        if len(row.cells) != len(heads):
+            raise ParameterError(
+                f"has {len(row.cells)} cells, the first row {len(heads)}", file=file.name, line=row.line
+            )
+    return {
+        head: _numbers(file, head, [row.cells[index] for row in rows[1:]], file.name)
+        for index, head in enumerate(heads)
+        if head
+    }
+
+
+def _numbers(file: Path, head: str, values: Any, name: str) -> Array:
+    try:
+        numbers = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as reason:
+        raise ParameterError("holds something that is no number", file=name, key=head) from reason
+    if numbers.ndim != 1 or not np.isfinite(numbers).all():
+        raise ParameterError("holds something that is no finite number", file=file.name, key=head)
+    return numbers
+
+
+def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
+    """Channel of a column, with its side, and the factor to SI units."""
+    match = _HEAD.fullmatch(name)
+    if match is None:
+        raise ParameterError(f"{name!r} is no channel with its unit, as 'left_toe [deg]'", file=file.name, key=head)
+    channel = match["name"].strip().lower().replace(" ", "_")
+    bare = channel.removeprefix("left_").removeprefix("right_")
+    if bare not in CHANNELS:
+        words = nearest_names(bare, CHANNELS)
+        raise ParameterError(f"no channel is named {bare!r}; {words}", file=file.name, key=head)
+    if bare == channel and bare not in OF_THE_AXLE:
+        raise ParameterError(f"which wheel? write left_{bare} or right_{bare}", file=file.name, key=head)
+    unit, _ = CHANNELS[bare]
+    if UNITS.get(match["unit"], ("", 0.0))[0] != unit:
+        known = [name for name, (si, _) in UNITS.items() if si == unit]
+        raise ParameterError(
+            f"{match['unit']!r} is no unit of {bare}; known are {', '.join(known)}", file=file.name, key=head
+        )
+    return channel, UNITS[match["unit"]][1]
+
+
+def _complete_rack(columns: dict[str, Array], file: Path) -> float | None:
+    """Rack travel per steering wheel angle; without a rack in the file one of 7.5 mm/rad, exact by definition."""
+    if "steering_wheel" not in columns:
+        if "rack" not in columns:
+            raise ParameterError("neither rack nor steering_wheel was measured", file=file.name)
+        return None
+    if "rack" not in columns:
+        columns["rack"] = 0.0075 * columns["steering_wheel"]
+        return 0.0075
+    small = np.abs(columns["steering_wheel"]) < np.radians(90.0)
+    return float(np.polyfit(columns["steering_wheel"][small], columns["rack"][small], 1)[0])
+
+
+def _left_wheel(columns: dict[str, Array], name: str, file: Path) -> Samples:
+    test = TESTS[name]
+    xs, parts = [], []
+    for side in _SIDES:
+        wheel = {key.removeprefix(f"{side}_"): value for key, value in columns.items() if key.startswith(f"{side}_")}
+        if not wheel:
+            continue
+        mirror = -1.0 if side == "right" and test.mirror == "opposed" else 1.0
+        if test.variable == "travel":
+            if "travel" not in wheel:
+                raise ParameterError("was not measured", file=file.name, key=f"{side}_travel")
+            x = wheel["travel"]
+        elif test.variable not in columns:
+            raise ParameterError("was not measured", file=file.name, key=test.variable)
+        else:
+            x = mirror * test.sign * columns[test.variable]
+        xs.append(x)
+        parts.append(wheel)
+    if not parts:
+        raise ParameterError("no column of a wheel: their names begin with left_ or right_", file=file.name)
+    common = set(parts[0]).intersection(*parts[1:])
+    left_out = set().union(*parts) - common
+    if left_out:
+        raise ParameterError(f"{', '.join(sorted(left_out))} of one wheel only", file=file.name)
+    x = np.concatenate(xs)
+    order = np.argsort(x, kind="stable")
+    if not x[order[0]] < 0.0 < x[order[-1]]:
+        raise ParameterError(f"{test.variable} does not go to both sides of 0", file=file.name)
+    channels = {key: np.concatenate([part[key] for part in parts])[order] for key in sorted(common)}
+    return Samples(x[order], channels, file.name)

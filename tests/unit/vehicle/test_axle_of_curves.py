@@ -1,0 +1,154 @@
+"""Axles of curves: their forces are slopes of an energy, both sides alike, and as stiff as they are asked to be."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer import simulate
+from activesteer.conventions import Array
+from activesteer.errors import ModelError, ParameterError
+from activesteer.rigs.kc import kinematics_compliance
+from activesteer.rigs.kc.tables import write_tables
+from activesteer.scenario import Car, load_car
+from activesteer.vehicle import Vehicle
+from activesteer.vehicle_builder import new_vehicle
+from activesteer.vehicle_builder.car_table import car_table
+from tests.raising import raises
+from tests.unit.vehicle_builder.other_curves import other_axle, other_curves
+
+JOINTS = ("x", "y", "z", "toe", "camber", "caster")
+
+
+@pytest.fixture(scope="module")
+def guided(tmp_path_factory: pytest.TempPathFactory) -> Car:
+    """The compact with curves for links."""
+    folder = tmp_path_factory.mktemp("kc")
+    result = kinematics_compliance("compact")
+    write_tables(result, folder)
+    (folder / "car.toml").write_text(car_table(load_car("compact"), result), encoding="utf-8")
+    return load_car(new_vehicle("guided", folder=folder / "car", kc=folder).vehicle_file)
+
+
+def strange(guided: Car) -> Vehicle:
+    """The same with curves that bend in every coordinate; far from any standing car."""
+    return dataclasses.replace(guided, config=dataclasses.replace(guided.config, curves=other_curves())).on()
+
+
+def suspension_forces(vehicle: Vehicle, qpos: Array) -> Array:
+    """Passive forces at rest without those of the road."""
+    model, data = vehicle.model, mujoco.MjData(vehicle.model)
+    data.qpos[:] = qpos
+    data.qpos[2] += 1.0
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    return data.qfrc_passive.copy()
+
+
+def test_forces_are_the_slopes_of_an_energy(guided: Car, rng: np.random.Generator) -> None:
+    """Virtual work: the stiffness is symmetric wherever the wheels are, to 1e-6 of its largest entry.
+
+    What a curve's slope hands from a side force to the springs it takes from the side: no way round gains work.
+    """
+    vehicle = strange(guided)
+    model = vehicle.model
+    names = [f"{corner}_{name}" for corner in ("fl", "fr", "rl", "rr") for name in JOINTS] + ["rack"]
+    dofs = [int(model.joint(name).dofadr[0]) for name in names]
+    qpos = model.qpos0.copy()
+    move = np.zeros(model.nv)
+    move[dofs] = 0.01 * rng.normal(size=len(dofs))
+    mujoco.mj_integratePos(model, qpos, move, 1.0)
+    stiffness = np.empty((len(dofs), len(dofs)))
+    for column, dof in enumerate(dofs):
+        sides = []
+        for sign in (1.0, -1.0):
+            there, step = qpos.copy(), np.zeros(model.nv)
+            step[dof] = sign * 1e-6
+            mujoco.mj_integratePos(model, there, step, 1.0)
+            sides.append(suspension_forces(vehicle, there)[dofs])
+        stiffness[:, column] = (sides[0] - sides[1]) / 2e-6
+    assert np.abs(stiffness).max() > 1e6
+    assert np.abs(stiffness - stiffness.T).max() < 1e-6 * np.abs(stiffness).max()
+
+
+def test_left_and_right_are_mirror_images(guided: Car, rng: np.random.Generator) -> None:
+    vehicle = strange(guided)
+    model = vehicle.model
+    signs = np.array([1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
+    moves = 0.01 * rng.normal(size=6)
+    forces = []
+    for corner, mirror in (("fl", np.ones(6)), ("fr", signs)):
+        qpos = model.qpos0.copy()
+        dofs = [int(model.joint(f"{corner}_{name}").dofadr[0]) for name in JOINTS]
+        for name, move in zip(JOINTS, mirror * moves, strict=True):
+            qpos[int(model.joint(f"{corner}_{name}").qposadr[0])] = move
+        qpos[int(model.joint("rack").qposadr[0])] = 0.01 * mirror[1]
+        forces.append(mirror * suspension_forces(vehicle, qpos)[dofs])
+    np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9, atol=1e-6)
+
+
+def test_the_rig_finds_the_measured_curves(guided: Car) -> None:
+    """Over the whole travel within 0.01 deg and 0.1 mm, over forces as well as five numbers can say it."""
+    before, after = kinematics_compliance("compact"), kinematics_compliance(Path(guided.mjcf).with_suffix(".toml"))
+    sweeps = [result.curves["parallel_travel"] for result in (before, after)]
+    for angle in ("toe_rad", "camber_rad"):
+        assert np.degrees(np.abs(getattr(sweeps[0], angle) - getattr(sweeps[1], angle)).max()) < 0.01, angle
+    ways = [sweep.centre_m - sweep.centre_m[sweep.zero] for sweep in sweeps]
+    assert np.abs(ways[0] - ways[1]).max() < 1e-4
+    for axle, name, share in (
+        ("front", "wheel_rate", 0.01), ("rear", "wheel_rate", 0.01), ("front", "roll_stiffness", 0.01),
+        ("front", "steering_ratio", 1e-3), ("front", "ackermann", 0.01), ("front", "side_force_toe", 0.03),
+        ("rear", "side_force_toe", 0.03), ("rear", "side_force_camber", 0.03), ("front", "aligning_steer", 0.03),
+        ("rear", "longitudinal_compliance_centre", 0.03), ("front", "roll_centre_height_by_force", 0.01),
+        ("rear", "kingpin_inclination", 0.02), ("car", "body_roll_frequency", 0.01),
+    ):  # fmt: skip
+        assert after[axle, name] == pytest.approx(before[axle, name], rel=share), (axle, name)
+
+
+def test_a_guided_car_drives_as_the_one_it_was_measured_on(guided: Car) -> None:
+    """A step of 30 deg: steady state within 1 %, peaks within 3 %."""
+    file = Path(guided.mjcf).with_suffix(".toml")
+    runs = [simulate("step_steer", "none", car, {"steer.steering_wheel_deg": 30.0}) for car in ("compact", file)]
+    for channel in ("yaw_rate_radps", "ay_mps2", "roll_rad"):
+        steady = [float(run[channel][-500:].mean()) for run in runs]
+        assert steady[1] == pytest.approx(steady[0], rel=0.01), channel
+        assert np.abs(runs[1][channel]).max() == pytest.approx(np.abs(runs[0][channel]).max(), rel=0.03), channel
+
+
+def test_half_a_step_changes_nothing(guided: Car) -> None:
+    """The stiff part is implicit in the engine, what bends of the curves is not: together they do not feel the step."""
+    file = Path(guided.mjcf).with_suffix(".toml")
+    changes = {"steer.steering_wheel_deg": 90.0, "duration_s": 2.0}
+    rolls = [simulate("step_steer", "none", file, changes, timestep_s=step)["roll_rad"] for step in (1e-3, 5e-4)]
+    assert np.abs(rolls[1]).max() == pytest.approx(np.abs(rolls[0]).max(), rel=2e-3)
+
+
+def test_the_state_is_complete(guided: Car) -> None:
+    vehicle = guided.on()
+    vehicle.start(20.0)
+    for _ in range(50):
+        mujoco.mj_step(vehicle.model, vehicle.data)
+    state = vehicle.save_state()
+    ends = []
+    for _ in range(2):
+        vehicle.restore_state(state)
+        for _ in range(50):
+            mujoco.mj_step(vehicle.model, vehicle.data)
+        ends.append(vehicle.data.qpos.copy())
+    np.testing.assert_array_equal(ends[0], ends[1])
+
+
+def test_links_where_curves_are_asked_for_are_an_error() -> None:
+    car = load_car("compact")
+    with pytest.raises(ModelError, match="fl_x"):
+        dataclasses.replace(car, config=dataclasses.replace(car.config, curves=other_curves())).on()
+
+
+def test_a_stiffness_that_holds_nothing_is_an_error() -> None:
+    axle = other_axle(steered=False)
+    with raises(ParameterError, key="stiffness"):
+        dataclasses.replace(axle, stiffness=(-1.0, *axle.stiffness[1:]))

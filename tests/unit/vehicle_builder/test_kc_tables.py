@@ -1,0 +1,85 @@
+"""Tables of a K&C rig: names, units, signs and sides of a laboratory, hysteresis, and what cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from activesteer.errors import ParameterError
+from activesteer.vehicle_builder import new_vehicle
+from activesteer.vehicle_builder.kc_checks import check_signs, unusual
+from activesteer.vehicle_builder.kc_tables import KcTables, Samples, read_kc, smoothed
+from tests.raising import raises
+from tests.unit.vehicle_builder.tables import COMPACT
+
+TRAVEL_MM = np.linspace(-60.0, 60.0, 25)
+
+
+def write(folder: Path, name: str, columns: dict[str, np.ndarray]) -> None:
+    rows = [",".join(f"{value:.8g}" for value in row) for row in np.array(list(columns.values())).T]
+    (folder / f"{name}.csv").write_text("\n".join([",".join(columns), *rows]), encoding="utf-8")
+
+
+def axle(folder: Path, **changes: np.ndarray) -> KcTables:
+    columns = {
+        "left_travel [mm]": TRAVEL_MM, "left_toe [min]": -0.3 * TRAVEL_MM, "left_camber [deg]": -0.5 - 0.02 * TRAVEL_MM,
+    }  # fmt: skip
+    write(folder, "rear_parallel_travel", columns | changes)
+    return read_kc(folder, ["rear"])
+
+
+def test_units_become_si(tmp_path: Path) -> None:
+    samples = axle(tmp_path).tests["rear"]["parallel_travel"]
+    assert samples.x[-1] == pytest.approx(0.06)
+    assert np.degrees(samples.channels["toe"][-1]) == pytest.approx(-0.3)
+
+
+def test_names_and_signs_of_a_laboratory_are_translated(tmp_path: Path) -> None:
+    write(tmp_path, "rear_parallel_travel", {"Z_L": TRAVEL_MM, "Delta_L": 0.005 * TRAVEL_MM, "Gamma_L": TRAVEL_MM})
+    names = '"Z_L" = "left_travel [mm]"\n"Delta_L" = "left_toe [deg]"\n"Gamma_L" = "left_camber [min]"\n'
+    (tmp_path / "names.toml").write_text(f"[names]\n{names}[signs]\ntoe = -1\n", encoding="utf-8")
+    samples = read_kc(tmp_path, ["rear"]).tests["rear"]["parallel_travel"]
+    assert np.degrees(samples.channels["toe"][-1]) == pytest.approx(-0.3)
+
+
+def test_the_right_wheel_is_the_left_one_in_a_mirror(tmp_path: Path) -> None:
+    """A force to the left pushes the left wheel outwards and the right one inwards."""
+    axle(tmp_path)
+    force = np.linspace(-3000.0, 3000.0, 13)
+    sides = {"left_centre_outwards [mm]": 1e-4 * force, "right_centre_outwards [mm]": -1e-4 * force}
+    write(tmp_path, "rear_side_force", {"force [N]": force, **sides})
+    samples = read_kc(tmp_path, ["rear"]).tests["rear"]["side_force"]
+    np.testing.assert_allclose(samples.channels["centre_outwards"], 1e-7 * samples.x, atol=1e-12)
+
+
+def test_the_middle_of_a_hysteresis_loop_is_found() -> None:
+    x = np.concatenate([np.linspace(-1.0, 1.0, 101), np.linspace(1.0, -1.0, 101)])
+    y = x**3 + 0.1 * np.sign(np.concatenate([np.ones(101), -np.ones(101)]))
+    at = np.linspace(-0.95, 0.95, 20)
+    np.testing.assert_allclose(smoothed(x, y, at), at**3, atol=1e-3)
+
+
+def test_a_column_without_unit_or_side_is_an_error(tmp_path: Path) -> None:
+    with raises(ParameterError, key="toe [deg]"):
+        axle(tmp_path, **{"toe [deg]": TRAVEL_MM})
+    with raises(ParameterError, key="left_caster"):
+        axle(tmp_path, **{"left_caster": TRAVEL_MM})
+
+
+def test_what_goes_against_the_force_is_an_error() -> None:
+    force = np.linspace(-3000.0, 3000.0, 13)
+    with raises(ParameterError, key="toe"):
+        check_signs({"aligning_moment": Samples(force / 20.0, {"toe": 1e-4 * force}, "rear_aligning_moment.csv")})
+
+
+def test_toe_out_in_bump_at_the_rear_is_asked_about(tmp_path: Path) -> None:
+    questions = list(unusual("rear", axle(tmp_path).tests["rear"]))
+    assert len(questions) == 1
+    assert "toe-out in bump at the rear" in questions[0]
+
+
+def test_measurements_without_an_axle_for_them_are_an_error(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="would have no effect"):
+        new_vehicle("mine", COMPACT, tmp_path / "mine", kc=tmp_path)
