@@ -106,11 +106,11 @@ def add_controller(parser: argparse.ArgumentParser, *, several: bool, default: s
     )  # fmt: skip
 
 
-def add_driver(parser: argparse.ArgumentParser) -> None:
-    """Adds `--driver`."""
+def add_driver(parser: argparse.ArgumentParser, default: str = "") -> None:
+    """Adds `--driver`; where the default depends on something, it is None, and `default` says it in words."""
     parser.add_argument(
-        "--driver", default=DEFAULT_DRIVER, metavar="DRIVER",
-        help="novice, typical, expert, a driver file, or my_file.py:MyDriver (default: typical)",
+        "--driver", default=None if default else DEFAULT_DRIVER, metavar="DRIVER",
+        help=f"novice, typical, expert, a driver file, or my_file.py:MyDriver (default: {default or DEFAULT_DRIVER})",
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from activesteer.commands.arguments import (
     add_controller,
+    add_driver,
     add_jobs,
     add_json,
     add_output,
@@ -25,6 +26,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument("standard", metavar="STANDARD", help="a name from `activesteer list`, as fmvss126")
     add_controller(parser, several=True)
     add_vehicle(parser)
+    add_driver(parser, default="whom the standard asks for")
     add_overrides(parser)
     add_output(parser, "DIR", "folder for page, JSON and runs, which is gone on with; none are written without it")
     add_jobs(parser)
@@ -45,6 +47,7 @@ def _test(options: argparse.Namespace) -> int:
             options.controller or ["none"],
             options.vehicle,
             overrides_of(options),
+            driver=options.driver,
             output=options.output,
             jobs=options.jobs,
             scheduler=options.scheduler,

@@ -1,10 +1,11 @@
-"""Double lane change (ISO 3888): into a lane beside one's own and back, at constant speed."""
+"""Double lane change (ISO 3888): into a lane beside one's own and back, at constant speed or coasting."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, ClassVar, Final
 
@@ -19,6 +20,7 @@ from activesteer.maneuver.least_jerk import Bound, least_jerk
 from activesteer.road.course import Course
 from activesteer.road.lane import Lane
 from activesteer.road.path import Path
+from activesteer.signals import Reference
 
 _AXLES_M: Final = (1.3, -1.3)
 """Where a car of 2.6 m wheelbase has its axles, ahead of its centre [m]: there its sides keep the margin."""
@@ -51,6 +53,9 @@ class LaneLayout:
     `least_jerk` that keeps the margin."""
     margin_m: Annotated[float, Range(0.0, 1.0)] = 0.1
     """Path of least jerk: least distance between the car's sides, at its axles, and the edges of the lanes [m]."""
+    throttle_off_m: Annotated[float, Range(0.0, 1000.0)] | None = None
+    """Distance into the entry lane from which on the car coasts, 2 m in ISO 3888-2 [m]; the speed is held where not
+    given."""
 
     def __post_init__(self) -> None:
         """Checks the words.
@@ -71,6 +76,19 @@ class LaneChange(AlongCourse):
     """The lanes."""
     vehicle_width_m: Width | None = None
     """Width of the vehicle, which the lanes are made for [m]; that of the vehicle file where not given."""
+
+    def reference(self, time_s: float) -> Reference:
+        """The path and the speed, or no throttle any more."""
+        return self._reference if time_s < self._throttle_off_s else self._coasting
+
+    @cached_property
+    def _throttle_off_s(self) -> float:
+        off_m = self.lane.throttle_off_m
+        return math.inf if off_m is None else (self.lane.entry_m + off_m) / self.speed_mps
+
+    @cached_property
+    def _coasting(self) -> Reference:
+        return self._reference._replace(hold_speed=False)
 
     def _make_course(self) -> Course:
         layout, width = self.lane, known_width(self.vehicle_width_m)

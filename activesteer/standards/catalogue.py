@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.standards import fmvss126, iso4138, iso7401, iso7975, iso13674, iso14512, iso21994
+from activesteer.standards import fmvss126, iso3888_2, iso4138, iso7401, iso7975, iso13674, iso14512, iso21994
 from activesteer.standards.standard import Standard
 
 STANDARDS: Final[dict[str, Standard]] = {
     module.STANDARD.name: module.STANDARD
-    for module in (fmvss126, iso4138, iso7401, iso7975, iso13674, iso14512, iso21994)
+    for module in (fmvss126, iso3888_2, iso4138, iso7401, iso7975, iso13674, iso14512, iso21994)
 }
 """Name -> standard."""
 

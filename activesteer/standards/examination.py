@@ -27,6 +27,7 @@ class Examination:
     Attributes:
         standard: The standard.
         vehicle: Name of the vehicle.
+        driver: Name of who drives.
         overrides: What was changed of it.
         findings: Controller -> what came out.
         versions: What it was made with.
@@ -35,6 +36,7 @@ class Examination:
 
     standard: Standard
     vehicle: str
+    driver: str
     overrides: Mapping[str, Any]
     findings: Mapping[str, Findings]
     versions: Mapping[str, str]
@@ -51,6 +53,7 @@ class Examination:
             "standard": self.standard.name,
             "edition": self.standard.edition,
             "vehicle": self.vehicle,
+            "driver": self.driver,
             "overrides": dict(self.overrides),
             "versions": dict(self.versions),
             "controllers": {name: found.values | {"summary": found.summary} for name, found in self.findings.items()},
@@ -63,6 +66,7 @@ def examine(
     vehicle: FileOrTable = "compact",
     overrides: Mapping[str, Any] | None = None,
     *,
+    driver: FileOrTable | None = None,
     output: str | os.PathLike[str] | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
@@ -75,6 +79,7 @@ def examine(
         controllers: Names or files of controllers, each of which is a test of its own.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value.
+        driver: Who drives, as for `simulate`; whom the standard asks for where not given.
         output: Folder for the runs, which can be gone on with; they are not kept where not given.
         jobs: Number of processes; that of the processors where not given.
         scheduler: Address of a Dask scheduler that drives the runs instead.
@@ -87,6 +92,7 @@ def examine(
         ActiveSteerError: an input is wrong, or a run failed without which the others make no sense.
     """
     standard = standard_of(name)
+    driver = standard.driver if driver is None else driver
     given = dict(overrides or {})
     found = {}
     with workers_for(jobs, scheduler=scheduler) as workers:
@@ -98,11 +104,10 @@ def examine(
                 if progress is not None:
                     progress(label, series, done, total)
 
-            ground = ProvingGround(standard.name, vehicle, controller, given, folder, workers, tell)
+            ground = ProvingGround(standard.name, vehicle, driver, controller, given, folder, workers, tell)
             found[label] = standard.examine(ground)
-    return Examination(
-        standard, label_of(vehicle), given, found, versions(), datetime.datetime.now(tz=datetime.UTC).date()
-    )
+    today = datetime.datetime.now(tz=datetime.UTC).date()
+    return Examination(standard, label_of(vehicle), label_of(driver), given, found, versions(), today)
 
 
 def write_json(result: Examination, path: Path) -> Path:

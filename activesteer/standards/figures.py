@@ -55,6 +55,7 @@ def _fill(axis: Axes, panel: Panel) -> None:
             own += 1
         else:
             colour, dashes = scale(curve.shade), "-"
+        dashes = dashes if curve.joined else ""
         marker = "o" if curve.marked else None
         axis.plot(curve.x, curve.y, color=colour, ls=dashes, lw=1.2, marker=marker, ms=3, label=curve.label or None)
     for value, label in panel.limits:

@@ -25,6 +25,7 @@ class ProvingGround:
     Attributes:
         standard: Name of the standard.
         vehicle: Name, path or table of the vehicle.
+        driver: Name, path or table of who drives, or his code.
         controller: Name or file of the controller.
         overrides: What the user changes of the car: dotted key -> value.
         folder: Where the studies go that can be gone on with; None where they are not kept.
@@ -34,6 +35,7 @@ class ProvingGround:
 
     standard: str
     vehicle: FileOrTable
+    driver: FileOrTable
     controller: str
     overrides: Mapping[str, Any]
     folder: Path | None
@@ -42,7 +44,7 @@ class ProvingGround:
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
         """See `Ground`."""
-        return resolve(maneuver, self.vehicle, {**(overrides or {}), **self.overrides})
+        return resolve(maneuver, self.vehicle, {**(overrides or {}), **self.overrides}, self.driver)
 
     def drive(
         self,
@@ -58,6 +60,7 @@ class ProvingGround:
                 "title": f"{self.standard}: {series}",
                 "maneuvers": [maneuver],
                 "vehicles": [self.vehicle],
+                "driver": self.driver,
                 "controllers": [self.controller],
                 "overrides": {**(overrides or {}), **self.overrides},
                 "design": {"kind": "list", "cases": [dict(case) for case in cases]},

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.quantities import display_unit, metric_label, metric_number
+from activesteer.resources import DEFAULT_DRIVER
 
 if TYPE_CHECKING:
     from activesteer.scenario import FileOrTable, Scenario
@@ -129,6 +130,7 @@ class Curve(NamedTuple):
         label: Its name in the legend; none where empty.
         shade: Place on a scale of colours from 0 to 1, of a curve that is one of many; None for a colour of its own.
         marked: Whether its points are drawn.
+        joined: Whether they are joined by a line.
     """
 
     x: ArrayLike
@@ -136,6 +138,7 @@ class Curve(NamedTuple):
     label: str = ""
     shade: float | None = None
     marked: bool = False
+    joined: bool = True
 
 
 class Panel(NamedTuple):
@@ -221,6 +224,7 @@ class Standard:
         implemented: What of it is done here, a sentence each.
         left_out: What is not, or not as it says.
         examine: Drives the runs of one car with one controller, and evaluates them.
+        driver: Who drives where nobody else is asked for.
     """
 
     name: str
@@ -229,6 +233,7 @@ class Standard:
     implemented: Sequence[str]
     left_out: Sequence[str]
     examine: Callable[[Ground], Findings]
+    driver: str = DEFAULT_DRIVER
 
 
 def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:

@@ -18,7 +18,7 @@ def examination(word: str, **values: bool) -> Examination:
     shaded = Picture(word, [Panel("x", "y", [Curve([1.0, 2.0], [1.0, 2.0], shade=0.5)], log=True)], (word, 0.0, 1.0))
     found = Findings(dict(values), word, [Table(word, [word], [[word]], frozenset([0]))], [picture, shaded])
     standard = Standard("one", word, word, [word], [word], lambda _: found)
-    return Examination(standard, word, {"road.mu": word}, {word: found}, {"activesteer": word}, datetime.date.min)
+    return Examination(standard, word, word, {"road.mu": word}, {word: found}, {"activesteer": word}, datetime.date.min)
 
 
 def test_page_shows_all_and_fetches_nothing():
