@@ -134,7 +134,7 @@ def _pictures(ground: Ground, speeds: dict[str, float | None], driven: dict[str,
         inside = x < course.lanes[-1].end_x_m + _BEYOND_M
         curves = [
             Curve(x[inside], y[inside], "centre of gravity"),
-            Curve(*course.cones_m.T, "cones", marked=True, joined=False),
+            Curve(course.cones_m[:, 0], course.cones_m[:, 1], "cones", marked=True, joined=False),
         ]
         tracks.append(Panel("x [m]", "y [m]", curves, f"{side} first"))
     labelled = {f"{side}, {speed:.0f} km/h": run for side, (speed, run) in best.items()}
