@@ -46,7 +46,7 @@ def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Abst
 def replacing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[Path]:
     """Gives a new file beside `path` to write to, which takes the place of `path` in the end.
 
-    So nobody meets half a file: where the body fails, the new file is deleted and what was there before stays. A device
+    So no one reads half a file: where the body fails, the new file is deleted and what was there before stays. A device
     is written to as it is.
 
     Args:

@@ -65,7 +65,7 @@ PLACES: Final = {name: len(CORNERS) * index for index, name in enumerate(PER_WHE
 """Field of a `BRAKE_STATE` -> its (first) place among the numbers."""
 
 NO_LIMIT_NM: Final = 1e9
-"""Drive torque limit that is none [N m]."""
+"""Drive torque limit that limits nothing [N m]."""
 
 
 def brake_setup(

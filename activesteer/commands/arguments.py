@@ -55,7 +55,7 @@ class Commands:
         return self._added.add_parser(name, description=description or f"{help[0].upper()}{help[1:]}.")
 
     def names(self) -> list[str]:
-        """The commands."""
+        """Names of the commands."""
         return [name for group in self._groups.values() for name in group]
 
     def parser(self) -> argparse.ArgumentParser:

@@ -29,7 +29,7 @@ class ProgressBar:
         self._width = 0
 
     def __enter__(self) -> ProgressBar:
-        """Begins."""
+        """Returns itself; the first value draws it."""
         return self
 
     def __exit__(self, *_: object) -> None:

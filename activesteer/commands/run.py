@@ -112,7 +112,7 @@ def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:
 
     try:
         before = _flat(Recording.open(path, recover=True).metadata)
-    except RecordingError:  # there is none, or none that anybody could look at
+    except RecordingError:  # there is no recording that could be missed
         return
     now = _flat({key: value for key, value in settings.items() if key != "overrides"})
     other = sorted(key for key, value in now.items() if before.get(key, value) != value)

@@ -42,7 +42,7 @@ class StopSignals:
     """
 
     def __init__(self) -> None:
-        """Knows of no signal."""
+        """Before any signal has arrived."""
         self.number: int | None = None
         self.options: argparse.Namespace | None = None
         self.finished = False

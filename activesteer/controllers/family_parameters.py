@@ -102,6 +102,6 @@ class IntegratedParameters:
     rear_rate_radps: _Rate = math.radians(28.0)
     """Rate of the rear steering [rad/s]."""
     tolerance_rad: _Limit = math.radians(0.3)
-    """Distance of an actuator from its demand that is none [rad]."""
+    """Distance of an actuator from its demand that does not count [rad]."""
     window_s: _Lag = 0.06
     """Time in which an actuator must come nearer to its demand, and as long again until it counts as failed [s]."""

@@ -73,7 +73,7 @@ class FrontSuperpositionParameters:
 
 @dataclass(frozen=True)
 class ControllerParameters:
-    """All of them."""
+    """Parameters of all controllers of a vehicle file."""
 
     desired_yaw_rate: DesiredYawRateParameters = DesiredYawRateParameters()
     """What both systems steer for."""

@@ -20,7 +20,7 @@ class SupervisedActuator:
         """Begins with a sound actuator.
 
         Args:
-            tolerance_rad: Distance from the demand that is none [rad].
+            tolerance_rad: Distance from the demand that does not count [rad].
             window_s: Time in which something must be seen of a demand [s].
             interval_s: Time between two steps [s].
         """

@@ -101,13 +101,13 @@ def _send_solids(
         size = np.array([solids[index].size_m for index in members])
         at = np.array([solids[index].position_m for index in members])
         turn = xyzw([solids[index].quaternion for index in members])
-        look: dict[str, Any] = {
+        style: dict[str, Any] = {
             "centers": at, "quaternions": turn, "colors": [colours[index] for index in members], "fill_mode": fill
         }  # fmt: skip
         if kind == "box":
-            drawn = rr.Boxes3D(half_sizes=size / 2, radii=_GHOST_LINE_M, **look)
+            drawn = rr.Boxes3D(half_sizes=size / 2, radii=_GHOST_LINE_M, **style)
         elif kind == "cylinder":
-            drawn = rr.Cylinders3D(lengths=size[:, 2], radii=size[:, 0] / 2, line_radii=_GHOST_LINE_M, **look)
+            drawn = rr.Cylinders3D(lengths=size[:, 2], radii=size[:, 0] / 2, line_radii=_GHOST_LINE_M, **style)
         else:
-            drawn = rr.Ellipsoids3D(half_sizes=size / 2, line_radii=_GHOST_LINE_M, **look)
+            drawn = rr.Ellipsoids3D(half_sizes=size / 2, line_radii=_GHOST_LINE_M, **style)
         stream.log(f"{path}/{kind}", drawn, static=True)

@@ -137,12 +137,12 @@ def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
     for plot in (*MOTION, *WHEELS, *links(run)):
         own_colours = alone or plot not in MOTION
         for path, lines in _entities(run, plot):
-            look = rr.SeriesLines(
+            style = rr.SeriesLines(
                 names=[_legend(run, line, alone=own_colours) for line in lines],
                 colors=[rgb(line.colour if line.colour and own_colours else run.colour) for line in lines],
                 widths=[line.width for line in lines],
             )
-            stream.log(path, look, static=True)
+            stream.log(path, style, static=True)
             values = np.stack([run.channel(line.channel) * _factor(line.channel) for line in lines], axis=1)
             columns = rr.Scalars.columns(scalars=values.reshape(-1))
             stream.send_columns(path, when, columns.partition(lengths=[len(lines)] * len(run.recording)))
@@ -190,24 +190,24 @@ def views_by_corner(plot: Plot, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]
     shown = []
     for line in plot.series:
         present = [run for run in runs if run.has(line.channel)]
-        looks = {
+        styles = {
             f"/{run.name}/plots/{line.channel}": rr.SeriesLines(names=[run.label], colors=[rgb(run.colour)])
             for run in present
         }
-        if looks:
+        if styles:
             head, _, unit = plot.title.rpartition(" [")
-            shown.append(_view(f"{head}, {line.name} [{unit}", list(looks), looks, legend=not shown))
+            shown.append(_view(f"{head}, {line.name} [{unit}", list(styles), styles, legend=not shown))
     return shown
 
 
 def _view(
-    title: str, contents: list[str], looks: dict[Any, rr.SeriesLines] | None = None, *, legend: bool
+    title: str, contents: list[str], styles: dict[Any, rr.SeriesLines] | None = None, *, legend: bool
 ) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",
         contents=contents,
         name=title,
-        overrides=looks,
+        overrides=styles,
         # Zooming or moving one plot moves all.
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
         # At the left: a manoeuvre begins quietly.

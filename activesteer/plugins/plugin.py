@@ -44,7 +44,7 @@ class Plugin:
     ours: bool = False
 
     def __post_init__(self) -> None:
-        """Whoever uses the truth is called so wherever his results are shown."""
+        """A block that uses the truth says so in its label, wherever its results are shown."""
         if self.uses_truth:
             object.__setattr__(self, "label", f"{self.label}+truth")
 

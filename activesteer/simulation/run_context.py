@@ -38,7 +38,7 @@ class RunContext(NamedTuple):
 
     @classmethod
     def of(cls, scenario: Scenario, vehicle: Vehicle, controller: Plugin) -> RunContext:
-        """Collects it."""
+        """The context of a run of a scenario, before it is driven."""
         metadata = {
             "controller": controller.name,
             **({"controller_parameters": dict(controller.parameters)} if controller.parameters else {}),

@@ -60,7 +60,7 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
     sedan = prepared(resolve("step_steer", "sedan"))
     sensed = prepared(resolve("step_steer", overrides={"sensors.preset": "production"}))
     stop = DrivenStop()
-    driven, along_path_driven = _Driven(scenario), _Driven(along_path)
+    driven, along_path_driven = _KeptInputs(scenario), _KeptInputs(along_path)
     with tempfile.TemporaryDirectory() as folder:
         stages: dict[str, Callable[[], float]] = {
             "bare_step_us": lambda: _bare(scenario),
@@ -157,7 +157,7 @@ def _plant(scenario: Scenario) -> float:
     return _per_step_us(lambda: _repeat(mujoco.mj_step, model, data, steps), steps)
 
 
-class _Driven:
+class _KeptInputs:
     """A run whose inputs of the engine are kept."""
 
     def __init__(self, scenario: Scenario) -> None:

@@ -207,7 +207,7 @@ class Vehicle:
         return self.measure()
 
     def _effective_radii(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
-        """Rolling radii under the loads of standing still, as whoever fits the sensors has measured them [m]."""
+        """Rolling radii under the loads of standing still, as measured when the sensors are fitted [m]."""
         loads_N = self.data.userdata[fb.U_FZ :: fb.USERDATA_PER_WHEEL][: len(CORNERS)]
         axles = (tyres[0], tyres[0], tyres[1], tyres[1])
         return [

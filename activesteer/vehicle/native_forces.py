@@ -236,7 +236,7 @@ def _friction_rate(entry, qvel, ten_velocity, state, timestep_s):
 
 @inlined
 def _polynomial(coefficients, x):
-    """Without a constant term."""
+    """Value of a polynomial without a constant term."""
     value = 0.0
     for power in range(fb.POWERS - 1, -1, -1):
         value = (value + coefficients[power]) * x

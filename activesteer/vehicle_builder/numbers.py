@@ -19,5 +19,5 @@ def sig(value: float, digits: int = 6) -> str:
 
 
 def vec(values: Iterable[float], digits: int = 6) -> str:
-    """Several of them."""
+    """Numbers with so many decimals at most, with blanks between, as MJCF takes them."""
     return " ".join(num(value, digits) for value in values)

@@ -172,7 +172,7 @@ class RearSteeringTable:
 
 @dataclass(frozen=True)
 class CarTable:
-    """A whole table."""
+    """All that a table of hardpoints says of a car."""
 
     units: str = "m"
     """Unit of all points: m or mm."""
@@ -192,7 +192,7 @@ class CarTable:
     aerodynamics: Aerodynamics | None = None
 
     def axle(self, name: str) -> AxleTable:
-        """One of the axles."""
+        """The axle of a name, `front` or `rear`."""
         return self.front if name == "front" else self.rear
 
 

@@ -36,7 +36,7 @@ class TrimmedAxle:
 
 @dataclass
 class Trimmed:
-    """The whole car."""
+    """What the trim found for both axles."""
 
     front: TrimmedAxle = field(default_factory=TrimmedAxle)
     rear: TrimmedAxle = field(default_factory=TrimmedAxle)
@@ -51,5 +51,5 @@ class Trimmed:
     """x and height of the whole car's centre of gravity."""
 
     def axle(self, name: str) -> TrimmedAxle:
-        """One of the axles."""
+        """The axle of a name, `front` or `rear`."""
         return self.front if name == "front" else self.rear

@@ -165,12 +165,12 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
                 pos=part.position_m,
                 quat=part.quaternion,
                 # Of a shell, what is round is the greenhouse.
-                rgba=_look(part.rgba, car, shell=part.rgba[3] < SEE_THROUGH, glass=part.kind == "sphere"),
+                rgba=_colour_of(part.rgba, car, shell=part.rgba[3] < SEE_THROUGH, glass=part.kind == "sphere"),
                 contype=0,
                 conaffinity=0,
             )
         elif all(body in bodies for body, _ in part.points):
-            tendon = spec.add_tendon(name=f"{prefix}{part.name}", width=part.radius_m, rgba=_look(part.rgba, car))
+            tendon = spec.add_tendon(name=f"{prefix}{part.name}", width=part.radius_m, rgba=_colour_of(part.rgba, car))
             for number, (body, point) in enumerate(part.points):
                 site = f"{prefix}{part.name}/{number}"
                 bodies[body].add_site(name=site, pos=point, group=4)
@@ -178,7 +178,7 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
     _add_shadow(spec, prefix, solids, _GHOST_OPACITY if car.ghost else 1.0)
 
 
-def _look(
+def _colour_of(
     rgba: tuple[float, float, float, float], car: Car, *, shell: bool = False, glass: bool = False
 ) -> tuple[float, float, float, float]:
     r, g, b, a = rgba

@@ -1,4 +1,4 @@
-"""Sizes below which a difference is none: what a driver or a sensor in a test car could not tell.
+"""Sizes below which a difference does not count: what a driver or a sensor in a test car could not tell.
 
 They rest on what is published about sensors and humans. That results of an earlier driver and earlier gains were known
 when they were written down is said in the guide (`docs/claims.md`).

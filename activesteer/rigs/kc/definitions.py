@@ -42,7 +42,7 @@ class Axle(NamedTuple):
 
     @property
     def tyre(self) -> TyreStiffness:
-        """Its tyres."""
+        """Stiffness of the tyres of this axle."""
         return self.measured.tyres[0 if self.name == "front" else 1]
 
     @property

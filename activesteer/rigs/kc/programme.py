@@ -50,7 +50,7 @@ class Measured:
 
     @property
     def parameters(self) -> VehicleParameters:
-        """The vehicle file."""
+        """Parameters of the vehicle that was measured."""
         return self.vehicle.parameters
 
 

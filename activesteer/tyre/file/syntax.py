@@ -59,7 +59,7 @@ def read_text(path: Path) -> str:
 
 
 def number(text: str) -> float | None:
-    """The finite number that a text stands for (Fortran's D exponent included), None where it is none."""
+    """The finite number that a text stands for (Fortran's D exponent included), None where it is no number."""
     if not _NUMBER.match(text):
         return None
     value = float(text.replace("d", "e").replace("D", "e"))

@@ -49,11 +49,11 @@ class CheckReport:
         return sum(finding.level == level for finding in self.findings)
 
     def __getitem__(self, what: str) -> Finding:
-        """The finding about something."""
+        """The finding whose `what` is this text."""
         return next(finding for finding in self.findings if finding.what == what)
 
     def as_table(self) -> dict[str, Any]:
-        """For JSON."""
+        """The report as JSON values."""
         return {
             "vehicle": self.vehicle,
             "errors": self.count("error"),
