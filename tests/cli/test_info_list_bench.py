@@ -108,7 +108,8 @@ def test_info_of_something_else_is_an_error(call, tmp_path, data, told):
     assert str(path) in answer.err
 
 
-def test_bench_has_the_promised_keys(call):
+def test_bench_has_the_promised_keys(call, monkeypatch):
+    monkeypatch.setattr("activesteer.studies.benchmark._RUNS_PER_PROCESS", 1)
     told = call("bench", "--rounds", "1", "--json")
     assert told.status == 0
     assert told.err == ""

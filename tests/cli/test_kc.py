@@ -25,9 +25,10 @@ def test_kc_json_has_what_is_promised(capsys):
 def test_kc_draws_into_a_folder(tmp_path, capsys):
     assert main(["kc", "-o", str(tmp_path / "kc")]) == 0
     assert "figure: " in capsys.readouterr().out
-    pictures = {picture.name for picture in (tmp_path / "kc").glob("*.png")}
-    assert "rear_camber.png" in pictures
+    pictures = list((tmp_path / "kc").glob("*.png"))
+    assert {picture.stem for picture in pictures} >= {"rear_camber", "parallel_travel", "steering", "targets"}
     assert len(pictures) >= 5
+    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
 
 
 def test_kc_names_the_vehicles_that_there_are(capsys):

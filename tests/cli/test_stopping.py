@@ -57,20 +57,25 @@ def test_signal_ends_every_command_at_any_moment(tmp_path, words, number, after_
 @pytest.mark.parametrize("swallowed", ["while True:\n    pass", "import time\ntime.sleep(60.0)"])
 def test_command_that_does_not_listen_is_ended(tmp_path, controller, swallowed):
     """A user's own code may catch everything, or be busy elsewhere."""
-    body = f"import contextlib\nwhile True:\n    with contextlib.suppress(BaseException):\n        {swallowed}"
+    loop = f"while True:\n    with contextlib.suppress(BaseException):\n        {swallowed}"
+    body = f"import contextlib\nopen('busy', 'w').close()\n{loop}"
     body = body.replace("\n    pass", "\n            pass").replace("\ntime.", "\n        time.")
-    stopped(tmp_path, ("run", "slalom", "-c", controller(body)), signal.SIGINT, 4.0)
+    stopped(tmp_path, ("run", "slalom", "-c", controller(body)), signal.SIGINT, tmp_path / "busy")
 
 
-def stopped(folder: Path, words: tuple[str, ...], number: signal.Signals, after_s: float) -> None:
-    """Sends the signal as a terminal does, to all processes of the group, and looks at the end."""
+def stopped(folder: Path, words: tuple[str, ...], number: signal.Signals, when: float | Path) -> None:
+    """Sends the signal as a terminal does, to all processes of the group, after a time [s] or when there is a file."""
     process = subprocess.Popen(
         [sys.executable, "-c", MAIN, *words],
         cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True, start_new_session=True,
     )  # fmt: skip
     try:
-        time.sleep(after_s)
+        if isinstance(when, Path):
+            while not when.exists() and process.poll() is None:
+                time.sleep(0.05)
+        else:
+            time.sleep(when)
         running = process.poll() is None
         if running:
             os.killpg(process.pid, number)
@@ -108,7 +113,7 @@ def is_true(saved: str, folder: Path) -> None:
     there = {
         str(path.relative_to(folder)): path
         for path in folder.rglob("*")
-        if path.is_file() and path.parts[-1] != "mine.py"
+        if path.is_file() and path.name not in {"mine.py", "busy"}
     }
     there = {name: path for name, path in there.items() if "__pycache__" not in name}
     if saved == "nothing was saved":

@@ -154,14 +154,6 @@ def test_a_steering_axis_is_found_from_two_poses(side: float) -> None:
     assert axis.centre_offset_m == pytest.approx(0.05 + 0.3 * math.tan(0.2))
 
 
-def test_pictures_are_drawn(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
-    paths = draw(compact(), tmp_path / "new" / "folder")
-    assert {path.stem for path in paths} >= {"rear_camber", "parallel_travel", "steering", "targets"}
-    for path in paths:
-        assert path.read_bytes().startswith(b"\x89PNG")
-
-
 def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     (tmp_path / "file").write_text("")

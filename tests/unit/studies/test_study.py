@@ -66,7 +66,7 @@ import sys
 from activesteer import study
 from tests.unit.studies.short import short_study
 if __name__ == "__main__":
-    study(short_study(*[0.7 + 0.01 * i for i in range(40)]), output=sys.argv[1], jobs=2)
+    study(short_study(*[0.7 + 0.01 * i for i in range(20)]), output=sys.argv[1], jobs=2)
 """
 
 
@@ -83,11 +83,11 @@ def test_a_killed_study_goes_on_with_what_is_missing(tmp_path):
     process.send_signal(signal.SIGKILL)
     process.wait()
     done = {path: path.stat().st_mtime_ns for path in parts.glob("[0-9]*.parquet")}
-    assert 0 < len(done) < 40
+    assert 0 < len(done) < 20
     progress = Store(tmp_path / "killed", ()).progress()
-    assert (progress.total, progress.running) == (40, False)
-    assert 0 < progress.done < 40
-    table = short_study(*[0.7 + 0.01 * i for i in range(40)])
+    assert (progress.total, progress.running) == (20, False)
+    assert 0 < progress.done < 20
+    table = short_study(*[0.7 + 0.01 * i for i in range(20)])
     study(table, output=tmp_path / "killed", jobs=1, limit=1)
     assert {path: path.stat().st_mtime_ns for path in done} == done
     study(table, output=tmp_path / "killed", jobs=1)
