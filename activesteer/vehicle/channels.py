@@ -17,7 +17,7 @@ from activesteer.signals import Channel
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.command_row import COMMAND_CHANNELS
 from activesteer.vehicle.guide_model import GUIDE
-from activesteer.vehicle.named_parts import find
+from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.native_channels import (
     Actuator,
     AxialForce,
@@ -206,7 +206,7 @@ class ChannelMap:
             ),
             Signal(
                 channel("hand_torque_Nm", "Nm", "torque of the hands at the steering wheel, left positive"),
-                lambda rows: felt * rows.actuator_force[:, demand],
+                self._column_torque(felt) or (lambda rows: felt * rows.actuator_force[:, demand]),
             ),
             Signal(
                 channel("front_steer_rad", "rad", "mean steer angle of the front wheels against the chassis"),
@@ -222,6 +222,28 @@ class ChannelMap:
             ),
             Signal(channel("rack_m", "m", "rack travel, positive steers left"), Column("sensordata", rack)),
         ]
+
+    def _column_torque(self, felt: float) -> AxialForce | None:
+        """A fraction of the torque that the column carries [N m]; None where there is no column.
+
+        The actuator that stands for the hands does not say it: its force is that of the demand of this step against the
+        angle at its beginning, and the engine carries out what is left of it at the end.
+        """
+        arms = tendon_arms(self._model, "steering_column")
+        if "steering_wheel" not in arms:
+            return None
+        tension = self._axial_force(self._model.tendon("steering_column").id)
+        scale = felt * arms["steering_wheel"]
+        return tension._replace(
+            stiffness_Npm=scale * tension.stiffness_Npm, second_Npm2=scale * tension.second_Npm2,
+            third_Npm3=scale * tension.third_Npm3, damping_Nspm=scale * tension.damping_Nspm,
+        )  # fmt: skip
+
+    def _axial_force(self, tendon: int) -> AxialForce:
+        """The law of a tendon's own stiffness."""
+        model = self._model
+        stiffness = model.tendon_stiffness[tendon], *model.tendon_stiffnesspoly[tendon]
+        return AxialForce._make((tendon, *stiffness, model.tendon_damping[tendon], *model.tendon_lengthspring[tendon]))
 
     def _corners(self) -> list[Signal]:
         signals: list[Signal] = []
@@ -311,8 +333,7 @@ class ChannelMap:
                 continue
             # What a damper's tendon has of a spring are the stops at both ends of its travel.
             name = model.tendon(index).name.replace("_damper", "_stop")
-            stiffness = model.tendon_stiffness[index], *model.tendon_stiffnesspoly[index]
-            law = AxialForce._make((index, *stiffness, model.tendon_damping[index], *model.tendon_lengthspring[index]))
+            law = self._axial_force(index)
             channel = Channel(f"{name}_force_N", "N", f"axial force of {name}, tension positive", "links")
             signals.append(Signal(channel, self._screwed(index, law) or law))
         return signals

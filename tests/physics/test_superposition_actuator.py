@@ -30,6 +30,14 @@ class Asks:
         return ActuatorCommand(superposition_demand_rad=math.radians(2.0) if asks else 0.0)
 
 
+class Sways:
+    """A controller that asks for 1 deg to and fro, once a second."""
+
+    def step(self, command: Any, measurement: Any) -> ActuatorCommand:
+        phase = 2.0 * math.pi * max(measurement.time_s, 0.0)
+        return ActuatorCommand(superposition_demand_rad=math.radians(1.0) * math.sin(phase))
+
+
 def asked(overrides: dict[str, Any] | None = None) -> Recording:
     return activesteer.simulate("straight_line", Asks, overrides={**STRAIGHT, **(overrides or {})})
 
@@ -65,8 +73,12 @@ def test_its_reaction_reaches_the_hands(geared: Recording) -> None:
 
 def test_hands_that_hold_no_more_than_a_torque_are_turned_against_the_superposition(geared: Recording) -> None:
     weak = asked({**GEARED, "driver.steering_torque_limit_Nm": 2.0})
-    assert np.abs(weak["hand_torque_Nm"]).max() <= 2.0 * (1.0 + 1e-9)
-    assert geared["hand_torque_Nm"].max() > 2.0
+    # The column also speeds the steering wheel up, 0.04 kgm2, against 0.2 Nms/rad of its bearings; the rest holds it.
+    rate = np.gradient(weak["steering_wheel_rad"], 1e-3)
+    held = weak["hand_torque_Nm"] + 0.65 * (0.04 * np.gradient(rate, 1e-3) + 0.2 * rate)
+    # All that they can once the motor's first jerk is over; the difference of angles is what is not exact.
+    np.testing.assert_allclose(held[AT + 80 :], 2.0, rtol=0.06)
+    assert geared["hand_torque_Nm"][-200:].min() > 2.0
     assert weak["steering_wheel_rad"][-1] < math.radians(-5.0)
     assert abs(geared["steering_wheel_rad"][-1]) < math.radians(0.1)
     assert weak["yaw_rate_radps"][-1] < geared["yaw_rate_radps"][-1]
@@ -101,3 +113,13 @@ def test_stuck_adds_nothing_more() -> None:
 def test_what_only_a_motor_has_is_an_error_at_the_servo() -> None:
     with raises(ParameterError, key="superposition_actuator.lock_torque_Nm", value=1.0):
         load_car("compact", {"superposition_actuator.lock_torque_Nm": 1.0})
+
+
+@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+def test_the_hands_feel_no_steps_of_the_simulation_while_the_superposition_moves(vehicle: str) -> None:
+    """A demand of 1 Hz; what the hands feel beside it would be the engine's step on stiff parts."""
+    straight = {**STRAIGHT, "duration_s": 1.2}
+    hand = activesteer.simulate("straight_line", Sways, vehicle, straight)["hand_torque_Nm"][100:]
+    smooth = np.convolve(hand, np.full(21, 1.0 / 21.0), "valid")
+    assert np.ptp(smooth) > 2.0
+    assert np.abs(hand[10:-10] - smooth).max() < 0.01 * np.ptp(smooth)
