@@ -26,11 +26,16 @@ def add_to(commands: Any) -> None:
     add_output(parser, "DIR", words)
     add_vehicle(parser)
     add_jobs(parser)
-    parser.add_argument("--figures", action="store_true", help="also draw the paper's figures")
+    parser.add_argument("--figures", action="store_true", help="also draw the paper's figures, or the comparison's")
     parser.add_argument(
         "--population", type=int, metavar="N",
         help="instead: in which share of N cars, roads and drivers each claim holds, and what each system does there; "
         "15 N runs",
+    )  # fmt: skip
+    parser.add_argument(
+        "--controllers", metavar="C,C...",
+        help="instead: these controllers side by side, with the sensors of production cars, in the five scenarios, a "
+        "step at 120 km/h, the severe lane change, braking on split friction and in a turn",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, metavar="S", help="of the population's sample (default: the stored one's)")
     add_scheduler(parser)
@@ -40,13 +45,18 @@ def add_to(commands: Any) -> None:
 
 def _reproduce(options: argparse.Namespace) -> int:
     # Here, where an interruption finds out what is saved.
-    options.output = options.output or Path("runs" if options.population is None else "population")
+    default = "comparison" if options.controllers else "runs" if options.population is None else "population"
+    options.output = options.output or Path(default)
+    if options.population is not None and options.controllers is not None:
+        raise ParameterError("--controllers drives nominal runs; leave --population out")
     if options.population is not None:
         options.how_to_go_on = "; the same command goes on with it"
         return _population(options)
     for name in ("seed", "scheduler"):
         if getattr(options, name) is not None:
             raise ParameterError(f"--{name} belongs to --population")
+    if options.controllers is not None:
+        return _compare(options)
     from activesteer.studies.reproduction import reproduce
 
     folder = options.output
@@ -80,6 +90,33 @@ def _reproduce(options: argparse.Namespace) -> int:
     if figures:
         print(f"figures: {len(figures)} files in {options.output / 'figures'}")
     return result.exit_status
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from activesteer.studies.comparison import compare
+
+    controllers = [name.strip() for name in options.controllers.split(",") if name.strip()]
+    with ProgressBar("compare", quiet=options.json) as bar:
+        made = compare(
+            controllers,
+            options.output,
+            options.vehicle,
+            jobs=options.jobs,
+            progress=lambda what, done, total: bar(done / total, what),
+        )
+    for (scenario, name), problem in made.failures.items():
+        print(f"{scenario} {name} failed: {problem}", file=sys.stderr)
+    figures = []
+    if options.figures:
+        from activesteer.studies.comparison_figure import draw_comparison
+
+        figures = [draw_comparison(made, options.output / "comparison.png")]
+    if options.json:
+        print_json({**made.to_json(), "figures": [str(path) for path in figures]})
+    else:
+        print(made.to_text())
+        print("\n".join(f"figure: {path}" for path in figures))
+    return 1 if made.failures else 0
 
 
 def _report(result: Reproduction, folder: Path) -> Path | None:

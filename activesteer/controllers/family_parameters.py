@@ -105,3 +105,35 @@ class IntegratedParameters:
     """Distance of an actuator from its demand that does not count [rad]."""
     window_s: _Lag = 0.06
     """Time in which an actuator must come nearer to its demand, and as long again until it counts as failed [s]."""
+
+
+@dataclass(frozen=True)
+class MpcParameters:
+    """Both axles within an envelope (`mpc`)."""
+
+    yaw_rate_scale_radps: _Scale = math.radians(1.0)
+    """Error of the yaw rate that weighs as much as a sideslip, an angle or a change of their scales [rad/s]."""
+    sideslip_scale_rad: _Scale = math.radians(0.5)
+    """Sideslip angle, likewise [rad]."""
+    rear_scale_rad: _Scale = math.radians(2.0)
+    """Rear angle away from that of the steady turn, likewise [rad]."""
+    superposition_scale_rad: _Scale = math.radians(4.0)
+    """Angle added at the front, likewise [rad]."""
+    change_scale_rad: _Scale = math.radians(5.0)
+    """Change of an angle from one block to the next, likewise [rad]."""
+    reference_lag_s: _Lag = 0.045
+    """Time constant at which the desired yaw rate follows the driver [s]."""
+    friction_fraction: _Fraction = 0.85
+    """Part of the estimated friction that the desired yaw rate may ask for [-]; all of it is the envelope's bound."""
+    actuator_lag_s: _Lag = 0.025
+    """Lag of both actuators in the model [s]."""
+    relaxation_length_m: _Length = 0.8
+    """Way over which an axle builds up its force, in the model [m]."""
+    rear_limit_rad: _Limit = math.radians(3.0)
+    """Most rear angle demanded [rad]."""
+    superposition_limit_rad: _Limit = math.radians(3.0)
+    """Most angle added at the front [rad]."""
+    superposition_rate_radps: _Rate = math.radians(29.0)
+    """Rate of the superposition [rad/s]."""
+    rear_rate_radps: _Rate = math.radians(28.0)
+    """Rate of the rear steering [rad/s]."""

@@ -11,6 +11,7 @@ from activesteer.controllers.family_parameters import (
     EscParameters,
     IntegratedParameters,
     LqrParameters,
+    MpcParameters,
     SideslipRearSteerParameters,
 )
 from activesteer.errors import ControllerError
@@ -89,6 +90,8 @@ class ControllerParameters:
     """Single brakes."""
     integrated: IntegratedParameters = IntegratedParameters()
     """Steering and brakes together."""
+    mpc: MpcParameters = MpcParameters()
+    """Both axles within an envelope."""
     estimator: EstimatorParameters = EstimatorParameters()
     """Speed, sideslip and friction, for controllers that ask for them."""
     interval_s: Annotated[float, Range(1e-4, 0.1)] | None = None

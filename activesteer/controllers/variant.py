@@ -16,6 +16,7 @@ from activesteer.controllers.esc import Esc
 from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.integrated import Integrated
 from activesteer.controllers.lqr import Lqr
+from activesteer.controllers.mpc import Mpc
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
 from activesteer.controllers.sideslip_rear_steer import SideslipRearSteer
@@ -29,6 +30,7 @@ _SYSTEMS: Final = {
     "lqr": Lqr,
     "esc": Esc,
     "integrated": Integrated,
+    "mpc": Mpc,
 }
 _OWN_KEYS: Final = ("name", "title", "system")
 
@@ -37,7 +39,7 @@ _OWN_KEYS: Final = ("name", "title", "system")
 class VariantFile(ControllerParameters):
     """The keys of a variant file: those of the table [controllers] of a vehicle file, and these."""
 
-    system: Literal["ars", "afs", "ars_sideslip", "lqr", "esc", "integrated"]
+    system: Literal["ars", "afs", "ars_sideslip", "lqr", "esc", "integrated", "mpc"]
     """What it is a variant of."""
     name: str = ""
     """Short name, for tables; the file's name where not given."""

@@ -86,7 +86,7 @@ def reproduce(
         for path in systems.values():
             check_target(path)
     total = len(scenarios) * len(SYSTEMS)
-    for done, (name, system, problem) in enumerate(_drive(scenarios, result.paths, jobs), 1):
+    for done, (name, system, problem) in enumerate(drive(scenarios, result.paths, jobs), 1):
         if problem:
             result.failures[name, system] = problem
         if progress is not None:
@@ -122,16 +122,30 @@ def _name_of(scenarios: Mapping[str, Scenario]) -> str:
     return next(iter(scenarios.values())).car.name
 
 
-class _Outcome(NamedTuple):
+class Outcome(NamedTuple):
+    """How a run ended.
+
+    Attributes:
+        scenario: Its name.
+        system: The controller.
+        problem: Why it ended early; empty where it did not.
+    """
+
     scenario: str
     system: str
     problem: str
 
 
-def _drive(
+def drive(
     scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
-) -> Iterator[_Outcome]:
-    """Makes all runs and tells each as it ends; what a search must find first is found once for the three systems."""
+) -> Iterator[Outcome]:
+    """Makes all runs and tells each as it ends; what a search must find first is found once for all controllers.
+
+    Args:
+        scenarios: What is driven, by name.
+        paths: Name of the scenario -> controller -> file.
+        jobs: Number of processes; that of the processors where not given.
+    """
     with workers_for(jobs) as workers:
         queue = TaskQueue(workers)
         for name, scenario in scenarios.items():
@@ -140,11 +154,11 @@ def _drive(
             if error is not None and not isinstance(error, ActiveSteerError):
                 raise error
             if system is not None:
-                yield _Outcome(name, system, str(error or value))
+                yield Outcome(name, system, str(error or value))
             elif error is not None:
-                yield from (_Outcome(name, system, str(error)) for system in SYSTEMS)
+                yield from (Outcome(name, other, str(error)) for other in paths[name])
             else:
-                for other in SYSTEMS:
+                for other in paths[name]:
                     queue.add((name, other), _run, value, other, paths[name][other])
 
 

@@ -1,0 +1,251 @@
+"""Envelope control: both axles by model predictive control within bounds on yaw rate and rear slip angle.
+
+The car may do what the driver asks as long as it stays in an envelope in which it can be steered back:
+
+    |r| <= mu g / v                  no more yaw rate than the friction can hold
+    |alpha_H| <= alpha_peak(mu)      the rear axle below the slip angle of its largest force
+
+The model is that of `lqr`. For an axle that slides C alpha becomes s C_0 alpha + C_0 e, s being force over slip angle
+as they are now, kept over the horizon: steered back, the axle gives as much less force as it has less slip angle, where
+a tangent would say that steering changes nothing.
+
+In every call the programme
+
+    minimise    sum over the horizon of ((r - r*) / r_s)^2 + (beta / beta_s)^2 + |(u - u*) / u_s|^2
+                                       + |(u - u before) / d_s|^2 + slack
+    subject to  the envelope, softened by a slack, angles within their limits, and the first ones within what the rates
+    allow
+
+is solved for angles in blocks that are held, and the first angles are demanded. r* and u* are the turn of `lqr`. The
+matrices depend on speed and slopes alone; they are made once for each of a grid of these.
+
+Sources: C. E. Beal and J. C. Gerdes, Model Predictive Control for Vehicle Stabilization at the Limits of Handling, IEEE
+Transactions on Control Systems Technology 21 (4), 2013, and C. G. Bobier, J. C. Gerdes, Staying within the nullcline
+boundary for vehicle envelope control using a sliding surface, Vehicle System Dynamics 51 (2), 2013: the envelope. Rear
+steering, lags and blocks are added.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from activesteer.controllers.axle_slopes import AxleSlopes
+from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
+from activesteer.controllers.family_parameters import MpcParameters
+from activesteer.controllers.lqr import steady_turn
+from activesteer.controllers.parameters import ControllerSetup
+from activesteer.controllers.quadratic_programme import solver
+from activesteer.controllers.turn_reference import TurnReference
+from activesteer.conventions import GRAVITY_MPS2, Array
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
+
+STATES: Final = ("yaw_rate", "sideslip", "front", "rear", "superposition", "rear_actuator")
+GIVEN: Final = ("front_intercept", "rear_intercept", "driver", "desired", "superposition_steady", "rear_steady",
+                "superposition_before", "rear_before")  # fmt: skip
+"""What does not change over the horizon, behind the states."""
+_SPEED_STEP_MPS: Final = 2.5
+_SLOPES: Final = tuple(0.1 * tenth for tenth in range(1, 11))
+"""Grid of s; e makes up for what lies between [-]."""
+_BLOCKS: Final = (1, 2, 3, 6, 12)
+"""Steps for which angles are held; their sum is the horizon."""
+_LOOKED_AT: Final = (2, 4, 7, 10, 13, 19, 25)
+"""Steps at which the envelope is to hold."""
+_SLACK_WEIGHT: Final = 1e7
+"""Cost of leaving the envelope by a rad/s or a rad, squared: that of a yaw rate error over the whole horizon, and a hundred times more."""
+
+
+class Problem(NamedTuple):
+    """The programme at a speed and slopes, but for what is known in a call; z is states and given values.
+
+    Attributes:
+        hessian: Shape (n, n); the unknowns are the blocks' angles in pairs, then the two slacks.
+        gradient: Gradient per z, shape (n, len(z)).
+        rows: What is bounded, per unknown, shape (m, n): envelope from above and from below.
+        offsets: What z adds to it, shape (m, len(z)).
+    """
+
+    hessian: Array
+    gradient: Array
+    rows: Array
+    offsets: Array
+
+
+class Mpc:
+    """Front superposition and rear steering within an envelope."""
+
+    interval_s = 0.01
+
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Makes the controller of one run.
+
+        Args:
+            setup: What it may know of the car.
+        """
+        p = self._parameters = setup.gains.mpc
+        self._estimator, self._car, self._interval_s = setup.estimator(), setup.single_track, setup.timestep_s
+        self._reference = TurnReference(self._car, p.reference_lag_s, p.friction_fraction, setup.timestep_s)
+        self._slopes, self._solve = AxleSlopes(setup), solver()
+        self._limits_rad = np.array([p.superposition_limit_rad, p.rear_limit_rad])
+        self._reach_rad = np.array([p.superposition_rate_radps, p.rear_rate_radps]) * setup.timestep_s
+        self._front_rad = self._rear_rad = 0.0
+        self._before_rad = np.zeros(2)
+
+    @classmethod
+    def from_vehicle(cls, setup: ControllerSetup) -> Mpc:
+        """Makes the controller for a car."""
+        return cls(setup)
+
+    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
+        """Both angles now.
+
+        Args:
+            command: What the driver does.
+            measurement: What the car's sensors say.
+        """
+        p, now = self._parameters, self._estimator.step(measurement)
+        speed, driver = now.speed_mps, command.front_steer_demand_rad
+        if speed < MIN_SPEED_MPS:
+            self._before_rad = np.zeros(2)
+            return ActuatorCommand()
+        desired = self._reference.step(driver, speed, now.friction)
+        added, turned = measurement.superposition_rad, measurement.rear_steer_rad
+        share = -np.expm1(-self._interval_s * speed / p.relaxation_length_m)
+        self._front_rad += share * (driver + added - self._front_rad)
+        self._rear_rad += share * (turned - self._rear_rad)
+        axles = self._slopes.axles(now, self._front_rad, self._rear_rad)
+        slopes = [min(_SLOPES, key=lambda known, axle=axle: abs(known - axle.secant)) for axle in axles]
+        cuts = [axle.force_rad - slope * axle.slip_angle_rad for axle, slope in zip(axles, slopes, strict=True)]
+        grid_mps = max(_SPEED_STEP_MPS * round(speed / _SPEED_STEP_MPS), 2.0 * _SPEED_STEP_MPS)
+        front, rear, _ = (gain * desired for gain in steady_gains(self._car, grid_mps))
+        problem = envelope_problem(self._car, p, self._interval_s, grid_mps, *slopes)
+        z = np.array([
+            now.yaw_rate_radps, now.sideslip_rad, self._front_rad, self._rear_rad, added, turned,
+            *cuts, driver, desired, front - driver, rear, *self._before_rad,
+        ])  # fmt: skip
+        blocks = len(_BLOCKS)
+        least, most = (np.tile(side * self._limits_rad, blocks) for side in (-1.0, 1.0))
+        least[:2] = np.clip(self._before_rad - self._reach_rad, -self._limits_rad, self._limits_rad)
+        most[:2] = np.clip(self._before_rad + self._reach_rad, -self._limits_rad, self._limits_rad)
+        bounds = np.array([now.friction * GRAVITY_MPS2 / speed, self._slopes.peak_rad(1, now.friction)])
+        envelope = np.repeat(bounds, len(_LOOKED_AT))
+        offset = problem.offsets @ z
+        free = np.full(len(envelope), np.inf)
+        lower = np.concatenate([least, [0.0, 0.0], -free, -envelope - offset[len(envelope) :]])
+        upper = np.concatenate([most, [np.inf, np.inf], envelope - offset[: len(envelope)], free])
+        found = self._solve(problem.hessian, problem.gradient @ z, problem.rows, lower, upper)
+        self._before_rad = found[:2]
+        added_demand, rear_demand = found[:2].tolist()
+        outside = bool(found[-2:].max() > 1e-6)
+        return ActuatorCommand(rear_demand, added_demand, desired, rear, rear_demand - rear, outside)
+
+
+@lru_cache(maxsize=64)
+def steady_gains(car: SingleTrackParameters, speed_mps: float) -> tuple[float, float, float]:
+    """Front angle, rear angle and sideslip of a steady turn per yaw rate; see `lqr.steady_turn`."""
+    front, rear, sideslip = steady_turn(car, speed_mps)[:, 0].tolist()
+    return front, rear, sideslip
+
+
+@lru_cache(maxsize=512)
+def envelope_problem(
+    car: SingleTrackParameters,
+    parameters: MpcParameters,
+    interval_s: float,
+    speed_mps: float,
+    front_slope: float = 1.0,
+    rear_slope: float = 1.0,
+) -> Problem:
+    """The programme at a speed and slopes.
+
+    Args:
+        car: The car as it is known.
+        parameters: Weights and lags.
+        interval_s: Time between two calls, the step of the model [s].
+        speed_mps: Speed [m/s].
+        front_slope: Force over slip angle of the front axle, 1 at no slip angle [-].
+        rear_slope: The same of the rear axle [-].
+    """
+    p, size = parameters, len(STATES) + len(GIVEN)
+    a, b = model(car, p, interval_s, speed_mps, front_slope, rear_slope)
+    steps, unknowns = sum(_BLOCKS) + 1, 2 * len(_BLOCKS)
+    block_of = np.repeat(np.arange(len(_BLOCKS)), _BLOCKS)
+    r, beta, rear = (STATES.index(name) for name in ("yaw_rate", "sideslip", "rear"))
+    desired, steady, before = len(STATES) + 3, len(STATES) + 4, len(STATES) + 6
+    identity = np.eye(size)
+    by_z, by_u = np.eye(size), np.zeros((size, unknowns))
+    weighed: list[tuple[Array, Array]] = []
+    bounded: dict[str, list[tuple[Array, Array]]] = {"yaw_rate": [], "slip": []}
+    for step in range(1, steps + 1):
+        by_z, by_u = a @ by_z, a @ by_u
+        if step == 1:
+            # What is demanded now works from the next call on.
+            by_z[:, before:] += b
+            continue
+        place = slice(2 * block_of[step - 2], 2 * block_of[step - 2] + 2)
+        by_u[:, place] += b
+        weighed.append(((by_z[r] - identity[desired]) / p.yaw_rate_scale_radps, by_u[r] / p.yaw_rate_scale_radps))
+        weighed.append((by_z[beta] / p.sideslip_scale_rad, by_u[beta] / p.sideslip_scale_rad))
+        for axle, scale in enumerate((p.superposition_scale_rad, p.rear_scale_rad)):
+            own = np.zeros(unknowns)
+            own[place.start + axle] = 1.0 / scale
+            weighed.append((-identity[steady + axle] / scale, own))
+        if step in _LOOKED_AT:
+            bounded["yaw_rate"].append((by_z[r], by_u[r]))
+            arm = car.cg_to_rear_m / speed_mps
+            by_both = [each[rear] - each[beta] + arm * each[r] for each in (by_z, by_u)]
+            bounded["slip"].append((by_both[0], by_both[1]))
+    for block in range(len(_BLOCKS)):
+        for axle in range(2):
+            change = np.zeros(unknowns)
+            change[2 * block + axle] = 1.0 / p.change_scale_rad
+            if block:
+                change[2 * (block - 1) + axle] = -1.0 / p.change_scale_rad
+            from_before = -identity[before + axle] / p.change_scale_rad if not block else np.zeros(size)
+            weighed.append((from_before, change))
+    of_z, of_u = (np.array(part) for part in zip(*weighed, strict=True))
+    hessian = np.diag([*np.zeros(unknowns), _SLACK_WEIGHT, _SLACK_WEIGHT])
+    hessian[:unknowns, :unknowns] = of_u.T @ of_u
+    gradient = np.zeros((unknowns + 2, size))
+    gradient[:unknowns] = of_u.T @ of_z
+    envelope = [*bounded["yaw_rate"], *bounded["slip"]]
+    offsets, rows = (np.array(part) for part in zip(*envelope, strict=True))
+    slack = np.repeat(np.eye(2), len(_LOOKED_AT), axis=0)
+    both = np.vstack([np.hstack([rows, -slack]), np.hstack([rows, slack])])
+    return Problem(hessian, gradient, both, np.vstack([offsets, offsets]))
+
+
+def model(
+    car: SingleTrackParameters,
+    parameters: MpcParameters,
+    interval_s: float,
+    speed_mps: float,
+    front_slope: float,
+    rear_slope: float,
+) -> tuple[Array, Array]:
+    """States and given values from one call to the next, for angles that are held.
+
+    Returns:
+        System matrix over `STATES` and `GIVEN`; input matrix, inputs superposition and rear angle.
+    """
+    size = len(STATES) + len(GIVEN)
+    softer = replace(
+        car,
+        front_stiffness_Nprad=front_slope * car.front_stiffness_Nprad,
+        rear_stiffness_Nprad=rear_slope * car.rear_stiffness_Nprad,
+        characteristic_speed_mps=speed_mps,  # there is none where the rear axle slides, and it is not asked for
+    )
+    inner, both = np.zeros((size + 2, size + 2)), np.eye(2)
+    inner[:2, :2], inner[:2, 2:4] = SingleTrack(softer).matrices(speed_mps)
+    inner[:2, 6:8] = SingleTrack(car).matrices(speed_mps)[1]
+    tyre_1ps, actuator_1ps = speed_mps / parameters.relaxation_length_m, 1.0 / parameters.actuator_lag_s
+    inner[2:4, 2:4], inner[2:4, 4:6] = -tyre_1ps * both, tyre_1ps * both
+    inner[2, 8] = tyre_1ps
+    inner[4:6, 4:6], inner[4:6, size:] = -actuator_1ps * both, actuator_1ps * both
+    whole = np.array(expm(interval_s * inner), dtype=np.float64)
+    return whole[:size, :size], whole[:size, size:]

@@ -1,0 +1,158 @@
+"""Any controllers side by side: the paper's five scenarios and four harder ones, behind the sensors of production cars.
+
+All drive the same scenarios; what is compared are the metrics of their recordings, under the names that they have
+there.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from activesteer.analysis.claims import SCENARIOS
+from activesteer.controllers import find_controller
+from activesteer.errors import ParameterError
+from activesteer.files import make_folder
+from activesteer.quantities import metric_label
+from activesteer.recording import Recording, check_target
+from activesteer.scenario import FileOrTable, resolve
+from activesteer.studies.reproduction import Progress, drive
+
+CASES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    **{name: (name, {}) for name in SCENARIOS},
+    "step_steer_120_kmh": ("step_steer", {"speed_kmh": 120.0}),
+    "severe_lane_change": ("severe_lane_change", {}),
+    "split_mu_braking": ("split_mu_braking", {}),
+    "brake_in_turn": ("brake_in_turn", {}),
+}
+"""Scenario -> manoeuvre and what is otherwise than in its file."""
+SHOWN: Final[dict[str, tuple[str, ...]]] = {
+    "step_steer": (
+        "yaw_rate_response_time_s", "ay_response_time_s", "yaw_rate_overshoot", "sideslip_peak_rad",
+    ),
+    "sine_with_dwell": ("yaw_rate_after_1000ms_share", "lateral_displacement_m", "sideslip_peak_abs_rad"),
+    "double_lane_change": ("sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps", "steering_wheel_peak_abs_rad"),
+    "slalom": ("sideslip_peak_abs_rad", "yaw_rate_rms_radps", "track_amplitude_m", "steering_wheel_peak_abs_rad"),
+    "split_mu_braking": ("stopping_distance_m", "lateral_deviation_max_m", "yaw_rate_peak_abs_radps"),
+    "brake_in_turn": (
+        "path_deviation_after_1000ms_m", "yaw_rate_deviation_after_1000ms_radps", "sideslip_peak_abs_rad",
+    ),
+}  # fmt: skip
+"""Scenario -> metrics that are printed and drawn; those of all are in the JSON."""
+SHOWN |= {"step_steer_120_kmh": SHOWN["step_steer"]}
+SHOWN |= {"double_lane_change_low_mu": SHOWN["double_lane_change"]}
+SHOWN |= {"severe_lane_change": (*SHOWN["double_lane_change"], "lane_overstep_m")}
+SENSORS: Final = {"sensors.preset": "production", "sensors.seed": 1}
+"""What all of them see the car through."""
+
+
+class Row(NamedTuple):
+    """One number of the table.
+
+    Attributes:
+        scenario: A name of `CASES`.
+        controller: The controller.
+        metric: Name of the metric in the recording.
+        value: SI, nan where the run does not define it.
+    """
+
+    scenario: str
+    controller: str
+    metric: str
+    value: float
+
+
+@dataclass
+class Comparison:
+    """What came of it.
+
+    Attributes:
+        controllers: What was compared, in the order given.
+        rows: Every metric of every run that got to its end.
+        files: The recordings.
+        failures: (scenario, controller) -> why that run ended early.
+    """
+
+    controllers: tuple[str, ...]
+    rows: list[Row] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+    failures: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def shown(self) -> list[tuple[str, str, dict[str, float]]]:
+        """Scenario, metric and its value by controller, for the metrics of `SHOWN`."""
+        known = {(row.scenario, row.metric, row.controller): row.value for row in self.rows}
+        found = []
+        for scenario, metrics in SHOWN.items():
+            for metric in metrics:
+                values = {name: known.get((scenario, metric, name)) for name in self.controllers}
+                found.append((scenario, metric, {name: value for name, value in values.items() if value is not None}))
+        order = list(CASES)
+        return sorted((line for line in found if line[2]), key=lambda line: order.index(line[0]))
+
+    def to_text(self) -> str:
+        """The metrics of `SHOWN` as a table."""
+        lines = [f"{'':62}" + "".join(f"{name:>13}" for name in self.controllers)]
+        before = ""
+        for scenario, metric, values in self.shown():
+            label, unit, factor = metric_label(metric)
+            label = f"{label} [{unit}]"
+            cells = (f"{values[name] * factor:13.3g}" if name in values else f"{'-':>13}" for name in self.controllers)
+            lines.append(f"{scenario if scenario != before else '':26}{label:36}" + "".join(cells))
+            before = scenario
+        return "\n".join(lines)
+
+    def to_json(self) -> dict[str, Any]:
+        """All numbers."""
+        return {
+            "table": [row._asdict() for row in self.rows],
+            "files": [str(file) for file in self.files],
+            "failures": {f"{scenario} {name}": problem for (scenario, name), problem in self.failures.items()},
+        }
+
+
+def compare(
+    controllers: Sequence[str],
+    folder: str | os.PathLike[str],
+    vehicle: FileOrTable = "compact",
+    *,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Drives `CASES` with every controller.
+
+    Args:
+        controllers: As for `simulate`.
+        folder: Where the recordings go, as SCENARIO-CONTROLLER.mcap; made where it does not exist.
+        vehicle: Name, path, or table of a vehicle.
+        jobs: Number of processes; that of the processors where not given.
+        progress: Called after every run.
+
+    Raises:
+        ActiveSteerError: an input is wrong. A run that fails ends no other run; it is named in `failures`.
+    """
+    labels = {find_controller(given).label: given for given in controllers}
+    if len(labels) < len(controllers):
+        raise ParameterError(f"of {', '.join(controllers)} two are called the same", value=tuple(controllers))
+    scenarios = {name: resolve(maneuver, vehicle, {**SENSORS, **other}) for name, (maneuver, other) in CASES.items()}
+    target = make_folder(folder, ParameterError)
+    paths = {name: {given: target / f"{name}-{label}.mcap" for label, given in labels.items()} for name in scenarios}
+    for systems in paths.values():
+        for path in systems.values():
+            check_target(path)
+    made, total = Comparison(tuple(labels)), len(scenarios) * len(labels)
+    named = {given: label for label, given in labels.items()}
+    for done, (scenario, given, problem) in enumerate(drive(scenarios, paths, jobs), 1):
+        if problem:
+            made.failures[scenario, named[given]] = problem
+        if progress is not None:
+            progress(f"{scenario} {named[given]}" + (" FAILED" if problem else ""), done, total)
+    for scenario, systems in paths.items():
+        for given, path in systems.items():
+            if (scenario, named[given]) not in made.failures:
+                made.files.append(path)
+                found = Recording.open(path).metrics
+                made.rows += [Row(scenario, named[given], metric, value) for metric, value in found.items()]
+    return made

@@ -1,0 +1,64 @@
+"""A comparison of controllers as a heat map: every number over that of the first controller."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from activesteer.plotting import new_figure, save
+from activesteer.quantities import metric_label
+from activesteer.studies.comparison import Comparison
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_RANGE: Final = 3.0
+"""Ratio at which the colours end, up and down."""
+
+
+def draw_comparison(made: Comparison, path: Path) -> Path:
+    """Draws it.
+
+    Raises:
+        ActiveSteerError: the file cannot be written, or matplotlib is not installed.
+    """
+    return save(comparison_figure(made), path)
+
+
+def comparison_figure(made: Comparison) -> Figure:
+    """The figure that `draw_comparison` writes."""
+    lines, first = made.shown(), made.controllers[0]
+    ratios = np.full((len(lines), len(made.controllers)), math.nan)
+    figure = new_figure(4.2 + 0.85 * len(made.controllers), 1.2 + 0.26 * len(lines))
+    axes = figure.subplots()
+    for row, (_, metric, values) in enumerate(lines):
+        _, _, factor = metric_label(metric)
+        base = abs(values.get(first, math.nan))
+        for column, name in enumerate(made.controllers):
+            if name not in values:
+                continue
+            value = abs(values[name])
+            if base > 0.0 and value > 0.0:
+                ratios[row, column] = math.log(value / base)
+            text = f"{values[name] * factor:.3g}"
+            axes.text(column, row, text, ha="center", va="center", fontsize="x-small")
+    span = math.log(_RANGE)
+    axes.imshow(ratios, cmap="RdBu_r", vmin=-span, vmax=span, aspect="auto", alpha=0.7)
+    axes.set_xticks(range(len(made.controllers)), made.controllers, fontsize="small")
+    axes.xaxis.tick_top()
+    labels, before = [], ""
+    for row, (scenario, metric, _) in enumerate(lines):
+        label, unit, _ = metric_label(metric)
+        name = f"{scenario.replace('_', ' ')}: " if scenario != before else ""
+        labels.append(f"{name}{label} [{unit}]")
+        if scenario != before and row:
+            axes.axhline(row - 0.5, color="black", linewidth=0.8)
+        before = scenario
+    axes.set_yticks(range(len(lines)), labels, fontsize="x-small")
+    axes.set_xlabel(
+        f"Blue: size below that of {first}, red: above; full colour: a factor of {_RANGE:g}", fontsize="x-small"
+    )
+    return figure
