@@ -54,7 +54,7 @@ class Esc:
     def from_vehicle(cls, setup: ControllerSetup) -> Esc:
         """Makes the controller for a car."""
         p, estimator = setup.gains.esc, setup.estimator()
-        reference = TurnReference(setup.single_track, p.reference_lag_s, p.friction_fraction, setup.timestep_s)
+        reference = TurnReference(setup.single_track, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         return cls(reference, estimator, p, setup.single_track.yaw_inertia_kgm2, brake_levers(setup))
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:

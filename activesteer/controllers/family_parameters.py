@@ -31,21 +31,21 @@ class SideslipRearSteerParameters:
 class LqrParameters:
     """Both axles by a linear-quadratic regulator (`lqr`)."""
 
-    yaw_rate_scale_radps: _Scale = math.radians(3.0)
+    yaw_rate_scale_radps: _Scale = math.radians(0.8)
     """Error of the yaw rate that weighs as much as a sideslip or an angle of their scales [rad/s]."""
     sideslip_scale_rad: _Scale = math.radians(0.5)
     """Sideslip angle, likewise [rad]."""
     rear_scale_rad: _Scale = math.radians(2.0)
     """Rear angle, likewise [rad]."""
-    superposition_scale_rad: _Scale = math.radians(2.0)
+    superposition_scale_rad: _Scale = math.radians(4.0)
     """Angle added at the front, likewise [rad]."""
-    reference_lag_s: _Lag = 0.03
-    """Time constant at which the desired yaw rate follows the driver [s]."""
+    reference_length_m: _Length = 0.87
+    """Way over which the desired yaw rate follows the driver [m]."""
     friction_fraction: _Fraction = 0.85
     """Part of the estimated friction that the desired yaw rate may ask for [-]."""
     actuator_lag_s: _Lag = 0.025
     """Lag of both actuators in the model [s]."""
-    relaxation_length_m: _Length = 0.5
+    relaxation_length_m: _Length = 0.8
     """Way over which a tyre builds up its force, in the model [m]."""
     rear_limit_rad: _Limit = math.radians(3.0)
     """Most rear angle demanded [rad]."""
@@ -65,8 +65,8 @@ class EscParameters:
     """T_r: time in which a moment takes back the error of the yaw rate [s]."""
     sideslip_time_s: _Lag = 0.2
     """T_b: half the time in which a moment turns the car back by the sideslip beyond its limit, without damping [s]."""
-    reference_lag_s: _Lag = 0.08
-    """Time constant at which the desired yaw rate follows the driver [s]."""
+    reference_length_m: _Length = 1.1
+    """Way over which the desired yaw rate follows the driver [m]."""
     friction_fraction: _Fraction = 0.9
     """Part of the estimated friction that the desired yaw rate may ask for [-]."""
     torque_limit_Nm: Annotated[float, Range(0.0, 1e4)] = 2000.0
@@ -121,8 +121,8 @@ class MpcParameters:
     """Angle added at the front, likewise [rad]."""
     change_scale_rad: _Scale = math.radians(5.0)
     """Change of an angle from one block to the next, likewise [rad]."""
-    reference_lag_s: _Lag = 0.045
-    """Time constant at which the desired yaw rate follows the driver [s]."""
+    reference_length_m: _Length = 0.65
+    """Way over which the desired yaw rate follows the driver [m]."""
     friction_fraction: _Fraction = 0.85
     """Part of the estimated friction that the desired yaw rate may ask for [-]; all of it is the envelope's bound."""
     actuator_lag_s: _Lag = 0.025

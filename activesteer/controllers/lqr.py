@@ -86,7 +86,7 @@ class Lqr:
         p = self._parameters = setup.gains.lqr
         self._estimator = setup.estimator()
         self._car, self._interval_s = setup.single_track, setup.timestep_s
-        self._reference = TurnReference(self._car, p.reference_lag_s, p.friction_fraction, setup.timestep_s)
+        self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         self._front_rad = self._rear_rad = 0.0
         self._before = 0.0, 0.0
 

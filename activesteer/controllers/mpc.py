@@ -57,7 +57,8 @@ _BLOCKS: Final = (1, 2, 3, 6, 12)
 _LOOKED_AT: Final = (2, 4, 7, 10, 13, 19, 25)
 """Steps at which the envelope is to hold."""
 _SLACK_WEIGHT: Final = 1e7
-"""Cost of leaving the envelope by a rad/s or a rad, squared: that of a yaw rate error over the whole horizon, and a hundred times more."""
+"""Cost of leaving the envelope by a rad/s or a rad, squared: that of a yaw rate error over the whole horizon, and a
+hundred times more."""
 
 
 class Problem(NamedTuple):
@@ -89,7 +90,7 @@ class Mpc:
         """
         p = self._parameters = setup.gains.mpc
         self._estimator, self._car, self._interval_s = setup.estimator(), setup.single_track, setup.timestep_s
-        self._reference = TurnReference(self._car, p.reference_lag_s, p.friction_fraction, setup.timestep_s)
+        self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         self._slopes, self._solve = AxleSlopes(setup), solver()
         self._limits_rad = np.array([p.superposition_limit_rad, p.rear_limit_rad])
         self._reach_rad = np.array([p.superposition_rate_radps, p.rear_rate_radps]) * setup.timestep_s

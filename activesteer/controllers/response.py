@@ -27,9 +27,9 @@ COMMANDS: Final = ("rear_steer_demand_rad", "superposition_demand_rad")
 _PULSE: Final = {"yaw_rate_radps": 1e-4, "ay_mps2": 1e-3, "rear_steer_rad": 1e-5, "superposition_rad": 1e-5}
 """Heights of the pulses: a hundredth of what a sensor resolves, so that no limit is reached."""
 _SETTLE_S: Final = 2.0
-_LENGTH_S: Final = 6.0
-_LEFT: Final = 0.01
-"""Share of the largest answer that may be left at the end [-]."""
+_LENGTH_S: Final = 8.0
+_LEFT: Final = 0.02
+"""Part of the largest answer that may be left at the end: an estimator learns the offset of a sensor slowly [-]."""
 _LINEAR: Final = 0.01
 """By how much half a pulse may be answered otherwise than by half [-]."""
 

@@ -9,21 +9,24 @@ from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
 
 class TurnReference:
-    """Desired yaw rate, eqs. 3 and 6 with the estimated friction, behind a first-order lag of the driver's angle."""
+    """Desired yaw rate, eqs. 3 and 6 with the estimated friction, behind a first-order lag of the driver's angle.
+
+    The lag is a way, as that of the tyres is: at twice the speed the car answers in half the time.
+    """
 
     def __init__(
-        self, single_track: SingleTrackParameters, lag_s: float, friction_fraction: float, interval_s: float
+        self, single_track: SingleTrackParameters, length_m: float, friction_fraction: float, interval_s: float
     ) -> None:
         """Computes the constants.
 
         Args:
             single_track: The car as it is known.
-            lag_s: Time constant at which the driver is followed [s].
+            length_m: Way over which the driver is followed [m].
             friction_fraction: Part of the friction that may be asked for [-].
             interval_s: Time between two steps [s].
         """
         self._gain = SingleTrack(single_track).yaw_rate_gain
-        self._share = -math.expm1(-interval_s / lag_s)
+        self._per_speed_spm = interval_s / length_m
         self._most_mps2 = friction_fraction * GRAVITY_MPS2
         self._asked_rad = 0.0
 
@@ -35,7 +38,7 @@ class TurnReference:
             speed_mps: Speed > 0 [m/s].
             friction: Friction of the road [-].
         """
-        self._asked_rad += self._share * (front_steer_rad - self._asked_rad)
+        self._asked_rad -= math.expm1(-self._per_speed_spm * speed_mps) * (front_steer_rad - self._asked_rad)
         desired = self._gain(speed_mps) * self._asked_rad
         limit = self._most_mps2 * friction / speed_mps
         return min(max(desired, -limit), limit)

@@ -17,8 +17,10 @@ from activesteer.controllers import (
     RearSteer,
     find_controller,
     load_controller,
+    read_variant,
 )
 from activesteer.errors import ControllerError
+from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
@@ -250,3 +252,9 @@ def test_controllers_are_told_what_sensors_measure_and_nothing_else():
         "wheel_torques",
         "parking_brake",
     }
+
+
+@pytest.mark.parametrize("name", ["ars_sideslip", "lqr", "esc", "integrated", "mpc"])
+def test_file_of_a_controller_says_what_stands_in_the_code(name):
+    gains = resolve("straight_line").controller_setup(0.001).gains
+    assert read_variant(name).gains_in(setup(gains=gains)) == gains

@@ -100,7 +100,7 @@ def test_loop_that_turns_round_the_critical_point_is_known_as_unstable():
 
 @pytest.mark.parametrize("name", ["ars", "afs"])
 def test_answer_to_pulses_is_that_of_the_linear_form(name):
-    bands = {f"controllers.{name}.corrector.{end}_degps": 0.0 for end in ("off", "full")}
+    bands = {f"controllers.{name}.corrector.{end}_degps": 0.0 for end in ("deadband_start", "deadband_end")}
     known = resolve("straight_line", overrides=bands).controller_setup(STEP_S)
     pulses = pulse_responses(load_controller(name, known), measured(0.0, 25.0), STEP_S)
     form = linear_controller(name, known, 25.0)
