@@ -9,7 +9,7 @@ limits that are not reached, and a user's own code have one as well as a written
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -34,7 +34,13 @@ _LINEAR: Final = 0.01
 """By how much half a pulse may be answered otherwise than by half [-]."""
 
 
-def pulse_responses(controller: Any, rolling: Measurement, interval_s: float, name: str = "it") -> Array:
+def pulse_responses(
+    controller: Any,
+    rolling: Measurement,
+    interval_s: float,
+    name: str = "it",
+    held: Mapping[str, tuple[int, int]] | None = None,
+) -> Array:
     """Impulse responses of a controller to its measurements.
 
     Args:
@@ -42,9 +48,11 @@ def pulse_responses(controller: Any, rolling: Measurement, interval_s: float, na
         rolling: What the sensors say of a car that rolls straight on, at its speed.
         interval_s: Time between two calls [s].
         name: What the controller is called, for the message.
+        held: Signal -> calls for which a sample of its sensor is held, and calls after a multiple of that in which it
+            is first seen. An estimator that takes each sample once answers to the whole sample, not to one call of it.
 
     Returns:
-        Shape (calls, len(COMMANDS), len(SIGNALS)): answer per unit of the pulse, the first in the call that gets it.
+        Shape (calls, len(COMMANDS), len(SIGNALS)): answer per unit of a sample, the first in the call that sees it.
 
     Raises:
         ControllerError: it does not answer a small pulse in proportion, or its answer does not end, so that it has no
@@ -52,12 +60,17 @@ def pulse_responses(controller: Any, rolling: Measurement, interval_s: float, na
     """
     settled = copy.deepcopy(controller)
     _answers(settled, rolling, interval_s, round(_SETTLE_S / interval_s))
+    rolling = rolling._replace(time_s=rolling.time_s + _SETTLE_S)
     count = round(_LENGTH_S / interval_s)
-    rest = _answers(copy.deepcopy(settled), rolling, interval_s, count)
     found = np.empty((count, len(COMMANDS), len(SIGNALS)))
     for column, signal in enumerate(SIGNALS):
+        calls, first = (held or {}).get(signal, (1, 0))
+        before = copy.deepcopy(settled)
+        _answers(before, rolling, interval_s, first)
+        seen = rolling._replace(time_s=rolling.time_s + first * interval_s)
+        rest = _answers(copy.deepcopy(before), seen, interval_s, count)
         whole, half = (
-            (_answers(copy.deepcopy(settled), rolling, interval_s, count, signal, height) - rest) / height
+            (_answers(copy.deepcopy(before), seen, interval_s, count, signal, height, calls) - rest) / height
             for height in (_PULSE[signal], 0.5 * _PULSE[signal])
         )
         largest = np.abs(whole).max()
@@ -89,14 +102,20 @@ def response_of(pulses: Array, interval_s: float) -> Callable[[Array], NDArray[n
 
 
 def _answers(
-    controller: Any, rolling: Measurement, interval_s: float, count: int, signal: str = "", height: float = 0.0
+    controller: Any,
+    rolling: Measurement,
+    interval_s: float,
+    count: int,
+    signal: str = "",
+    height: float = 0.0,
+    calls: int = 1,
 ) -> Array:
-    """What is demanded in so many calls, the first of which gets a pulse; shape (count, len(COMMANDS))."""
+    """What is demanded in so many calls, the first of which get a pulse; shape (count, len(COMMANDS))."""
     straight = DriverCommand(front_steer_demand_rad=0.0)
     found = np.empty((count, len(COMMANDS)))
     for call in range(count):
         seen = rolling._replace(time_s=rolling.time_s + call * interval_s)
-        if call == 0 and signal:
+        if call < calls and signal:
             seen = seen._replace(**{signal: getattr(seen, signal) + height})
         answer: ActuatorCommand = controller.step(straight, seen)
         found[call] = answer.rear_steer_demand_rad, answer.superposition_demand_rad

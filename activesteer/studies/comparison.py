@@ -29,22 +29,24 @@ CASES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "brake_in_turn": ("brake_in_turn", {}),
 }
 """Scenario -> manoeuvre and what is otherwise than in its file."""
+_STEP: Final = ("yaw_rate_response_time_s", "ay_response_time_s", "yaw_rate_overshoot", "sideslip_peak_rad")
+_LANES: Final = ("sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps", "steering_wheel_peak_abs_rad")
 SHOWN: Final[dict[str, tuple[str, ...]]] = {
-    "step_steer": (
-        "yaw_rate_response_time_s", "ay_response_time_s", "yaw_rate_overshoot", "sideslip_peak_rad",
-    ),
+    "step_steer": _STEP,
     "sine_with_dwell": ("yaw_rate_after_1000ms_share", "lateral_displacement_m", "sideslip_peak_abs_rad"),
-    "double_lane_change": ("sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps", "steering_wheel_peak_abs_rad"),
+    "double_lane_change": _LANES,
     "slalom": ("sideslip_peak_abs_rad", "yaw_rate_rms_radps", "track_amplitude_m", "steering_wheel_peak_abs_rad"),
+    "double_lane_change_low_mu": _LANES,
+    "step_steer_120_kmh": _STEP,
+    "severe_lane_change": (*_LANES, "lane_overstep_m"),
     "split_mu_braking": ("stopping_distance_m", "lateral_deviation_max_m", "yaw_rate_peak_abs_radps"),
     "brake_in_turn": (
-        "path_deviation_after_1000ms_m", "yaw_rate_deviation_after_1000ms_radps", "sideslip_peak_abs_rad",
+        "path_deviation_after_1000ms_m",
+        "yaw_rate_deviation_after_1000ms_radps",
+        "sideslip_peak_abs_rad",
     ),
-}  # fmt: skip
+}
 """Scenario -> metrics that are printed and drawn; those of all are in the JSON."""
-SHOWN |= {"step_steer_120_kmh": SHOWN["step_steer"]}
-SHOWN |= {"double_lane_change_low_mu": SHOWN["double_lane_change"]}
-SHOWN |= {"severe_lane_change": (*SHOWN["double_lane_change"], "lane_overstep_m")}
 SENSORS: Final = {"sensors.preset": "production", "sensors.seed": 1}
 """What all of them see the car through."""
 

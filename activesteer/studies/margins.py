@@ -6,9 +6,9 @@ opened at one actuator while the other stays closed. The controller enters with 
 linear_form`) where it has one, its corrector fully active, and otherwise with its answers to small pulses
 (`controllers.response`).
 
-What is sampled and held every N steps enters as the mean of the N held values, (1 - z^-N) / (N (1 - z^-1)): a delay
-of (N - 1) / 2 steps and the loss of gain that belongs to it. What samples fold down from above half their rate is left
-out.
+What is sampled and held for N calls of the controller enters as the mean of the N held values: a delay of (N - 1) / 2
+calls and the loss of gain that belongs to it; so do commands, held for N steps of the simulation. Samples and calls
+begin together, as in a run. What samples fold down from above half their rate is left out.
 
 The disk margin is alpha of the balanced disk, 1 / max |S - 1/2|, S being the sensitivity of the opened loop: the loop
 stays stable for every gain from (2 - alpha) / (2 + alpha) to its inverse together with every phase within
@@ -128,8 +128,9 @@ def round_trip(
     motion[:, 1] += through
     motion[:, 1:] *= back[:, None, None]
     sensors = config.sensors.all()
-    seen = np.stack([_sensed(sensors[name], h, back) for name in _SENSORS], axis=1)
-    bus = back ** round(config.controllers.bus_delay_s / h) * _held(round(unit_s / h), back)
+    every = round(unit_s / h)
+    seen = np.stack([_sensed(sensors[name], h, back, every) for name in _SENSORS], axis=1)
+    bus = back ** round(config.controllers.bus_delay_s / h) * _held(every, back)
     return bus[:, None, None] * answer(frequencies_radps) @ (seen[:, :, None] * motion)
 
 
@@ -137,10 +138,15 @@ def _held(steps: int, back: Response) -> Response:
     return sum((back**step for step in range(steps)), np.zeros_like(back)) / steps
 
 
-def _sensed(sensor: Sensor, step_s: float, back: Response) -> Response:
+def _calls(sensor: Sensor, unit_s: float) -> int:
+    """For how many calls of the control unit a sample is held."""
+    return max(1, round((sensor.sample_time_s or 0.0) / unit_s))
+
+
+def _sensed(sensor: Sensor, step_s: float, back: Response, every: int) -> Response:
     """Frequency response of a sensor: bandwidth, samples, delay; see `sensors.signal_chain`."""
     share = -math.expm1(-2.0 * math.pi * sensor.bandwidth_Hz * step_s) if sensor.bandwidth_Hz else 1.0
-    samples = _held(max(1, round((sensor.sample_time_s or 0.0) / step_s)), back)
+    samples = _held(_calls(sensor, every * step_s), back**every)
     return share / (1.0 - (1.0 - share) * back) * samples * back ** round((sensor.delay_s or 0.0) / step_s)
 
 
@@ -222,7 +228,8 @@ def loop_margins(
         for given, plugin in zip(controllers, plugins, strict=True):
             unit_s = interval_s(plugin, scenario.car.config.controllers, car.timestep_s)
             setup = _fully_active(scenario.controller_setup(unit_s))
-            answer = _answer(given, plugin.label, setup, rolling, plugin.make(setup))
+            sensors = scenario.car.config.sensors.all()
+            answer = _answer(given, plugin.label, setup, sensors, rolling, plugin.make(setup))
             returned = round_trip(car, answer, scenario, unit_s, FREQUENCIES_RADPS)
             stable = is_stable(returned)
             for index, loop in enumerate(LOOPS):
@@ -257,11 +264,16 @@ def _ideal(scenario: Scenario) -> Any:
 
 
 def _answer(
-    given: Any, name: str, setup: ControllerSetup, rolling: Measurement, made: Controller
+    given: Any,
+    name: str,
+    setup: ControllerSetup,
+    sensors: Mapping[str, Sensor],
+    rolling: Measurement,
+    made: Controller,
 ) -> Callable[[Array], Response]:
     """The controller's frequency response, demands per measurement."""
     if not has_linear_form(given):
-        return response_of(pulse_responses(made, rolling, setup.timestep_s, name), setup.timestep_s)
+        return _answer_to_samples(sensors, made, rolling, setup.timestep_s, name)
     form = linear_controller(given, setup, rolling.speed_mps)
 
     def response(frequencies_radps: Array) -> Response:
@@ -270,5 +282,23 @@ def _answer(
         states = np.linalg.solve(z * np.eye(len(form.a)) - form.a, np.asarray(form.b[:, 1:], dtype=np.complex128))
         answer[:, :, :1] = form.c @ states + form.d[:, 1:]
         return answer
+
+    return response
+
+
+def _answer_to_samples(
+    sensors: Mapping[str, Sensor], made: Controller, rolling: Measurement, unit_s: float, name: str
+) -> Callable[[Array], Response]:
+    """The frequency response of a controller that is known by its answers to samples."""
+    calls = [_calls(sensors[sensor], unit_s) for sensor in _SENSORS]
+    ages = [math.ceil((sensors[sensor].delay_s or 0.0) / unit_s - 1e-9) for sensor in _SENSORS]
+    held = {signal: (count, age % count) for signal, count, age in zip(SIGNALS, calls, ages, strict=True)}
+    to_samples = response_of(pulse_responses(made, rolling, unit_s, name, held), unit_s)
+
+    def response(frequencies_radps: Array) -> Response:
+        back = np.exp(-1j * frequencies_radps * unit_s)
+        # Of an answer to samples that are held, what belongs to the hold is in the sensor already.
+        holds = np.stack([count * _held(count, back) for count in calls], axis=1)
+        return to_samples(frequencies_radps) / holds[:, None, :]
 
     return response

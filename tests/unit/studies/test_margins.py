@@ -112,6 +112,26 @@ def test_answer_to_pulses_is_that_of_the_linear_form(name):
     assert not pulses[:, :, 1:].any()
 
 
+class TakesEverySecond:
+    """As an estimator does that takes each sample of a slow sensor once."""
+
+    calls, angle_rad = 0, 0.0
+
+    def step(self, _, measurement):
+        if self.calls % 2 == 1:
+            self.angle_rad += 0.1 * (measurement.yaw_rate_radps - self.angle_rad)
+        self.calls += 1
+        return ActuatorCommand(self.angle_rad)
+
+
+def test_controller_that_takes_each_sample_once_answers_to_the_whole_sample():
+    made = load_controller(TakesEverySecond, setup())
+    pulses = pulse_responses(made, measured(0.0), 0.005, "mine", {"yaw_rate_radps": (2, 0)})
+    # A yaw rate that lasts is one sample behind the other, each seen for two calls.
+    assert pulses[:, 0, 0].sum() / 2.0 == pytest.approx(1.0, rel=1e-6)
+    assert not pulses[:, :, 1:].any()
+
+
 class Root:
     def step(self, _, measurement):
         return ActuatorCommand(0.01 * math.sqrt(abs(measurement.yaw_rate_radps)))
