@@ -147,6 +147,8 @@ def _row(
 
 MEASURED: Final = "measured"
 """Before the name of a channel, which is then what a sensor says of it."""
+ESTIMATED: Final = "estimated"
+"""The same of what a controller estimates."""
 _QUANTITIES: Final = {
     row.channel: row
     for row in (
@@ -182,10 +184,10 @@ def quantity_of(channel: str) -> Quantity:
     """How a channel is shown.
 
     Args:
-        channel: Its name, with or without a corner or `measured` before it.
+        channel: Its name, with or without a corner, `measured` or `estimated` before it.
     """
     corner, _, rest = channel.partition("_")
-    if corner == MEASURED:
+    if corner in (MEASURED, ESTIMATED):
         true = quantity_of(rest)
-        return true._replace(channel=channel, label=f"measured {true.label}", short=f"measured {true.short}")
+        return true._replace(channel=channel, label=f"{corner} {true.label}", short=f"{corner} {true.short}")
     return _QUANTITIES[rest]._replace(channel=channel) if corner in CORNERS else _QUANTITIES[channel]

@@ -192,6 +192,7 @@ class ActuatorCommand(NamedTuple):
             `CORNERS` [Nm]; below 0 they release what the pedal asks for.
         drive_torque_change_Nm: Change of the torque that the driver demands at the driven wheels together, forward
             positive [Nm].
+        estimate: What the controller takes the motion of the car for, where it uses an estimator.
     """
 
     rear_steer_demand_rad: float = 0.0
@@ -202,3 +203,4 @@ class ActuatorCommand(NamedTuple):
     saturated: bool = False
     brake_torque_demand_Nm: tuple[float, float, float, float] = NO_BRAKES
     drive_torque_change_Nm: float = 0.0
+    estimate: Estimate | None = None

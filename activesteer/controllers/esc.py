@@ -66,7 +66,7 @@ class Esc:
         """
         p, now = self._parameters, self._estimator.step(measurement)
         if now.speed_mps < p.least_speed_mps:
-            return ActuatorCommand()
+            return ActuatorCommand(estimate=now)
         desired = self._reference.step(command.front_steer_demand_rad, now.speed_mps, now.friction)
         error = _beyond(desired - now.yaw_rate_radps, p.yaw_rate_band_radps)
         slide = _beyond(now.sideslip_rad, p.sideslip_limit_rad)
@@ -79,6 +79,7 @@ class Esc:
             saturated=limited,
             brake_torque_demand_Nm=torques,
             drive_torque_change_Nm=change,
+            estimate=now,
         )
 
 

@@ -98,7 +98,7 @@ class Integrated:
         now = turn.estimate
         if now.speed_mps < MIN_SPEED_MPS:
             self._demand_rad = np.zeros(2)
-            return ActuatorCommand()
+            return ActuatorCommand(estimate=now)
         slopes = self._slopes.at(
             now, command.front_steer_demand_rad + measurement.superposition_rad, measurement.rear_steer_rad
         )
@@ -135,6 +135,7 @@ class Integrated:
             saturated=bool((np.abs(found[:2] - wished_rad) > p.tolerance_rad).any()),
             brake_torque_demand_Nm=(fl, fr, rl, rr),
             drive_torque_change_Nm=-min(max(command.drive_torque_demand_Nm, 0.0), fl + fr + rl + rr),
+            estimate=now,
         )
 
     def _effects(self, front_slope: float, rear_slope: float) -> np.ndarray:

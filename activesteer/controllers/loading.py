@@ -8,13 +8,14 @@ from typing import Any, Final, Protocol
 from activesteer.config import Range
 from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.no_control import NoControl
+from activesteer.controllers.observer import Observer
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
 from activesteer.controllers.variant import read_variant
 from activesteer.errors import ControllerError, shown
 from activesteer.plugins import Kind, Plugin, find
 from activesteer.resources import list_controller_variants
-from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Measurement
+from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement
 
 
 class Controller(Protocol):
@@ -39,7 +40,7 @@ class Controller(Protocol):
         ...
 
 
-BUILT_IN: Final = {"none": NoControl, "ars": RearSteer, "afs": FrontSuperposition}
+BUILT_IN: Final = {"none": NoControl, "observer": Observer, "ars": RearSteer, "afs": FrontSuperposition}
 """Name -> class; variants of them are data, see `variant`."""
 
 _MAX_ANGLE_RAD: Final = 1.0
@@ -60,6 +61,9 @@ class _ControllerKind(Kind):
         if torques is not NO_BRAKES and not _are_torques(torques):
             needed = f"four finite torques of at most {_MAX_TORQUE_NM:g} Nm, fl fr rl rr, are needed"
             raise self.fail(name, f"{said} brake_torque_demand_Nm = {shown(torques)}; {needed}", torques)
+        if command.estimate is not None and not isinstance(command.estimate, Estimate):
+            problem = f"{said} estimate = {shown(command.estimate)}; an activesteer.Estimate is needed"
+            raise self.fail(name, problem, command.estimate, Estimate)
         return command
 
 
@@ -83,7 +87,7 @@ CONTROLLER: Final = _ControllerKind(
         "drive_torque_change_Nm": Range(-_MAX_TORQUE_NM, _MAX_TORQUE_NM),
     },
     error=ControllerError,
-    unchecked=("brake_torque_demand_Nm",),
+    unchecked=("brake_torque_demand_Nm", "estimate"),
     data=list_controller_variants,
 )
 """What controllers have in common."""
@@ -93,7 +97,7 @@ def find_controller(given: Any) -> Plugin:
     """Finds a controller; see `activesteer.plugins.find`.
 
     Args:
-        given: `none`, `ars`, `afs`; the name of a variant, or its file; or a user's own code:
+        given: `none`, `observer`, `ars`, `afs`; the name of a variant, or its file; or a user's own code:
             `path/to/file.py:ClassName`, a class, an object, a factory.
 
     Raises:

@@ -106,7 +106,7 @@ class Lqr:
         speed_mps = turn.estimate.speed_mps
         if speed_mps < MIN_SPEED_MPS:
             self.apply(0.0, 0.0)
-            return ActuatorCommand()
+            return ActuatorCommand(estimate=turn.estimate)
         fade = min((speed_mps - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
         wished_added, wished_rear = (fade * angle for angle in turn.demand_rad)
         added = min(max(wished_added, -p.superposition_limit_rad), p.superposition_limit_rad)
@@ -114,7 +114,9 @@ class Lqr:
         self.apply(added, rear)
         saturated = (added, rear) != (wished_added, wished_rear)
         steady = turn.steady_rad[1]
-        return ActuatorCommand(rear, added, turn.desired_radps, steady, rear - steady, saturated)
+        return ActuatorCommand(
+            rear, added, turn.desired_radps, steady, rear - steady, saturated, estimate=turn.estimate
+        )
 
     def turn(self, command: DriverCommand, measurement: Measurement, works: tuple[bool, bool] = BOTH) -> Turn:
         """The turn that is asked for, and what the state feedback demands for it; at walking speed none.

@@ -52,8 +52,10 @@ class SideslipRearSteer:
         known = measurement._replace(speed_mps=now.speed_mps, yaw_rate_radps=now.yaw_rate_radps)
         asked = self._paper.step(command, known)
         if now.speed_mps < MIN_SPEED_MPS:
-            return asked
+            return asked._replace(estimate=now)
         correction = asked.correction_rad - self._sideslip_gain * now.sideslip_rad
         wanted = asked.prediction_rad + correction
         angle = min(max(wanted, -self._limit_rad), self._limit_rad)
-        return asked._replace(rear_steer_demand_rad=angle, correction_rad=correction, saturated=angle != wanted)
+        return asked._replace(
+            rear_steer_demand_rad=angle, correction_rad=correction, saturated=angle != wanted, estimate=now
+        )

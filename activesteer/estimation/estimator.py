@@ -26,7 +26,8 @@ class Estimator:
         ...
         ...     def step(self, command, measurement):
         ...         estimate = self.estimator.step(measurement)
-        ...         return activesteer.ActuatorCommand(rear_steer_demand_rad=-0.2 * estimate.sideslip_rad)
+        ...         angle_rad = -0.2 * estimate.sideslip_rad
+        ...         return activesteer.ActuatorCommand(rear_steer_demand_rad=angle_rad, estimate=estimate)
         >>> recording = activesteer.simulate("step_steer", Watching, overrides={"sensors.preset": "production"})
     """
 

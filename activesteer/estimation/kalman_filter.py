@@ -76,6 +76,12 @@ def begin(known, memory):
 
 
 @inlined
+def _step_of(state, place):
+    """Step of a difference, outwards: what is mirrored has mirrored derivatives."""
+    return math.copysign(_DIFFERENCES[place], state[place])
+
+
+@inlined
 def _is_braked(known, memory):
     return abs(memory.front_along_N) > 2.0 * _MOST_BRAKED * memory.state[FRICTION] * known.front_load_N
 
@@ -99,7 +105,7 @@ def _differentiate(known, tyres, memory, duration_s, moved, slope):
         slope[column, column] = 1.0
         if column in (RATE_OFFSET, AY_OFFSET) or (column == FRICTION and _is_braked(known, memory)):
             continue
-        step = _DIFFERENCES[column]
+        step = _step_of(state, column)
         start[column] += step
         follow(known, tyres, memory, start, duration_s, other)
         start[column] = state[column]
@@ -230,7 +236,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2):
     for place in (FRONT_SLIP, REAR_SLIP, FRICTION):
         if place == FRICTION and _is_braked(known, memory):
             continue
-        kept, step = state[place], _DIFFERENCES[place]
+        kept, step = state[place], _step_of(state, place)
         state[place] += step
         other_front_N, other_rear_N = forces_of(known, tyres, memory, state)
         state[place] = kept

@@ -26,8 +26,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-
 from activesteer.compilation import compiled, inlined
 from activesteer.estimation.records import FRICTION
 
@@ -37,8 +35,6 @@ _FREE: Final = 0.02
 """Fraction of the friction below which a wheel is taken to roll freely."""
 _MOST_USED: Final = 0.98
 """Fraction of the friction beyond which the brush model says no slip."""
-_STANDING_MPS: Final = 0.5
-"""Slower than this, wheels that stand still are a car that stands still [m/s]."""
 
 
 @compiled
@@ -97,24 +93,29 @@ def correct_speed(known, memory, duration_s):
     use_std = math.hypot(known.use_std, math.sqrt(memory.covariance[FRICTION, FRICTION]) / friction)
     # A slip that is not what it is taken for stays so: it counts as one measurement in all that time.
     repeated = 1.0 + known.use_s / duration_s
-    stands = abs(memory.speed_mps) < _STANDING_MPS and np.abs(memory.by_wheel_mps).max() < 1e-3
+    error_sum, weights = 0.0, 0.0
     for wheel in range(4):
-        along_N = 0.0 if stands else memory.along_N[wheel]
+        along_N = memory.along_N[wheel]
         slip, slope, used = brush_slip(along_N, memory.load_N[wheel], friction, known.slip_stiffness[wheel])
+        variance = known.wheel_variance_m2ps2
+        if used < _MOST_USED:
+            variance += repeated * (memory.speed_mps * use_std * used * slope) ** 2
+        else:
+            slip = 0.0  # at least; how much more nobody knows
         error = memory.by_wheel_mps[wheel] / (1.0 + slip) - memory.speed_mps
-        variance = known.wheel_variance_m2ps2 + repeated * (memory.speed_mps * use_std * used * slope) ** 2
-        expected = memory.speed_variance + variance
-        limit = _GATE * math.sqrt(expected)
-        if abs(error) > limit:
-            # Brakes slow a wheel down and the engine speeds it up; what is wrong the other way is the estimate.
-            if used > _FREE and (error > 0.0) == (along_N > 0.0):
-                left_out += 1
-                continue
-            error = math.copysign(limit, error)
-        gain, offset_gain = memory.speed_variance / expected, memory.speed_offset_covariance / expected
-        memory.speed_mps += gain * error
-        memory.ax_offset_mps2 += offset_gain * error
-        memory.offset_variance -= offset_gain * memory.speed_offset_covariance
-        memory.speed_offset_covariance *= 1.0 - gain
-        memory.speed_variance *= 1.0 - gain
+        slips = used > _FREE and (error > 0.0) == (along_N > 0.0)
+        limit = _GATE * math.sqrt(memory.speed_variance + variance)
+        # Brakes slow a wheel down and the engine speeds it up; what is wrong the other way is the estimate.
+        if slips and (used >= _MOST_USED or abs(error) > limit):
+            left_out += 1
+            continue
+        error_sum += min(max(error, -limit), limit) / variance
+        weights += 1.0 / variance
+    # All at once, so that it does not matter which is the first.
+    expected = 1.0 + memory.speed_variance * weights
+    memory.speed_mps += memory.speed_variance / expected * error_sum
+    memory.ax_offset_mps2 += memory.speed_offset_covariance / expected * error_sum
+    memory.offset_variance -= memory.speed_offset_covariance**2 * weights / expected
+    memory.speed_offset_covariance /= expected
+    memory.speed_variance /= expected
     return left_out

@@ -21,6 +21,8 @@ from activesteer.estimation.records import (
     YAW_RATE,
 )
 
+STANDING_MPS: Final = 0.5
+"""Slower than this, wheels that stand still are a car that stands still [m/s]."""
 _BRAKING_NM: Final = 100.0
 """Brake torque of all wheels from which the engine is taken to do nothing [N m]."""
 
@@ -41,8 +43,7 @@ def read_wheels(known, memory, said, duration_s):
         spin = said[SAID_SPINS + wheel]
         brake_Nm = known.torque_per_pressure_NmpPa[wheel] * max(said[SAID_PRESSURES + wheel], 0.0)
         spun_up_Nm = known.wheel_inertia_kgm2 * (spin - memory.last_spin_radps[wheel]) / duration_s
-        # A brake holds a wheel that stands, whatever its pressure is.
-        along_N[wheel] = -((brake_Nm if spin > 0.0 else 0.0) + spun_up_Nm) / known.rolling_radius_m[wheel]
+        along_N[wheel] = -(math.copysign(brake_Nm, spin) + spun_up_Nm) / known.rolling_radius_m[wheel]
         braking_Nm += brake_Nm
         memory.last_spin_radps[wheel] = spin
     drive_N = 0.0
@@ -61,6 +62,9 @@ def read_wheels(known, memory, said, duration_s):
         memory.load_N[wheel] = load_N
         most_N = friction * max(load_N, 0.0)
         along_N[wheel] = min(max(along_N[wheel] + known.drive_fraction[wheel] * drive_N, -most_N), most_N)
+        if said[SAID_SPINS + wheel] == 0.0:
+            # Whatever holds it: it slides on a car that moves, and does nothing to one that stands.
+            along_N[wheel] = -math.copysign(most_N, memory.speed_mps) if abs(memory.speed_mps) > STANDING_MPS else 0.0
         memory.moment_Nm -= known.left_m[wheel] * along_N[wheel]
         across_mps = state[LATERAL_SPEED] + known.to_axle_m[wheel] * state[YAW_RATE]
         rolled_mps = known.rolling_radius_m[wheel] * said[SAID_SPINS + wheel]

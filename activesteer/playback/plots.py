@@ -65,7 +65,10 @@ MOTION: Final = (
             Series("measured_yaw_rate_radps", "measured", "#a6a6a6", 0.8),
         ),
     ),
-    _of_car("sideslip_rad"),
+    Plot(
+        quantity_of("sideslip_rad").title,
+        (Series("sideslip_rad"), Series("estimated_sideslip_rad", "estimated", "#a6a6a6", 0.8)),
+    ),
     Plot(
         quantity_of("ay_mps2").title,
         (Series("ay_mps2"), Series("measured_ay_mps2", "measured", "#a6a6a6", 0.8)),

@@ -82,6 +82,8 @@ class ClosedLoop:
         self.commands = DriverCommand(front_steer_demand_rad=0.0), ActuatorCommand()
         self.faults = Faults(vehicle)
         self._advance(lambda _: settling, self.driver, self.controller, steps, None)
+        if (estimate := self.commands[1].estimate) is not None:
+            vehicle.record_estimate(estimate)
         vehicle.rebase()
         self.fail(maneuver.fault)
         self.measurement = self.measurement._replace(time_s=0.0)

@@ -18,7 +18,7 @@ from activesteer.errors import ModelError, SimulationDiverged
 from activesteer.road.road import Road
 from activesteer.sensors import SensorBlock
 from activesteer.sensors.block import speed_radii
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, WheelTorques
+from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion, WheelTorques
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
@@ -27,6 +27,7 @@ from activesteer.vehicle.actuator_records import ActuatorRecords
 from activesteer.vehicle.channels import ChannelMap, RawRows
 from activesteer.vehicle.command_row import CARRIED_OUT, COMMANDS, write_commands
 from activesteer.vehicle.equilibrium import static_ride
+from activesteer.vehicle.estimate_row import write_estimate
 from activesteer.vehicle.loading import load_model
 from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.native_forces import install_native_forces
@@ -101,6 +102,7 @@ class Vehicle:
             self._measured = np.empty(0) if self._sensors is None else self._sensors.outputs
             self._brake_setup, self._brake_state = np.zeros(1, BRAKE_SETUP), np.zeros(1, BRAKE_STATE)
             self._brake_row = self._brake_state.view(np.float64)
+            self._estimate, self._estimates = np.empty(0), False
             self.channels = ChannelMap(self.model, parameters)
             self._bind()
             self._place()
@@ -272,6 +274,8 @@ class Vehicle:
             SimulationDiverged: the engine warns, or something recorded is not finite or beyond all reason.
         """
         write_commands(self._command_memory, command, asked)
+        if self._estimates:
+            write_estimate(self._estimate.data, asked.estimate)
         torques = command.wheel_torques
         gear = command.gear if torques is None else CLUTCH_OPEN
         if gear != self._gear:
@@ -384,12 +388,25 @@ class Vehicle:
         mujoco.mj_forward(self.model, now)
         write_commands(commands.data, command, asked)
         return RawRows(
-            *(array[np.newaxis] for array in (*self._arrays_of(now), commands, self._measured, self._brake_row))
+            *(
+                array[np.newaxis]
+                for array in (*self._arrays_of(now), commands, self._measured, self._brake_row, self._estimate)
+            )
         )
 
     def live_arrays(self) -> tuple[NDArray[np.float64], ...]:
         """The engine's arrays, the last commands, what the sensors say, the brakes, in the order of `RawRows`."""
-        return (*self._arrays_of(self.data), self._commands, self._measured, self._brake_row)
+        return (*self._arrays_of(self.data), self._commands, self._measured, self._brake_row, self._estimate)
+
+    def record_estimate(self, estimate: Estimate) -> None:
+        """From now on what the controller estimates is recorded too.
+
+        Args:
+            estimate: What it estimates now.
+        """
+        self._estimate, self._estimates = np.array(estimate, np.float64), True
+        native_step.record_from(self._plan, self.live_arrays())
+        self.channels.add_estimate()
 
     @staticmethod
     def _arrays_of(data: mujoco.MjData) -> tuple[NDArray[np.float64], ...]:

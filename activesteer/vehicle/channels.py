@@ -16,6 +16,7 @@ from activesteer.sensors.block import MEASURED
 from activesteer.signals import Channel
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.command_row import COMMAND_CHANNELS
+from activesteer.vehicle.estimate_row import ESTIMATE_CHANNELS
 from activesteer.vehicle.guide_model import GUIDE
 from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.native_channels import (
@@ -68,6 +69,8 @@ class RawRows(NamedTuple):
     """What the sensors said when driver and controller decided; empty with ideal sensors."""
     brakes: Array
     """A `BRAKE_STATE`."""
+    estimate: Array
+    """The members of an `Estimate`; empty where no controller makes one."""
 
 
 class Column(NamedTuple):
@@ -107,17 +110,26 @@ class ChannelMap:
         for name in _MOTION_SENSORS:
             # They are read block by block; a missing one is to show now.
             self._sensor(name)
-        signals = [
+        self._signals = [
             *self._motion(), *self._steering(), *self._corners(), *self._links(), *self._actuators(), *self._motors(),
             *(Signal(channel, Column("commands", place)) for channel, place in COMMAND_CHANNELS.items()),
             *self._measured(), *self._brakes(),
         ]  # fmt: skip
-        signals.append(
+        self._signals.append(
             Signal(
                 Channel("active_faults", "", "how many faults of actuators and sensors act", "vehicle"),
                 Column("userdata", model.nuserdata - 1),
             )
         )
+        self._arrange()
+
+    def add_estimate(self) -> None:
+        """Adds the channels of what a controller estimates."""
+        self._signals += [Signal(channel, Column("estimate", place)) for place, channel in enumerate(ESTIMATE_CHANNELS)]
+        self._arrange()
+
+    def _arrange(self) -> None:
+        signals = self._signals
         self.channels = tuple(signal.channel for signal in signals)
         wanted = [(place, signal.values) for place, signal in enumerate(signals)]
         self._computed = [(place, values) for place, values in wanted if callable(values)]

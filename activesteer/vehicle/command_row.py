@@ -60,7 +60,7 @@ def write_commands(row: memoryview, command: DriverCommand, asked: ActuatorComma
     """
     # Taken apart by position: by name it takes twice as long, and this happens every step.
     steering_wheel, drive, pedal, at_limit, _, gear, front, parking = command
-    rear, added, desired, prediction, correction, limited, (fl, fr, rl, rr), change = asked
+    rear, added, desired, prediction, correction, limited, (fl, fr, rl, rr), change, _ = asked
     _pack_into(
         row, 0, steering_wheel, drive, pedal, parking, at_limit, gear, front, rear, added, desired, prediction,
         correction, limited, fl, fr, rl, rr, change,

@@ -36,8 +36,9 @@ FASTEST_MPS: Final = 200.0
 
 _N_WHEELS: Final = len(CORNERS)
 _ENGINE_ARRAYS: Final = 7
-"""Arrays of the engine that a row is copied from; behind them come the commands, what the sensors say, the brakes."""
-_SOURCES: Final = _ENGINE_ARRAYS + 3
+"""Arrays of the engine that a row is copied from; behind them come the commands, what the sensors say, the brakes, and
+what is estimated."""
+_SOURCES: Final = _ENGINE_ARRAYS + 4
 _WARNINGS: Final = len(mujoco.mjtWarning.__members__) - 1
 _EXPONENT: Final = 0x7FF0000000000000
 """Bits of a float64 that are all set where it is not finite, and only there."""
@@ -166,9 +167,19 @@ def step_plan(
     plan["ratio"] = ratio
     plan["timestep_s"] = model.opt.timestep
     read_through(plan, sensors)
+    record_from(plan, recorded)
+    return plan
+
+
+def record_from(plan: NDArray[Any], recorded: Sequence[NDArray[np.float64]]) -> None:
+    """Has rows copied from these arrays.
+
+    Args:
+        plan: A `STEP_PLAN`; changed.
+        recorded: As for `step_plan`; they must outlive the plan.
+    """
     plan["sources"] = [array.ctypes.data for array in recorded]
     plan["sizes"] = [array.size for array in recorded]
-    return plan
 
 
 def read_through(plan: NDArray[Any], sensors: SensorBlock | None) -> None:

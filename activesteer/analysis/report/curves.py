@@ -15,7 +15,7 @@ from activesteer.analysis.source import read_course
 from activesteer.analysis.track import front_axle, path_distance
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import RecordingError
-from activesteer.quantities import MEASURED, Quantity, quantity_of
+from activesteer.quantities import ESTIMATED, MEASURED, Quantity, quantity_of
 from activesteer.recording import Recording
 from activesteer.road.course import Course
 
@@ -64,13 +64,13 @@ def _added(name: str) -> Callable[[Recording], Array | None]:
     return values
 
 
-def _beside_measured(channel: str) -> Panel:
-    """What a sensor says, and the truth where that was recorded beside it."""
+def _beside_truth(word: str, channel: str) -> Panel:
+    """What a sensor says or a controller estimates, and the truth where that was recorded beside it."""
 
     def truth(recording: Recording) -> Array | None:
-        return recording[channel] if f"{MEASURED}_{channel}" in recording else None
+        return recording[channel] if f"{word}_{channel}" in recording else None
 
-    return _of(f"{MEASURED}_{channel}", truth, note="dashed: true")
+    return _of(f"{word}_{channel}", truth, note="dashed: true")
 
 
 def _over_corners(channel: str, choose: np.ufunc) -> Callable[[Recording], Array]:
@@ -95,8 +95,10 @@ PANELS: Final = (
     Panel(_DISTANCE.label.capitalize(), _DISTANCE, (_from_path,)),
     _of("roll_rad"),
     _of("speed_mps"),
-    _beside_measured("yaw_rate_radps"),
-    _beside_measured("ay_mps2"),
+    _beside_truth(ESTIMATED, "sideslip_rad"),
+    _beside_truth(ESTIMATED, "speed_mps"),
+    _beside_truth(MEASURED, "yaw_rate_radps"),
+    _beside_truth(MEASURED, "ay_mps2"),
     Panel("Friction utilisation, highest of four wheels", quantity_of(_USE), (_over_corners(_USE, np.maximum),)),
     Panel("Wheel load, lowest of four wheels", _LOAD, (_over_corners("tyre_fz_N", np.minimum),)),
 )  # fmt: skip

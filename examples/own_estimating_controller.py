@@ -1,0 +1,43 @@
+"""A controller of one's own that knows the sideslip angle, as well as a car of today can: from an estimator.
+
+    python examples/own_estimating_controller.py
+    activesteer run step_steer -c "examples/own_estimating_controller.py:SideslipDamper?gain=0.4"
+
+More of it: docs/estimation.md.
+"""
+
+import math
+
+import activesteer
+from activesteer import ActuatorCommand
+
+
+class SideslipDamper:
+    """Turns the rear wheels against the sideslip angle, by a fraction of it."""
+
+    def __init__(self, setup, gain=0.5, limit_deg=3.0):
+        """`setup.estimator()` knows the car as its file says it, and what the data sheets of the sensors say."""
+        self.estimator = setup.estimator()
+        self.gain, self.limit_rad = gain, math.radians(limit_deg)
+
+    def step(self, command, measurement):
+        """Called every millisecond; so the estimator is too."""
+        estimate = self.estimator.step(measurement)
+        # A car that slides to the left of its heading has that stopped by rear wheels to the right.
+        wanted_rad = -self.gain * estimate.sideslip_rad
+        if estimate.sideslip_std_rad > math.radians(1.0):
+            wanted_rad = 0.0  # nobody knows where it slides
+        angle_rad = min(max(wanted_rad, -self.limit_rad), self.limit_rad)
+        return ActuatorCommand(rear_steer_demand_rad=angle_rad, estimate=estimate)
+
+
+def compare():
+    """The same step steer without control and with the damper, with the sensors of a car of today."""
+    sensors = {"sensors.preset": "production"}
+    controllers = {"none": "none", "damper": SideslipDamper}
+    return {name: activesteer.simulate("step_steer", item, overrides=sensors) for name, item in controllers.items()}
+
+
+if __name__ == "__main__":
+    for name, recording in compare().items():
+        print(f"{name:8} sideslip up to {math.degrees(abs(recording['sideslip_rad']).max()):.2f} deg")

@@ -1,0 +1,25 @@
+"""What the tests of this folder share."""
+
+from __future__ import annotations
+
+import pytest
+
+from activesteer.scenario import resolve
+from tests.unit.estimation.drives import drive
+
+PRODUCTION = {"sensors.preset": "production"}
+
+
+@pytest.fixture(scope="session")
+def slalom():
+    return drive("slalom")
+
+
+@pytest.fixture(scope="session")
+def make():
+    """Makes estimators of the compact with production sensors."""
+
+    def made(interval_s=0.001, **overrides):
+        return resolve("straight_line", overrides=PRODUCTION | overrides).controller_setup(interval_s).estimator()
+
+    return made

@@ -1,0 +1,57 @@
+"""Drives whose sensors' words are kept, for the tests of this folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import activesteer
+from activesteer.controllers import load_controller
+from activesteer.estimation import Estimator
+from activesteer.recording import Recording
+from activesteer.signals import Estimate, Measurement
+
+
+class Drive(NamedTuple):
+    """A drive.
+
+    Attributes:
+        recording: What was recorded.
+        said: What the sensors said in each step, and before the recording while the car settled.
+    """
+
+    recording: Recording
+    said: list[Measurement]
+
+
+def drive(maneuver: str, **overrides: Any) -> Drive:
+    """Drives the compact with production sensors, observed."""
+    said: list[Measurement] = []
+
+    class Listening:
+        def __init__(self, setup):
+            self.inner = load_controller("observer", setup)
+
+        def step(self, command, measurement):
+            said.append(measurement)
+            return self.inner.step(command, measurement)
+
+    return Drive(
+        activesteer.simulate(maneuver, Listening, overrides={"sensors.preset": "production", **overrides}), said
+    )
+
+
+def estimates(estimator: Estimator, said: Iterable[Measurement]) -> dict[str, np.ndarray]:
+    """What an estimator makes of it, by member of `Estimate`."""
+    rows = np.array([estimator.step(measurement) for measurement in said])
+    return dict(zip(Estimate._fields, rows.T, strict=True))
+
+
+def rolling(speed_mps: float, spins: Iterable[float] | None = None, **others: Any) -> Measurement:
+    """A car that rolls straight ahead, its wheels with a radius of 0.3077 m."""
+    spin = speed_mps / 0.3077
+    zero = {name: 0.0 for name in Measurement._fields[:8]}
+    wheels = tuple(spins) if spins is not None else (spin, spin, spin, spin)
+    return Measurement(**{**zero, "speed_mps": speed_mps, "wheel_speed_radps": wheels, **others})

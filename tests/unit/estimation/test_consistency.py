@@ -1,0 +1,134 @@
+"""The filter's errors are as large as its covariance says: in its own model exactly, in the multibody car nearly.
+
+Source: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, section 5.4 (NEES,
+NIS and their bounds by the chi-square distribution).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from activesteer import simulate
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.estimation.kalman_filter import begin, correct, predict
+from activesteer.estimation.records import (
+    AY_OFFSET,
+    FRICTION,
+    FRONT_ERROR,
+    LATERAL_SPEED,
+    MEMORY,
+    N_STATES,
+    RATE_OFFSET,
+    REAR_ERROR,
+    YAW_RATE,
+    known_of,
+)
+from activesteer.estimation.two_track_model import follow, follow_roll, forces_of, slip_angles
+from activesteer.scenario import resolve
+
+MOTION = [LATERAL_SPEED, YAW_RATE]
+RUNS, STEPS, INTERVAL_S, SPEED_MPS = 40, 150, 0.01, 25.0
+
+
+def bounds(freedom: int, samples: int) -> tuple[float, float]:
+    """Where the mean of so many squared errors lies with 95 %."""
+    low, high = chi2.ppf([0.025, 0.975], freedom * samples) / samples
+    return low, high
+
+
+@pytest.fixture(scope="module")
+def known_and_tyres():
+    setup = resolve("straight_line", overrides={"sensors.preset": "production"}).controller_setup(0.001)
+    known = known_of(setup.estimation, setup.gains.estimator, setup.timestep_s)[0]
+    return known, np.array([tyre.force_N for tyre in setup.estimation.tyres])
+
+
+def drift(known, memory, state, duration_s, rng):
+    """What the filter takes for unknown, drawn: as `kalman_filter` describes it."""
+    front_rad, rear_rad = slip_angles.py_func(known, memory, state, SPEED_MPS)
+    for place, mean, size, time_s in (
+        (FRONT_ERROR, 0.0, known.slip_angle_std_rad + known.slip_angle_fraction * abs(front_rad), known.slip_angle_s),
+        (REAR_ERROR, 0.0, known.slip_angle_std_rad + known.slip_angle_fraction * abs(rear_rad), known.slip_angle_s),
+        (AY_OFFSET, 0.0, known.ay_offset_std_mps2, known.ay_offset_s),
+        (FRICTION, known.friction, known.friction_std, known.friction_s),
+    ):
+        kept = math.exp(-duration_s / time_s)
+        state[place] = mean + kept * (state[place] - mean) + size * math.sqrt(1.0 - kept**2) * rng.standard_normal()
+    state[RATE_OFFSET] += math.sqrt(known.rate_walk_rad2ps3 * duration_s) * rng.standard_normal()
+    state[LATERAL_SPEED] += math.sqrt(known.lateral_density_m2ps3 * duration_s) * rng.standard_normal()
+    state[YAW_RATE] += math.sqrt(known.yaw_density_rad2ps3 * duration_s) * rng.standard_normal()
+
+
+def force_errors(known, tyres, memory, state, rng):
+    """Errors of both axles' forces, drawn [N]."""
+    forces_N = np.abs(forces_of(known, tyres, memory, state))
+    return (known.force_std_N + known.force_fraction * forces_N) * rng.standard_normal(2)
+
+
+def one_run(known, tyres, rng):
+    """NEES of the motion at the end, and mean NIS, of a car that is the filter's own model."""
+    true, memory = np.zeros(1, MEMORY)[0], np.zeros(1, MEMORY)[0]
+    true["speed_mps"] = memory["speed_mps"] = SPEED_MPS
+    begin(known, memory)
+    state = memory.state + np.linalg.cholesky(memory.covariance + 1e-16 * np.eye(N_STATES)) @ rng.standard_normal(
+        N_STATES
+    )
+    squared = []
+    for step in range(STEPS):
+        angle_rad = 0.03 * math.sin(math.pi * step * INTERVAL_S)
+        true["front_angle_rad"] = memory["front_angle_rad"] = angle_rad
+        predict(known, tyres, memory, INTERVAL_S)
+        errors_N = force_errors(known, tyres, true, state, rng) * math.sqrt(2.0 * known.force_s * INTERVAL_S)
+        follow(known, tyres, true, state, INTERVAL_S, state)
+        state[LATERAL_SPEED] += errors_N.sum() / known.mass_kg
+        state[YAW_RATE] += errors_N @ (known.cg_to_front_m, -known.cg_to_rear_m) / known.yaw_inertia_kgm2
+        drift(known, true, state, INTERVAL_S, rng)
+        front_N, rear_N = forces_of(known, tyres, true, state)
+        ay_mps2 = (front_N * math.cos(angle_rad) + rear_N) / known.mass_kg
+        follow_roll(known, true, ay_mps2, INTERVAL_S)
+        for name in ("roll_rad", "loading_mps2", "rolling_mps"):
+            memory[name] = true[name]
+        front_N, rear_N = forces_of(known, tyres, true, state)
+        ay_mps2 = (front_N * math.cos(angle_rad) + rear_N) / known.mass_kg
+        ay_mps2 += force_errors(known, tyres, true, state, rng).sum() / known.mass_kg
+        rate = state[YAW_RATE] + state[RATE_OFFSET]
+        rate += math.hypot(math.sqrt(known.rate_variance_rad2ps2), known.rate_fraction * rate) * rng.standard_normal()
+        felt = ay_mps2 + GRAVITY_MPS2 * true.roll_rad + state[AY_OFFSET]
+        felt += math.hypot(math.sqrt(known.ay_variance_m2ps4), known.ay_fraction * felt) * rng.standard_normal()
+        squared.append(correct(known, tyres, memory, rate, felt))
+    error = (state - memory.state)[MOTION]
+    return error @ np.linalg.solve(memory.covariance[np.ix_(MOTION, MOTION)], error), np.mean(squared)
+
+
+def test_errors_in_its_own_model_are_those_of_its_covariance(known_and_tyres, rng):
+    nees, nis = np.mean([one_run(*known_and_tyres, rng) for _ in range(RUNS)], axis=0)
+    low, high = bounds(len(MOTION), RUNS)
+    assert low < nees < high
+    low, high = bounds(2, RUNS * STEPS)
+    assert low < nis < high
+
+
+@pytest.mark.slow
+def test_errors_in_other_cars_than_the_known_one_are_those_of_its_covariance(rng):
+    """Each a car of its own: mass, tyres, friction of the road, offsets of the sensors."""
+    squared = []
+    for seed in range(6):
+        run = simulate(
+            "slalom",
+            "observer",
+            overrides={
+                "sensors.preset": "production",
+                "sensors.seed": seed,
+                "factors.mass": rng.uniform(0.95, 1.1),
+                "factors.tyre_cornering_stiffness": rng.uniform(0.9, 1.1),
+                "road.mu": rng.uniform(0.7, 1.0),
+            },
+        )
+        error = run["estimated_sideslip_rad"] - run["sideslip_rad"]
+        squared.append(np.mean((error / run["estimated_sideslip_std_rad"]) ** 2))
+    low, high = bounds(1, len(squared))
+    assert low < np.mean(squared) < high

@@ -1,0 +1,138 @@
+"""Speed, sideslip and friction from what the sensors say: how near to the truth, and from nothing but the sensors."""
+
+from __future__ import annotations
+
+import copy
+import math
+
+import numpy as np
+import pytest
+
+from activesteer.errors import ControllerError
+from activesteer.signals import Measurement
+from tests.raising import raises
+from tests.unit.controllers.cars import setup
+from tests.unit.estimation.drives import estimates, rolling
+
+SIDESLIP_RMS_RAD = math.radians(0.3)
+"""What the estimator is to keep."""
+SPEED_RMS = 0.01
+"""The same, relative."""
+
+
+def rms(values) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def test_sideslip_and_speed_of_a_slalom_are_found(slalom):
+    run = slalom.recording
+    assert np.degrees(np.abs(run["sideslip_rad"]).max()) > 2.0
+    assert rms(run["estimated_sideslip_rad"] - run["sideslip_rad"]) < SIDESLIP_RMS_RAD
+    assert rms(run["estimated_speed_mps"] / run["vx_mps"] - 1.0) < SPEED_RMS
+
+
+def test_estimate_is_better_than_the_sensor_that_it_rests_on(slalom):
+    run = slalom.recording
+    measured = rms(run["measured_yaw_rate_radps"] - run["yaw_rate_radps"])
+    assert rms(run["estimated_yaw_rate_radps"] - run["yaw_rate_radps"]) < 0.5 * measured
+
+
+def test_error_is_as_large_as_it_is_said_to_be(slalom):
+    run = slalom.recording
+    for name, truth in (("sideslip", "sideslip_rad"), ("yaw_rate", "yaw_rate_radps"), ("speed", "vx_mps")):
+        unit = {"sideslip": "rad", "yaw_rate": "radps", "speed": "mps"}[name]
+        error = run[f"estimated_{name}_{unit}"] - run[truth]
+        inside = np.abs(error) < 2.0 * run[f"estimated_{name}_std_{unit}"]
+        assert inside.mean() > 0.9, name
+
+
+def test_nothing_but_the_sensors_is_used(slalom, make):
+    # Ideal sensors say the true speed, and with any a clock: an estimator that lives on either changes with it.
+    said = slalom.said[:4000]
+    other = [measurement._replace(speed_mps=1.0, time_s=0.0) for measurement in said]
+    assert estimates(make(), said)["sideslip_rad"].tolist() == estimates(make(), other)["sideslip_rad"].tolist()
+
+
+def test_road_and_load_are_unknown(slalom, make):
+    said = slalom.said[:3000]
+    changed = make(**{"road.mu": 0.3, "factors.mass": 1.2, "factors.tyre_cornering_stiffness": 0.7})
+    assert estimates(make(), said)["friction"].tolist() == estimates(changed, said)["friction"].tolist()
+
+
+@pytest.mark.parametrize("every", [2, 5, 10])
+def test_slower_controllers_get_as_good_an_estimate(slalom, make, every):
+    run, said = slalom.recording, slalom.said
+    before = len(said) - len(run.time_s)
+    found = estimates(make(every * 0.001), said[::every])["sideslip_rad"][before // every :]
+    assert rms(found - run["sideslip_rad"][::every]) < SIDESLIP_RMS_RAD
+
+
+def test_what_is_mirrored_is_estimated_mirrored(slalom, make):
+    def mirrored(m: Measurement) -> Measurement:
+        swapped = 1, 0, 3, 2
+        return m._replace(
+            yaw_rate_radps=-m.yaw_rate_radps,
+            ay_mps2=-m.ay_mps2,
+            steering_wheel_rad=-m.steering_wheel_rad,
+            rear_steer_rad=-m.rear_steer_rad,
+            superposition_rad=-m.superposition_rad,
+            wheel_speed_radps=tuple(m.wheel_speed_radps[wheel] for wheel in swapped),
+            brake_pressure_Pa=tuple(m.brake_pressure_Pa[wheel] for wheel in swapped),
+        )
+
+    said = slalom.said[2000:8000]
+    one, other = estimates(make(), said), estimates(make(), map(mirrored, said))
+    assert one["sideslip_rad"] == pytest.approx(-other["sideslip_rad"], abs=1e-9)
+    assert one["speed_mps"] == pytest.approx(other["speed_mps"], rel=1e-9)
+
+
+def test_copy_goes_on_as_the_original_does(slalom, make):
+    estimator = make()
+    estimates(estimator, slalom.said[:3333])
+    other = copy.deepcopy(estimator)
+    assert [estimator.step(m) for m in slalom.said[3333:3500]] == [other.step(m) for m in slalom.said[3333:3500]]
+
+
+def test_wheels_that_lock_do_not_stop_the_car(make):
+    estimator, speed_mps, deceleration_mps2 = make(), 25.0, 8.0
+    felt_mps2 = deceleration_mps2 * (1.0 + 9.81 * 0.0049)
+    said = [rolling(speed_mps)] * 1000
+    pressed = (80e5,) * 4
+    for step in range(1000):
+        # They lock within 0.1 s; what brakes the car is the sliding tyre.
+        spin = max(1.0 - step / 100, 0.0) * speed_mps / 0.3077
+        said.append(rolling(0.0, (spin,) * 4, ax_mps2=-felt_mps2, brake_pressure_Pa=pressed))
+    found = estimates(estimator, said)["speed_mps"]
+    assert found[999] == pytest.approx(speed_mps, rel=5e-3)
+    assert found[-1] == pytest.approx(speed_mps - deceleration_mps2, rel=0.03)
+
+
+def test_driven_wheel_that_spins_is_no_speed(make):
+    spin = 20.0 / 0.3077
+    said = [rolling(20.0)] * 1000 + [rolling(20.0, (spin * (1.0 + k / 500), spin, spin, spin)) for k in range(500)]
+    assert estimates(make(), said)["speed_mps"][-1] == pytest.approx(20.0, rel=0.01)
+
+
+def test_standing_car_has_no_speed_and_no_sideslip(make):
+    found = estimates(make(), [rolling(0.0)] * 2000)
+    assert np.abs(found["speed_mps"]).max() < 0.05
+    assert not found["sideslip_rad"].any()
+    assert found["yaw_rate_radps"][-1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_friction_that_does_not_show_is_not_learned(make):
+    found = estimates(make(), [rolling(30.0)] * 5000)
+    assert found["friction"][-1] == pytest.approx(0.9, abs=0.02)
+    assert found["friction_std"][-1] > 0.95 * 0.25
+
+
+def test_friction_that_shows_is(slalom):
+    run = slalom.recording
+    assert run["estimated_friction_std"].min() < 0.05
+    shows = run["estimated_friction_std"] < 0.08
+    assert np.abs(run["estimated_friction"][shows] - 0.9).max() < 0.25
+
+
+def test_car_without_the_table_has_no_estimator():
+    with raises(ControllerError, key="two_track"):
+        setup().estimator()
