@@ -43,6 +43,7 @@ def bounds(freedom: int, samples: int) -> tuple[float, float]:
 @pytest.fixture(scope="module")
 def known_and_tyres():
     setup = resolve("straight_line", overrides={"sensors.preset": "production"}).controller_setup(0.001)
+    assert setup.estimation is not None
     known = known_of(setup.estimation, setup.gains.estimator, setup.timestep_s)[0]
     return known, np.array([tyre.force_N for tyre in setup.estimation.tyres])
 
@@ -69,7 +70,7 @@ def force_errors(known, tyres, memory, state, rng):
     return (known.force_std_N + known.force_fraction * forces_N) * rng.standard_normal(2)
 
 
-def one_run(known, tyres, rng):
+def one_run(known, tyres, rng: np.random.Generator):
     """NEES of the motion at the end, and mean NIS, of a car that is the filter's own model."""
     true, memory = np.zeros(1, MEMORY)[0], np.zeros(1, MEMORY)[0]
     true["speed_mps"] = memory["speed_mps"] = SPEED_MPS
@@ -105,7 +106,8 @@ def one_run(known, tyres, rng):
 
 
 def test_errors_in_its_own_model_are_those_of_its_covariance(known_and_tyres, rng):
-    nees, nis = np.mean([one_run(*known_and_tyres, rng) for _ in range(RUNS)], axis=0)
+    known, tyres = known_and_tyres
+    nees, nis = np.mean([one_run(known, tyres, rng) for _ in range(RUNS)], axis=0)
     low, high = bounds(len(MOTION), RUNS)
     assert low < nees < high
     low, high = bounds(2, RUNS * STEPS)
