@@ -75,6 +75,7 @@ def all_commands() -> Commands:
         fault_map,
         figures,
         identify,
+        import_,
         info,
         kc,
         linearise,
@@ -100,7 +101,7 @@ def all_commands() -> Commands:
     commands = Commands(f"activesteer {__version__}")
     for title, modules in {
         "drive": (listing, run, watch),
-        "look": (info, report, replay, video, recover),
+        "look": (info, report, replay, video, import_, recover),
         "car": (vehicle, tyre, kc),
         "study": (study, tune, envelope, fault_map, identify, linearise, driver, margins),
         "prove": (reproduce, test, figures, validate, bench),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Final
 
 import numpy as np
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS
+from activesteer.errors import RecordingError
 
 SIGNALS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("roll", "rad"))
 """Channels that are evaluated: name and unit suffix."""
@@ -29,13 +31,32 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     """
     values: dict[str, float] = {}
     for name, unit in SIGNALS:
-        channel = np.asarray(recording[f"{name}_{unit}"], dtype=np.float64)
-        values[f"{name}_peak_abs_{unit}"] = float(np.abs(channel).max())
-        values[f"{name}_rms_{unit}"] = float(np.sqrt(np.mean(channel**2)))
+        values |= _size(recording, name, unit)
     values["steering_wheel_peak_abs_rad"] = float(np.abs(recording["steering_wheel_rad"]).max())
     values["friction_used_max"] = max(_friction_used(recording, corner) for corner in CORNERS)
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
     return values
+
+
+def measured_metrics(recording: RecordingLike) -> dict[str, float]:
+    """Those of `metrics` whose channels were measured; a car on a proving ground has no sensors of tyre forces."""
+    values: dict[str, float] = {}
+    for name, unit in SIGNALS:
+        with suppress(RecordingError):
+            values |= _size(recording, name, unit)
+    with suppress(RecordingError):
+        values["steering_wheel_peak_abs_rad"] = float(np.abs(recording["steering_wheel_rad"]).max())
+    with suppress(RecordingError):
+        values["speed_end_mps"] = float(recording["speed_mps"][-1])
+    return values
+
+
+def _size(recording: RecordingLike, name: str, unit: str) -> dict[str, float]:
+    channel = np.asarray(recording[f"{name}_{unit}"], dtype=np.float64)
+    return {
+        f"{name}_peak_abs_{unit}": float(np.abs(channel).max()),
+        f"{name}_rms_{unit}": float(np.sqrt(np.mean(channel**2))),
+    }
 
 
 def _friction_used(recording: RecordingLike, corner: str) -> float:

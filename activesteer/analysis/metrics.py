@@ -29,6 +29,7 @@ BY_KIND: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "follow_path": path_following.metrics,
     "brake_in_turn": brake_in_turn.metrics,
     "straight_braking": straight_braking.metrics,
+    "measured": general.measured_metrics,
 }
 """Kinds of manoeuvre with metrics of their own; every other kind gets those of `general`."""
 

@@ -77,7 +77,10 @@ def add_vehicle(parser: argparse.ArgumentParser) -> None:
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
     """Adds what `scenario_of` reads: the manoeuvre, `--vehicle`, `--driver`, `--set` and `--fault`."""
-    parser.add_argument("maneuver", metavar="MANEUVER", help="a name from `activesteer list`, or a TOML file")
+    parser.add_argument(
+        "maneuver", metavar="MANEUVER",
+        help="a name from `activesteer list`, a TOML file, or a recording, whose steering, speed and brake are driven",
+    )  # fmt: skip
     add_vehicle(parser)
     add_driver(parser)
     add_overrides(parser)
@@ -179,7 +182,13 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
     faults = {"fault": [fault_table(text) for text in options.faults]} if options.faults else {}
     overrides = pairs(options.overrides, "--set", "road.mu=0.4", faults)
-    return resolve(options.maneuver, options.vehicle, overrides, options.driver)
+    maneuver: Any = options.maneuver
+    if maneuver.endswith(".mcap"):
+        from activesteer.measured.driving import open_loop_of
+        from activesteer.recording import Recording
+
+        maneuver = open_loop_of(Recording.open(Path(maneuver), recover=True), Path(maneuver).stem)
+    return resolve(maneuver, options.vehicle, overrides, options.driver)
 
 
 def overrides_of(options: argparse.Namespace) -> dict[str, Any]:

@@ -1,0 +1,49 @@
+"""`activesteer import FILE -o OUT.mcap`: measured data as a recording."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from activesteer.commands.arguments import add_json, add_output, add_vehicle
+from activesteer.commands.output import print_entry, print_json
+from activesteer.errors import ParameterError
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser(
+        "import",
+        help="measured data as a recording",
+        description="Reads a CSV, MAT, Parquet or MDF file: columns become channels in SI units and signs of ISO 8855 "
+        "on a uniform time. Without a map by the names that exporters write.",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="a .csv, .txt, .mat, .parquet or .mf4 file")
+    parser.add_argument("--map", type=Path, metavar="MAP.toml", help="which column is which channel, and in which unit")
+    add_vehicle(parser)
+    add_output(parser, "OUT.mcap", "the recording; FILE with the ending .mcap where not given")
+    add_json(parser)
+    parser.set_defaults(action=_import)
+
+
+def _import(options: argparse.Namespace) -> int:
+    from activesteer.measured.importing import import_file
+
+    output = options.output or options.file.with_suffix(".mcap")
+    if output.suffix != ".mcap":
+        raise ParameterError(f"-o {output}: a recording's name ends in .mcap")
+    found = import_file(options.file, options.map, options.vehicle)
+    recording = found.recording
+    recording.save(output)
+    if options.json:
+        step_s = float(recording.time_s[1] - recording.time_s[0])
+        print_json({"file": str(output), "rows": len(recording), "step_s": step_s, "channels": found.taken,
+                    "notes": list(found.notes)})  # fmt: skip
+        return 0
+    print(f"{output}: {len(recording)} rows, {recording.time_s[0]:.3f} to {recording.time_s[-1]:.3f} s")
+    for name, column in found.taken.items():
+        print_entry(f"  {name:24} ", column)
+    for note in found.notes:
+        print_entry("! ", note)
+    return 0

@@ -1,0 +1,276 @@
+"""Measured data as a recording: columns to channels on a uniform time, and what is unusual in them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from activesteer.analysis.metrics import metrics
+from activesteer.config import field_in_unit
+from activesteer.conventions import Array
+from activesteer.errors import RecordingError, nearest_names, shown
+from activesteer.measured.columns import Column, find, read_columns
+from activesteer.measured.map_file import ChannelMap, MeasurementMap, read_map
+from activesteer.measured.motion import moved_car, with_motion
+from activesteer.measured.names import TURNED_IN_SAE, UNITS, Known, is_time, known_column, si_of
+from activesteer.measured.plausibility import suspicions
+from activesteer.measured.resampling import Samples, gaps, resampled, samples
+from activesteer.recording import Recording
+from activesteer.recording.contents import MAX_ROWS
+from activesteer.road.road import Road
+from activesteer.scenario import load_car
+from activesteer.signals import Channel
+from activesteer.simulation.appearance import scene_of
+from activesteer.version import __version__
+
+_OWN_UNITS: Final = {
+    "_radps": "rad/s", "_rad": "rad", "_mps2": "m/s2", "_mps": "m/s", "_Nm": "Nm", "_N": "N", "_Pa": "Pa", "_m": "m",
+    "_s": "s",
+}  # fmt: skip
+_LATEST_S: Final = 1e6
+"""Times beyond are those of a calendar, and begin at zero in a recording."""
+
+
+class Import(NamedTuple):
+    """What came of a file.
+
+    Attributes:
+        recording: The recording.
+        taken: Channel, and the column and unit that it was made of.
+        notes: What was done that the file does not say, and what looks wrong.
+    """
+
+    recording: Recording
+    taken: dict[str, str]
+    notes: tuple[str, ...]
+
+
+class _Source(NamedTuple):
+    """Where a channel comes from."""
+
+    column: Column
+    known: Known
+    given: ChannelMap | None
+
+
+def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compact") -> Import:
+    """Reads a file of measured data.
+
+    Args:
+        path: CSV, MAT, Parquet or MDF.
+        map_path: Map file; by the names of the columns where not given.
+        vehicle: The car that stands for the measured one in replay.
+
+    Returns:
+        The recording, and what is to be said of it.
+
+    Raises:
+        RecordingError: file or map cannot be read, a column or unit is unknown, or there is a gap.
+        ActiveSteerError: there is no such vehicle.
+    """
+    chosen = read_map(map_path)
+    columns = read_columns(path)
+    car = load_car(vehicle)
+    model = car.on(Road())
+    table = {channel.name: channel for channel in model.channels.channels}
+    notes: list[str] = []
+    sources = _mapped(chosen, columns, table, path) if chosen.channels else _by_name(columns, table, path, notes)
+    shared = _shared_time(columns, chosen, path, needed=any(_own_time(source) is None for source in sources.values()))
+    signals = {
+        name: _signal(name, _si_unit(name, table), source, shared, chosen, path) for name, source in sources.items()
+    }
+    grid_s, shift_s = _grid(signals, chosen, path, notes)
+    values = {}
+    for name, signal in signals.items():
+        bridged = gaps(signal, _bridge_s(chosen, signal), float(grid_s[0]), float(grid_s[-1]))
+        if bridged:
+            begin, end = bridged[0]
+            raise RecordingError(
+                f"{name} has no samples from {begin:.3f} to {end:.3f} s; a map allows it with max_gap_s, or leaves it "
+                "out with start_s and end_s",
+                file=path.name,
+            )
+        values[name] = resampled(signal, grid_s)
+        if chosen.axes == "sae_j670" and name in TURNED_IN_SAE:
+            values[name] = -values[name]
+    taken = {name: f"{source.column.name} [{source.known.unit or '-'}]" for name, source in sources.items()}
+    notes += suspicions(values)
+    time_s = grid_s - shift_s
+    derived = with_motion(time_s, values)
+    channels = [_channel(name, table, taken) for name in derived]
+    metadata: dict[str, Any] = {
+        "maneuver": {"name": path.stem, "kind": chosen.kind, "title": chosen.title or f"measured: {path.name}"},
+        "vehicle": {"name": "measured"},
+        "controller": "measured",
+        "measured": {"file": path.name, "columns": taken, "axes": chosen.axes, "notes": notes, "shown_as": vehicle},
+        "versions": {"activesteer": __version__},
+    }
+    attachments = {} if map_path is None else {map_path.name: map_path.read_bytes()}
+    recording = Recording(
+        channels, time_s, np.column_stack(list(derived.values())), metadata=metadata, attachments=attachments,
+        poses=moved_car(model, time_s, derived), scene=scene_of(model.model),
+    )  # fmt: skip
+    try:
+        recording.metrics.update(metrics(recording))
+    except RecordingError as error:
+        recording.metadata["metrics_error"] = str(error)
+        notes.append(f"no metrics of the kind {chosen.kind}: {error}")
+    return Import(recording, taken, tuple(notes))
+
+
+def _mapped(
+    chosen: MeasurementMap, columns: list[Column], table: Mapping[str, Channel], path: Path
+) -> dict[str, _Source]:
+    """Where the map says that channels come from."""
+    sources = {}
+    for name, given in chosen.channels.items():
+        if name not in table and field_in_unit(name, table)[0] is not None:
+            raise RecordingError(
+                f"is a channel in another unit; call it {field_in_unit(name, table)[0]} and give `unit`",
+                key=f"channels.{name}",
+            )
+        column = find(columns, given.column, path)
+        known = Known(name, given.unit or column.unit or _si_unit(name, table), given.sign)
+        sources[name] = _Source(column, known, given)
+    return sources
+
+
+def _by_name(columns: list[Column], table: Mapping[str, Channel], path: Path, notes: list[str]) -> dict[str, _Source]:
+    """What the names of columns say."""
+    names = {column.name for column in columns}
+    channels = [*table, "brake_pedal"]
+    sources: dict[str, _Source] = {}
+    for column in columns:
+        known = known_column(column.name, names, channels)
+        if known is None:
+            continue
+        if known.channel in sources:
+            first = sources[known.channel].column.name
+            raise RecordingError(
+                f"{shown(first)} and {shown(column.name)} are both {known.channel}; a map says which",
+                file=path.name,
+            )
+        unit = column.unit or known.unit
+        if not unit:
+            unit = _si_unit(known.channel, table)
+            if unit and not known.sure:
+                notes.append(f"{column.name} has no unit and is taken for {unit} (a map can say another)")
+        sources[known.channel] = _Source(column, known._replace(unit=unit), None)
+    if not sources:
+        some = ", ".join(shown(name) for name in sorted(names)[:8])
+        raise RecordingError(
+            f"no column has a name that is known here (it has {some}); a map says what they are: --map", file=path.name
+        )
+    return sources
+
+
+def _si_unit(name: str, table: Mapping[str, Channel]) -> str:
+    if name in table:
+        return table[name].unit
+    return next((unit for ending, unit in _OWN_UNITS.items() if name.endswith(ending)), "")
+
+
+def _own_time(source: _Source) -> Array | None:
+    return source.column.read()[1]
+
+
+def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, needed: bool) -> Array | None:
+    """Times that columns without their own share [s]."""
+    if not needed:
+        if chosen.time:
+            raise RecordingError("every column has its own time here; leave it out", key="time", value=chosen.time)
+        return None
+    if chosen.time:
+        column = find(columns, chosen.time, path)
+    else:
+        named = [column for column in columns if is_time(column.name)]
+        if len(named) != 1:
+            what = "no column is called as a time is" if not named else "several columns are called as times are"
+            words = nearest_names("time", [column.name for column in columns])
+            raise RecordingError(f"{what}: {words}; a map says which: time = NAME", file=path.name)
+        column = named[0]
+    unit = chosen.time_unit or column.unit or known_time_unit(column.name)
+    found = si_of(unit)
+    if found is None or found[0] != "s":
+        raise RecordingError(f"the time has the unit {shown(unit)}; known are s, ms, us", file=path.name, value=unit)
+    return column.read()[0] * found[1]
+
+
+def known_time_unit(name: str) -> str:
+    """Unit in the name of a time column; s where there is none."""
+    ending = name.rstrip("])").replace("[", " ").replace("(", " ").replace("_", " ").split()
+    return ending[-1] if len(ending) > 1 and ending[-1] in ("ms", "us", "s") else "s"
+
+
+def _signal(
+    name: str, wanted: str, source: _Source, shared: Array | None, chosen: MeasurementMap, path: Path
+) -> Samples:
+    """The samples of a channel, SI and signs of ISO 8855."""
+    column, known, given = source
+    found = si_of(known.unit)
+    if found is None or found[0] != wanted:
+        raise RecordingError(
+            f"{name} is in {wanted or 'pure numbers'}, and {shown(column.name)} in {shown(known.unit)}; "
+            f"known units are {', '.join(UNITS)}",
+            file=path.name,
+            value=known.unit,
+            allowed=UNITS,
+        )
+    values, own = column.read()
+    time_s = own if own is not None else shared
+    assert time_s is not None
+    signal = samples(column.name, np.asarray(time_s, np.float64), values, path.name)
+    inside = np.ones(len(signal.time_s), bool)
+    if chosen.start_s is not None:
+        inside &= signal.time_s >= chosen.start_s
+    if chosen.end_s is not None:
+        inside &= signal.time_s <= chosen.end_s
+    if np.count_nonzero(inside) < 2:
+        raise RecordingError(f"{column.name} has no samples between start_s and end_s", file=path.name)
+    time_s, values = signal.time_s[inside], signal.values[inside]
+    if given is not None:
+        values = values + given.offset
+        if given.zero_until_s is not None:
+            early = time_s <= given.zero_until_s
+            if not early.any():
+                raise RecordingError(
+                    f"{column.name} begins at {time_s[0]:g} s, after zero_until_s", key=f"channels.{name}.zero_until_s"
+                )
+            values = values - values[early].mean()
+    return Samples(time_s, values * (known.sign * found[1]))
+
+
+def _bridge_s(chosen: MeasurementMap, signal: Samples) -> float:
+    """A slow signal has no gaps between its samples."""
+    return max(chosen.max_gap_s, 1.5 * float(np.median(np.diff(signal.time_s))))
+
+
+def _grid(signals: Mapping[str, Samples], chosen: MeasurementMap, path: Path, notes: list[str]) -> tuple[Array, float]:
+    """Instants at which all signals exist, at the step of the fastest of them; and what is zero in the recording."""
+    start = max(float(signal.time_s[0]) for signal in signals.values())
+    end = min(float(signal.time_s[-1]) for signal in signals.values())
+    step = chosen.step_s or min(float(np.median(np.diff(signal.time_s))) for signal in signals.values())
+    step = round(step, 9)
+    if step <= 0.0 or end - start < step:
+        raise RecordingError(
+            f"the signals have no time in common: the last begins at {start:g} s, the first ends at {end:g} s",
+            file=path.name,
+        )
+    count = int((end - start) / step + 1e-6) + 1
+    if count > MAX_ROWS:
+        raise RecordingError(f"{count} rows of {step:g} s, at most {MAX_ROWS} are allowed", file=path.name)
+    shift = 0.0
+    if start < 0.0 or start > _LATEST_S:
+        shift = start
+        notes.append(f"the time begins at {start:g} s in the file and at 0 here")
+    return np.minimum(start + np.arange(count) * step, end), shift
+
+
+def _channel(name: str, table: Mapping[str, Channel], taken: Mapping[str, str]) -> Channel:
+    meaning = f"measured: {taken[name]}" if name in taken else "derived from measured channels"
+    if name in table:
+        return table[name]._replace(meaning=f"{table[name].meaning}; {meaning}", single=False)
+    return Channel(name, _si_unit(name, table), meaning, "measured", single=False)

@@ -1,0 +1,83 @@
+"""Where a measured car was: its path from speed and yaw rate where no position was measured, and its body there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from activesteer.conventions import Array
+from activesteer.recording import Poses
+from activesteer.vehicle import Vehicle
+
+
+def with_motion(time_s: Array, channels: Mapping[str, Array]) -> dict[str, Array]:
+    """Channels with what follows from them: speed, yaw angle and path.
+
+    Without a position the path begins at the origin along x; its direction is yaw plus sideslip angle where that was
+    measured, and yaw alone where it was not.
+
+    Args:
+        time_s: Time, uniform [s], shape (n,).
+        channels: Measured values by channel name, SI.
+
+    Returns:
+        The same and, where they were missing and follow, `speed_mps`, `yaw_rad`, `x_m`, `y_m`.
+    """
+    found = dict(channels)
+    if "speed_mps" not in found and "vx_mps" in found:
+        found["speed_mps"] = np.hypot(found["vx_mps"], found.get("vy_mps", 0.0))
+    if "yaw_rad" not in found and "yaw_rate_radps" in found:
+        found["yaw_rad"] = _integral(time_s, found["yaw_rate_radps"])
+    if not {"x_m", "y_m"} <= set(found) and {"speed_mps", "yaw_rad"} <= set(found):
+        course = found["yaw_rad"] + found.get("sideslip_rad", 0.0)
+        found["x_m"] = _integral(time_s, found["speed_mps"] * np.cos(course))
+        found["y_m"] = _integral(time_s, found["speed_mps"] * np.sin(course))
+    return found
+
+
+def _integral(time_s: Array, values: Array) -> Array:
+    """By trapezoids, zero at the beginning."""
+    return np.append(0.0, np.cumsum(np.diff(time_s) * 0.5 * (values[1:] + values[:-1])))
+
+
+def moved_car(vehicle: Vehicle, time_s: Array, channels: Mapping[str, Array]) -> Poses | None:
+    """A car in its design position, moved as a whole along the path, for replay; None where there is no path.
+
+    Args:
+        vehicle: Whose bodies are shown.
+        time_s: Time [s], shape (n,).
+        channels: Values by channel name.
+    """
+    if not {"x_m", "y_m", "yaw_rad"} <= set(channels):
+        return None
+    rows = np.arange(0, len(time_s), max(1, round(0.01 / float(time_s[1] - time_s[0]))))
+    half = 0.5 * channels["yaw_rad"][rows]
+    turn = np.column_stack([np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)])
+    cos, sin = np.cos(2.0 * half), np.sin(2.0 * half)
+    centre = vehicle.data.site("cg").xpos
+    at = np.array([vehicle.data.body(name).xpos for name in vehicle.body_names]) - [centre[0], centre[1], 0.0]
+    how = np.array([vehicle.data.body(name).xquat for name in vehicle.body_names])
+    x_m, y_m = channels["x_m"][rows, None], channels["y_m"][rows, None]
+    positions = np.stack(
+        [
+            x_m + cos[:, None] * at[:, 0] - sin[:, None] * at[:, 1],
+            y_m + sin[:, None] * at[:, 0] + cos[:, None] * at[:, 1],
+            np.broadcast_to(at[:, 2], (len(rows), len(at))),
+        ],
+        axis=-1,
+    )
+    return Poses(time_s[rows], vehicle.body_names, positions, _product(turn[:, None], how[None]))
+
+
+def _product(one: Array, other: Array) -> Array:
+    """Product of quaternions w x y z."""
+    w, x, y, z = np.moveaxis(one, -1, 0)
+    W, X, Y, Z = np.moveaxis(other, -1, 0)
+    return np.stack(
+        [
+            w * W - x * X - y * Y - z * Z, w * X + x * W + y * Z - z * Y,
+            w * Y - x * Z + y * W + z * X, w * Z + x * Y - y * X + z * W,
+        ],
+        axis=-1,
+    )  # fmt: skip

@@ -1,0 +1,144 @@
+"""What columns of other programs are called, in which units, and which of them turn round in the axes of SAE J670."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection
+from typing import Final, NamedTuple
+
+from activesteer.config import field_in_unit
+from activesteer.conventions import GRAVITY_MPS2
+
+_DEG: Final = math.radians(1.0)
+_UNITS: Final = {
+    "rad": ("rad", 1.0), "deg": ("rad", _DEG), "°": ("rad", _DEG), "degree": ("rad", _DEG), "degrees": ("rad", _DEG),
+    "grad": ("rad", _DEG), "rad/s": ("rad/s", 1.0), "radps": ("rad/s", 1.0), "deg/s": ("rad/s", _DEG),
+    "°/s": ("rad/s", _DEG), "degps": ("rad/s", _DEG), "dps": ("rad/s", _DEG), "rpm": ("rad/s", math.pi / 30.0),
+    "1/min": ("rad/s", math.pi / 30.0), "m/s": ("m/s", 1.0), "mps": ("m/s", 1.0), "km/h": ("m/s", 1.0 / 3.6),
+    "kmh": ("m/s", 1.0 / 3.6), "kph": ("m/s", 1.0 / 3.6), "mph": ("m/s", 0.44704), "m/s2": ("m/s2", 1.0),
+    "m/s^2": ("m/s2", 1.0), "m/s²": ("m/s2", 1.0), "mps2": ("m/s2", 1.0), "g": ("m/s2", GRAVITY_MPS2),
+    "m": ("m", 1.0), "cm": ("m", 0.01), "mm": ("m", 0.001), "s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6),
+    "n": ("N", 1.0), "kn": ("N", 1e3), "nm": ("Nm", 1.0), "n m": ("Nm", 1.0), "pa": ("Pa", 1.0), "bar": ("Pa", 1e5),
+    "mpa": ("Pa", 1e6), "%": ("", 0.01), "": ("", 1.0), "-": ("", 1.0), "1": ("", 1.0),
+}  # fmt: skip
+"""Unit as files have it, in lower case -> SI unit and factor. `grad` is the German degree."""
+UNITS: Final = tuple(unit for unit in _UNITS if unit not in ("", "-", "1"))
+"""What a unit may be called."""
+
+TIME_WORDS: Final = frozenset({"time", "times", "t", "zeit", "timestamp", "timestamps", "tstamp", "tstart"})
+
+TURNED_IN_SAE: Final = (
+    "y_m", "z_m", "yaw_rad", "pitch_rad", "vy_mps", "vz_mps", "yaw_rate_radps", "pitch_rate_radps", "ay_mps2",
+    "az_mps2", "sideslip_rad", "steering_wheel_rad", "steering_wheel_demand_rad", "hand_torque_Nm", "front_steer_rad",
+    "rear_steer_rad", "superposition_rad", "rack_m", "front_axle_y_m",
+)  # fmt: skip
+"""Channels that are positive to the left or upwards here, and to the right or downwards with the axes of SAE J670
+(x forward, y right, z down): all of them but what is along x or about it."""
+
+
+class Known(NamedTuple):
+    """What a column is.
+
+    Attributes:
+        channel: Channel that it fills.
+        unit: Its unit where the file does not say.
+        sign: -1 where the exporter has it the other way round than ISO 8855.
+        sure: Whether that is the exporter's unit; else it is taken for SI because nobody said.
+    """
+
+    channel: str
+    unit: str = ""
+    sign: float = 1.0
+    sure: bool = True
+
+
+_WORDS: Final = {
+    "steering_wheel_rad": "steeringwheelangle steerwheelangle swa handwheelangle lenkradwinkel lwi lws steeringangle "
+    "lenkwinkel deltah",
+    "yaw_rate_radps": "yawrate yawvelocity gierrate giergeschwindigkeit psidot psip angularratez gyroz r",
+    "ay_mps2": "lateralacceleration latacc lateralacc querbeschleunigung accy accely ay",
+    "ax_mps2": "longitudinalacceleration longacc laengsbeschleunigung längsbeschleunigung accx accelx ax",
+    "speed_mps": "speed velocity vehiclespeed vehspeed geschwindigkeit fahrgeschwindigkeit v vehv",
+    "vx_mps": "vx longitudinalvelocity velforward",
+    "vy_mps": "vy lateralvelocity vellateral",
+    "sideslip_rad": "sideslip sideslipangle schwimmwinkel beta slipangle",
+    "roll_rad": "roll rollangle wankwinkel phi",
+    "pitch_rad": "pitch pitchangle nickwinkel theta",
+    "yaw_rad": "yaw yawangle heading gierwinkel psi",
+    "x_m": "x posx positionx", "y_m": "y posy positiony",
+    "hand_torque_Nm": "steeringwheeltorque handtorque lenkmoment",
+    "brake_pedal": "brakepedal brakepedalposition bremspedal",
+}  # fmt: skip
+_BY_WORD: Final = {word: channel for channel, words in _WORDS.items() for word in words.split()}
+
+_EXPORTERS: Final[tuple[tuple[str, dict[str, Known]], ...]] = (
+    # IPG CarMaker writes SI and ISO 8855.
+    ("Car.YawRate", {
+        "Steer.WhlAng": Known("steering_wheel_rad", "rad"), "Driver.Steer.Ang": Known("steering_wheel_rad", "rad"),
+        "Car.YawRate": Known("yaw_rate_radps", "rad/s"), "Car.ay": Known("ay_mps2", "m/s2"),
+        "Car.ax": Known("ax_mps2", "m/s2"), "Car.v": Known("speed_mps", "m/s"), "Car.Roll": Known("roll_rad", "rad"),
+        "Car.Pitch": Known("pitch_rad", "rad"), "Car.Yaw": Known("yaw_rad", "rad"),
+        "Car.SideSlipAngle": Known("sideslip_rad", "rad"), "Car.tx": Known("x_m", "m"), "Car.ty": Known("y_m", "m"),
+    }),
+    # Mechanical Simulation CarSim: degrees, km/h and g, ISO 8855.
+    ("AVz", {
+        "Steer_SW": Known("steering_wheel_rad", "deg"), "AVz": Known("yaw_rate_radps", "deg/s"),
+        "Ay": Known("ay_mps2", "g"), "Ax": Known("ax_mps2", "g"), "Vx": Known("vx_mps", "km/h"),
+        "Vy": Known("vy_mps", "km/h"), "Beta": Known("sideslip_rad", "deg"), "Roll": Known("roll_rad", "deg"),
+        "Pitch": Known("pitch_rad", "deg"), "Yaw": Known("yaw_rad", "deg"), "Xcg_TM": Known("x_m", "m"),
+        "Ycg_TM": Known("y_m", "m"),
+    }),
+    # Runs of Project Chrono, as `activesteer validate` compares them: SI, and a rack that steers right.
+    ("delta_FL", {"rack": Known("rack_m", "m", -1.0), "vx": Known("vx_mps", "m/s"), "vy": Known("vy_mps", "m/s"),
+        "r": Known("yaw_rate_radps", "rad/s"), "ax": Known("ax_mps2", "m/s2"), "ay": Known("ay_mps2", "m/s2"),
+        "beta": Known("sideslip_rad", "rad"), "roll": Known("roll_rad", "rad"), "pitch": Known("pitch_rad", "rad"),
+        "x": Known("x_m", "m"), "y": Known("y_m", "m"), "psi": Known("yaw_rad", "rad"),
+    }),
+)  # fmt: skip
+"""A name that tells an exporter, and the names that it writes."""
+
+
+def si_of(unit: str) -> tuple[str, float] | None:
+    """SI unit of a unit as files have it, and the factor to it; None where it is unknown."""
+    text = unit.strip().strip("[]()").strip()
+    return _UNITS.get(text.lower().replace("**", "^"))
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """A name without the unit in brackets behind it, and that unit."""
+    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
+    return (found[1], found[2]) if found and si_of(found[2]) else (name, "")
+
+
+def is_time(name: str) -> bool:
+    """Whether a column is called as times are."""
+    return name == "time_s" or _word(split_unit(name)[0]) in TIME_WORDS
+
+
+def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> Known | None:
+    """What a column is by its name.
+
+    Args:
+        name: The name.
+        columns: Those of all columns of the file.
+        channels: Channels of a car.
+
+    Returns:
+        What it is; None where the name says nothing.
+    """
+    for mark, names in _EXPORTERS:
+        if mark in columns and name in names:
+            return names[name]
+    if name in channels:
+        return Known(name)
+    channel, _ = field_in_unit(name, channels)
+    if channel is not None:
+        return Known(channel, name.rsplit("_", 1)[1])
+    words, unit = split_unit(name)
+    channel = _BY_WORD.get(_word(words))
+    return None if channel is None else Known(channel, unit, sure=bool(unit))
+
+
+def _word(name: str) -> str:
+    return re.sub(r"[\W_]", "", name.lower())

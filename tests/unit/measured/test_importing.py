@@ -1,0 +1,188 @@
+"""Files of other programs become recordings: formats, units, signs, gaps, and what looks wrong in them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from activesteer.errors import RecordingError
+from activesteer.measured.importing import import_file
+from activesteer.measured.plausibility import suspicions
+from activesteer.playback.runs import runs_of
+from activesteer.recording import Recording
+
+TIME_S = np.arange(0.0, 4.0, 0.01)
+SPEED_MPS = np.full_like(TIME_S, 20.0)
+WHEEL_RAD = 0.5 * np.sin(2.0 * np.pi * 0.5 * TIME_S)
+RATE_RADPS = 0.01 * SPEED_MPS * WHEEL_RAD
+AY_MPS2 = SPEED_MPS * RATE_RADPS
+
+
+def write(path: Path, names: str, columns: list[np.ndarray], separator: str = ",", *, comma: bool = False) -> Path:
+    lines = [names, *(separator.join(f"{value:.9g}" for value in row) for row in np.column_stack(columns))]
+    text = "\n".join(lines[1:])
+    path.write_text(f"{names}\n{text.replace('.', ',') if comma else text}\n", encoding="utf-8")
+    return path
+
+
+def check(recording: Recording) -> None:
+    np.testing.assert_allclose(recording["yaw_rate_radps"], np.interp(recording.time_s, TIME_S, RATE_RADPS), atol=1e-6)
+    np.testing.assert_allclose(recording["ay_mps2"], np.interp(recording.time_s, TIME_S, AY_MPS2), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("separator", "comma"), [(",", False), (";", True), ("\t", True), ("|", False), ("   ", False)]
+)
+def test_a_csv_has_any_separator_and_decimal_comma(tmp_path, separator, comma):
+    names = separator.join(["time[s]", "LWI[deg]", "Gierrate[deg/s]", "Querbeschleunigung[g]", "v[km/h]"])
+    columns = [TIME_S, np.degrees(WHEEL_RAD), np.degrees(RATE_RADPS), AY_MPS2 / 9.81, 3.6 * SPEED_MPS]
+    found = import_file(write(tmp_path / "a.csv", names, columns, separator, comma=comma))
+    check(found.recording)
+    assert found.notes == ()
+    assert found.recording["speed_mps"][0] == pytest.approx(20.0)
+    assert found.recording.metrics["yaw_rate_peak_abs_radps"] == pytest.approx(0.1, rel=1e-3)
+
+
+def test_a_line_of_units_and_a_preamble_are_understood_and_bytes_of_windows(tmp_path):
+    lines = ["Car: 12; driver: x", "time;yaw rate;speed", "s;°/s;km/h"]
+    lines += [f"{t:.3f};{math.degrees(r):.6f};72.0" for t, r in zip(TIME_S, RATE_RADPS, strict=True)]
+    path = tmp_path / "a.csv"
+    path.write_bytes("\r\n".join(lines).encode("latin-1"))
+    recording = import_file(path).recording
+    np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS, atol=1e-7)
+
+
+def test_mat_parquet_and_our_own_exports_come_back(tmp_path):
+    savemat(tmp_path / "a.mat", {"run": {"t": TIME_S, "YawRate": RATE_RADPS}, "lateral_acceleration": AY_MPS2})
+    (tmp_path / "map.toml").write_text(
+        'time = "run.t"\n[channels]\nyaw_rate_radps = { column = "run.YawRate", unit = "rad/s" }\n'
+        'ay_mps2 = { column = "lateral_acceleration", unit = "m/s2" }\n'
+    )
+    recording = import_file(tmp_path / "a.mat", tmp_path / "map.toml").recording
+    check(recording)
+    assert list(recording.attachments) == ["map.toml"]
+    for export, ending in (("to_csv", "csv"), ("to_parquet", "parquet"), ("to_mat", "mat")):
+        path = getattr(recording, export)(tmp_path / f"again.{ending}")
+        check(import_file(path).recording)
+
+
+def test_mdf_channels_have_times_of_their_own(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    slow = TIME_S[::10]
+    file = asammdf.MDF(version="4.10")
+    file.append([asammdf.Signal(np.degrees(RATE_RADPS), TIME_S, name="YawRate", unit="deg/s")])
+    file.append([asammdf.Signal(np.full_like(slow, 72.0), slow, name="VehicleSpeed", unit="km/h")])
+    file.save(tmp_path / "a.mf4", overwrite=True)
+    file.close()
+    recording = import_file(tmp_path / "a.mf4").recording
+    assert recording.time_s[1] - recording.time_s[0] == pytest.approx(0.01)
+    np.testing.assert_allclose(recording["speed_mps"], 20.0)
+    np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS[: len(recording)], atol=1e-9)
+
+
+def test_a_map_gives_units_signs_offsets_and_the_axes_of_sae(tmp_path):
+    path = write(tmp_path / "a.csv", "t,p,q,b", [TIME_S, -np.degrees(RATE_RADPS), -AY_MPS2 + 0.3, 0.1 + 0.0 * TIME_S])
+    (tmp_path / "map.toml").write_text(
+        'axes = "sae_j670"\nstep_s = 0.02\nstart_s = 1.0\nend_s = 3.0\n[channels]\n'
+        'yaw_rate_radps = { column = "p", unit = "deg/s" }\n'
+        'ay_mps2 = { column = "q", unit = "m/s2", offset = -0.3 }\n'
+        'roll_rad = { column = "b", unit = "rad", zero_until_s = 2.0 }\n'
+    )
+    recording = import_file(path, tmp_path / "map.toml").recording
+    assert (recording.time_s[0], recording.time_s[-1], len(recording)) == (1.0, 3.0, 101)
+    # Averaged over a step of 20 ms, a sine of 0.5 Hz loses 0.02 %.
+    np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS[100:301:2], atol=3e-4)
+    np.testing.assert_allclose(recording["ay_mps2"], AY_MPS2[100:301:2], atol=6e-3)
+    np.testing.assert_allclose(recording["roll_rad"], 0.0, atol=1e-12)
+
+
+def test_the_path_of_a_circle_follows_from_speed_and_yaw_rate_and_a_car_drives_it(tmp_path):
+    path = write(tmp_path / "a.csv", "time_s,yaw_rate_radps,speed_mps", [TIME_S, 0.0 * TIME_S + 0.5, SPEED_MPS])
+    recording = import_file(path).recording
+    np.testing.assert_allclose(recording["x_m"], 40.0 * np.sin(0.5 * TIME_S), atol=1e-3)
+    np.testing.assert_allclose(recording["y_m"], 40.0 * (1.0 - np.cos(0.5 * TIME_S)), atol=1e-3)
+    recording.save(tmp_path / "a.mcap")
+    run = runs_of({"a": Recording.open(tmp_path / "a.mcap")})[0]
+    poses = run.recording.poses
+    chassis, wheel = (poses.positions_m[:, poses.names.index(name)] for name in ("chassis", "fl_wheel"))
+    assert np.ptp(np.linalg.norm(chassis - wheel, axis=1)) < 1e-9  # moved as one
+    assert (chassis[-1] - chassis[0])[:2] == pytest.approx([recording["x_m"][-1] - 0.0, recording["y_m"][-1]], abs=3.0)
+
+
+def test_gaps_are_bridged_as_long_as_the_map_allows(tmp_path):
+    holed = RATE_RADPS.copy()
+    holed[100:105] = np.nan
+    path = write(tmp_path / "short.csv", "time_s,yaw_rate_radps,speed_mps", [TIME_S, holed, SPEED_MPS])
+    np.testing.assert_allclose(import_file(path).recording["yaw_rate_radps"], RATE_RADPS, atol=1e-3)
+    holed[100:150] = np.nan
+    path = write(tmp_path / "long.csv", "time_s,yaw_rate_radps,speed_mps", [TIME_S, holed, SPEED_MPS])
+    with pytest.raises(RecordingError, match=r"yaw_rate_radps has no samples from 0.990 to 1.500 s; .*max_gap_s"):
+        import_file(path)
+
+
+@pytest.mark.parametrize(
+    ("factors", "said"),
+    [
+        ({"yaw_rate_radps": math.degrees(1.0)}, "57 times too large"),
+        ({"yaw_rate_radps": math.radians(1.0)}, "57 times too small"),
+        ({"speed_mps": 3.6}, "km/h that were taken as m/s"),
+        ({"ay_mps2": 1.0 / 9.81}, "g that were taken as m/s2"),
+        ({"ay_mps2": -1.0}, "ay_mps2 is positive to the right"),
+        ({"yaw_rate_radps": -1.0}, "yaw_rate_radps is positive to the right"),
+        ({"steering_wheel_rad": -1.0}, "steering_wheel_rad and yaw_rate_radps are of opposite sign"),
+        ({"steering_wheel_rad": math.degrees(1.0)}, "deg that were taken as rad"),
+        ({"steering_wheel_rad": 1.0 / 16.0}, "angle of the road wheels"),
+    ],
+)
+def test_a_wrong_unit_or_sign_is_suspected_in_one_line(factors, said):
+    right = {
+        "speed_mps": SPEED_MPS, "yaw_rate_radps": RATE_RADPS, "ay_mps2": AY_MPS2, "steering_wheel_rad": WHEEL_RAD
+    }  # fmt: skip
+    assert suspicions(right) == []
+    lines = suspicions({name: factors.get(name, 1.0) * values for name, values in right.items()})
+    assert len(lines) == 1
+    assert said in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "said"),
+    [
+        ("a.csv", b"", "no line of numbers"),
+        ("a.csv", b"\x00\xff" * 100, "no line of numbers"),
+        ("a.csv", b"time,yaw_rate_radps\n0,0\n0.1,x\n", "'x'"),
+        ("a.csv", b"time,yaw_rate_radps\n0,0\n1,0\n0.5,0\n", "goes backwards, from 1 to 0.5 s"),
+        ("a.csv", b"time,yaw_rate_radps\n0,0\n", "fewer than two samples"),
+        ("a.csv", b"time,yaw_rate_radps[bar]\n0,0\n1,1\n", "yaw_rate_radps"),
+        ("a.csv", b"time,foo\n0,0\n1,1\n", "'foo'"),
+        ("a.csv", b"u,yaw_rate_radps\n0,0\n1,1\n", "no column is called as a time"),
+        ("a.csv", b"time,yawrate,YawRate\n0,0,0\n1,1,1\n", "are both yaw_rate_radps"),
+        ("a.mat", b"MATLAB 5.0 MAT-file" + bytes(200), "no MATLAB file"),
+        ("a.parquet", b"PAR1" + bytes(50) + b"PAR1", "no Parquet file"),
+        ("a.mf4", b"MDF     4.10    " + bytes(200), "no MDF file"),
+        ("a.xlsx", b"PK", "end in .csv"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_an_error_of_one_line(tmp_path, name, data, said):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(RecordingError) as caught:
+        import_file(tmp_path / name)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_map_that_names_what_is_not_there_is_an_error(tmp_path):
+    path = write(tmp_path / "a.csv", "t,p", [TIME_S, RATE_RADPS])
+    for text, said in (
+        ('[channels]\nyaw_rate_radps = { column = "P" }\n', "there is no column 'P'; known are: p, t"),
+        ('[channels]\nyaw_rate_radps = { column = "p", unit = "bar" }\n', "is in rad/s, and 'p' in 'bar'"),
+        ('[channels]\nyaw_rate_degps = { column = "p" }\n', "call it yaw_rate_radps"),
+        ('axis = "sae_j670"\n', "axes"),
+    ):
+        (tmp_path / "map.toml").write_text(text)
+        with pytest.raises(RecordingError) as caught:
+            import_file(path, tmp_path / "map.toml")
+        assert said in str(caught.value)
