@@ -70,6 +70,7 @@ def all_commands() -> Commands:
     """The commands of the program, in the groups under which `--help` lists them."""
     from activesteer.commands import (
         bench,
+        compare,
         driver,
         envelope,
         fault_map,
@@ -101,7 +102,7 @@ def all_commands() -> Commands:
     commands = Commands(f"activesteer {__version__}")
     for title, modules in {
         "drive": (listing, run, watch),
-        "look": (info, report, replay, video, import_, recover),
+        "look": (info, report, compare, replay, video, import_, recover),
         "car": (vehicle, tyre, kc),
         "study": (study, tune, envelope, fault_map, identify, linearise, driver, margins),
         "prove": (reproduce, test, figures, validate, bench),

@@ -251,6 +251,7 @@ def _mdf(path: Path) -> list[Column]:
         raise RecordingError("MDF files need asammdf, which is not installed: pip install 'activesteer[mdf]'") from (
             error
         )
+    file: Any = None
     problem = ""
     # Of a broken file asammdf leaves half an object, which complains to the terminal when it is deleted.
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None

@@ -11,13 +11,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from activesteer.analysis.corridor import TIME_TOLERANCE_S, corridor
 from activesteer.conventions import Array
 from activesteer.validation.comparison import Comparison, absolute, relative
 from activesteer.validation.reference import Table
 
 STEADY_TOLERANCE: Final = 0.02
 PEAK_TOLERANCE: Final = 0.05
-TIME_TOLERANCE_S: Final = 0.02
 RMS_TOLERANCE: Final = 0.02
 LOAD_TOLERANCE: Final = 0.01
 SPEED_TOLERANCE: Final = 0.005
@@ -77,11 +77,7 @@ class Trace(NamedTuple):
 
     def corridor(self) -> tuple[Array, Array]:
         """Lower and upper edge around the reference: 20 ms to either side, and 2 % of peak to peak."""
-        t, values = self.time_s, self.reference
-        fine = np.linspace(-TIME_TOLERANCE_S, TIME_TOLERANCE_S, 9)
-        moved = np.stack([np.interp(t + shift, t, values) for shift in fine])
-        width = RMS_TOLERANCE * self.span
-        return moved.min(axis=0) - width, moved.max(axis=0) + width
+        return corridor(self.time_s, self.reference, RMS_TOLERANCE * self.span)
 
 
 def traces(ours: Table, reference: Table, quantities: tuple[Quantity, ...] = QUANTITIES) -> list[Trace]:

@@ -1,0 +1,62 @@
+"""`activesteer compare MEASURED.mcap... SIMULATED.mcap`: measured runs beside a simulated one, with a verdict."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import Any
+
+from activesteer.commands.arguments import add_json, add_output
+from activesteer.commands.output import print_json
+from activesteer.errors import ParameterError
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser(
+        "compare",
+        help="measured runs beside a simulated one: time shift, residuals, verdict",
+        description="Finds the time shift, and says which share of the measurement lies in the tolerance corridor "
+        "around the simulation. The status is 1 where a quantity does not.",
+    )
+    parser.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE.mcap",
+        help="recordings: measured ones, of several their mean counts, and the simulated one at the end",
+    )  # fmt: skip
+    parser.add_argument(
+        "--standard", choices=("iso19364", "iso19365"), default="iso19365",
+        help="iso19364: cross plots over the lateral acceleration, for steady-state driving; iso19365: over time "
+        "(default)",
+    )  # fmt: skip
+    add_output(parser, "FILE.html", "the page; none is written without it")
+    add_json(parser)
+    parser.set_defaults(action=_compare)
+
+
+def _compare(options: argparse.Namespace) -> int:
+    from activesteer.measured.comparison import compare, words
+    from activesteer.recording import Recording
+
+    if len(options.files) < 2:
+        raise ParameterError("two recordings at least are needed: measured ones, and the simulated one at the end")
+    *measured, simulated = (Recording.open(file, recover=True) for file in options.files)
+    found = compare(measured, simulated, options.standard)
+    if options.output is not None:
+        from activesteer.measured.page import write_page
+
+        names = [file.stem for file in options.files]
+        write_page(found, names[:-1], names[-1], options.output)
+    if options.json:
+        print_json(found.to_json())
+        return 0 if found.inside else 1
+    for file, shift_s in zip(options.files, found.shifts_s, strict=False):
+        later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{1e3 * shift_s:+.1f} ms"
+        print(f"time shift of {file}: {later}")
+    for each in found.quantities:
+        label, residual, tolerance, share, verdict = words(each)
+        print(f"  {label:24} rms {residual:>14}   {tolerance:>18}   {share:>7} {verdict}")
+    print("inside" if found.inside else "outside")
+    if options.output is not None:
+        print(f"page: {options.output}")
+    return 0 if found.inside else 1

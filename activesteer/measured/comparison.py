@@ -1,0 +1,255 @@
+"""Measured runs beside a simulated one: time shift, residuals, tolerance corridors, share inside, verdict.
+
+ISO 19364 (steady-state circular driving) and ISO 19365 (sine with dwell) put the corridor around the simulation and
+look whether the measurement lies in it: the first in cross plots over the lateral acceleration, the second over time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from activesteer.analysis.corridor import TIME_TOLERANCE_S, corridor
+from activesteer.analysis.series import rms
+from activesteer.conventions import Array
+from activesteer.errors import RecordingError
+from activesteer.measured.alignment import time_shift
+from activesteer.quantities import quantity_of
+from activesteer.recording import Recording
+
+STANDARDS: Final = {
+    "iso19364": "ISO 19364: cross plots over the lateral acceleration",
+    "iso19365": "ISO 19365: over time",
+}
+SHARE_NEEDED: Final = 0.95
+"""Share of the samples that must lie in the corridor; an assumption: the standards ask for all points of a mean curve,
+and leave open what a single sample of a noisy signal is worth."""
+_ACROSS: Final = "ay_mps2"
+_QUOTED: Final = "as quoted of ISO 19364 and ISO 19365; the standards' texts were not at hand"
+_ASSUMED: Final = "assumption"
+_DEG: Final = math.radians(1.0)
+_CROSS_POINTS: Final = 1500
+"""Most measured and simulated points of a cross plot that are compared with each other."""
+
+
+class Tolerance(NamedTuple):
+    """How far a measured value may be from the simulated one: offset + gain x its size.
+
+    Attributes:
+        offset: SI.
+        gain: Fraction of the simulated value.
+        source: Where it is from.
+    """
+
+    offset: float
+    gain: float
+    source: str
+
+    def width(self, values: Array) -> Array:
+        """Half the width of the corridor around values."""
+        return self.offset + self.gain * np.abs(values)
+
+
+TOLERANCES: Final = {
+    "steering_wheel_rad": Tolerance(5.0 * _DEG, 0.03, _QUOTED),
+    "ay_mps2": Tolerance(0.1, 0.06, _QUOTED),
+    "yaw_rate_radps": Tolerance(0.5 * _DEG, 0.06, _ASSUMED),
+    "sideslip_rad": Tolerance(0.3 * _DEG, 0.1, _ASSUMED),
+    "roll_rad": Tolerance(0.2 * _DEG, 0.1, _ASSUMED),
+    "speed_mps": Tolerance(1.0 / 3.6, 0.01, _ASSUMED),
+}
+"""Channels that are compared."""
+
+
+class Compared(NamedTuple):
+    """One quantity of measurement and simulation.
+
+    Attributes:
+        channel: Its name.
+        tolerance: What is allowed.
+        x: Instants [s] in the simulation's time or, in a cross plot, measured lateral accelerations [m/s2], shape (n,).
+        measured: Measured values, of several runs their mean, shape (n,).
+        confidence: Half of the 95 % interval of that mean, shape (n,); zero for one run.
+        simulated: What the simulation has there, shape (n,): in a cross plot at its nearest point.
+        low: Lower edge of the corridor at x; in a cross plot that of the simulation's curve.
+        high: Upper edge.
+        within: Which samples lie in it, shape (n,).
+    """
+
+    channel: str
+    tolerance: Tolerance
+    x: Array
+    measured: Array
+    confidence: Array
+    simulated: Array
+    low: Array
+    high: Array
+    within: Array
+
+    @property
+    def residual(self) -> Array:
+        """Measured less simulated."""
+        return self.measured - self.simulated
+
+    @property
+    def share_inside(self) -> float:
+        """Share of the samples in the corridor."""
+        return float(np.mean(self.within))
+
+    @property
+    def inside(self) -> bool:
+        """Whether as many are inside as are needed."""
+        return self.share_inside >= SHARE_NEEDED
+
+    def to_json(self) -> dict[str, Any]:
+        """As in the JSON output, SI."""
+        return {
+            "channel": self.channel,
+            "rms": rms(self.residual),
+            "confidence_rms": rms(self.confidence),
+            "offset": self.tolerance.offset,
+            "gain": self.tolerance.gain,
+            "source": self.tolerance.source,
+            "share_inside": self.share_inside,
+            "inside": self.inside,
+        }
+
+
+class Comparison(NamedTuple):
+    """What came out.
+
+    Attributes:
+        standard: Key of `STANDARDS`.
+        shifts_s: How much later each measured run is [s]; nan where nothing told it, and none was made up for.
+        quantities: What both have.
+    """
+
+    standard: str
+    shifts_s: tuple[float, ...]
+    quantities: tuple[Compared, ...]
+
+    @property
+    def inside(self) -> bool:
+        """Whether every quantity is inside."""
+        return all(quantity.inside for quantity in self.quantities)
+
+    def to_json(self) -> dict[str, Any]:
+        """As in the JSON output, SI."""
+        return {
+            "standard": self.standard,
+            "time_shift_s": float(np.mean(self.shifts_s)),
+            "time_shifts_s": list(self.shifts_s),
+            "quantities": [quantity.to_json() for quantity in self.quantities],
+            "inside": self.inside,
+        }
+
+
+def compare(measured: Sequence[Recording], simulated: Recording, standard: str = "iso19365") -> Comparison:
+    """Compares measured runs of one manoeuvre with its simulation.
+
+    Args:
+        measured: At least one.
+        simulated: The simulation.
+        standard: Key of `STANDARDS`.
+
+    Raises:
+        RecordingError: the runs have no channel or no time in common.
+    """
+    names = [name for name in TOLERANCES if all(name in run for run in (*measured, simulated))]
+    if standard == "iso19364" and _ACROSS not in names:
+        raise RecordingError(f"cross plots need {_ACROSS} in every run", value=_ACROSS)
+    if not names:
+        raise RecordingError(f"the runs have none of the channels that are compared: {', '.join(TOLERANCES)}")
+    shifts = tuple(time_shift(run, simulated) for run in measured)
+    made_up = [0.0 if math.isnan(shift) else shift for shift in shifts]
+    start = max(simulated.time_s[0], *(run.time_s[0] - shift for run, shift in zip(measured, made_up, strict=True)))
+    end = min(simulated.time_s[-1], *(run.time_s[-1] - shift for run, shift in zip(measured, made_up, strict=True)))
+    time_s = measured[0].time_s - made_up[0]
+    time_s = time_s[(time_s >= start - 1e-9) & (time_s <= end + 1e-9)]
+    if len(time_s) < 10:
+        raise RecordingError(f"the runs have {len(time_s)} samples in common; 10 are needed to compare them")
+
+    def mean_of(name: str) -> tuple[Array, Array]:
+        values = np.stack(
+            [np.interp(time_s + shift, run.time_s, run[name]) for run, shift in zip(measured, made_up, strict=True)]
+        )
+        return values.mean(axis=0), _confidence(values)
+
+    if standard == "iso19364":
+        across = mean_of(_ACROSS)[0]
+        found = [
+            _crossed(name, across, *mean_of(name), np.asarray(simulated[_ACROSS]), np.asarray(simulated[name]))
+            for name in names
+            if name not in (_ACROSS, "speed_mps")
+        ]
+    else:
+        found = [
+            _timed(name, time_s, *mean_of(name), np.interp(time_s, simulated.time_s, simulated[name])) for name in names
+        ]
+    return Comparison(standard, shifts, tuple(found))
+
+
+def _confidence(values: Array) -> Array:
+    """Half of the 95 % interval of the mean (Student), shape (n,)."""
+    from scipy.stats import t  # noqa: PLC0415 - slow to import
+
+    count = len(values)
+    if count < 2:
+        return np.zeros(values.shape[1])
+    return t.ppf(0.975, count - 1) * values.std(axis=0, ddof=1) / math.sqrt(count)
+
+
+def _timed(name: str, time_s: Array, measured: Array, confidence: Array, simulated: Array) -> Compared:
+    tolerance = TOLERANCES[name]
+    low, high = corridor(time_s, simulated, tolerance.width(simulated))
+    within = (measured >= low) & (measured <= high)
+    return Compared(name, tolerance, time_s, measured, confidence, simulated, low, high, within)
+
+
+def _crossed(
+    name: str, across: Array, measured: Array, confidence: Array, sim_across: Array, sim_values: Array
+) -> Compared:
+    """Inside is a point in the ellipse of both tolerances around some point of the simulated curve."""
+    tolerance = TOLERANCES[name]
+    rows = np.unique(np.linspace(0, len(across) - 1, min(len(across), _CROSS_POINTS)).astype(int))
+    curve = np.unique(np.linspace(0, len(sim_across) - 1, min(len(sim_across), _CROSS_POINTS)).astype(int))
+    x, y, px, py = across[rows], measured[rows], sim_across[curve], sim_values[curve]
+    width_x, width_y = TOLERANCES[_ACROSS].width(px), tolerance.width(py)
+    distance = ((x[:, None] - px) / width_x) ** 2 + ((y[:, None] - py) / width_y) ** 2
+    nearest = distance.argmin(axis=1)
+    within = distance[np.arange(len(x)), nearest] <= 1.0
+    beside = py[nearest]
+    return Compared(
+        name, tolerance, x, y, confidence[rows], beside, beside - width_y[nearest], beside + width_y[nearest], within
+    )
+
+
+def words(found: Compared) -> tuple[str, str, str, str, str]:
+    """Quantity, rms of the residual, tolerance, share inside and verdict, as they are printed."""
+    shown = quantity_of(found.channel)
+    unit, factor = shown.unit.name, shown.factor
+    allowed = f"{found.tolerance.offset * factor:.3g} {unit} + {100.0 * found.tolerance.gain:g} %"
+    return (
+        shown.label,
+        f"{rms(found.residual) * factor:.3g} {unit}",
+        allowed,
+        f"{100.0 * found.share_inside:.1f} %",
+        "inside" if found.inside else "outside",
+    )
+
+
+def assumptions(found: Comparison) -> list[str]:
+    """What of the verdict is no standard's, one line each."""
+    assumed = [quantity_of(each.channel).label for each in found.quantities if each.tolerance.source == _ASSUMED]
+    lines = [f"Tolerances of steering wheel angle and lateral acceleration {_QUOTED}."]
+    if assumed:
+        lines.append(f"Tolerances of {', '.join(assumed)} are assumptions.")
+    lines.append(f"A quantity is inside where {100.0 * SHARE_NEEDED:g} % of its samples are; an assumption.")
+    if found.standard == "iso19365":
+        lines.append(
+            f"The corridor reaches {1e3 * TIME_TOLERANCE_S:g} ms to either side, as in `activesteer validate`."
+        )
+    return lines

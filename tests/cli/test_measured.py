@@ -1,0 +1,64 @@
+"""`activesteer import`, `compare` and `run` of a recording: from a file of another program to a verdict."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import activesteer
+
+NAMES = {
+    "Lenkradwinkel [deg]": "steering_wheel_rad",
+    "Gierrate [deg/s]": "yaw_rate_radps",
+    "Wankwinkel [deg]": "roll_rad",
+}
+
+
+@pytest.fixture(scope="module")
+def truth():
+    table = {
+        "kind": "open_loop", "speed_kmh": 72.0, "duration_s": 2.0, "settle_s": 0.5, "hold_last": True,
+        "steering": {"time_s": [0.5, 0.7], "steering_wheel_deg": [0.0, 30.0]},
+    }  # fmt: skip
+    return activesteer.simulate(table)
+
+
+def test_a_run_written_in_degrees_50_ms_late_comes_back_and_is_driven_again(call, tmp_path, truth):
+    columns = [truth.time_s + 0.05, *(np.degrees(truth[name]) for name in NAMES.values()), truth["ay_mps2"],
+               3.6 * truth["speed_mps"]]  # fmt: skip
+    header = ";".join(["t [s]", *NAMES, "ay [m/s2]", "v [km/h]"])
+    rows = [";".join(f"{value:.9g}".replace(".", ",") for value in row) for row in np.column_stack(columns)]
+    (tmp_path / "a.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
+    truth.save("simulated.mcap")
+
+    told = call("import", "a.csv", "--json")
+    assert (told.status, told.json["notes"]) == (0, [])
+    told = call("compare", "a.mcap", "simulated.mcap", "-o", "a.html", "--json")
+    assert told.status == 0
+    assert told.json["time_shift_s"] == pytest.approx(0.05, abs=1e-4)
+    assert told.json["inside"] is True
+    channels = {each["channel"]: each for each in told.json["quantities"]}
+    assert set(channels) == {*NAMES.values(), "ay_mps2", "speed_mps"}
+    assert all(each["rms"] < 1e-4 and each["share_inside"] == 1.0 for each in channels.values())
+    page = (tmp_path / "a.html").read_text()
+    assert "<svg" in page
+    assert "50.0 ms" in page
+
+    assert call("run", "a.mcap", "-o", "again.mcap", "--set", "settle_s=0.5").status == 0
+    told = call("compare", "a.mcap", "again.mcap", "--json")
+    # The steering wheel follows the angle that was recorded, as it follows any demand, 2 ms later.
+    assert told.json["time_shift_s"] == pytest.approx(-0.002, abs=1e-3)
+    assert told.status == 0
+    rate = next(each for each in told.json["quantities"] if each["channel"] == "yaw_rate_radps")
+    assert rate["rms"] < 0.02 * np.abs(truth["yaw_rate_radps"]).max()
+
+
+def test_what_cannot_be_compared_or_imported_is_answered(call, truth, tmp_path):
+    truth.save(tmp_path / "a.mcap")
+    assert call("compare", "a.mcap").err.startswith("activesteer: two recordings at least")
+    assert "file does not exist" in call("import", "no.csv").err or call("import", "no.csv").status == 1
+    (tmp_path / "a.csv").write_text("t,yawrate\n0,0\n1,1\n")
+    assert "ends in .mcap" in call("import", "a.csv", "-o", "a.txt").err
+    told = call("import", "a.csv")
+    assert "yawrate has no unit and is taken for rad/s" in told.out
+    assert "steering_wheel_rad or rack_m is needed" in call("run", "a.mcap").err
