@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -91,4 +91,5 @@ def _refined(coarse_s: float, own_s: Array, other_s: Array, pairs: list[tuple[Ar
         )
 
     bounds = (coarse_s - _STEP_S, coarse_s + _STEP_S)
-    return float(minimize_scalar(difference, bounds=bounds, method="bounded", options={"xatol": 1e-7}).x)
+    optimum: Any = minimize_scalar(difference, bounds=bounds, method="bounded", options={"xatol": 1e-7})
+    return float(optimum.x)

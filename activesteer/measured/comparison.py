@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.analysis.corridor import TIME_TOLERANCE_S, corridor
 from activesteer.analysis.series import rms
@@ -87,7 +88,7 @@ class Compared(NamedTuple):
     simulated: Array
     low: Array
     high: Array
-    within: Array
+    within: NDArray[np.bool_]
 
     @property
     def residual(self) -> Array:
@@ -249,7 +250,5 @@ def assumptions(found: Comparison) -> list[str]:
         lines.append(f"Tolerances of {', '.join(assumed)} are assumptions.")
     lines.append(f"A quantity is inside where {100.0 * SHARE_NEEDED:g} % of its samples are; an assumption.")
     if found.standard == "iso19365":
-        lines.append(
-            f"The corridor reaches {1e3 * TIME_TOLERANCE_S:g} ms to either side, as in `activesteer validate`."
-        )
+        lines.append(f"The corridor reaches {1e3 * TIME_TOLERANCE_S:g} ms to either side, as in activesteer validate.")
     return lines

@@ -76,7 +76,8 @@ def draw(found: Compared, standard: str, runs: int) -> Figure:
         right.fill_between(x, low, high, color="#cfe0ee", lw=0.0)
     right.plot(x, factor * found.residual[order], color="#333333", **(style | ({} if across else {"ls": "-"})))
     outside = ~found.within[order]
-    right.plot(x[outside], factor * found.residual[order][outside], ".", color="#b3261e", ms=3, label="outside")
+    if outside.any():
+        right.plot(x[outside], factor * found.residual[order][outside], ".", color="#b3261e", ms=3, label="outside")
     for axis, title in ((left, shown.title), (right, f"Measured less simulated [{shown.unit.name}]")):
         _finish(axis, title, "lateral acceleration [m/s²]" if across else "time of the simulation [s]")
     return figure
@@ -88,4 +89,5 @@ def _finish(axis: Axes, title: str, x_label: str) -> None:
     axis.tick_params(labelsize="small")
     axis.grid(visible=True, color="#dddddd", linewidth=0.6)
     axis.spines[["top", "right"]].set_visible(False)
-    axis.legend(frameon=False, fontsize="x-small")
+    if axis.get_legend_handles_labels()[1]:
+        axis.legend(frameon=False, fontsize="x-small")
