@@ -18,8 +18,12 @@ if TYPE_CHECKING:
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
-    parser = commands.add_parser("validate", help="compare a car with the same car in another multibody code")
-    parser.add_argument("name", nargs="?", default="sedan", help="folder in models/reference (default: sedan)")
+    parser = commands.add_parser(
+        "validate", help="compare a car with another multibody code, or with a measurement on the road"
+    )
+    parser.add_argument(
+        "name", nargs="?", default="sedan", help="folder in models/reference: sedan, tesla_model_s (default: sedan)"
+    )
     add_output(parser, "DIR", "folder for page, JSON and runs; none are written without it")
     parser.add_argument(
         "--reference", type=Path, metavar="DIR", help="folder with further reference runs, NAME.csv in the same columns"
@@ -27,6 +31,10 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--study", action="store_true",
         help="also: what the other code's simplifications of the tyre cost, and what the step size costs",
+    )  # fmt: skip
+    parser.add_argument(
+        "--samples", type=int, default=200, metavar="N",
+        help="of a car that was measured on the road: how often mass, tyre, radius, lateral acceleration are drawn",
     )  # fmt: skip
     parser.add_argument("--timestep", type=float, default=0.001, metavar="S", help="our step [s] (default: 0.001)")
     add_jobs(parser)
@@ -36,6 +44,10 @@ def add_to(commands: Any) -> None:
 
 
 def _validate(options: argparse.Namespace) -> int:
+    from activesteer.validation.measured_circle import is_measured
+
+    if is_measured(options.name):
+        return _circle(options)
     from activesteer.validation import to_json, validate
     from activesteer.validation.page import write_page
     from activesteer.validation.programme import write_json, write_runs
@@ -75,6 +87,25 @@ def _validate(options: argparse.Namespace) -> int:
         for title, rows in _titled(tables).items():
             print(as_text(title, rows))
     return status
+
+
+def _circle(options: argparse.Namespace) -> int:
+    from activesteer.validation.circle_page import write_circle_page
+    from activesteer.validation.measured_circle import validate_circle
+
+    with ProgressBar("validate", quiet=options.json) as bar:
+        result = validate_circle(
+            options.name, options.samples, options.jobs, scheduler=options.scheduler, progress=bar
+        )  # fmt: skip
+    if options.json:
+        print_json(result.as_table())
+    else:
+        print(result.text())
+    if options.output is not None:
+        page = write_circle_page(result, options.output / "validation.html")
+        if not options.json:
+            print(f"page: {page}")
+    return 0 if result.inside else 1
 
 
 def _study(data: ReferenceData, options: argparse.Namespace) -> dict[str, list[Response]]:

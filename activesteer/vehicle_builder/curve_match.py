@@ -10,6 +10,7 @@ import dataclasses
 from typing import Final
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from activesteer.conventions import Array
 from activesteer.rigs.kc.held_car import Case, HeldCar
@@ -76,7 +77,10 @@ def match_steering(axle: Axle, found: TrimmedAxle, held: HeldCar, pinion_m: floa
     assert curves is not None
     rack = np.array(asked.rack_m)
     cases = [Case("contact", steering_wheel_rad=float(at / pinion_m)) for at in rack]
-    poses, _, standing, _ = _swept(held, cases, rack)
+    there = np.empty(len(rack))
+    poses, _, standing, _ = _swept(held, cases, rack, there)
+    # The column gives way a little: the rack is not quite where the steering wheel asks for it.
+    there = 0.5 * (there - there[::-1])
     # The left wheel at s and the right one at -s are mirror images.
     both = np.stack([_left(poses[:, 0], 0), _left(poses[::-1, 1], 1)])
     rest = np.stack([_left(standing[None, 0], 0), _left(standing[None, 1], 1)])
@@ -86,7 +90,8 @@ def match_steering(axle: Axle, found: TrimmedAxle, held: HeldCar, pinion_m: floa
     for column, (name, by_travel) in enumerate(zip(OVER_RACK, OVER_TRAVEL, strict=True)):
         over = np.array(getattr(asked, by_travel))
         change = now[:, column] - np.interp(lifted, travel, over) + np.interp(0.0, travel, over)
-        missing = np.array(getattr(asked, name)) - (-change if name == "rack_steer_rad" else change)
+        wanted = CubicSpline(rack, getattr(asked, name))(there)
+        missing = np.interp(rack, there, wanted - (-change if name == "rack_steer_rad" else change))
         greatest = max(greatest, _size(name, missing))
         changes[name] = _corrected(curves, name, missing)
     found.curves = dataclasses.replace(curves, **changes)
@@ -102,8 +107,13 @@ def _wheels(axle: Axle) -> list[int]:
     return [0, 1] if axle.name == "front" else [2, 3]
 
 
-def _swept(held: HeldCar, cases: list[Case], order: Array) -> tuple[Array, Array, Array, Array]:
-    """Poses (n, 4, 6) and loads (n, 4) of a sweep, from its middle outwards; and those of the standing car."""
+def _swept(
+    held: HeldCar, cases: list[Case], order: Array, rack: Array | None = None
+) -> tuple[Array, Array, Array, Array]:
+    """Poses (n, 4, 6) and loads (n, 4) of a sweep, from its middle outwards; and those of the standing car.
+
+    `rack` is filled with the travel of the rack [m].
+    """
     held.reset()
     standing, standing_loads = _poses(held), held.load_N.copy()
     poses, loads = np.empty((len(cases), 4, 6)), np.empty((len(cases), 4))
@@ -113,6 +123,8 @@ def _swept(held: HeldCar, cases: list[Case], order: Array) -> tuple[Array, Array
         for index in side:
             held.equilibrium(cases[index])
             poses[index], loads[index] = _poses(held), held.load_N
+            if rack is not None:
+                rack[index] = _rack(held)
     held.reset()
     return poses, loads, standing, standing_loads
 
@@ -129,6 +141,10 @@ def _poses(held: HeldCar) -> Array:
             np.arctan2(-x, y) * INWARDS[corner], pose.centre_m[2],
         ])  # fmt: skip
     return np.array(rows)
+
+
+def _rack(held: HeldCar) -> float:
+    return float(held.data.qpos[int(held.model.joint("rack").qposadr[0])])
 
 
 def _left(poses: Array, corner: int) -> Array:

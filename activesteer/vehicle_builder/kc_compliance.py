@@ -17,7 +17,7 @@ from activesteer.vehicle.axle_curves import COORDINATES, upper_triangle
 
 _SCALE: Final = np.array([1e-4, 1e-4, 2e-4, 2e-4, 2e-4])
 """Residuals are counted in these: 0.1 mm and 0.01 deg."""
-_PULL: Final = 0.02
+_PULL: Final = 0.3
 """Weight of the usual compliance against one sample."""
 _USUAL: Final = np.diag([2.2e-6, 1.0e-7, 1.8e-6, 6.0e-5, 8.0e-5])
 """Compliance of a wheel at its centre [m/N, rad/(N m)]: about the compact's, 2.2 mm/kN along and 0.1 mm/kN across the

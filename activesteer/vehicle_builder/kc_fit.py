@@ -191,10 +191,13 @@ def _over_rack(
 
 def _loads(axle: str, tests: dict[str, Samples], radius_m: float, in_series: Array) -> list[Load]:
     """The tests of compliance: load at the wheel centre per unit of what was swept, and what moved."""
+    camber = tests["parallel_travel"]
+    # A wheel that leans stands beside its centre.
+    beside_m = -radius_m * float(np.sin(smoothed(camber.x, camber.channels["camber"], np.zeros(1))[0]))
     per_unit = {
         "side_force": (0.0, 1.0, radius_m, 0.0, 0.0),
         "side_force_opposed": (0.0, 1.0, radius_m, 0.0, 0.0),
-        "braking_force": (1.0, 0.0, 0.0, -radius_m, 0.0),
+        "braking_force": (1.0, 0.0, 0.0, -radius_m, -beside_m),
         "drive_force": (1.0, 0.0, 0.0, 0.0, 0.0),
         "aligning_moment": (0.0, 0.0, 0.0, 0.0, 1.0),
         "aligning_moment_opposed": (0.0, 0.0, 0.0, 0.0, 1.0),

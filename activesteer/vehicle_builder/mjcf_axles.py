@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from activesteer.conventions import Array
+from activesteer.vehicle_builder.completion import rack_per_steer_m
 from activesteer.vehicle_builder.design import Axle, Car, Solid
 from activesteer.vehicle_builder.levers import Mount
 from activesteer.vehicle_builder.numbers import num, sig, vec
@@ -18,6 +19,16 @@ _GUIDED = """  <!-- {words} guide the {axle} axle, a fragment of the chassis bod
        the other joints follow the curves of the vehicle file and give way about them. Vehicle coordinates: origin on
        the road below the front axle, x forward, y left, z up, design position. Sites of springs and dampers are only
        drawn. -->"""
+
+
+_VIEWER_GUIDES = (
+    ("x", "5e5", "3e3"),
+    ("y", "5e6", "1e4"),
+    ("toe", "5e4", "200"),
+    ("camber", "1e5", "500"),
+    ("caster", "2e4", "200"),
+)
+"""Joint, stiffness and damping of a guide in the scene."""
 
 
 def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
@@ -280,7 +291,27 @@ def viewer_springs(car: Car) -> str:
                     f'    <spatial name="{corner}_viewer_spring" class="coil"><site site="{corner}_spring_inner"/>'
                     f'<site site="{corner}_spring_outer"/></spatial>'
                 )
-    return "\n".join(lines) + ("\n" if lines else "")
+    return "\n".join([*lines, *_viewer_guides(car)]) + ("\n" if lines else "")
+
+
+def _viewer_guides(car: Car) -> list[str]:
+    """What holds the wheels of axles of curves where their native forces are missing: straight guides, steered."""
+    lines = []
+    for axle in car.axles:
+        if axle.measured is None:
+            continue
+        lines.append("    <!-- Stand in for the curves that guide the wheels. -->")
+        for side in (1.0, -1.0):
+            corner = corner_name(axle, side)
+            for joint, stiffness, damping in _VIEWER_GUIDES:
+                rack = ""
+                if joint == "toe" and axle.name == "front":
+                    rack = f'<joint joint="rack" coef="{num(-1.0 / rack_per_steer_m(axle))}"/>'
+                lines.append(
+                    f'    <fixed name="{corner}_viewer_{joint}" stiffness="{stiffness}" damping="{damping}" '
+                    f'springlength="0"><joint joint="{corner}_{joint}" coef="1"/>{rack}</fixed>'
+                )
+    return lines
 
 
 def spring_classes(car: Car, trimmed: Trimmed) -> str:

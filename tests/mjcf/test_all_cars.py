@@ -55,7 +55,8 @@ def test_bodies_on_the_right_are_those_on_the_left_mirrored(car: mujoco.MjModel)
             inertia(car, right), mirrored, atol=1e-12 + 1e-9 * np.abs(mirrored).max(), err_msg=name
         )
         pairs += 1
-    assert pairs >= 6
+    # Knuckle and wheel, and at the rear what steers; struts are bodies of their own.
+    assert pairs >= 5
 
 
 def test_joints_on_the_right_turn_about_mirrored_lines(car: mujoco.MjModel) -> None:

@@ -1,0 +1,265 @@
+"""A car against the road: the steering wheel angle that it needs on a circle, beside what was measured on a real one.
+
+Nothing of the car is fitted to the measurement. What is uncertain is drawn: mass, lateral acceleration, tyre, radius.
+What the car's data leave open, and somebody had to decide, is turned over one by one, to see what hangs on it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from scipy.stats import gaussian_kde
+
+from activesteer.config import read_toml
+from activesteer.conventions import Array
+from activesteer.errors import ParameterError
+from activesteer.files import is_file
+from activesteer.resources import find_vehicle, models_dir
+from activesteer.simulation.runner import simulate
+from activesteer.studies.workers import in_parallel
+from activesteer.vehicle.axle_curves import COORDINATES, upper_triangle
+
+DATA: Final = "measured_circle.json"
+TOLERANCE_DEG: Final = 5.0
+TOLERANCE_FRACTION: Final = 0.03
+"""Tolerance of the steering wheel angle in ISO 19364: 5 deg and 3 % of the measured value."""
+_SIGMAS: Final = {"mass": 0.01, "tyre": 0.05, "ay_mps2": 0.1, "radius": 0.01}
+"""Standard deviations: mass 1 % (assumed), tyre side force 5 %, lateral acceleration 0.1 m/s2, radius 1 % (assumed)."""
+_SEED: Final = 20121121
+_ENTRY_S: Final = 3.0
+_SETTLED_S: Final = 2.0
+_RISE_MPS2: Final = 0.15
+_TOE: Final = COORDINATES.index("toe")
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A decision that the data left open, turned over.
+
+    Attributes:
+        name: What is different.
+        angle_deg: Steering wheel angle then.
+    """
+
+    name: str
+    angle_deg: float
+
+
+@dataclass(frozen=True)
+class CircleResult:
+    """The comparison.
+
+    Attributes:
+        vehicle: The car.
+        measured_deg: Measured steering wheel angles, shape (n,).
+        nominal_deg: Ours with every uncertain value at its middle.
+        samples_deg: Ours of the samples, shape (m,).
+        decisions: What open decisions are worth.
+    """
+
+    vehicle: str
+    measured_deg: Array
+    nominal_deg: float
+    samples_deg: Array
+    decisions: tuple[Decision, ...]
+
+    @property
+    def difference_deg(self) -> float:
+        """Mean of ours less mean of the measured ones."""
+        return float(self.samples_deg.mean() - self.measured_deg.mean())
+
+    @property
+    def tolerance_deg(self) -> float:
+        """That of ISO 19364."""
+        return TOLERANCE_DEG + TOLERANCE_FRACTION * float(self.measured_deg.mean())
+
+    @property
+    def inside(self) -> bool:
+        """Whether the means differ by no more than the tolerance."""
+        return abs(self.difference_deg) <= self.tolerance_deg
+
+    @property
+    def area_metric_deg(self) -> float:
+        """Area between both cumulative distributions (Ferson, Oberkampf, Ginzburg 2008)."""
+        grid = np.sort(np.concatenate([self.samples_deg, self.measured_deg]))
+        ours, theirs = (
+            np.searchsorted(np.sort(values), grid[:-1], side="right") / len(values)
+            for values in (self.samples_deg, self.measured_deg)
+        )
+        return float(np.sum(np.abs(ours - theirs) * np.diff(grid)))
+
+    @property
+    def overlap(self) -> float:
+        """Common area of both densities, 0 to 1."""
+        both = np.concatenate([self.samples_deg, self.measured_deg])
+        grid = np.linspace(both.min() - 10.0, both.max() + 10.0, 2000)
+        least = np.minimum(gaussian_kde(self.samples_deg)(grid), gaussian_kde(self.measured_deg)(grid))
+        return float(least.sum() * (grid[1] - grid[0]))
+
+    def as_table(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "vehicle": self.vehicle,
+            "measured_deg": {
+                "mean": self.measured_deg.mean(), "std": self.measured_deg.std(ddof=1), "n": len(self.measured_deg),
+            },
+            "ours_deg": {
+                "nominal": self.nominal_deg, "mean": self.samples_deg.mean(), "std": self.samples_deg.std(ddof=1),
+                "n": len(self.samples_deg),
+            },
+            "difference_deg": self.difference_deg, "tolerance_deg": self.tolerance_deg, "inside": self.inside,
+            "area_metric_deg": self.area_metric_deg, "overlap": self.overlap,
+            "decisions": {decision.name: decision.angle_deg for decision in self.decisions},
+        }  # fmt: skip
+
+    def text(self) -> str:
+        """What the command prints."""
+        ours, theirs = self.samples_deg, self.measured_deg
+        lines = [
+            f"{self.vehicle}: steering wheel angle on the measured circle",
+            f"  measured   {theirs.mean():7.1f} +- {theirs.std(ddof=1):.1f} deg  ({len(theirs)} values)",
+            f"  predicted  {ours.mean():7.1f} +- {ours.std(ddof=1):.1f} deg  ({len(ours)} samples, nominal "
+            f"{self.nominal_deg:.1f})",
+            f"  difference {self.difference_deg:+7.1f} deg, tolerance of ISO 19364 {self.tolerance_deg:.1f} deg: "
+            + ("inside" if self.inside else "OUTSIDE"),
+            f"  area metric {self.area_metric_deg:.1f} deg, overlap of the distributions {100.0 * self.overlap:.0f} %",
+            "what open decisions are worth, one at a time:",
+            *(f"  {decision.name:66} {decision.angle_deg:7.1f} deg" for decision in self.decisions),
+        ]
+        return "\n".join(lines)
+
+
+def is_measured(name: str) -> bool:
+    """Whether there is a measured circle of this car."""
+    return is_file(models_dir() / "reference" / name / DATA)
+
+
+def validate_circle(
+    name: str,
+    samples: int = 200,
+    jobs: int | None = None,
+    *,
+    scheduler: str | None = None,
+    progress: Callable[[float, str], None] = lambda _share, _what: None,
+) -> CircleResult:
+    """Drives a car on the circle on which it was measured.
+
+    Args:
+        name: The car, and its folder in `models/reference`.
+        samples: How often the uncertain values are drawn.
+        jobs: Processes.
+        scheduler: Address of a Dask scheduler.
+        progress: Told the fraction that is done.
+
+    Returns:
+        The comparison.
+
+    Raises:
+        ParameterError: fewer than 10 samples.
+        ActiveSteerError: a run failed.
+    """
+    if samples < 10:
+        raise ParameterError(
+            f"{samples} samples make no distribution; at least 10 are needed", key="samples", value=samples
+        )
+    data = json.loads((models_dir() / "reference" / name / DATA).read_text(encoding="utf-8"))
+    ay, radius = float(data["ay_mean_mps2"]), float(data["radius_m"])
+    table, _ = read_toml(find_vehicle(name))
+    table["name"] = name
+    draws = np.random.default_rng(_SEED).normal(size=(samples, 4))
+    calls = [(table, radius, ay, 1.0, 1.0)]
+    calls += [(changed, radius, ay, 1.0, 1.0) for changed in (change(table) for change in _DECISIONS.values())]
+    calls += [
+        (table, radius * (1.0 + _SIGMAS["radius"] * r), ay + _SIGMAS["ay_mps2"] * a, 1.0 + _SIGMAS["mass"] * m,
+         1.0 + _SIGMAS["tyre"] * t)
+        for m, t, a, r in draws.tolist()
+    ]  # fmt: skip
+    angles = in_parallel(
+        steering_wheel_deg, calls, jobs, lambda _place, done: progress(done / len(calls), "circle"), scheduler=scheduler
+    )
+    first = 1 + len(_DECISIONS)
+    decisions = tuple(Decision(what, angle) for what, angle in zip(_DECISIONS, angles[1:first], strict=True))
+    return CircleResult(name, np.array(data["steering_wheel_deg"]), angles[0], np.array(angles[first:]), decisions)
+
+
+def steering_wheel_deg(table: Mapping[str, Any], radius_m: float, ay_mps2: float, mass: float, tyre: float) -> float:
+    """Mean of the angles to the left and to the right that hold a car on a circle.
+
+    Args:
+        table: The vehicle file.
+        radius_m: Radius [m].
+        ay_mps2: Lateral acceleration [m/s2].
+        mass: Factor on the mass.
+        tyre: Factor on the tyres' side force: on friction and cornering stiffness.
+
+    Returns:
+        The angle [deg].
+    """
+    slow, fast = (math.sqrt((ay_mps2 + beside) * radius_m) for beside in (-0.4, 0.2))
+    overrides = {
+        "circle.radius_m": radius_m,
+        "circle.entry_s": _ENTRY_S,
+        "circle.acceleration_mps2": _RISE_MPS2,
+        "speed_mps": slow,
+        "circle.end_speed_mps": fast,
+        "duration_s": _ENTRY_S + (fast - slow) / _RISE_MPS2 + 0.5,
+        "factors.mass": mass,
+        "factors.tyre_friction": tyre,
+        "factors.tyre_cornering_stiffness": tyre,
+    }
+    run = simulate("constant_radius", "none", dict(table), overrides)
+    late = run.time_s > _ENTRY_S + _SETTLED_S
+    # A circle of some metres' width: the angle over lateral acceleration is a straight line.
+    line = np.polyfit(np.abs(run["ay_mps2"][late]), np.degrees(np.abs(run["steering_wheel_rad"][late])), 1)
+    return float(np.polyval(line, ay_mps2))
+
+
+def _without_aligning_compliance(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Toe gives way to side force as measured, and to aligning moment no more than that needs."""
+    curves = {}
+    for axle, given in table["curves"].items():
+        matrix = np.zeros((5, 5))
+        matrix[np.triu_indices(5)] = given["stiffness"]
+        compliance = np.linalg.inv(matrix + np.triu(matrix, 1).T)
+        others = [index for index in range(5) if index != _TOE]
+        coupling = compliance[_TOE, others]
+        compliance[_TOE, _TOE] = 1.05 * float(coupling @ np.linalg.solve(compliance[np.ix_(others, others)], coupling))
+        curves[axle] = given | {"stiffness": list(upper_triangle(np.asarray(np.linalg.inv(compliance), np.float64)))}
+    return {**table, "curves": curves}
+
+
+def _ratio_by_letter(table: Mapping[str, Any]) -> dict[str, Any]:
+    """`isteerR` as the right wheel's: with `isteerL`, 4.2 % more angle at the wheels."""
+    front = table["curves"]["front"]
+    scale = 0.5 * (0.0646 + 0.070055) / 0.0646
+    steer = [scale * value for value in front["rack_steer_deg"]]
+    return {**table, "curves": {**table["curves"], "front": front | {"rack_steer_deg": steer}}}
+
+
+def _front_toe_turned_round(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Side force towards the middle of the car toes the front wheels in."""
+    turned = np.ones(5)
+    turned[_TOE] = -1.0
+    front = table["curves"]["front"]
+    matrix = np.zeros((5, 5))
+    matrix[np.triu_indices(5)] = front["stiffness"]
+    upper = upper_triangle(matrix * np.outer(turned, turned))
+    return {**table, "curves": {**table["curves"], "front": front | {"stiffness": list(upper)}}}
+
+
+_DECISIONS: Final[dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]]] = {
+    "no compliance to aligning moment (assumed: as the compact's)": _without_aligning_compliance,
+    "isteerR by the letter (read: the mirror image of isteerL)": _ratio_by_letter,
+    "anti-roll bars twice as stiff (read: of an axle, as the springs)": lambda table: {
+        **table,
+        "factors": {"anti_roll_bar": 2.0},
+    },
+    "elkin_y_toe_f the other way round (read: understeering)": _front_toe_turned_round,
+    "the first two": lambda table: _ratio_by_letter(_without_aligning_compliance(table)),
+}
+"""Decision -> the vehicle file with it turned over."""
