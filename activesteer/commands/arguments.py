@@ -171,6 +171,11 @@ def add_pace(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_cutaway(parser: argparse.ArgumentParser) -> None:
+    """Adds `--cutaway`, which shows what the body hides."""
+    parser.add_argument("--cutaway", action="store_true", help="see the suspension through the body")
+
+
 def scenario_of(options: argparse.Namespace) -> Scenario:
     """The scenario that the arguments name.
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from activesteer.commands.arguments import add_recording
+from activesteer.commands.arguments import add_cutaway, add_recording
 from activesteer.errors import ParameterError, PlaybackError
 
 
@@ -27,6 +27,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--compare", action="store_true", help="of several files, only the page that shows them side by side"
     )
+    add_cutaway(parser)
     parser.set_defaults(action=_replay)
 
 
@@ -48,12 +49,12 @@ def _replay(options: argparse.Namespace) -> int:
     names = run_names(options.files, recordings)
     runs = runs_of(dict(zip(names, recordings, strict=True)))
     if options.output is not None:
-        save(runs, options.output, compare=options.compare)
+        save(runs, options.output, compare=options.compare, cutaway=options.cutaway)
         print(f"{options.output}: open it with `rerun {options.output}`", file=sys.stderr)
     if options.web:
-        serve(runs, _announce, compare=options.compare)
+        serve(runs, _announce, compare=options.compare, cutaway=options.cutaway)
     elif options.output is None:
-        show(runs, compare=options.compare)
+        show(runs, compare=options.compare, cutaway=options.cutaway)
     return 0
 
 

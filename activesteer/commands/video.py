@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from activesteer.commands.arguments import add_output, add_pace, add_recording
+from activesteer.commands.arguments import add_cutaway, add_output, add_pace, add_recording
 from activesteer.commands.progress import ProgressBar
 from activesteer.conventions import CORNERS
 from activesteer.errors import ParameterError
@@ -33,14 +33,15 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--compare", type=Path, metavar="OTHER.mcap", help="also show the car of another recording, transparent"
     )
-    parser.add_argument("--size", type=_size, default=(640, 480), metavar="WxH", help="pixels (default: 640x480)")
+    parser.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="pixels (default: 1280x720)")
     parser.add_argument("--fps", type=float, help="pictures a second (default: 30, of a GIF 20)")
     add_pace(parser)
+    add_cutaway(parser)
     parser.set_defaults(action=_video)
 
 
 def _size(text: str) -> tuple[int, int]:
-    """`640x480`."""
+    """`1280x720`."""
     found = re.fullmatch(r"(\d{1,6})[x*](\d{1,6})", text.strip().lower())
     if found is None:
         raise argparse.ArgumentTypeError(f"{text!r} is no size; one such as 1280x720 is needed")
@@ -58,7 +59,7 @@ def _video(options: argparse.Namespace) -> int:
     recordings = [Recording.open(file, recover=True) for file in files]
     output = options.output if options.output is not None else options.file.with_suffix(".mp4")
     rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0
-    settings = Settings(options.camera, options.corner, options.size, rate, options.speed)
+    settings = Settings(options.camera, options.corner, options.size, rate, options.speed, options.cutaway)
     started = time.monotonic()
     with ProgressBar(f"{output}", quiet=False) as progress:
         made = make_film(dict(zip(run_names(files, recordings), recordings, strict=True)), output, settings, progress)

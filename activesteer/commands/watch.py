@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from activesteer.commands.arguments import add_controller, add_pace, add_scenario, scenario_of
+from activesteer.commands.arguments import add_controller, add_cutaway, add_pace, add_scenario, scenario_of
 from activesteer.errors import ParameterError, PlaybackError
 
 _ELSEWHERE: Final = "`activesteer video` makes a film of a recording without a window"
@@ -29,6 +29,7 @@ def add_to(commands: Any) -> None:
     add_scenario(parser)
     add_controller(parser, several=False)
     add_pace(parser)
+    add_cutaway(parser)
     parser.set_defaults(action=_watch)
 
 
@@ -40,18 +41,18 @@ def _watch(options: argparse.Namespace) -> int:
     # What is wrong with the manoeuvre is said wherever one is; only then is a window needed.
     scenario = scenario_of(options)
     check_display()
-    _show(prepared(scenario), options.controller, options.speed)
+    _show(prepared(scenario), options.controller, options.speed, cutaway=options.cutaway)
     return 0
 
 
-def _show(scenario: Any, controller: str, speed: float) -> None:
+def _show(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> None:
     import mujoco.viewer
 
     from activesteer.simulation.closed_loop import ClosedLoop
     from activesteer.simulation.live_view import Pacer, drive, scene_for
 
     simulation = ClosedLoop(scenario, controller)
-    scene = scene_for(simulation, scenario.maneuver)
+    scene = scene_for(simulation, scenario.maneuver, cutaway=cutaway)
     with (
         _threads_joined(),
         mujoco.viewer.launch_passive(scene.model, scene.data, show_left_ui=False, show_right_ui=False) as viewer,

@@ -8,25 +8,27 @@ from typing import Any, Final
 import numpy as np
 import rerun as rr
 
+from activesteer.bodywork import SEE_THROUGH, Panel, dressed
 from activesteer.conventions import yaw_of
 from activesteer.playback.geometry import about_vertical, xyzw
 from activesteer.playback.runs import CHASSIS, Run
 from activesteer.playback.timeline import times
-from activesteer.recording import Primitive
+from activesteer.recording import Primitive, ScenePart
+from activesteer.road.footprint import footprint_of
 
 _GHOST_LINE_M: Final = 0.012
 """Radius of the lines that draw the car of another run: solids would hide what is in the same place [m]."""
-_SEE_THROUGH: Final = 0.5
-"""Solids with less opacity are the shell of the body, which takes the colour of the run where there are several."""
+_CUTAWAY_OPACITY: Final = 0.25
+"""Opacity of a body through which the suspension is to be seen."""
 
 
-def send_car(stream: rr.RecordingStream, run: Run, *, tinted: bool) -> None:
+def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> None:
     """Sends bodies, their solids, and the frame `NAME/chase` that follows the car and turns with it, but stays level.
 
     Args:
         stream: Where to.
         run: The run.
-        tinted: Whether the shell of the body is to have the run's colour.
+        cutaway: Whether the body is to be seen through.
     """
     poses = run.recording.poses
     when = times(poses.time_s[run.poses])
@@ -44,10 +46,13 @@ def send_car(stream: rr.RecordingStream, run: Run, *, tinted: bool) -> None:
         when,
         rr.Transform3D.columns(translation=place.astype(np.float32), quaternion=turn.astype(np.float32)),
     )
-    bodies = _bodies(run)
-    for body, solids in bodies.items():
-        colours = [_colour(solid, run.colour if tinted else None) for solid in solids]
-        _send_solids(stream, f"{body_path(run, body)}/solid", solids, colours)
+    parts, panels = dressed(run.recording.scene, footprint_of(run.recording.metadata))
+    for body, solids in _bodies(run, parts).items():
+        _send_solids(stream, f"{body_path(run, body)}/solid", solids, [_colour(solid, run.colour) for solid in solids])
+    for panel in panels:
+        if panel.body in poses.names:
+            _send_panel(stream, run, panel, _CUTAWAY_OPACITY if cutaway and panel.shell else 1.0)
+    bodies = _bodies(run, run.recording.scene)
     for path, body in zip(ghost_paths(run), ghost_bodies(run), strict=True):
         _send_solids(stream, path, bodies[body], [(*rgb(run.colour), 255)] * len(bodies[body]), lines=True)
 
@@ -59,7 +64,7 @@ def body_path(run: Run, body: str) -> str:
 
 def ghost_bodies(run: Run) -> list[str]:
     """Bodies that are drawn of a car that is not the one looked at: chassis and wheels."""
-    return [body for body in _bodies(run) if body == CHASSIS or body.endswith("_wheel")]
+    return [body for body in _bodies(run, run.recording.scene) if body == CHASSIS or body.endswith("_wheel")]
 
 
 def ghost_paths(run: Run) -> list[str]:
@@ -72,17 +77,28 @@ def rgb(colour: str) -> tuple[int, int, int]:
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
-def _bodies(run: Run) -> dict[str, list[Primitive]]:
+def _bodies(run: Run, parts: Sequence[ScenePart]) -> dict[str, list[Primitive]]:
     bodies: dict[str, list[Primitive]] = {}
-    for part in run.recording.scene:
+    for part in parts:
         if isinstance(part, Primitive) and part.body in run.recording.poses.names:
             bodies.setdefault(part.body, []).append(part)
     return bodies
 
 
-def _colour(solid: Primitive, tint: str | None) -> tuple[int, int, int, int]:
+def _send_panel(stream: rr.RecordingStream, run: Run, panel: Panel, opacity: float) -> None:
+    red, green, blue = rgb(run.colour) if panel.rgb is None else (round(255 * value) for value in panel.rgb)
+    drawn = rr.Mesh3D(
+        vertex_positions=panel.vertices_m.astype(np.float32),
+        vertex_normals=panel.normals.astype(np.float32),
+        triangle_indices=panel.faces,
+        albedo_factor=(red, green, blue, round(255 * opacity)),
+    )
+    stream.log(f"{body_path(run, panel.body)}/solid/{panel.name}", drawn, static=True)
+
+
+def _colour(solid: Primitive, tint: str) -> tuple[int, int, int, int]:
     r, g, b, a = (round(255 * value) for value in solid.rgba)
-    return (*rgb(tint), a) if tint and solid.rgba[3] < _SEE_THROUGH else (r, g, b, a)
+    return (*rgb(tint), a) if solid.rgba[3] < SEE_THROUGH else (r, g, b, a)
 
 
 def _send_solids(

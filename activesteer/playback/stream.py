@@ -33,13 +33,14 @@ def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
     return stream
 
 
-def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint) -> None:
+def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint, *, cutaway: bool = False) -> None:
     """Sends everything.
 
     Args:
         stream: Where to; its target must be chosen before.
         runs: The runs.
         layout: The layout; it takes the place of one that a viewer remembers.
+        cutaway: Whether bodies are to be seen through.
     """
     stream.send_blueprint(layout, make_active=True, make_default=True)
     several = len(runs) > 1
@@ -47,7 +48,7 @@ def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint)
     send_road(stream, runs)
     send_course(stream, runs)
     for run in runs:
-        send_car(stream, run, tinted=several)
+        send_car(stream, run, cutaway=cutaway)
         send_links(stream, run)
         send_tyre_forces(stream, run)
         send_track(stream, run)

@@ -27,13 +27,14 @@ _FOOTER_BYTES: Final = 64
 """What a whole file ends with: this word among its last bytes."""
 
 
-def save(runs: Sequence[Run], path: Path, *, compare: bool = False) -> None:
+def save(runs: Sequence[Run], path: Path, *, compare: bool = False, cutaway: bool = False) -> None:
     """Writes a .rrd file with its layout.
 
     Args:
         runs: The runs.
         path: The file; one that exists is replaced.
         compare: Whether to leave out the pages of the single runs.
+        cutaway: Whether bodies are to be seen through.
 
     Raises:
         PlaybackError: the name does not end in .rrd, or the file cannot be written.
@@ -46,7 +47,7 @@ def save(runs: Sequence[Run], path: Path, *, compare: bool = False) -> None:
         # It writes in a thread of its own, which only logs what goes wrong.
         stream.save(part)
         try:
-            fill(stream, runs, blueprint(runs, compare=compare))
+            fill(stream, runs, blueprint(runs, compare=compare), cutaway=cutaway)
             stream.disconnect()
             with part.open("rb") as file:
                 file.seek(-min(_FOOTER_BYTES, part.stat().st_size), os.SEEK_END)
@@ -57,17 +58,18 @@ def save(runs: Sequence[Run], path: Path, *, compare: bool = False) -> None:
             raise PlaybackError(f"cannot write {shown_path(path)}: not all of it could be written; is the disk full?")
 
 
-def show(runs: Sequence[Run], *, compare: bool = False) -> None:
+def show(runs: Sequence[Run], *, compare: bool = False, cutaway: bool = False) -> None:
     """Opens the viewer's window, and returns when it is closed.
 
     Args:
         runs: The runs.
         compare: Whether to leave out the pages of the single runs.
+        cutaway: Whether bodies are to be seen through.
 
     Raises:
         PlaybackError: there is no viewer, or it ended with an error, as it does without a display.
     """
-    _run_viewer(["--port", "auto"], runs, compare=compare)
+    _run_viewer(["--port", "auto"], runs, compare=compare, cutaway=cutaway)
 
 
 def serve(
@@ -75,6 +77,7 @@ def serve(
     announce: Callable[[str], object],
     *,
     compare: bool = False,
+    cutaway: bool = False,
 ) -> None:
     """Serves the viewer to browsers of this machine, until it is interrupted.
 
@@ -82,6 +85,7 @@ def serve(
         runs: The runs.
         announce: Called with the address to open as soon as it is served.
         compare: Whether to leave out the pages of the single runs.
+        cutaway: Whether bodies are to be seen through.
 
     Raises:
         PlaybackError: there is no viewer, or it ended with an error.
@@ -90,7 +94,7 @@ def serve(
     proxy = urllib.parse.quote(f"rerun+http://{_HOST}:{data}/proxy", safe="")
     arguments = ["--serve-web", "--bind", _HOST, "--port", str(data), "--web-viewer-port", str(page)]
     url = f"http://{_HOST}:{page}/?url={proxy}"
-    _run_viewer(arguments, runs, compare=compare, ready=lambda: announce(url), port=page)
+    _run_viewer(arguments, runs, compare=compare, cutaway=cutaway, ready=lambda: announce(url), port=page)
 
 
 def _run_viewer(
@@ -98,6 +102,7 @@ def _run_viewer(
     runs: Sequence[Run],
     *,
     compare: bool,
+    cutaway: bool,
     ready: Callable[[], object] | None = None,
     port: int | None = None,
 ) -> None:
@@ -105,7 +110,7 @@ def _run_viewer(
     binary = viewer_binary()
     with tempfile.TemporaryDirectory(prefix="activesteer-") as folder:
         file, log = Path(folder) / "runs.rrd", Path(folder) / "viewer.log"
-        save(runs, file, compare=compare)
+        save(runs, file, compare=compare, cutaway=cutaway)
         try:
             with log.open("w") as output:
                 process = subprocess.Popen([str(binary), *arguments, str(file)], stdout=output, stderr=output)

@@ -10,9 +10,11 @@ from typing import Any, Final, NamedTuple, Protocol
 
 from activesteer.maneuver import Maneuver
 from activesteer.quantities import quantity_of
+from activesteer.road.footprint import Footprint
 from activesteer.simulation.appearance import scene_of
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.video import Car, RenderScene
+from activesteer.video.cameras import CUTAWAY
 from activesteer.video.gauges import MIN_SPEED_MPS
 
 FRAME_S: Final = 0.016
@@ -105,18 +107,21 @@ class DriveResult(NamedTuple):
     finished: bool
 
 
-def scene_for(simulation: ClosedLoop, maneuver: Maneuver) -> RenderScene:
+def scene_for(simulation: ClosedLoop, maneuver: Maneuver, *, cutaway: bool = False) -> RenderScene:
     """The scene for a simulation's car.
 
     Args:
         simulation: The simulation.
         maneuver: The manoeuvre, whose road and course are shown.
+        cutaway: Whether the body is to be seen through.
 
     Raises:
         PlaybackError: the car cannot be drawn.
     """
     vehicle = simulation.vehicle
-    return RenderScene([Car(scene_of(vehicle.model), vehicle.body_names)], maneuver.course, maneuver.road)
+    size = Footprint.from_table(vehicle.dimensions())
+    car = Car(scene_of(vehicle.model), vehicle.body_names, size=size, shell_opacity=CUTAWAY if cutaway else 1.0)
+    return RenderScene([car], maneuver.course, maneuver.road)
 
 
 def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pacer) -> DriveResult:

@@ -15,6 +15,8 @@ from activesteer.video.track import Track
 
 CAMERAS: Final = ("chase", "top", "wheel")
 """Names of the cameras."""
+CUTAWAY: Final = 0.12
+"""Opacity of a body through which the suspension is to be seen."""
 
 
 class View(NamedTuple):
@@ -46,7 +48,7 @@ def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
     if name == "top":
         return View(_top(track), 1.0)
     if name == "wheel":
-        return View(_wheel(track, corner), 0.12)
+        return View(_wheel(track, corner), CUTAWAY)
     raise ParameterError(f"there is no camera {name!r}; {nearest_names(name, CAMERAS)}", value=name)
 
 

@@ -15,8 +15,9 @@ from activesteer.conventions import CORNERS, RUN_COLOURS, SYSTEM_LABELS
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.road.course import course_of
+from activesteer.road.footprint import footprint_of
 from activesteer.road.road import road_of
-from activesteer.video.cameras import view
+from activesteer.video.cameras import CUTAWAY, view
 from activesteer.video.encoder import check, encoder, frame_rate
 from activesteer.video.gauges import Dials, Gauges
 from activesteer.video.offscreen import Offscreen
@@ -25,8 +26,6 @@ from activesteer.video.track import Track
 
 COLOURS: Final = ("#c9ccd1", *RUN_COLOURS[1:])
 """Those of the plots, but for the first: a near-black car could hardly be distinguished from its tyres and the road."""
-_ALONE: Final = "#3a76b8"
-"""Colour of a car that is compared with none."""
 _SAMPLES: Final = 6
 
 
@@ -38,12 +37,14 @@ class Settings:
     """`chase`, `top` or `wheel`."""
     corner: str = CORNERS[0]
     """The wheel that the camera `wheel` looks at."""
-    size: tuple[int, int] = (640, 480)
+    size: tuple[int, int] = (1280, 720)
     """Width and height [pixels]."""
     rate_hz: float = 30.0
     """Pictures a second [1/s]."""
     speed: float = 1.0
     """Simulated seconds that a second of film shows."""
+    cutaway: bool = False
+    """Whether the bodies of the cars are to be seen through; for the camera `wheel` they always are."""
 
     def __post_init__(self) -> None:
         """Checks the numbers.
@@ -79,13 +80,17 @@ class Film:
         self.settings = settings
         self._tracks = [Track(recording, name) for name, recording in recordings.items()]
         self._view = view(settings.camera, self._tracks[0], settings.corner)
-        colours = _colours(recordings) if len(recordings) > 1 else [_ALONE]
+        colours = _colours(recordings)
+        opacity = CUTAWAY if settings.cutaway else self._view.shell_opacity
         cars = [
-            Car(recording.scene, track.bodies, colour, self._view.shell_opacity, ghost=number > 0)
+            Car(
+                recording.scene, track.bodies, colour, opacity,
+                ghost=number > 0, size=footprint_of(recording.metadata),
+            )
             for number, (recording, track, colour) in enumerate(
                 zip(recordings.values(), self._tracks, colours, strict=True)
             )
-        ]
+        ]  # fmt: skip
         first = next(iter(recordings.values()))
         maneuver = first.metadata.get("maneuver", {})
         self._scene = RenderScene(cars, course_of(first.metadata), road_of(first.metadata), settings.size)

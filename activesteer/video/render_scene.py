@@ -12,20 +12,26 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
+from activesteer.bodywork import SEE_THROUGH, Panel, dressed
 from activesteer.conventions import Array, yaw_of
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.course import Course
+from activesteer.road.footprint import Footprint
 from activesteer.road.road import Road
 from activesteer.video.road import add_areas, add_course, add_road
 
 CHASSIS: Final = "chassis"
 """Body that cameras follow."""
 
-SEE_THROUGH: Final = 0.5
-"""Solids with less opacity are the shell of the body."""
+_PAINT: Final = (0.23, 0.46, 0.72)
+"""Of a car to which no colour is given."""
 _GHOST_OPACITY: Final = 0.35
 """Opacity of a solid of a ghost, relative to that of the same solid of a car."""
+_HIDDEN_M: Final = 0.2
+_SEEN_M: Final = 1.0
+"""A ghost that is nearer than this to another car is fainter, and nearer than the one before it is not drawn [m]: two
+surfaces in one place would show through each other in patches."""
 _GLASS: Final = (0.1, 0.13, 0.17)
 _GLASS_OPACITY: Final = 0.85
 _SHADOW: Final = (0.02, 0.02, 0.025, 0.25)
@@ -65,6 +71,7 @@ class Car(NamedTuple):
         colour: Colour of its shell, `#rrggbb`; that of the model where it is empty.
         shell_opacity: Opacity of its shell, 0 to 1.
         ghost: Whether it is transparent all over.
+        size: Its size, from which it gets a body and wheels; where it is not known, the solids of the model are drawn.
     """
 
     parts: tuple[ScenePart, ...]
@@ -72,6 +79,7 @@ class Car(NamedTuple):
     colour: str = ""
     shell_opacity: float = 1.0
     ghost: bool = False
+    size: Footprint | None = None
 
 
 class RenderScene:
@@ -117,7 +125,15 @@ class RenderScene:
         ]
         self._chassis = [car.bodies.index(CHASSIS) for car in cars]
         self._shadow = [self._mocap_id(f"{number}/shadow") for number in range(len(cars))]
+        self._opacity = self.model.geom_rgba[:, 3].copy(), self.model.tendon_rgba[:, 3].copy()
+        self._ghosts = [(number, *self._drawn(number)) for number, car in enumerate(cars) if car.ghost]
         mujoco.mj_forward(self.model, self.data)
+
+    def _drawn(self, car: int) -> tuple[list[int], list[int]]:
+        """Numbers of the geoms and of the tendons of a car."""
+        model, prefix = self.model, f"{car}/"
+        geoms = [index for index in range(model.ngeom) if model.body(model.geom_bodyid[index]).name.startswith(prefix)]
+        return geoms, [index for index in range(model.ntendon) if model.tendon(index).name.startswith(prefix)]
 
     def _mocap_id(self, body: str) -> int:
         return int(self.model.body_mocapid[self.model.body(body).id])
@@ -138,7 +154,13 @@ class RenderScene:
         data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
 
     def update(self) -> None:
-        """Makes everything that hangs on the bodies follow them."""
+        """Makes everything that hangs on the bodies follow them; a ghost fades where it is in the place of a car."""
+        chassis = [self.data.mocap_pos[mocap[index]] for mocap, index in zip(self._mocap, self._chassis, strict=True)]
+        for ghost, geoms, tendons in self._ghosts:
+            apart = min(float(np.linalg.norm(chassis[ghost] - chassis[other])) for other in range(ghost))
+            share = min(max((apart - _HIDDEN_M) / (_SEEN_M - _HIDDEN_M), 0.0), 1.0)
+            self.model.geom_rgba[geoms, 3] = share * self._opacity[0][geoms]
+            self.model.tendon_rgba[tendons, 3] = share * self._opacity[1][tendons]
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
@@ -153,7 +175,11 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
         "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
         "sphere": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
     }
-    for part in car.parts:
+    parts, panels = dressed(car.parts, car.size)
+    for panel in panels:
+        if panel.body in bodies:
+            _add_panel(spec, bodies[panel.body], panel, car, f"{prefix}{panel.body}/{panel.name}")
+    for part in parts:
         if isinstance(part, Primitive):
             if part.body not in bodies:
                 continue
@@ -176,6 +202,18 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
                 bodies[body].add_site(name=site, pos=point, group=4)
                 tendon.wrap_site(site)
     _add_shadow(spec, prefix, solids, _GHOST_OPACITY if car.ghost else 1.0)
+
+
+def _add_panel(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: Panel, car: Car, name: str) -> None:
+    mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+    mesh.uservert, mesh.userface = panel.vertices_m.ravel(), panel.faces.ravel()
+    mesh.usernormal = panel.normals.ravel()
+    mesh.userfacenormal = panel.faces.ravel()
+    rgb = panel.rgb or (_rgb(car.colour) if car.colour else _PAINT)
+    opacity = (car.shell_opacity if panel.shell else 1.0) * (_GHOST_OPACITY if car.ghost else 1.0)
+    body.add_geom(
+        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=(*rgb, opacity), contype=0, conaffinity=0
+    )
 
 
 def _colour_of(

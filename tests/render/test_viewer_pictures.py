@@ -80,8 +80,9 @@ def spread(mask: NDArray[np.bool_]) -> float:
 
 
 def _shell(pixels: NDArray[np.int16]) -> NDArray[np.bool_]:
-    """Where the blue shell of the body is, which is seen through."""
-    return (pixels[..., 2] - pixels[..., 0] > 40) & (pixels[..., 2] - pixels[..., 1] > 15)
+    """Where the body is, in the colour of its system, lit and in the shade."""
+    red, green, blue = np.moveaxis(pixels, -1, 0)
+    return (red > 60) & (red > 1.5 * green) & (green > 2 * blue - 10)
 
 
 def view(pictures: Pictures, start: str) -> NDArray[np.int16]:
@@ -170,8 +171,7 @@ def test_the_plots_hold_all_runs_in_their_colours(together: Pictures) -> None:
     for start in ("Yaw rate", "Sideslip", "Lateral"):
         pixels = view(together, start)
         seen = [spread(like(pixels, colour, 35)) for colour in (NONE, ARS, AFS)]
-        # The car without control lies under the one with front superposition for most of the time.
-        assert min(seen) > 0.05, (start, seen)
+        assert min(seen) > 0.1, (start, seen)
 
 
 def test_the_plots_of_wheels_and_links_are_drawn(viewer: Headless, drives: Drives, folder: Path) -> None:

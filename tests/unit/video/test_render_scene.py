@@ -77,6 +77,21 @@ def test_ghost_is_clearer_than_the_car_and_has_its_own_colour():
     assert shells[1][3] < 0.5
 
 
+def test_a_ghost_in_the_place_of_a_car_is_not_drawn():
+    run = circle()
+    cars = [Car(run.scene, run.poses.names), Car(run.scene, run.poses.names, ghost=True)]
+    built = stage(*cars)
+    positions, quaternions = Track(run, "circle").poses(1.0)
+    ghost = built.model.body("1/chassis").geomadr[0]
+    opacity = []
+    for beside_m in (0.0, 0.6, 3.0):
+        built.place(0, positions, quaternions)
+        built.place(1, positions + np.array([0.0, beside_m, 0.0]), quaternions)
+        built.update()
+        opacity.append(built.model.geom_rgba[ghost, 3])
+    assert opacity[0] == 0.0 < opacity[1] < opacity[2]
+
+
 def test_solids_have_the_size_of_the_recording():
     parts = (
         Primitive("chassis", "box", (4.0, 2.0, 1.0)),

@@ -1,0 +1,118 @@
+"""What cars are drawn with in place of the plain solids of their models: a body, and wheels with spokes.
+
+It is looks alone, put on when something is drawn: no model and no recording knows of it. The surfaces are made by
+`tools/make_bodies.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import Array
+from activesteer.recording import Primitive, ScenePart
+from activesteer.resources import models_dir
+from activesteer.road.footprint import Footprint
+
+SEE_THROUGH: Final = 0.5
+"""Solids of a model with less opacity are the shell of its body."""
+_SALOON_FROM_M: Final = 2.72
+"""Cars with a longer wheelbase are drawn as saloons, others as hatchbacks [m]."""
+_DRAWN: Final = {"hatchback": (2.637, 1.8), "saloon": (2.85, 1.86)}
+"""Wheelbase and width that the surfaces were made for [m]."""
+_COLOURS: Final = {
+    "glass": (0.07, 0.09, 0.12),
+    "trim": (0.06, 0.06, 0.07),
+    "lamp": (0.93, 0.95, 0.98),
+    "tail": (0.72, 0.04, 0.05),
+    "plate": (0.94, 0.94, 0.9),
+    "tyre": (0.05, 0.05, 0.055),
+    "dark": (0.1, 0.1, 0.11),
+    "rim": (0.75, 0.77, 0.8),
+    "mark": (0.95, 0.75, 0.1),
+}
+
+
+class Panel(NamedTuple):
+    """A surface of one colour, fixed in the frame of a body.
+
+    Attributes:
+        body: Name of the body.
+        name: What it is, such as `glass`.
+        vertices_m: Its points in the frame of the body [m], shape (n, 3).
+        normals: Directions of the surface there, shape (n, 3).
+        faces: Corners of its triangles, counter-clockwise from outside, shape (m, 3).
+        rgb: Its colour, 0 to 1; None where it has the paint of the car.
+    """
+
+    body: str
+    name: str
+    vertices_m: Array
+    normals: Array
+    faces: NDArray[np.int32]
+    rgb: tuple[float, float, float] | None
+
+    @property
+    def shell(self) -> bool:
+        """Whether it is of the body, which hides what is below it, and not of a wheel."""
+        return not self.body.endswith("_wheel")
+
+
+def dressed(parts: Sequence[ScenePart], size: Footprint | None) -> tuple[tuple[ScenePart, ...], tuple[Panel, ...]]:
+    """A car with a body and wheels.
+
+    Args:
+        parts: What its model looks like.
+        size: Its size; where it is not known, the car stays as it is.
+
+    Returns:
+        What of the model is still to be drawn, and the panels.
+    """
+    if size is None:
+        return tuple(parts), ()
+    solids = [part for part in parts if isinstance(part, Primitive)]
+    shell = [solid for solid in solids if solid.body == "chassis" and solid.rgba[3] < SEE_THROUGH]
+    panels = list(_body(size)) if shell else []
+    hidden = {id(solid) for solid in shell}
+    for body in dict.fromkeys(solid.body for solid in solids if solid.body.endswith("_wheel")):
+        tyre = max((solid for solid in solids if solid.body == body), key=lambda solid: solid.size_m[0])
+        hidden |= {id(solid) for solid in solids if solid.body == body}
+        panels += _wheel(body, 0.5 * tyre.size_m[0], tyre.size_m[2])
+    return tuple(part for part in parts if id(part) not in hidden), tuple(panels)
+
+
+def _body(size: Footprint) -> tuple[Panel, ...]:
+    name = "saloon" if size.wheelbase_m > _SALOON_FROM_M else "hatchback"
+    wheelbase_m, width_m = _DRAWN[name]
+    panels = []
+    for part, vertices, normals, faces in _surfaces(name):
+        points = vertices * (1.0, size.width_m / width_m, 1.0)
+        # Only what is between the axles becomes longer.
+        points[:, 0] -= np.clip(-points[:, 0] / wheelbase_m, 0.0, 1.0) * (size.wheelbase_m - wheelbase_m)
+        panels.append(Panel("chassis", part, points, normals, faces, _COLOURS.get(part)))
+    return tuple(panels)
+
+
+def _wheel(body: str, radius_m: float, width_m: float) -> list[Panel]:
+    return [
+        Panel(body, part, vertices * (radius_m, width_m, radius_m), normals, faces, _COLOURS[part])
+        for part, vertices, normals, faces in _surfaces("wheel")
+    ]
+
+
+@cache
+def _surfaces(name: str) -> tuple[tuple[str, Array, Array, NDArray[np.int32]], ...]:
+    with np.load(models_dir() / "bodies" / f"{name}.npz") as file:
+        return tuple(
+            (
+                part,
+                file[f"{part}_vertices"].astype(np.float64),
+                file[f"{part}_normals"] / 127.0,
+                file[f"{part}_faces"].astype(np.int32),
+            )
+            for part in (key.removesuffix("_faces") for key in file if key.endswith("_faces"))
+        )
