@@ -33,7 +33,7 @@ def viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
 @pytest.fixture(scope="session")
 def drives() -> dict[str, Recording]:
     """A double lane change on a slippery road, so fast that the cars differ."""
-    scenario = resolve("double_lane_change_low_mu", overrides={"maneuver.speed_kmh": 95.0})
+    scenario = resolve("double_lane_change_low_mu", overrides={"maneuver.speed_kmh": 95.0, "duration_s": 10.0})
     return {controller: run_scenario(scenario, controller) for controller in ("none", "ars", "afs")}
 
 

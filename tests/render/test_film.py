@@ -61,7 +61,7 @@ def white(r, g, b):
 
 
 def test_chase_camera_shows_car_road_cones_and_sky(picture):
-    pixels = picture(2.0)
+    pixels = picture(1.7)
     assert 0.02 < share(pixels, blue) < 0.4
     middle = pixels[:, 110:210]
     assert share(middle, blue) > 2 * share(pixels[:, :100], blue)
