@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,7 +179,8 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
         faces.append(mesh[2] + start)
         start += len(mesh[0])
     used, numbers = np.unique(np.concatenate(faces), return_inverse=True)
-    vertices, normals = (np.concatenate([mesh[index] for mesh in meshes])[used] for index in (0, 1))
+    vertices = np.concatenate([mesh[0] for mesh in meshes])[used]
+    normals = np.concatenate([mesh[1] for mesh in meshes])[used]
     return vertices, normals, numbers.reshape(-1, 3)
 
 
@@ -301,7 +302,7 @@ def main() -> None:
     """Writes the files."""
     FOLDER.mkdir(exist_ok=True)
     for name, parts in (("hatchback", body(HATCHBACK)), ("saloon", body(SALOON)), ("wheel", wheel())):
-        arrays: dict[str, NDArray[np.generic]] = {}
+        arrays: dict[str, Any] = {}
         for part, (vertices, normals, faces) in sorted(parts.items()):
             arrays[f"{part}_vertices"] = vertices.astype(np.float32)
             arrays[f"{part}_normals"] = np.round(127.0 * normals).astype(np.int8)
