@@ -113,7 +113,7 @@ class Mpc:
         speed, driver = now.speed_mps, command.front_steer_demand_rad
         if speed < MIN_SPEED_MPS:
             self._before_rad = np.zeros(2)
-            return ActuatorCommand()
+            return ActuatorCommand(estimate=now)
         desired = self._reference.step(driver, speed, now.friction)
         added, turned = measurement.superposition_rad, measurement.rear_steer_rad
         share = -np.expm1(-self._interval_s * speed / p.relaxation_length_m)
@@ -143,7 +143,9 @@ class Mpc:
         self._before_rad = found[:2]
         added_demand, rear_demand = found[:2].tolist()
         outside = bool(found[-2:].max() > 1e-6)
-        return ActuatorCommand(rear_demand, added_demand, desired, rear, rear_demand - rear, outside)
+        return ActuatorCommand(
+            rear_demand, added_demand, desired, rear, rear_demand - rear, saturated=outside, estimate=now
+        )
 
 
 @lru_cache(maxsize=64)

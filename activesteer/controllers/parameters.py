@@ -128,7 +128,7 @@ class ControllerSetup:
         """
         if self.estimation is None:
             raise ControllerError(
-                "an estimator needs the table [two_track] in the vehicle file: `activesteer identify --write`",
+                "an estimator needs the table [two_track] in the vehicle file, as models/vehicles/compact.toml has it",
                 key="two_track",
             )
         return Estimator(self.estimation, self.gains.estimator, self.timestep_s)
