@@ -18,11 +18,15 @@ times are chosen.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from activesteer.controllers.family_parameters import EscParameters
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.turn_reference import TurnReference
-from activesteer.estimation import Estimator
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+
+if TYPE_CHECKING:
+    from activesteer.estimation.estimator import Estimator
 
 
 class Esc:

@@ -32,7 +32,6 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
 from activesteer.controllers.family_parameters import LqrParameters
@@ -228,6 +227,8 @@ def model(
     tyre_1ps, actuator_1ps = speed_mps / parameters.relaxation_length_m, 1.0 / parameters.actuator_lag_s
     inner[2:4, 2:4], inner[2:4, 4:6] = -tyre_1ps * both, tyre_1ps * both
     inner[4:6, 4:6], inner[4:6, 6:] = -actuator_1ps * both, actuator_1ps * both
+    from scipy.linalg import expm  # noqa: PLC0415 - slow to import, and not every run needs it
+
     a, b = np.array(expm(interval_s * inner), dtype=np.float64), np.zeros((8, 2))
     # The command of this call works in the next interval: now it only takes the place of the one before.
     a[6:] = 0.0

@@ -32,7 +32,6 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from activesteer.controllers.axle_slopes import AxleSlopes
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
@@ -250,5 +249,7 @@ def model(
     inner[2:4, 2:4], inner[2:4, 4:6] = -tyre_1ps * both, tyre_1ps * both
     inner[2, 8] = tyre_1ps
     inner[4:6, 4:6], inner[4:6, size:] = -actuator_1ps * both, actuator_1ps * both
+    from scipy.linalg import expm  # noqa: PLC0415 - slow to import, and not every run needs it
+
     whole = np.array(expm(interval_s * inner), dtype=np.float64)
     return whole[:size, :size], whole[:size, size:]

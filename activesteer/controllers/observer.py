@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.estimation import Estimator
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+
+if TYPE_CHECKING:
+    from activesteer.estimation.estimator import Estimator
 
 
 class Observer:

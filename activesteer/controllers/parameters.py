@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from activesteer.config import Range
 from activesteer.controllers.family_parameters import (
@@ -15,8 +15,11 @@ from activesteer.controllers.family_parameters import (
     SideslipRearSteerParameters,
 )
 from activesteer.errors import ControllerError
-from activesteer.estimation import Estimator, EstimatorParameters, EstimatorSetup
+from activesteer.estimation import EstimatorParameters, EstimatorSetup
 from activesteer.theory.single_track import SingleTrackParameters
+
+if TYPE_CHECKING:
+    from activesteer.estimation.estimator import Estimator
 
 _NotNegative = Annotated[float, Range(0.0)]
 
@@ -131,4 +134,6 @@ class ControllerSetup:
                 "an estimator needs the table [two_track] in the vehicle file, as models/vehicles/compact.toml has it",
                 key="two_track",
             )
+        from activesteer.estimation.estimator import Estimator  # noqa: PLC0415 - compiled code, which lists of controllers do without
+
         return Estimator(self.estimation, self.gains.estimator, self.timestep_s)

@@ -9,11 +9,15 @@ its rear wheels turned with the front ones. Yaw rate, speed and sideslip are the
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
-from activesteer.estimation import Estimator
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+
+if TYPE_CHECKING:
+    from activesteer.estimation.estimator import Estimator
 
 
 class SideslipRearSteer:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from activesteer.sensors import Sensors
 from activesteer.theory.single_track import SingleTrackParameters
 from activesteer.theory.two_track import TwoTrackParameters
+
+if TYPE_CHECKING:
+    from activesteer.sensors import Sensors
 
 
 @dataclass(frozen=True)

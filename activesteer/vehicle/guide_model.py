@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.linalg import eigh
 
 from activesteer.conventions import CORNERS
 from activesteer.errors import ModelError
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.axle_curves import COORDINATES, AxleCurves, Curves
 from activesteer.vehicle.named_parts import find, tendon_arms
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 JOINTS: Final = ("x", "y", "z", "toe", "camber", "caster")
 """Joints of a guided knuckle in the order of the model: the wheel's steer angle and inclination are `toe` and `camber`
@@ -34,6 +35,8 @@ def fit_guides(spec: mujoco.MjSpec, curves: Curves) -> None:
     Raises:
         ModelError: the model's joints are not those of a guided knuckle.
     """
+    from scipy.linalg import eigh  # noqa: PLC0415 - slow to import, and only axles of curves need it
+
     corners = [corner for corner in CORNERS if curves.axle(corner) is not None]
     if not corners:
         return
@@ -103,6 +106,8 @@ def _mirror(side: float) -> NDArray[np.float64]:
 
 
 def _spline(points: tuple[float, ...], values: NDArray[np.float64]) -> CubicSpline:
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - slow to import, and only axles of curves need it
+
     return CubicSpline(points, values, axis=1)
 
 

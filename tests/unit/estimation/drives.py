@@ -9,7 +9,7 @@ import numpy as np
 
 import activesteer
 from activesteer.controllers import load_controller
-from activesteer.estimation import Estimator
+from activesteer.estimation.estimator import Estimator
 from activesteer.recording import Recording
 from activesteer.signals import Estimate, Measurement
 
