@@ -2,9 +2,10 @@
 
 The loop goes from the demand of an actuator through the linearised car (`linearisation`: servo, suspensions, tyres),
 the sensors (bandwidth, delay), the control unit (its interval, the bus) and the controller back to the demand. It is
-opened at one actuator while the other stays closed. The controller enters with its linear form (`controllers.
-linear_form`) where it has one, its corrector fully active, and otherwise with its answers to small pulses
-(`controllers.response`).
+opened at one actuator while the other stays closed, and at both at once: a bus delays the demands of both, and a
+controller that moves both actuators can bear less of that than either margin says. The controller enters with its
+linear form (`controllers.linear_form`) where it has one, its corrector fully active, and otherwise with its answers to
+small pulses (`controllers.response`).
 
 What is sampled and held for N calls of the controller enters as the mean of the N held values: a delay of (N - 1) / 2
 calls and the loss of gain that belongs to it; so do commands, held for N steps of the simulation. Samples and calls
@@ -21,9 +22,10 @@ response. Source: P. Seiler, A. Packard, P. Gahinet, An introduction to disk mar
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -47,6 +49,8 @@ FREQUENCIES_RADPS: Final = np.geomspace(0.05, 300.0, 800)
 """Frequencies at which they are [rad/s]: from a hundredth of the car's natural frequency to beyond its suspensions'."""
 LOOPS: Final = ("rear", "superposition")
 """Where a loop is opened; the order of the demands."""
+BOTH: Final = "both"
+"""What is said of both, where gain, phase or delay change by the same in both."""
 
 _SENSORS: Final = ("yaw_rate", "ay", "rear_steer", "superposition")
 """Sensors that belong to `SIGNALS`."""
@@ -94,6 +98,10 @@ def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) ->
         delay_s=_least(delays_s),
         disk=float(1.0 / np.abs(sensitivity - 0.5).max()),
     )
+
+
+def _weakest(margins: Sequence[Margins]) -> Margins:
+    return Margins(*(float(np.fmin.reduce(values)) for values in zip(*map(astuple, margins), strict=True)))
 
 
 def _least(values: Array) -> float:
@@ -163,6 +171,19 @@ def opened(returned: Response, loop: str) -> Response:
     return -(returned[:, own, own] + through)
 
 
+def opened_at_both(returned: Response) -> tuple[Response, Response]:
+    """The loops that one factor f on both demands meets: det(1 - f M) = 0 where 1 + f L = 0, -L an eigenvalue of M.
+
+    Args:
+        returned: As from `round_trip`.
+    """
+    values = np.linalg.eigvals(returned)
+    for before, here in itertools.pairwise(values):
+        if np.abs(here - before).sum() > np.abs(here[::-1] - before).sum():
+            here[:] = here[::-1].copy()
+    return -values[:, 0], -values[:, 1]
+
+
 def is_stable(returned: Response) -> bool:
     """Whether all loops closed are stable, where all that is in them is: det(1 - M) never goes round 0 (Nyquist)."""
     determinant = np.linalg.det(np.eye(2) - returned)
@@ -178,7 +199,7 @@ class LoopMargins:
 
     Attributes:
         controller: The controller.
-        loop: Where it is opened.
+        loop: Where it is opened: one of `LOOPS`, or `BOTH`.
         speed_kmh: Speed [km/h].
         margins: What was found.
     """
@@ -209,6 +230,8 @@ def loop_margins(
 ) -> list[LoopMargins]:
     """Margins of every loop of every controller at every speed; an actuator that a controller leaves alone has none.
 
+    Where a controller moves both actuators, those of both together are the last.
+
     Args:
         controllers: As for `simulate`.
         vehicle: Name, path, or table of a vehicle.
@@ -232,10 +255,16 @@ def loop_margins(
             answer = _answer(given, plugin.label, setup, sensors, rolling, plugin.make(setup))
             returned = round_trip(car, answer, scenario, unit_s, FREQUENCIES_RADPS)
             stable = is_stable(returned)
-            for index, loop in enumerate(LOOPS):
-                if np.abs(returned[:, index]).max() > 0.0:
-                    margins = margins_of(opened(returned, loop), FREQUENCIES_RADPS, stable)
-                    found.append(LoopMargins(plugin.label, loop, 3.6 * car.speed_mps, margins))
+            loops = {
+                loop: (opened(returned, loop),)
+                for index, loop in enumerate(LOOPS)
+                if np.abs(returned[:, index]).max() > 0.0
+            }
+            if len(loops) == len(LOOPS):
+                loops[BOTH] = opened_at_both(returned)
+            for loop, parts in loops.items():
+                margins = _weakest([margins_of(part, FREQUENCIES_RADPS, stable) for part in parts])
+                found.append(LoopMargins(plugin.label, loop, 3.6 * car.speed_mps, margins))
     return found
 
 

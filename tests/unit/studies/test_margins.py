@@ -15,9 +15,19 @@ from activesteer.controllers.response import SIGNALS, pulse_responses
 from activesteer.errors import ControllerError
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand
+from activesteer.simulation.runner import simulate
 from activesteer.studies.discrete_time_map import ACTUATORS, INPUTS, OUTPUTS
 from activesteer.studies.linearisation import LinearCar
-from activesteer.studies.margins import FREQUENCIES_RADPS, is_stable, margins_of, opened, round_trip
+from activesteer.studies.margins import (
+    BOTH,
+    FREQUENCIES_RADPS,
+    is_stable,
+    loop_margins,
+    margins_of,
+    opened,
+    opened_at_both,
+    round_trip,
+)
 from tests.unit.controllers.cars import measured, setup
 
 STEP_S, GAIN_1PS = 1e-3, 8.0
@@ -81,6 +91,28 @@ def test_delay_as_long_as_the_delay_margin_makes_the_loop_marginal():
     steps = margin_s / STEP_S
     assert steps == pytest.approx(math.pi / 2.0 / GAIN_1PS / STEP_S, rel=0.01)
     assert largest_root(math.floor(steps) - 1) < 1.0 < largest_root(math.ceil(steps) + 1)
+
+
+def test_a_delay_of_both_demands_meets_two_loops_that_do_not_know_of_each_other_one_by_one():
+    quick, slow = integrator(), 0.5 * integrator()
+    returned = np.zeros((len(FREQUENCIES_RADPS), 2, 2), complex)
+    returned[:, 0, 0], returned[:, 1, 1] = -quick, -slow
+    delays_s = sorted(margins_of(loop, FREQUENCIES_RADPS).delay_s for loop in opened_at_both(returned))
+    assert delays_s == pytest.approx([math.pi / 2.0 / GAIN_1PS, math.pi / GAIN_1PS], rel=0.01)
+
+
+@pytest.mark.parametrize("preset", ["ideal", "production"])
+def test_the_bus_may_delay_both_demands_by_less_than_their_margin_in_a_run_and_no_more(preset):
+    """`lqr` at 100 km/h after 0.1 deg of steering wheel: what the margin says is what the full car does."""
+    sensors = {"sensors.preset": preset}
+    both = next(m for m in loop_margins(["lqr"], speeds_kmh=[100.0], overrides=sensors) if m.loop == BOTH)
+    steering = {"time_s": [0.0, 0.5, 0.6, 0.8, 0.9], "steering_wheel_deg": [0.0, 0.0, 0.1, 0.1, 0.0]}
+    kick = {"kind": "open_loop", "speed_kmh": 100, "duration_s": 4.0, "hold_last": True, "steering": steering}
+    swings_rad = []
+    for delay_ms in (math.floor(1e3 * both.margins.delay_s) - 1, math.ceil(1e3 * both.margins.delay_s) + 2):
+        run = simulate(kick, controller="lqr", overrides={**sensors, "controllers.bus_delay_s": 1e-3 * delay_ms})
+        swings_rad.append(float(np.ptp(run["rear_steer_demand_rad"][run.time_s > 3.0])))
+    assert swings_rad[0] < math.radians(2.0) < swings_rad[1]
 
 
 @pytest.mark.parametrize("delay_s", [0.02, 0.09])
