@@ -17,11 +17,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, StudyError
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.plan import label_of
+from activesteer.studies.run_task import Status
 from activesteer.studies.study import study
 from activesteer.studies.workers import in_parallel
 
@@ -270,8 +271,13 @@ def _map_row(driver: str, line: Line, row: Mapping[str, Any]) -> dict[str, Any]:
     place = {"driver": driver, "controller": row["controller"], "speed_kmh": row["speed_kmh"], "line_m": row[line.key]}
     told = {*place, line.key}
     metrics = {name: value for name, value in row.items() if isinstance(value, float) and name not in told}
-    # A run that did not come to its end has no metrics: its car did not get through.
-    return {**place, "kept": row["status"] == "ok" and line.kept(row), **metrics}
+    # Of a run that the engine gave up, or that ended before the last gate, the car did not get through. Any other failure
+    # says nothing of the car.
+    status, diverged = row["status"], f"{row['error']}".startswith(SimulationDiverged.__name__)
+    if status == Status.CRASHED or (status == Status.FAILED and not diverged):
+        where = f"{driver}, {row['controller']}, {row['speed_kmh']:g} km/h, {line.key} = {row[line.key]:g}"
+        raise StudyError(f"map of {where}: {row['error']}")
+    return {**place, "kept": status == Status.OK and line.kept(row), **metrics}
 
 
 def _entry_speed(

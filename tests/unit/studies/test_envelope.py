@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from activesteer.errors import ParameterError, SimulationDiverged
+from activesteer.errors import ParameterError, SimulationDiverged, StudyError
 from activesteer.recording import Recording
 from activesteer.studies import envelope as module
-from activesteer.studies.envelope import LINES, RANGE_KMH, RESOLUTION_KMH, Envelope, State, envelope
+from activesteer.studies.envelope import LINES, RANGE_KMH, RESOLUTION_KMH, Envelope, State, _map_row, envelope
 from activesteer.studies.envelope_figure import draw_envelope
 
 LANES = LINES["lane_change"]
@@ -97,3 +97,20 @@ def test_a_map_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found.cells("typical") == {(60.0, 0.15): State.NOBODY, (140.0, 0.15): State.ALL}
     assert found.nominal == (80.0, 0.2)
     assert found.exceptions == []
+
+
+@pytest.mark.parametrize(
+    ("status", "error", "lost"),
+    [
+        ("failed", "SimulationDiverged: yaw rate", True),
+        ("failed", "ModelError: gone", False),
+        ("crashed", "killed", False),
+    ],
+)
+def test_a_run_that_failed_for_another_reason_than_its_motion_is_no_car_that_is_lost(status, error, lost):
+    row = {"controller": "none", "speed_kmh": 80.0, LANES.key: 0.1, "status": status, "error": error}
+    if lost:
+        assert _map_row("typical", LANES, row)["kept"] is False
+    else:
+        with pytest.raises(StudyError):
+            _map_row("typical", LANES, row)
