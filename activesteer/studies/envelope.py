@@ -271,7 +271,7 @@ def _map_row(driver: str, line: Line, row: Mapping[str, Any]) -> dict[str, Any]:
     place = {"driver": driver, "controller": row["controller"], "speed_kmh": row["speed_kmh"], "line_m": row[line.key]}
     told = {*place, line.key}
     metrics = {name: value for name, value in row.items() if isinstance(value, float) and name not in told}
-    # Of a run that the engine gave up, or that ended before the last gate, the car did not get through. Any other failure
+    # Where the engine gave up a run, or the last gate was not reached, the car did not get through. Any other failure
     # says nothing of the car.
     status, diverged = row["status"], f"{row['error']}".startswith(SimulationDiverged.__name__)
     if status == Status.CRASHED or (status == Status.FAILED and not diverged):
