@@ -9,7 +9,7 @@ from typing import Any, Final
 from activesteer.analysis.sine_with_dwell import DISPLACEMENT_TIME_S, INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.slow_ramp import FIT, REFERENCE_MPS2
 from activesteer.errors import ManeuverError
-from activesteer.standards.standard import Curve, Findings, Ground, Panel, Picture, Run, Standard, Table
+from activesteer.standards.standard import SIDES, Curve, Findings, Ground, Panel, Picture, Run, Standard, Table
 
 RAMP_DEGPS: Final = 13.5
 """Rate of the slowly increasing steer [deg/s]; S7.6."""
@@ -27,7 +27,6 @@ HEAVY_KG: Final = 3500.0
 """Displacement that is needed [m], and mass above which the smaller one is enough [kg]."""
 RATIOS: Final = ("yaw_ratio_1s", "yaw_ratio_175s")
 _METRICS: Final = ("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share")
-_SIDES: Final = ("left", "right")
 _BEGIN_S: Final = 1.5
 """When the sine begins: the signals are zeroed over the second before [s]."""
 _SINE: Final = {"steer.start_s": _BEGIN_S, "duration_s": 5.6}
@@ -75,7 +74,7 @@ def _examine(ground: Ground) -> Findings:
     a_deg, ramps_deg = _reference_angle(ground)
     mass_kg = ground.scenario("sine_with_dwell").car.config.single_track.mass_kg
     least_m = LEAST_DISPLACEMENT_M if mass_kg <= HEAVY_KG else LEAST_HEAVY_DISPLACEMENT_M
-    steps = [(side, *step) for side in _SIDES for step in amplitudes(a_deg)]
+    steps = [(side, *step) for side in SIDES for step in amplitudes(a_deg)]
     runs = ground.drive(
         "sine_with_dwell",
         "sine_with_dwell",
@@ -177,14 +176,14 @@ def _pictures(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> 
                 [factor * row[name] for row in series if row["direction"] == side],
                 f"{side} first", marked=True,
             )
-            for side in _SIDES
+            for side in SIDES
         ]  # fmt: skip
         return Panel("amplitude [A]", label, curves, limits=(limit,))
 
     scale = ("amplitude [A]", FIRST_FACTOR, last)
     limits = [(100.0 * limit, f"{100.0 * limit:.0f} % allowed") for limit in RATIO_LIMITS]
     return [
-        Picture("Yaw rate", [panel("yaw_rate_radps", "yaw rate [deg/s]", side) for side in _SIDES], scale),
+        Picture("Yaw rate", [panel("yaw_rate_radps", "yaw rate [deg/s]", side) for side in SIDES], scale),
         Picture(
             "Yaw rate after the completion of steer, of its first peak after the reversal; lateral displacement",
             [

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from activesteer.standards.standard import (
+    SIDES,
     Curve,
     Findings,
     Ground,
@@ -27,7 +28,6 @@ COARSE_KMH: Final = (35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 70.0, 75.0, 80.0)
 """Entry speeds that are tried first [km/h]; beyond the highest and below the lowest it is not looked."""
 FINE_KMH: Final = 1.0
 """Resolution of the search [km/h]."""
-_SIDES: Final = ("left", "right")
 _CHANNELS: Final = ("x_m", "y_m", "speed_mps", "steering_wheel_rad", "yaw_rate_radps", "sideslip_rad")
 _SHOWN: Final = ("steering_wheel_rad", "yaw_rate_radps", "sideslip_rad", "speed_mps")
 _DURATION_S: Final = 14.0
@@ -63,8 +63,8 @@ def is_clean(run: Run) -> bool:
 
 def _examine(ground: Ground) -> Findings:
     speeds: dict[str, float | None] = {}
-    driven: dict[str, dict[float, Run]] = {side: {} for side in _SIDES}
-    for side in _SIDES:
+    driven: dict[str, dict[float, Run]] = {side: {} for side in SIDES}
+    for side in SIDES:
 
         def attempt(series: str, speeds_kmh: Sequence[float], side: str = side) -> list[bool]:
             runs = ground.drive(
@@ -87,7 +87,7 @@ def _examine(ground: Ground) -> Findings:
         "entry_speed_kmh": speeds,
         "runs": [
             {"direction": side, "clean": is_clean(run), **run.values}
-            for side in _SIDES
+            for side in SIDES
             for _, run in sorted(driven[side].items())
         ],
     }

@@ -12,6 +12,7 @@ from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.quantities import display_unit
 from activesteer.standards.standard import (
+    SIDES,
     Curve,
     Findings,
     Ground,
@@ -29,7 +30,6 @@ FIXED_RADIUS_M: Final = 40.0
 """Radius on which the second method begins [m]."""
 SPEED_KMH: Final = 80.0
 """Speed of the third method [km/h]."""
-_SIDES: Final = {"left": 1.0, "right": -1.0}
 _CHANNELS: Final = (
     "steering_wheel_rad", "ay_mps2", "vx_mps", "yaw_rate_radps", "sideslip_rad", "roll_rad",
 )  # fmt: skip
@@ -49,14 +49,14 @@ def _examine(ground: Ground) -> Findings:
         f"constant radius {RADIUS_M:g} m": ground.drive(
             "constant_radius",
             "constant_radius",
-            [{"circle.radius_m": sign * RADIUS_M} for sign in _SIDES.values()],
+            [{"circle.radius_m": sign * RADIUS_M} for sign in SIDES.values()],
             curves=_CHANNELS,
         ),
         f"constant steering wheel angle, from {FIXED_RADIUS_M:g} m on": _fixed_angle(ground, car),
         f"constant speed {SPEED_KMH:g} km/h": ground.drive(
             "constant_speed",
             "slowly_increasing_steer",
-            [{"steer.rate_degps": sign * 5.0} for sign in _SIDES.values()],
+            [{"steer.rate_degps": sign * 5.0} for sign in SIDES.values()],
             {"speed_kmh": SPEED_KMH},
             _CHANNELS,
         ),
@@ -65,14 +65,14 @@ def _examine(ground: Ground) -> Findings:
     for method, runs in methods.items():
         found: dict[str, dict[str, float]] = {}
         values[method] = []
-        for side, run in zip(_SIDES, runs, strict=True):
+        for side, run in zip(SIDES, runs, strict=True):
             try:
                 found[side] = _defined(evaluate(run, car))
                 values[method].append({"direction": side, **found[side]})
             except RecordingError as error:
                 values[method].append({"direction": side, "error": str(error)})
         tables.append(metrics_table(method[0].upper() + method[1:], found))
-        pictures.append(_picture(method, dict(zip(_SIDES, runs, strict=True))))
+        pictures.append(_picture(method, dict(zip(SIDES, runs, strict=True))))
         words.append(f"{method}: {_words(found)}")
     return Findings({"methods": values}, "; ".join(words), tables, pictures)
 
@@ -94,12 +94,12 @@ def _fixed_angle(ground: Ground, car: CarGeometry) -> list[Run]:
     }
     cases = [
         {"steering": {"time_s": [0.0, 0.5 * _ENTRY_S], "steering_wheel_deg": [0.0, sign * angle_deg]}}
-        for sign in _SIDES.values()
+        for sign in SIDES.values()
     ]
     # A table is no value of a factor: the two sides are two series.
     return [
         ground.drive(f"constant_angle_{side}", {**maneuver, **case}, [{"speed_kmh": _START_KMH}], curves=_CHANNELS)[0]
-        for side, case in zip(_SIDES, cases, strict=True)
+        for side, case in zip(SIDES, cases, strict=True)
     ]
 
 
@@ -130,7 +130,7 @@ def _picture(method: str, runs: dict[str, Run]) -> Picture:
                 continue
             ay = _smooth(run["ay_mps2"])
             top = int(np.argmax(np.abs(ay))) + 1
-            curves.append(Curve(np.abs(ay[:top]), _SIDES[side] * factor * _smooth(run[channel])[:top], side))
+            curves.append(Curve(np.abs(ay[:top]), SIDES[side] * factor * _smooth(run[channel])[:top], side))
         return Panel("lateral acceleration [m/s²]", axis_label(channel), curves)
 
     channels = ("steering_wheel_rad", "sideslip_rad", "roll_rad")

@@ -11,6 +11,7 @@ from activesteer.analysis.frequency_response import INPUT, FrequencyResponse, HI
 from activesteer.errors import RecordingError
 from activesteer.quantities import DisplayUnit, display_unit
 from activesteer.standards.standard import (
+    SIDES,
     Curve,
     Findings,
     Ground,
@@ -27,7 +28,6 @@ SPEED_KMH: Final = 80.0
 """Speed of all runs [km/h]."""
 STEP_MPS2: Final = 4.0
 """Steady-state lateral acceleration of the step [m/s2]."""
-_SIDES: Final = {"left": 1.0, "right": -1.0}
 _STEP_CHANNELS: Final = ("yaw_rate_radps", "ay_mps2", "sideslip_rad", "roll_rad")
 _BEGIN_S: Final = 0.5
 _RESPONSES: Final = {
@@ -44,11 +44,11 @@ def _examine(ground: Ground) -> Findings:
     driven = ground.drive(
         "step_steer",
         "step_steer",
-        [{"steer.steering_wheel_deg": sign * angle_deg} for sign in _SIDES.values()],
+        [{"steer.steering_wheel_deg": sign * angle_deg} for sign in SIDES.values()],
         {"speed_kmh": SPEED_KMH, "steer.start_s": _BEGIN_S},
         _STEP_CHANNELS,
     )
-    steps = dict(zip(_SIDES, driven, strict=True))
+    steps = dict(zip(SIDES, driven, strict=True))
     [sweep] = ground.drive("sine_sweep", "sine_sweep", [{"speed_kmh": SPEED_KMH}], curves=(INPUT, *_RESPONSES))
     found = _responses(sweep)
     left = steps["left"]

@@ -7,6 +7,7 @@ from typing import Final
 
 from activesteer.quantities import display_unit
 from activesteer.standards.standard import (
+    SIDES,
     Curve,
     Findings,
     Ground,
@@ -25,7 +26,6 @@ AY_MPS2: Final = 5.0
 """Steady state before the brake [km/h, m/s2]: a circle of 100 m."""
 PEDALS: Final = (0.12, 0.2, 0.28, 0.36, 0.44, 0.52, 0.6)
 """Pedal positions of a series, from gentle to nearly full braking."""
-_SIDES: Final = {"left": 1.0, "right": -1.0}
 _SHOWN: Final = (
     "yaw_rate_deviation_after_1000ms_radps", "path_deviation_after_1000ms_m", "sideslip_peak_abs_rad",
 )  # fmt: skip
@@ -39,12 +39,12 @@ def _examine(ground: Ground) -> Findings:
     angle_deg = steering_wheel_at(ground, SPEED_KMH, AY_MPS2)
     cases = [
         {"turn.steering_wheel_deg": sign * angle_deg, "brake.pedal": pedal}
-        for sign in _SIDES.values()
+        for sign in SIDES.values()
         for pedal in PEDALS
     ]
     changes = {"speed_kmh": SPEED_KMH, "brake.start_s": _BEGIN_S, "duration_s": _BEGIN_S + _AFTER_S}
     runs = ground.drive("brake_in_turn", "brake_in_turn", cases, changes, _CHANNELS)
-    by_side = {side: runs[len(PEDALS) * number :][: len(PEDALS)] for number, side in enumerate(_SIDES)}
+    by_side = {side: runs[len(PEDALS) * number :][: len(PEDALS)] for number, side in enumerate(SIDES)}
     done = [run for run in runs if not run.error]
     summary = f"no result: {runs[0].error}"
     if done:

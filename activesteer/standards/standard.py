@@ -22,6 +22,8 @@ CURVE_STEP_S: Final = 0.02
 """Time between two values of a channel that is kept [s]; that of studies."""
 
 _LEAD_S: Final = 0.2
+SIDES: Final = {"left": 1.0, "right": -1.0}
+"""Side to which a car is steered -> sign of the steering wheel angle, ISO 8855."""
 
 
 @dataclass(frozen=True)
