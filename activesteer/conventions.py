@@ -28,6 +28,8 @@ GRAVITY_MPS2: Final = 9.81
 
 DEFAULT_TIMESTEP_S: Final = 0.001
 """Step of the engine and of the control loop [s]."""
+CURVE_STEP_S: Final = 0.02
+"""Time between two values of a channel that a study keeps over time [s]: enough for a picture."""
 
 SYSTEM_LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering", "afs": "3 active front steering"}
 """What the runs of the three systems are called, numbered as in the paper's figures."""

@@ -9,11 +9,10 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.hysteresis import loop, slope_at_zero
-from activesteer.conventions import Array
+from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import RecordingError
 from activesteer.quantities import display_unit
 from activesteer.standards.standard import (
-    CURVE_STEP_S,
     Curve,
     Findings,
     Ground,

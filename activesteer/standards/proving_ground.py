@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 
 from activesteer.scenario import FileOrTable, Scenario, resolve
-from activesteer.standards.standard import CURVE_STEP_S, Run
+from activesteer.standards.standard import Run
 from activesteer.studies import run_task
 from activesteer.studies.study import study
 from activesteer.studies.workers import Workers
-
-assert run_task.CURVE_STEP_S == CURVE_STEP_S
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from activesteer.conventions import Array
+from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import RecordingError
 from activesteer.quantities import display_unit, metric_label, metric_number
 from activesteer.resources import DEFAULT_DRIVER
@@ -18,8 +18,6 @@ from activesteer.resources import DEFAULT_DRIVER
 if TYPE_CHECKING:
     from activesteer.scenario import FileOrTable, Scenario
 
-CURVE_STEP_S: Final = 0.02
-"""Time between two values of a channel that is kept [s]; that of studies."""
 
 _LEAD_S: Final = 0.2
 SIDES: Final = {"left": 1.0, "right": -1.0}

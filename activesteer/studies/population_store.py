@@ -19,11 +19,12 @@ import pyarrow.parquet as pq
 from activesteer.analysis.bands import FILE as BANDS
 from activesteer.analysis.bands import TRACK, Band, band_of_tracks, band_over_time, table_of
 from activesteer.analysis.claims.population import Population
+from activesteer.conventions import CURVE_STEP_S
 from activesteer.errors import StudyError
 from activesteer.files import make_folder, replacing, write_text
 from activesteer.resources import studies_dir
 from activesteer.studies.population import STUDY, population_study
-from activesteer.studies.run_task import CLAIM, CURVE, CURVE_STEP_S
+from activesteer.studies.run_task import CLAIM, CURVE
 from activesteer.studies.store import RESULTS
 
 SUMMARY: Final = "summary.json"

@@ -17,6 +17,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from activesteer.analysis.claims import SCENARIOS
+from activesteer.conventions import CURVE_STEP_S
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import file_word, make_folder, writing
 from activesteer.recording import Recording
@@ -33,8 +34,6 @@ CLAIM: Final = "claim_"
 """What the name of a column begins with that says whether a claim holds for the sample."""
 CURVE: Final = "curve_"
 """What the name of a column begins with that holds a channel over time."""
-CURVE_STEP_S: Final = 0.02
-"""Time between two values of such a column [s]: enough for a picture."""
 _VERSION: Final = "version of "
 _engine = threading.Lock()
 """The engine's callbacks belong to the process: of a worker's threads, one drives at a time."""

@@ -42,7 +42,7 @@ class StudyFile:
         seed: Of the samples.
         metrics: Patterns of the metrics that are kept, as `yaw_rate_*`; all of them where empty.
         recordings: `none`, `failed`, `all`, or a number n: those of every n-th sample.
-        curves: Channels that are kept of every run, every `run_task.CURVE_STEP_S`.
+        curves: Channels that are kept of every run, every `conventions.CURVE_STEP_S`.
         claims: Whether the paper's claims are checked for every sample; needs its three systems.
         timestep_s: Step of engine, driver and controller [s].
         tune: The table [tune], as it is; see `tuning`.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from activesteer.standards.standard import CURVE_STEP_S, Run
+from activesteer.conventions import CURVE_STEP_S
+from activesteer.standards.standard import Run
 
 
 def run_of(channels: dict[str, np.ndarray], **metrics: float) -> Run:
