@@ -19,6 +19,7 @@ from activesteer.vehicle import Vehicle
 from tests.physics.runs import car, corners, mass_kg, run
 
 SLIPPERY = {"road__mu": 0.3, "duration_s": 11.5}
+ICE = {"road__mu": 0.1, "duration_s": 40.0}
 WITHOUT = {"vehicle__brakes__abs": False}
 COASTING = {
     "kind": "open_loop", "name": "coasting", "speed_kmh": 80, "duration_s": 1.0, "settle_s": 1.0, "drive": "coast",
@@ -40,22 +41,12 @@ def _of_sedan(changes: tuple[tuple[str, Any], ...]) -> Recording:
 
 
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])
-@pytest.mark.parametrize("changes", [{}, SLIPPERY])
+@pytest.mark.parametrize("changes", [{}, SLIPPERY, ICE])
 def test_no_wheel_locks_and_nine_tenths_of_the_friction_are_used(vehicle: str, changes: dict[str, Any]) -> None:
     """Half of the sedan's brake torque is at the rear wheels, so that they run to their limit first."""
     found = stop_from_100(vehicle, changes).metrics
     assert found["wheel_slip_max"] < 0.5
     assert 0.9 <= found["braking_efficiency"] <= 1.0
-
-
-def test_on_ice_too_where_little_torque_is_left_to_speed_a_released_wheel_up() -> None:
-    ice = {**COASTING, "kind": "straight_braking", "speed_kmh": 60, "duration_s": 24.0, "road": {"mu": 0.1}}
-    ice |= {"brake": {"start_s": 0.5, "rise_s": 0.1, "pedal": 1.0}}
-    del ice["drive"]
-    found = simulate(ice).metrics
-    assert found["wheel_slip_max"] < 0.5
-    # Below 25 km/h a released wheel needs longer to speed up than the car to slow down: 0.8 there, 0.97 from 100 km/h.
-    assert found["braking_efficiency"] > 0.88
 
 
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])
