@@ -31,6 +31,8 @@ from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
+from activesteer.studies.comparison import compare
+from activesteer.studies.comparison_figure import comparison_figure
 from activesteer.studies.driver_loop import FREQUENCIES_RADPS, driver_loops
 from activesteer.studies.envelope import envelope
 from activesteer.studies.envelope_figure import envelope_figure
@@ -48,6 +50,10 @@ CONTROL_FREE: Final = frozenset({"slowly_increasing_steer", "constant_radius", "
 """Kinds that are there to look at the car itself, or in which no system has anything to do."""
 
 CORNER_WORDS: Final = {"fl": "front left", "rl": "rear left"}
+
+
+COMPARED: Final = ("none", "ars", "afs", "ars_sideslip", "esc", "lqr", "mpc", "integrated")
+"""Controllers of the page on chassis control."""
 
 
 def at_wheel(channel: str) -> Quantity:
@@ -94,6 +100,7 @@ def main(names: Sequence[str]) -> None:
         "sensors": _sensors,
         "tyres": _tyres,
         "brakes": _brakes,
+        "comparison": _comparison,
     }
     pictures |= {f"envelope_{name}": lambda name=name: {f"envelope_{name}": _envelope(name)} for name in ENVELOPES}
     for name in names or pictures:
@@ -256,6 +263,12 @@ def _brakes() -> dict[str, Figure]:
     axes[-1].set(xlabel="time [s]", xlim=(0.4, 4.2))
     figure.align_ylabels(list(axes))
     return {"brakes_stop": figure}
+
+
+def _comparison() -> dict[str, Figure]:
+    """All built-in controllers side by side."""
+    with tempfile.TemporaryDirectory() as folder:
+        return {"comparison": comparison_figure(compare(COMPARED, folder))}
 
 
 def _envelope(name: str) -> Figure:

@@ -46,7 +46,7 @@ def comparison_figure(made: Comparison) -> Figure:
             text = f"{values[name] * factor:.3g}"
             axes.text(column, row, text, ha="center", va="center", fontsize="x-small")
     span = math.log(_RANGE)
-    axes.imshow(ratios, cmap="RdBu_r", vmin=-span, vmax=span, aspect="auto", alpha=0.7)
+    axes.imshow(ratios, cmap="RdBu_r", vmin=-span, vmax=span, aspect="auto", alpha=0.5)
     axes.set_xticks(range(len(made.controllers)), made.controllers, fontsize="small")
     axes.xaxis.tick_top()
     labels, before = [], ""
