@@ -177,7 +177,7 @@ def opened_at_both(returned: Response) -> tuple[Response, Response]:
     Args:
         returned: As from `round_trip`.
     """
-    values = np.linalg.eigvals(returned)
+    values: Response = np.asarray(np.linalg.eigvals(returned), dtype=np.complex128)
     for before, here in itertools.pairwise(values):
         if np.abs(here - before).sum() > np.abs(here[::-1] - before).sum():
             here[:] = here[::-1].copy()
@@ -255,7 +255,7 @@ def loop_margins(
             answer = _answer(given, plugin.label, setup, sensors, rolling, plugin.make(setup))
             returned = round_trip(car, answer, scenario, unit_s, FREQUENCIES_RADPS)
             stable = is_stable(returned)
-            loops = {
+            loops: dict[str, tuple[Response, ...]] = {
                 loop: (opened(returned, loop),)
                 for index, loop in enumerate(LOOPS)
                 if np.abs(returned[:, index]).max() > 0.0
