@@ -12,7 +12,9 @@ left, z normal to the road. A slip angle > 0 gives a lateral force < 0; a slip r
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterable
+from itertools import cycle
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +38,54 @@ SYSTEM_LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering",
 
 RUN_COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
 """Colours of the three systems, then of other runs; colour-blind readers can tell them apart (Okabe and Ito, 2008)."""
+RUN_COLOURS_ON_DARK: Final = ("#c9ccd1", "#f0843c", "#4aa8e0", "#2bbd8e", "#e39cc4", "#f0b429")
+"""The same hues where the background is dark."""
+RUN_DASHES: Final = ((), (7.0, 2.0), (7.0, 1.5, 1.5, 1.5), (3.0, 1.5), (10.0, 3.0), (1.5, 1.0))
+"""Dashes and gaps of their curves, in widths of the line: they tell them apart in grey, and show the curve below."""
+
+
+class RunLook(NamedTuple):
+    """How a run looks, wherever it is drawn.
+
+    Attributes:
+        label: What its curve is called.
+        place: Its colour's place in `RUN_COLOURS`.
+        dashes: Dashes and gaps of its curve, in widths of the line; none is a full line.
+    """
+
+    label: str
+    place: int
+    dashes: tuple[float, ...]
+
+    @property
+    def colour(self) -> str:
+        """Its colour on a light background, `#rrggbb`."""
+        return RUN_COLOURS[self.place]
+
+    @property
+    def on_dark(self) -> str:
+        """Its colour on a dark one."""
+        return RUN_COLOURS_ON_DARK[self.place]
+
+
+def run_looks(names: Iterable[str]) -> dict[str, RunLook]:
+    """How runs look that are shown together.
+
+    Args:
+        names: Names of the runs; `none`, `ars` and `afs` are the three systems.
+
+    Returns:
+        By name, in the order in which they are drawn: the systems in the paper's, always in the same colours, then the
+        others, which take a system's colour only where the others are used up and that system is not there.
+    """
+    given = list(dict.fromkeys(names))
+    known = [name for name in SYSTEM_LABELS if name in given]
+    others = [name for name in given if name not in SYSTEM_LABELS]
+    places = {name: place for place, name in enumerate(SYSTEM_LABELS)}
+    spare = [*range(len(places), len(RUN_COLOURS)), *(places[name] for name in SYSTEM_LABELS if name not in given)]
+    places |= dict(zip(others, cycle(spare), strict=False))
+    dashes = dict(zip(known + others, cycle(RUN_DASHES), strict=False))
+    return {name: RunLook(SYSTEM_LABELS.get(name, name), places[name], dashes[name]) for name in known + others}
 
 
 def yaw_of(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

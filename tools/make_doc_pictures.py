@@ -141,7 +141,7 @@ def _frequency_responses(runs: Mapping[str, Any]) -> Figure:
         phase_deg = np.degrees(np.unwrap(np.angle(yaw.response)))
         shown = (np.abs(yaw.response), phase_deg, np.radians(np.abs(lateral.response)))
         for axis, values in zip(axes, shown, strict=True):
-            axis.semilogx(yaw.frequency_Hz, values, color=curve.colour, linewidth=1.4, label=curve.label)
+            axis.semilogx(yaw.frequency_Hz, values, color=curve.look.colour, linewidth=1.4, label=curve.look.label)
     titles = ("yaw rate gain\n[1/s]", "yaw rate phase\n[deg]", "lateral acc. gain\n[m/s² per deg]")
     for axis, title in zip(axes, titles, strict=True):
         style.plain(axis, title)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.frequency_response import OUTPUTS, frequency_response
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import RUN_COLOURS
+from activesteer.conventions import RUN_COLOURS, run_looks
 from activesteer.errors import ParameterError
 from activesteer.plotting import new_figure, save
 from activesteer.quantities import quantity_of
@@ -121,7 +121,8 @@ def driver_loops_figure(
     speeds = sorted({row["speed_kmh"] for row in rows})
     middle = speeds[len(speeds) // 2]
     controllers = list(dict.fromkeys(row["controller"] for row in rows))
-    for place, (controller, colour) in enumerate(zip(controllers, RUN_COLOURS * len(controllers), strict=False)):
+    for place, (controller, look) in enumerate(run_looks(controllers).items()):
+        colour = look.colour
         own = [row for row in rows if row["controller"] == controller]
         shown, response = next(
             (row, response)

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
+from activesteer.conventions import RUN_COLOURS, run_looks
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
 
@@ -67,12 +67,8 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
     """
     if not recordings:
         raise RecordingError("there is no recording to play back, at least one is needed")
-    ordered = [name for name in SYSTEM_LABELS if name in recordings]
-    ordered += [name for name in recordings if name not in SYSTEM_LABELS]
-    spare = iter(range(len(SYSTEM_LABELS), len(SYSTEM_LABELS) + len(ordered)))
-    colours = dict(zip(SYSTEM_LABELS, COLOURS, strict=False))
     runs = []
-    for number, name in enumerate(ordered, start=1):
+    for number, (name, look) in enumerate(run_looks(recordings).items(), start=1):
         recording = recordings[name]
         poses = np.flatnonzero(recording.poses.usable())
         if len(recording) == 0 or CHASSIS not in recording.poses.names or len(poses) == 0:
@@ -80,10 +76,9 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
                 f"{name}: {recording!r} has nothing to play back: rows and poses of a car are needed", value=name
             )
         path = re.sub(r"\W", "_", name, flags=re.ASCII)
-        path = f"{number}_{path}" if len(ordered) > 1 else path
-        colour = colours.get(name) or COLOURS[next(spare) % len(COLOURS)]
+        path = f"{number}_{path}" if len(recordings) > 1 else path
         shown = recording.at(_shown(recording.time_s))
-        runs.append(Run(shown, path or "run", name, SYSTEM_LABELS.get(name, name), colour, poses))
+        runs.append(Run(shown, path or "run", name, look.label, COLOURS[look.place], poses))
     return runs
 
 

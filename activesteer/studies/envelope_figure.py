@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
+from activesteer.conventions import run_looks
 from activesteer.errors import StudyError
 from activesteer.plotting import new_figure, save
 from activesteer.studies.envelope import Envelope, State
@@ -71,10 +71,10 @@ def _draw_map(axes: Axes, made: Envelope, driver: str) -> None:
             axes.annotate(
                 text, (place[0], high), (0, -2), textcoords="offset points", ha="center", va="top", fontsize="xx-small"
             )
-    known = [*SYSTEM_LABELS, *(entry["controller"] for entry in made.entry_speeds)]
+    looks = run_looks(entry["controller"] for entry in made.entry_speeds)
     mine = [entry for entry in made.entry_speeds if entry["driver"] == driver and entry["entry_speed_kmh"] is not None]
     for entry, size in zip(mine, np.linspace(12.0, 6.0, len(mine)), strict=True):
-        colour = RUN_COLOURS[list(dict.fromkeys(known)).index(entry["controller"]) % len(RUN_COLOURS)]
+        colour = looks[entry["controller"]].colour
         # Ever smaller, so that equal speeds are seen as rings.
         axes.plot(
             entry["entry_speed_kmh"], made.nominal[1], "o", color=colour, markersize=size, label=entry["controller"]

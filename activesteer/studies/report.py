@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from activesteer.conventions import RUN_COLOURS
+from activesteer.conventions import run_looks
 from activesteer.errors import StudyError
 from activesteer.files import write_text
 from activesteer.pages import render
@@ -77,7 +77,7 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
     shown = _shown_rows(table)
     return {
         "controllers": who["controller"][0],
-        "colours": [RUN_COLOURS[place % len(RUN_COLOURS)] for place in range(len(who["controller"][0]))],
+        "colours": [run_looks(who["controller"][0])[name].colour for name in who["controller"][0]],
         "groups": [f"{who['maneuver'][0][m]}, {who['vehicle'][0][v]}" for m, v in groups],
         "metrics": [{"name": name, "label": metric_label(name)[0], "unit": metric_label(name)[1]} for name in values],
         "factors": [_factor(key, table[key]) for key in study.keys],

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, RUN_COLOURS, SYSTEM_LABELS
+from activesteer.conventions import CORNERS, RUN_COLOURS, run_looks
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.road.course import course_of
@@ -80,7 +80,8 @@ class Film:
         self.settings = settings
         self._tracks = [Track(recording, name) for name, recording in recordings.items()]
         self._view = view(settings.camera, self._tracks[0], settings.corner)
-        colours = _colours(recordings)
+        looks = run_looks(recordings)
+        colours = [COLOURS[looks[name].place] for name in recordings]
         opacity = CUTAWAY if settings.cutaway else self._view.shell_opacity
         cars = [
             Car(
@@ -95,7 +96,7 @@ class Film:
         maneuver = first.metadata.get("maneuver", {})
         self._scene = RenderScene(cars, course_of(first.metadata), road_of(first.metadata), settings.size)
         dials = [
-            Dials(recording, SYSTEM_LABELS.get(name, name), colour)
+            Dials(recording, looks[name].label, colour)
             for (name, recording), colour in zip(recordings.items(), colours, strict=True)
         ]
         self._gauges = Gauges(dials, str(maneuver.get("title") or maneuver.get("name") or ""), settings.size)
@@ -189,10 +190,3 @@ def make_film(
                 if progress is not None:
                     progress(number / len(times))
     return FilmInfo(len(times), rate)
-
-
-def _colours(recordings: Mapping[str, Recording]) -> list[str]:
-    """Those of the three systems, and others for other runs."""
-    fixed = dict(zip(SYSTEM_LABELS, COLOURS, strict=False))
-    spare = iter(range(len(recordings)))
-    return [fixed.get(name) or COLOURS[(3 + next(spare)) % len(COLOURS)] for name in recordings]

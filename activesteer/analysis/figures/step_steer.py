@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from activesteer.analysis.figures import style
 from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, Curve
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import RUN_COLOURS
+from activesteer.conventions import RUN_COLOURS, RunLook
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure, save
 from activesteer.quantities import quantity_of
@@ -45,7 +45,7 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
     figure = new_figure(width_in=7.5, height_in=9.5)
     axes: list[Axes] = list(figure.subplots(5, 1, sharex=True))
     for curve in curves:
-        style.draw(axes[0], curve, YAW_RATE, label=curve.label)
+        style.draw(axes[0], curve, YAW_RATE, label=curve.look.label)
         if np.any(curve.recording[DESIRED.channel]):
             style.draw(axes[0], curve, DESIRED, width=1.0, style="--")
         style.draw(axes[1], curve, FRONT, width=0.8)
@@ -103,7 +103,7 @@ def figure_2(
     figure = new_figure(width_in=7.5, height_in=5.5)
     axes: list[Axes] = list(figure.subplots(2, 1, sharex=True))
     for axis, panel in zip(axes, (YAW_RATE, ROLL), strict=True):
-        style.draw(axis, Curve(recording, "", RUN_COLOURS[0]), panel, label="multibody car", width=2.0)
+        style.draw(axis, Curve(recording, RunLook("", 0, ())), panel, label="multibody car", width=2.0)
         for (label, channels), colour in zip((models or {}).items(), RUN_COLOURS[1:], strict=False):
             if panel.channel in channels:
                 values = channels[panel.channel] * panel.factor

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.bands import Band, bands_of
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
+from activesteer.conventions import RunLook, run_looks
 from activesteer.errors import ParameterError
 from activesteer.plotting import new_figure
 from activesteer.quantities import Quantity, quantity_of
@@ -43,14 +43,12 @@ class Curve(NamedTuple):
 
     Attributes:
         recording: The run.
-        label: Its name in the legend.
-        colour: Its colour.
+        look: Label, colour and dashes.
         bands: Where the curves of the population lie, by channel; empty where the run belongs to none.
     """
 
     recording: RecordingLike
-    label: str
-    colour: str
+    look: RunLook
     bands: Mapping[str, Band] = MappingProxyType({})
 
 
@@ -62,15 +60,7 @@ def curves(recordings: Mapping[str, RecordingLike]) -> list[Curve]:
     """
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
-    known = [label for label in SYSTEM_LABELS if label in recordings]
-    others = [label for label in recordings if label not in SYSTEM_LABELS]
-    colours = dict(zip(SYSTEM_LABELS, RUN_COLOURS, strict=False))
-    spare = RUN_COLOURS[len(SYSTEM_LABELS) :]
-    colours |= {label: spare[i % len(spare)] for i, label in enumerate(others)}
-    return [
-        Curve(recordings[label], SYSTEM_LABELS.get(label, label), colours[label], bands_of(recordings[label]))
-        for label in known + others
-    ]
+    return [Curve(recordings[name], look, bands_of(recordings[name])) for name, look in run_looks(recordings).items()]
 
 
 def draw(axis: Axes, curve: Curve, panel: Quantity, label: str = "", width: float = 1.4, style: str = "-") -> None:
@@ -79,7 +69,7 @@ def draw(axis: Axes, curve: Curve, panel: Quantity, label: str = "", width: floa
     values = thinned(curve.recording[panel.channel]) * panel.factor
     # A leading underscore keeps a line out of the legend.
     line = label or "_hidden"
-    axis.plot(thinned(curve.recording.time_s), values, style, color=curve.colour, linewidth=width, label=line)
+    axis.plot(thinned(curve.recording.time_s), values, style, color=curve.look.colour, linewidth=width, label=line)
 
 
 def draw_band(axis: Axes, curve: Curve, channel: str, factor: float = 1.0) -> None:
@@ -88,7 +78,13 @@ def draw_band(axis: Axes, curve: Curve, channel: str, factor: float = 1.0) -> No
     if band is not None:
         edges = band.low * factor, band.high * factor
         axis.fill_between(
-            band.at, *edges, color=curve.colour, alpha=BAND_ALPHA, linewidth=0.0, zorder=1.5, label=f"_{BAND_LABEL}"
+            band.at,
+            *edges,
+            color=curve.look.colour,
+            alpha=BAND_ALPHA,
+            linewidth=0.0,
+            zorder=1.5,
+            label=f"_{BAND_LABEL}",
         )
 
 
@@ -149,7 +145,7 @@ def fill_panels(axes: Sequence[Axes], drawn: Sequence[Curve], panels: Sequence[Q
     """
     for row, (axis, panel) in enumerate(zip(axes, panels, strict=True)):
         for curve in drawn:
-            label = curve.label if row == 0 else ""
+            label = curve.look.label if row == 0 else ""
             if panel is ADDED:
                 draw_added(axis, curve)
             else:

@@ -77,7 +77,7 @@ def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
     for curve in drawn:
         style.draw_band(axis, curve, TRACK[1])
         x, y = (style.thinned(values) for values in track.front_axle(curve.recording))
-        axis.plot(x, y, color=curve.colour, linewidth=1.4, label=curve.label)
+        axis.plot(x, y, color=curve.look.colour, linewidth=1.4, label=curve.look.label)
     _draw_course(axis, read_course(drawn[0].recording), TRACK_ASPECT)
 
 

@@ -118,7 +118,7 @@ def plots(group: Group) -> dict[str, Any]:
         "step_s": float(grid[1] - grid[0]) if len(grid) > 1 else 0.0,
         "start_s": float(grid[0]),
         "samples": len(grid),
-        "runs": [{"name": run.name, "label": run.label, "colour": run.colour} for run in group.runs],
+        "runs": [{"name": run.name, "label": run.look.label, "colour": run.look.colour} for run in group.runs],
         "panels": panels,
         "marks": _marks(group),
         "track": _track(group, grid),

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims import SCENARIOS
-from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
+from activesteer.conventions import RunLook, run_looks
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
 from activesteer.recording.run_names import run_names
@@ -24,15 +24,13 @@ class Run(NamedTuple):
         source: Where it comes from, such as the name of its file.
         recording: The recording.
         name: What its column is called, short (`ars`).
-        label: What its curve is called.
-        colour: Its colour, `#rrggbb`.
+        look: Label, colour and dashes of its curves.
     """
 
     source: str
     recording: Recording
     name: str
-    label: str
-    colour: str
+    look: RunLook
 
     @property
     def problem(self) -> str:
@@ -104,12 +102,5 @@ def entry(recording: Recording, table: str, key: str) -> str:
 
 def _group(name: str, recordings: Mapping[str, Recording]) -> Group:
     named = dict(zip(run_names(list(recordings), recordings.values()), recordings.items(), strict=True))
-    ordered = [system for system in SYSTEM_LABELS if system in named]
-    ordered += [other for other in named if other not in SYSTEM_LABELS]
-    colours = dict(zip(SYSTEM_LABELS, RUN_COLOURS, strict=False))
-    # The colours of the three systems stay theirs as long as there are others.
-    spare = [*RUN_COLOURS[len(SYSTEM_LABELS) :], *(colours[system] for system in SYSTEM_LABELS if system not in named)]
-    others = [run for run in ordered if run not in SYSTEM_LABELS]
-    colours |= {run: spare[number % len(spare)] for number, run in enumerate(others)}
-    runs = tuple(Run(*named[run], run, SYSTEM_LABELS.get(run, run), colours[run]) for run in ordered)
+    runs = tuple(Run(*named[run], run, look) for run, look in run_looks(named).items())
     return Group(name, entry(runs[0].recording, "maneuver", "title") or name, runs)

@@ -144,14 +144,14 @@ def test_runs_of_one_controller_are_called_by_their_files():
     runs = {"a.mcap": recording_of(step_steer(), "ars"), "b.mcap": recording_of(step_steer(), "ars")}
     (group,) = groups_of(runs)
     assert [run.name for run in group.runs] == ["a", "b"]
-    assert group.runs[0].colour != group.runs[1].colour
+    assert group.runs[0].look.colour != group.runs[1].look.colour
     again = {f"{folder}/a.mcap": run for folder, run in zip("xy", runs.values(), strict=True)}
     assert [run.name for run in groups_of(again)[0].runs] == ["x/a", "y/a"]
 
 
 def test_users_controller_is_called_by_its_class():
     (group,) = groups_of({"a.mcap": recording_of(step_steer(), "my/file.py:Mine")})
-    assert group.runs[0].label == "Mine"
+    assert group.runs[0].look.label == "Mine"
 
 
 def test_curves_are_in_degrees_and_thinned(page):
