@@ -187,13 +187,7 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
     faults = {"fault": [fault_table(text) for text in options.faults]} if options.faults else {}
     overrides = pairs(options.overrides, "--set", "road.mu=0.4", faults)
-    maneuver: Any = options.maneuver
-    if maneuver.endswith(".mcap"):
-        from activesteer.measured.driving import open_loop_of
-        from activesteer.recording import Recording
-
-        maneuver = open_loop_of(Recording.open(Path(maneuver), recover=True), Path(maneuver).stem)
-    return resolve(maneuver, options.vehicle, overrides, options.driver)
+    return resolve(options.maneuver, options.vehicle, overrides, options.driver)
 
 
 def overrides_of(options: argparse.Namespace) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, 
 from activesteer.scenario.driver import ChosenDriver, driver_with
 from activesteer.scenario.estimation import estimator_setup
 from activesteer.scenario.overrides import Override, applied, plain
+from activesteer.scenario.recorded_inputs import is_recording, led, recorded_inputs
 from activesteer.vehicle.powertrain import Drive
 
 
@@ -72,7 +73,7 @@ def resolve(
     """Reads and checks everything that a run needs.
 
     Args:
-        maneuver: Name, path, or table of a manoeuvre.
+        maneuver: Name, path, or table of a manoeuvre; or path of a recording (`.mcap`), whose inputs are driven.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value: `speed_kmh`, `road.mu`, `controllers.ars.limit_deg`; with `maneuver.` or
             `vehicle.` in front where both have such a key, and `driver.` in front of keys of the driver.
@@ -83,6 +84,7 @@ def resolve(
 
     Raises:
         ManeuverError: the manoeuvre is not found or wrong.
+        RecordingError: the recording cannot be read, or lacks steering or speed.
         DriverError: the driver is not found or wrong.
         ParameterError: the vehicle is not found or wrong, or an override names a key that does not exist.
         ModelError: the model file is not found.
@@ -96,7 +98,8 @@ def resolve(
         >>> scenario.maneuver.course.path.length_m > 100.0
         True
     """
-    table, source, folder, files = read_table(maneuver, "maneuver", find_maneuver, ManeuverError)
+    given = recorded_inputs(maneuver) if is_recording(maneuver) else maneuver
+    table, source, folder, files = read_table(given, "maneuver", find_maneuver, ManeuverError)
     kind = maneuver_class(table, source)
     if folder is not None:
         # A table may come from a recording, which holds both what was asked for and what it led to.
@@ -113,7 +116,10 @@ def resolve(
     table, csv_files = filled_from_csv(table, folder, source)
     who = driver_with(driver, sorted_out["driver"])
     made_from = {**files, **csv_files, **car.files, **who.files}
-    return Scenario(build_maneuver(table, source), car, who, changes, made_from)
+    built = build_maneuver(table, source)
+    if is_recording(maneuver):
+        built = build_maneuver(led(table, car.on(built.road).steering_lag_s), source)
+    return Scenario(built, car, who, changes, made_from)
 
 
 def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:

@@ -20,7 +20,7 @@ def label_of(item: FileOrTable) -> str:
     path, colon, class_name = named.rpartition(":")
     if colon:
         return f"{Path(path).name}:{class_name}{mark}{parameters}"
-    return Path(item).stem if str(item).endswith(".toml") else str(item)
+    return Path(item).stem if str(item).endswith((".toml", ".mcap")) else str(item)
 
 
 class FactorValues:

@@ -35,7 +35,7 @@ CLAIM: Final = "claim_"
 CURVE: Final = "curve_"
 """What the name of a column begins with that holds a channel over time."""
 _VERSION: Final = "version of "
-_engine = threading.Lock()
+engine_lock = threading.Lock()
 """The engine's callbacks belong to the process: of a worker's threads, one drives at a time."""
 
 
@@ -152,7 +152,7 @@ def drive(settings: Settings, requests: Sequence[Request]) -> list[Row]:
     Returns:
         A row for each.
     """
-    with _engine:
+    with engine_lock:
         if problem := _problem(digest({"expected": settings.expected}), settings):
             return [failed_row(settings, request, Status.FAILED, problem) for request in requests]
         rows: list[Row] = []

@@ -254,7 +254,7 @@ def _located(item: FileOrTable, folder: Path) -> FileOrTable:
     if isinstance(item, Mapping):
         return item
     text = os.fspath(item)
-    is_path = text.endswith(".toml") or os.sep in text
+    is_path = text.endswith((".toml", ".mcap")) or os.sep in text
     return str((folder / user_path(text, StudyError)).resolve()) if is_path else text
 
 

@@ -316,6 +316,16 @@ class Vehicle:
             return None
         return -arms["steering_wheel"] / arms["rack"]
 
+    @property
+    def steering_lag_s(self) -> float:
+        """Time by which the recorded steering wheel follows a steady turning of the demanded one [s].
+
+        One step, and damping over stiffness of the hands.
+        """
+        hands = self._places.steering_wheel
+        stiffness, damping = self.model.actuator_gainprm[hands, 0], -self.model.actuator_biasprm[hands, 2]
+        return float(self.model.opt.timestep + damping / stiffness)
+
     def measure(self) -> Measurement:
         """What the car's sensors say of the instant at which the last step began, and the yaw rate at its end.
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+import os
+from typing import Any, Final, TypeGuard
 
 import numpy as np
 
 from activesteer.errors import RecordingError
+from activesteer.files import user_path
 from activesteer.recording import Recording
 
 _LONGEST: Final = 200_000
@@ -16,7 +18,33 @@ _ON_GROUND: Final = 0.5
 """Speed from which on a car drives [m/s]."""
 
 
-def open_loop_of(recording: Recording, name: str) -> dict[str, Any]:
+def is_recording(maneuver: object) -> TypeGuard[str | os.PathLike[str]]:
+    """Whether what is given for a manoeuvre is a recording, whose inputs are to be driven again."""
+    return isinstance(maneuver, (str, os.PathLike)) and os.fspath(maneuver).endswith(".mcap")
+
+
+def recorded_inputs(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The manoeuvre of a file; see `open_loop_of`. Of a damaged one, what comes before the damage.
+
+    Raises:
+        RecordingError: it cannot be read, or lacks something.
+    """
+    file = user_path(path, RecordingError)
+    return open_loop_of(Recording.open(file, recover=True), file.stem)
+
+
+def led(table: dict[str, Any], lag_s: float) -> dict[str, Any]:
+    """The manoeuvre with its steering demanded earlier, so that the steering wheel stands where it was recorded.
+
+    Args:
+        table: Table of an open-loop manoeuvre.
+        lag_s: How much earlier [s]; see `Vehicle.steering_lag_s`.
+    """
+    steering = table["steering"]
+    return table | {"steering": steering | {"time_s": [time_s - lag_s for time_s in steering["time_s"]]}}
+
+
+def open_loop_of(recording: Recording, name: str, begin_s: float = 0.0) -> dict[str, Any]:
     """The manoeuvre that turns the steering wheel, or moves the rack, and holds the speed as in a recording.
 
     The time of the manoeuvre is that of the recording, from zero to its end: before its first row the first values
@@ -25,6 +53,7 @@ def open_loop_of(recording: Recording, name: str) -> dict[str, Any]:
     Args:
         recording: With `steering_wheel_rad` or `rack_m`, and `speed_mps` or `vx_mps`.
         name: What to call it.
+        begin_s: Instant of the recording that is zero in the manoeuvre [s].
 
     Returns:
         The table of the manoeuvre, for `resolve`.
@@ -35,7 +64,7 @@ def open_loop_of(recording: Recording, name: str) -> dict[str, Any]:
     if len(recording) < 2:
         raise RecordingError(f"{name}: {len(recording)} rows are too few to drive", value=len(recording))
     rows = np.arange(0, len(recording), max(1, math.ceil(len(recording) / _LONGEST)))
-    time_s = recording.time_s[rows].tolist()
+    time_s = (recording.time_s[rows] - begin_s).tolist()
 
     def values(*names: str) -> tuple[str, list[float]] | None:
         found = next((channel for channel in names if channel in recording), None)
@@ -55,7 +84,7 @@ def open_loop_of(recording: Recording, name: str) -> dict[str, Any]:
         "name": name,
         "title": f"inputs of {name}",
         "speed_mps": max(speed[1][0], _ON_GROUND),
-        "duration_s": float(recording.time_s[-1]),
+        "duration_s": time_s[-1],
         "hold_last": True,
         "steering": {"time_s": time_s, steering[0]: steering[1]},
         "speed": {"time_s": time_s, "speed_mps": speed[1]},
