@@ -24,10 +24,10 @@ from activesteer.commands.progress import ProgressBar
 from activesteer.config import Source, build
 from activesteer.errors import ParameterError
 
-_ROW: Final = "{:<30}{:<13}{:>7}{:>10}{:>8}{:>9}{:>9}{:>11}"
+_ROW: Final = "{:<30}{:<18}{:>7}{:>10}{:>8}{:>9}{:>9}{:>10}{:>11}"
 _HEADS: Final = (
-    ("fault", "situation", "speed", "yaw rate", "a_y", "off 1 s", "driver", "tolerated"),
-    ("", "", "km/h", "deg/s", "m/s2", "m", "m", "s"),
+    ("fault", "situation", "speed", "yaw rate", "a_y", "off 1 s", "driver", "corrects", "tolerated"),
+    ("", "", "km/h", "deg/s", "m/s2", "m", "m", "deg", "s"),
 )
 
 
@@ -42,13 +42,11 @@ def add_to(commands: Any) -> None:
         "--fault", action="append", default=[], dest="faults", metavar="PART:KIND[=SIZE]",
         help="a fault, as rear:stuck or rear:offset=1deg (default: those of the controller's actuators)",
     )  # fmt: skip
-    parser.add_argument(
-        "--preset", default="usual", metavar="NAME", help="usual, or un_r79: a circle of 100 m, 80 km/h"
-    )
+    parser.add_argument("--preset", default="usual", metavar="NAME", help="usual, or un_r79: circles of 100 m, 80 km/h")
     parser.add_argument("--speeds-kmh", metavar="V,V", help="speeds, in place of the preset's (usual: 60,100,140)")
     parser.add_argument(
         "--situations", metavar="NAME,NAME",
-        help="in place of the preset's: straight, turn, lane_change, circle_100m",
+        help="in place of the preset's: straight, turn, lane_change, circle_100m, circle_100m_right",
     )  # fmt: skip
     parser.add_argument(
         "--limit", action="append", default=[], dest="limits", metavar="KEY=VALUE",
@@ -109,7 +107,8 @@ def _line(row: Mapping[str, Any]) -> str:
     words = "always" if tolerated is None else "failed" if math.isnan(tolerated) else f"{tolerated:.3f}"
     figures = (math.degrees(row["yaw_rate_change_radps"]), row["ay_change_mps2"])
     offsets = (row["lateral_offset_1s_m"], row["lateral_offset_1s_driver_m"])
-    numbers = [f"{value:.2f}" for value in (*figures, *offsets)]
+    correction_deg = math.degrees(row["steering_correction_rad"])
+    numbers = [*(f"{value:.2f}" for value in (*figures, *offsets)), f"{correction_deg:.1f}"]
     return _ROW.format(row["fault"], row["situation"], f"{row['speed_kmh']:g}", *numbers, words)
 
 

@@ -23,7 +23,9 @@ from activesteer.commands.progress import ProgressBar
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("test", help="test a car by a standard: series, verdict, page")
-    parser.add_argument("standard", metavar="STANDARD", help="a name from `activesteer list`, as fmvss126")
+    parser.add_argument(
+        "standard", metavar="STANDARD", nargs="?", default="", help="its name; without one, those there are"
+    )
     add_controller(parser, several=True)
     add_vehicle(parser)
     add_driver(parser, default="whom the standard asks for")

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 _BESIDE: Final = 3
 """Most panels beside each other."""
+_ROW_IN: Final = 2.7
+_NAME_IN: Final = 0.17
+"""Height of a row of panels, and of a name where ordinates are names [in]."""
 _LIMIT: Final = "#b3261e"
 _SCALE: Final = "viridis"
 
@@ -27,7 +30,8 @@ def draw(picture: Picture) -> Figure:
     """
     columns = 2 if len(picture.panels) == 4 else min(len(picture.panels), _BESIDE)
     rows = math.ceil(len(picture.panels) / columns)
-    figure = new_figure(9.0, 2.7 * rows + 0.4, picture.title)
+    names = max(len(panel.names) for panel in picture.panels)
+    figure = new_figure(9.0, max(_ROW_IN, 0.8 + _NAME_IN * names) * rows + 0.4, picture.title)
     axes = figure.subplots(rows, columns, squeeze=False)
     for axis in axes.flat[len(picture.panels) :]:
         axis.set_visible(False)
@@ -67,6 +71,9 @@ def _fill(axis: Axes, panel: Panel) -> None:
         axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.xaxis.set_major_formatter(ScalarFormatter())
         axis.xaxis.set_minor_formatter(NullFormatter())
+    if panel.names:
+        axis.set_yticks(range(len(panel.names)), panel.names)
+        axis.invert_yaxis()
     axis.set_title(panel.title, fontsize="small")
     axis.set_xlabel(panel.x_label, fontsize="small")
     axis.set_ylabel(panel.y_label, fontsize="small")

@@ -12,6 +12,7 @@ import numpy as np
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.standards.standard import Run
 from activesteer.studies import run_task
+from activesteer.studies.fault_map import PRESETS, fault_map
 from activesteer.studies.study import study
 from activesteer.studies.workers import Workers
 
@@ -69,6 +70,20 @@ class ProvingGround:
             progress=lambda counted: self.progress(series, counted.done, counted.total),
         )
         return [_run(row, case) for row, case in zip(table.to_pylist(), cases, strict=True)]
+
+    def fault_map(self, preset: str) -> list[dict[str, Any]]:
+        """See `Ground`; nothing of it is kept to be gone on with."""
+        asked = PRESETS[preset]
+        return fault_map(
+            self.controller,
+            self.vehicle,
+            self.overrides,
+            speeds_kmh=asked.speeds_kmh,
+            situations=asked.situations,
+            driver=self.driver,
+            workers=self.workers,
+            progress=lambda done, total: self.progress("fault_map", done, total),
+        ).rows
 
 
 def _run(row: Mapping[str, Any], case: Mapping[str, Any]) -> Run:

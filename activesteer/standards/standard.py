@@ -120,6 +120,20 @@ class Ground(Protocol):
         """
         ...
 
+    def fault_map(self, preset: str) -> list[dict[str, Any]]:
+        """Drives the faults of the controller's actuators and sensors.
+
+        Args:
+            preset: Name of speeds and situations, one of `studies.fault_map.PRESETS`.
+
+        Returns:
+            The rows of the map.
+
+        Raises:
+            ActiveSteerError: an input is wrong, or the car in order cannot be driven so.
+        """
+        ...
+
 
 class Curve(NamedTuple):
     """A curve in a panel, in the units of its axes.
@@ -151,6 +165,7 @@ class Panel(NamedTuple):
         title: What stands above.
         limits: Values of the ordinate that a standard sets, with their names.
         log: Whether the abscissa is logarithmic.
+        names: Names of the ordinates 0, 1, ... from above, where these are no numbers.
     """
 
     x_label: str
@@ -159,6 +174,7 @@ class Panel(NamedTuple):
     title: str = ""
     limits: Sequence[tuple[float, str]] = ()
     log: bool = False
+    names: Sequence[str] = ()
 
 
 class Picture(NamedTuple):

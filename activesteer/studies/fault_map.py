@@ -25,12 +25,18 @@ from activesteer.scenario import FileOrTable, resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
-from activesteer.studies.workers import in_parallel
+from activesteer.studies.workers import Workers, in_parallel
 
 OFFSET_AT_S: Final = 1.0
 """How long after the beginning of a fault the lateral offset is taken [s]."""
 TURN_MPS2: Final = 4.0
 """Lateral acceleration of the turn, and the greatest of the lane change [m/s2]."""
+
+FIGURES: Final = (
+    "yaw_rate_change_radps", "ay_change_mps2", "lateral_offset_1s_m", "lateral_offset_1s_driver_m",
+    "steering_correction_rad", "fault_tolerant_time_s",
+)  # fmt: skip
+"""What is said of a fault; see `FaultMap`."""
 
 _RESOLUTION_S: Final = 0.005
 """To this the fault-tolerant time is found [s]."""
@@ -93,9 +99,10 @@ SITUATIONS: Final = {
     "turn": Situation(lambda speed, time: TURN_MPS2 / speed**2 * _entry(time), lambda speed: _ENTRY_S + _STEADY_S),
     "lane_change": Situation(_lane_change, lambda speed: 1.0 + (0.5 - 1.0 / math.sqrt(12.0)) * _lane_change_s()),
     "circle_100m": Situation(lambda speed, time: _entry(time) / 100.0, lambda speed: _ENTRY_S + _STEADY_S),
+    "circle_100m_right": Situation(lambda speed, time: -_entry(time) / 100.0, lambda speed: _ENTRY_S + _STEADY_S),
 }
 """Straight ahead; a left turn of 4 m/s2; a change of lane by 3.5 m to the left with as much, the fault at the
-first peak of its curvature; a left-hand circle of 100 m, that of UN R79, annex 4, for cars."""
+first peak of its curvature; a circle of 100 m, that of UN R79, annex 4, for cars, to the left and to the right."""
 
 
 class Preset(NamedTuple):
@@ -107,8 +114,8 @@ class Preset(NamedTuple):
 
 PRESETS: Final = {
     "usual": Preset((60.0, 100.0, 140.0), ("straight", "turn", "lane_change")),
-    # Cars and light vans: a circle of 100 m at 80 km/h. From memory of the text: check it before you rely on it.
-    "un_r79": Preset((80.0,), ("circle_100m",)),
+    # Cars and light vans, by extracts of UN R79, revision 4, annex 4, and of GB 17675-2021, which takes it over.
+    "un_r79": Preset((80.0,), ("circle_100m", "circle_100m_right")),
 }
 """Name -> what is driven."""
 
@@ -134,7 +141,8 @@ class FaultMap:
         limits: The limits.
         rows: One for each fault, speed and situation: `fault`, `speed_kmh`, `situation`, `yaw_rate_change_radps`,
             `ay_change_mps2`, `lateral_offset_1s_m` (left positive; these with the hands fixed),
-            `lateral_offset_1s_driver_m`, `fault_tolerant_time_s` (None where the limits hold for as long as is looked).
+            `lateral_offset_1s_driver_m`, `steering_correction_rad` (greatest change of the driver's steering wheel
+            angle), `fault_tolerant_time_s` (None where the limits hold for as long as is looked).
             What did not come to its end has nan, and `error`.
     """
 
@@ -154,6 +162,7 @@ def fault_map(
     driver: Any = DEFAULT_DRIVER,
     jobs: int | None = None,
     scheduler: str | None = None,
+    workers: Workers | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> FaultMap:
     """Drives every fault at every speed in every situation.
@@ -169,6 +178,7 @@ def fault_map(
         driver: Who drives.
         jobs: Processes; as many as there are processors where not given.
         scheduler: Address of a Dask scheduler, or its scheduler file, that drives them instead.
+        workers: Who drives them instead; they stay with whoever gave them.
         progress: Called after every pair of speed and situation with how many are done, and how many there are.
 
     Returns:
@@ -189,7 +199,7 @@ def fault_map(
     cells = [(name, speed) for name in situations for speed in speeds_kmh]
     drive = functools.partial(_cell, controller, driver, vehicle, dict(overrides or {}), chosen, limits)
     tell = (lambda _, count: progress(count, len(cells))) if progress else lambda _, __: None
-    done = in_parallel(drive, cells, jobs, tell, scheduler=scheduler)
+    done = in_parallel(drive, cells, jobs, tell, scheduler=scheduler, workers=workers)
     rows = [row for cell in done for row in cell]
     order = list(chosen)
     return FaultMap(limits, sorted(rows, key=lambda row: order.index(row["fault"])))
@@ -246,6 +256,7 @@ class _Motion(NamedTuple):
     yaw_rad: Array
     yaw_rate_radps: Array
     ay_mps2: Array
+    steering_wheel_rad: Array
 
 
 class _Keeps:
@@ -310,23 +321,23 @@ class _Runs:
 
 def _judged(runs: _Runs, fault: Fault, limits: Limits) -> dict[str, Any]:
     """The figures of a fault; nan where the run did not come to its end."""
-    nothing: dict[str, Any] = dict.fromkeys(
-        ("yaw_rate_change_radps", "ay_change_mps2", "lateral_offset_1s_m", "lateral_offset_1s_driver_m"), math.nan
-    )
     try:
         fixed = runs.hands_fixed(fault)
         driven = runs.with_driver(fault)
         broken_s = _first_broken_s(runs, fixed, limits)
         tolerant_s = None if broken_s is None else _tolerant_s(runs, fault, limits, broken_s)
     except SimulationDiverged as error:
-        return {**nothing, "fault_tolerant_time_s": math.nan, "error": str(error)}
-    return {
-        "yaw_rate_change_radps": float(np.abs(fixed.yaw_rate_radps - runs.in_order.yaw_rate_radps).max()),
-        "ay_change_mps2": float(np.abs(fixed.ay_mps2 - runs.in_order.ay_mps2).max()),
-        "lateral_offset_1s_m": _offset_m(runs, fixed),
-        "lateral_offset_1s_driver_m": _offset_m(runs, driven),
-        "fault_tolerant_time_s": tolerant_s,
-    }
+        return dict.fromkeys(FIGURES, math.nan) | {"error": str(error)}
+    good = runs.in_order
+    figures = (
+        float(np.abs(fixed.yaw_rate_radps - good.yaw_rate_radps).max()),
+        float(np.abs(fixed.ay_mps2 - good.ay_mps2).max()),
+        _offset_m(runs, fixed),
+        _offset_m(runs, driven),
+        float(np.abs(driven.steering_wheel_rad - good.steering_wheel_rad).max()),
+        tolerant_s,
+    )
+    return dict(zip(FIGURES, figures, strict=True))
 
 
 def _offset_m(runs: _Runs, motion: _Motion) -> float:

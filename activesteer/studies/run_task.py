@@ -67,7 +67,7 @@ class Settings:
         recordings: `none`, `failed`, `all`, or n for every n-th sample.
         folder: Where recordings go.
         claims: Whether the paper's claims are checked for every sample.
-        curves: Channels that are kept of every run.
+        curves: Channels that are kept of every run that was driven to its end.
         expected: Hash of the files of each pair of manoeuvre and vehicle, of each controller, and the versions, as the
             study began with them.
     """
@@ -231,13 +231,13 @@ def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, 
             except ActiveSteerError as reason:
                 row["error"] = f"{row['error']}; {reason}"
         return None
+    every_steps = max(1, round(CURVE_STEP_S / settings.timestep_s))
+    row.update((f"{CURVE}{name}", np.float32(recording[name][::every_steps])) for name in settings.curves)
     if problem := recording.metadata.get("metrics_error"):
         row |= {"status": Status.UNEVALUATED.value, "error": str(problem)[:_ERROR_CHARACTERS]}
         return None
     row["status"] = Status.OK.value
     row.update((name, float(value)) for name, value in recording.metrics.items() if _is_kept(settings.metrics, name))
-    every_steps = max(1, round(CURVE_STEP_S / settings.timestep_s))
-    row.update((f"{CURVE}{name}", np.float32(recording[name][::every_steps])) for name in settings.curves)
     return recording
 
 

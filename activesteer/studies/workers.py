@@ -313,6 +313,7 @@ def in_parallel(
     report: Callable[[int, int], None] = lambda _place, _done: None,
     *,
     scheduler: str | None = None,
+    workers: Workers | None = None,
 ) -> list[Any]:
     """Calls a function with each set of arguments, spread over processes.
 
@@ -322,6 +323,7 @@ def in_parallel(
         jobs: Number of processes; that of the processors where not given. With 1 all is done in this process.
         report: Called after each call with the place of its arguments and how many calls are done.
         scheduler: Address of a Dask scheduler, or its scheduler file, that calls it instead.
+        workers: Who calls it instead; they stay with whoever gave them.
 
     Returns:
         What it returned, in the order of the arguments.
@@ -332,9 +334,9 @@ def in_parallel(
         BaseException: what a call raised.
     """
     results: dict[int, Any] = {}
-    with workers_for(jobs, scheduler=scheduler) as workers:
+    with workers_for(jobs, scheduler=scheduler) if workers is None else contextlib.nullcontext(workers) as crew:
         tasks = ((place, function, *each) for place, each in enumerate(arguments))
-        for outcome in TaskQueue(workers).outcomes(tasks):
+        for outcome in TaskQueue(crew).outcomes(tasks):
             results[outcome.key] = outcome.result()
             report(outcome.key, len(results))
     return [results[place] for place in range(len(arguments))]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.handling import CarGeometry, evaluate
-from activesteer.errors import ManeuverError, RecordingError
+from activesteer.errors import ManeuverError, ParameterError, RecordingError
 from activesteer.files import json_text
 from activesteer.standards import iso7401, iso7975, iso13674
 from activesteer.standards.catalogue import STANDARDS, standard_of
@@ -38,8 +38,10 @@ def test_every_standard_says_what_it_is():
         assert standard_of(name) is standard
         for text in (standard.title, standard.edition, *standard.implemented, *standard.left_out):
             assert text
-    with pytest.raises(Exception, match="there is no standard"):
-        standard_of("iso1")
+    with pytest.raises(ParameterError, match=r"there is no standard 'iso740'.*iso7401"):
+        standard_of("iso740")
+    with pytest.raises(ParameterError, match=f"known are: {', '.join(sorted(STANDARDS))}"):
+        standard_of("")
 
 
 class RampGround:

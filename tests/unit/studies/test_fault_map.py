@@ -41,6 +41,8 @@ def test_straight_ahead_left_and_right_mirror_and_a_stuck_actuator_does_nothing(
     assert left["lateral_offset_1s_m"] < -1.0
     # He sees it and acts 0.2 s later; a second is short.
     assert abs(left["lateral_offset_1s_driver_m"]) < 0.8 * abs(left["lateral_offset_1s_m"])
+    assert left["steering_correction_rad"] > math.radians(10.0)
+    assert stuck["steering_correction_rad"] < math.radians(0.1)
     assert stuck["fault_tolerant_time_s"] is None
     assert stuck["yaw_rate_change_radps"] < 1e-3
 
@@ -72,14 +74,14 @@ def test_wider_limits_tolerate_longer() -> None:
     assert row["fault_tolerant_time_s"] > 0.04
 
 
-@pytest.mark.parametrize("name", ["turn", "lane_change", "circle_100m"])
+@pytest.mark.parametrize("name", ["turn", "lane_change", "circle_100m", "circle_100m_right"])
 def test_the_paths_have_the_curvature_that_they_shall_have(name: str) -> None:
     speed = 80.0 / 3.6
     maneuver: Any = resolve(_maneuver(name, speed, 6.0)).maneuver
     x, y = np.array(maneuver.path.x_m), np.array(maneuver.path.y_m)
     heading = np.unwrap(np.arctan2(np.diff(y), np.diff(x)))
-    curvature = np.diff(heading)
-    expected = {"turn": TURN_MPS2 / speed**2, "lane_change": TURN_MPS2 / speed**2, "circle_100m": 0.01}[name]
+    curvature = (-1.0 if name.endswith("_right") else 1.0) * np.diff(heading)
+    expected = 0.01 if "circle" in name else TURN_MPS2 / speed**2
     assert curvature.max() == pytest.approx(expected, rel=0.01)
     at_fault = round(SITUATIONS[name].fault_s(speed) * speed)
     assert curvature[at_fault - 1] == pytest.approx(expected, rel=0.02)

@@ -1,0 +1,269 @@
+"""UN R79: steering effort at walking pace, and failures of auxiliary steering equipment in a circle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from activesteer.quantities import display_unit
+from activesteer.standards.standard import (
+    SIDES,
+    Curve,
+    Findings,
+    Ground,
+    Panel,
+    Picture,
+    Run,
+    Standard,
+    Table,
+    time_panels,
+)
+from activesteer.studies.fault_map import FIGURES
+
+
+class Effort(NamedTuple):
+    """A line of table 2 for cars (M1).
+
+    Attributes:
+        radius_m: Radius to be reached [m].
+        limit_N: Greatest force at the rim until then [N].
+        case: What is the matter with the car: dotted key -> value.
+    """
+
+    radius_m: float
+    limit_N: float
+    case: Mapping[str, Any]
+
+
+EFFORTS: Final = {
+    "intact": Effort(12.0, 150.0, {}),
+    "power_assist_failed": Effort(20.0, 300.0, {"steering.assist_fraction": 0.0}),
+}
+"""Name -> what is asked of the steering effort."""
+WITHIN_S: Final = 4.0
+"""Time in which the radius is to be reached [s]."""
+SPEED_KMH: Final = 10.0
+"""Speed of the spiral [km/h]."""
+RIM_RADIUS_M: Final = 0.185
+"""Nominal radius of the steering wheel [m]: an assumption, that of a wheel of 370 mm; vehicle files have none."""
+PRESET: Final = "un_r79"
+"""What the fault map calls the circle of annex 4."""
+CIRCLES: Final = {"circle_100m": "left", "circle_100m_right": "right"}
+_TURNED_S: Final = 3.0
+"""Time in which the steering wheel comes to the Ackermann angle of the radius: a third more is left to the car [s]."""
+_BEGIN_S: Final = 0.5
+_CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "vx_mps")
+
+
+class Reached(NamedTuple):
+    """What it took to reach a radius.
+
+    Attributes:
+        time_s: Time from the beginning of steer on; nan where it is not reached [s].
+        effort_N: Greatest force at the rim until then; nan where it is not reached [N].
+    """
+
+    time_s: float
+    effort_N: float
+
+
+def reached(run: Run, radius_m: float) -> Reached:
+    """When a car comes to a radius, and how hard it was to steer.
+
+    Args:
+        run: A spiral that begins at `_BEGIN_S`.
+        radius_m: Radius of the path of the centre of gravity [m].
+    """
+    if not run.channels:
+        return Reached(math.nan, math.nan)
+    tighter = np.abs(run["yaw_rate_radps"]) * radius_m >= np.abs(run["vx_mps"])
+    if not tighter.any():
+        return Reached(math.nan, math.nan)
+    first = int(np.argmax(tighter))
+    effort_N = float(np.abs(run["hand_torque_Nm"][: first + 1]).max()) / RIM_RADIUS_M
+    return Reached(float(run.time_s[first]) - _BEGIN_S, effort_N)
+
+
+def _examine(ground: Ground) -> Findings:
+    spirals = {name: _spirals(ground, name, effort) for name, effort in EFFORTS.items()}
+    efforts = []
+    for name, runs in spirals.items():
+        asked = EFFORTS[name]
+        for side, run in runs.items():
+            found = reached(run, asked.radius_m)
+            good = found.time_s <= WITHIN_S and found.effort_N <= asked.limit_N
+            efforts.append({
+                "steering": name, "direction": side, "radius_m": asked.radius_m, "time_s": found.time_s,
+                "effort_N": found.effort_N, "limit_N": asked.limit_N, "pass": good,
+            })  # fmt: skip
+    faults = [
+        {"fault": row["fault"], "direction": CIRCLES[row["situation"]]}
+        | {name: row[name] for name in (*FIGURES, "error") if name in row}
+        for row in ground.fault_map(PRESET)
+    ]
+    values = {
+        "rim_radius_m": RIM_RADIUS_M, "efforts": efforts, "faults": faults,
+        "pass": all(row["pass"] for row in efforts),
+    }  # fmt: skip
+    summary = f"{_effort_words(efforts)}; circle, for which there are no numbers: {_fault_words(faults)}"
+    force = {f"{name.replace('_', ' ')}, {side}": run for name, runs in spirals.items() for side, run in runs.items()}
+    pictures = [
+        Picture("Spiral at 10 km/h", time_panels(force, _CHANNELS[:2], _BEGIN_S, "the beginning of steer")),
+        _dots(faults),
+    ]
+    return Findings(values, summary, [_effort_table(efforts), _fault_table(faults)], pictures)
+
+
+def _spirals(ground: Ground, name: str, effort: Effort) -> dict[str, Run]:
+    """The two runs to a radius at steadily rising steering wheel angle."""
+    config = ground.scenario("slowly_increasing_steer").car.config
+    single_track = config.single_track
+    angle_deg = math.degrees(
+        config.steering.ratio * (single_track.cg_to_front_m + single_track.cg_to_rear_m) / effort.radius_m
+    )
+    runs = ground.drive(
+        f"effort_{name}",
+        "slowly_increasing_steer",
+        [{"steer.rate_degps": sign * angle_deg / _TURNED_S, **effort.case} for sign in SIDES.values()],
+        {
+            "speed_kmh": SPEED_KMH,
+            "steer.start_s": _BEGIN_S,
+            "steer.end_deg": angle_deg * WITHIN_S / _TURNED_S,
+            "duration_s": _BEGIN_S + WITHIN_S + 0.5,
+        },
+        _CHANNELS,
+    )
+    return dict(zip(SIDES, runs, strict=True))
+
+
+def _effort_words(efforts: list[dict[str, Any]]) -> str:
+    broken = [row for row in efforts if not row["pass"]]
+    if broken:
+        words = [f"{row['steering'].replace('_', ' ')}, {row['direction']}: {_how(row)}" for row in broken]
+        return f"steering effort: {'; '.join(words)}"
+    hardest = [
+        f"{max(row['effort_N'] for row in efforts if row['steering'] == name):.0f} N of {asked.limit_N:.0f} "
+        f"({name.replace('_', ' ')})"
+        for name, asked in EFFORTS.items()
+    ]
+    return f"limits of the steering effort kept: {' and '.join(hardest)}"
+
+
+def _how(row: Mapping[str, Any]) -> str:
+    if math.isnan(row["time_s"]):
+        return f"{row['radius_m']:g} m are not reached in {WITHIN_S:g} s"
+    return f"{row['effort_N']:.0f} N ({row['limit_N']:.0f} allowed) after {row['time_s']:.1f} s"
+
+
+def _fault_words(faults: list[dict[str, Any]]) -> str:
+    done = [row for row in faults if "error" not in row]
+    words = "no run came to its end"
+    if done:
+        worst = max(done, key=lambda row: row["steering_correction_rad"])
+        words = (
+            f"{worst['fault']} ({worst['direction']}) takes the greatest correction, "
+            f"{math.degrees(worst['steering_correction_rad']):.0f} deg of the steering wheel, with the car "
+            f"{abs(worst['lateral_offset_1s_driver_m']):.2f} m off after 1 s"
+        )
+    return words + (
+        "" if done == faults else f"; {len(faults) - len(done)} of {len(faults)} faults did not come to their end"
+    )
+
+
+def _effort_table(efforts: list[dict[str, Any]]) -> Table:
+    rows = [
+        (
+            row["steering"].replace("_", " "), row["direction"], f"{row['radius_m']:g}", _number(row["time_s"], 2),
+            _number(row["effort_N"], 1), f"{row['limit_N']:.0f}", "pass" if row["pass"] else "fail",
+        )
+        for row in efforts
+    ]  # fmt: skip
+    columns = (
+        "steering", "to the", "turning radius [m]", f"reached after [s], at most {WITHIN_S:g}", "steering effort [N]",
+        "at most [N]", "result",
+    )  # fmt: skip
+    outside = frozenset(i for i, row in enumerate(efforts) if not row["pass"])
+    return Table("Steering effort until the radius is reached", columns, rows, outside)
+
+
+def _fault_table(faults: list[dict[str, Any]]) -> Table:
+    def tolerated(row: Mapping[str, Any]) -> str:
+        return "always" if row["fault_tolerant_time_s"] is None else _number(row["fault_tolerant_time_s"], 3)
+
+    rows = [
+        (
+            row["fault"], row["direction"], *(_number(_shown(row, name), 2) for name in FIGURES[:-1]),
+            row.get("error") or tolerated(row),
+        )
+        for row in faults
+    ]  # fmt: skip
+    columns = (
+        "fault", "circle", "yaw rate, change, hands fixed [deg/s]", "lateral acceleration, change, hands fixed [m/s²]",
+        "lateral offset after 1 s, hands fixed [m]", "the same with the driver [m]", "driver's correction [deg]",
+        "tolerated for [s], by the fault map's limits",
+    )  # fmt: skip
+    outside = frozenset(i for i, row in enumerate(faults) if "error" in row)
+    return Table("Failures in a circle of 100 m at 80 km/h", columns, rows, outside)
+
+
+def _shown(row: Mapping[str, Any], name: str) -> float:
+    return display_unit(name).factor * row[name]
+
+
+def _number(value: float, digits: int) -> str:
+    return "-" if math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _dots(faults: list[dict[str, Any]]) -> Picture:
+    """What each fault does, one line a fault."""
+    names = list(dict.fromkeys(row["fault"] for row in faults))
+
+    def panel(figure: str, label: str) -> Panel:
+        curves = []
+        for side in SIDES:
+            rows = [row for row in faults if row["direction"] == side]
+            places = [float(names.index(row["fault"])) for row in rows]
+            curves.append(Curve([_shown(row, figure) for row in rows], places, side, marked=True, joined=False))
+        shown = names if figure == FIGURES[0] else [""] * len(names)
+        return Panel(label, "", curves, names=shown)
+
+    panels = [
+        panel("yaw_rate_change_radps", "yaw rate, change,\nhands fixed [deg/s]"),
+        panel("lateral_offset_1s_m", "lateral offset after 1 s,\nhands fixed [m]"),
+        panel("steering_correction_rad", "driver's correction,\nsteering wheel [deg]"),
+    ]
+    return Picture("Failures in a circle of 100 m at 80 km/h", panels)
+
+
+STANDARD: Final = Standard(
+    name="r79-circle",
+    title="UN R79: steering effort, and failures of auxiliary steering equipment in a circle",
+    edition=(
+        "UN Regulation 79, revision 4 (03 series of amendments, 2018): paragraphs 6.2.4 to 6.2.6 with table 2, and "
+        "annex 4, for cars (M1). The numbers are from extracts of this revision and of GB 17675-2021, which takes them "
+        "over; how the tests are driven is from memory. The text was not at hand: check it before you rely on it."
+    ),
+    implemented=(
+        "Steering effort: from straight ahead into a spiral at 10 km/h, left and right. The force at the rim until the "
+        "radius of 12 m is reached, within 4 s, is at most 150 N; with a failure, here that of the whole power assist, "
+        "at most 300 N to a radius of 20 m. These are the limits that decide between pass and fail.",
+        "Annex 4: the faults of the fault map, each set when the car goes steadily round a circle of 100 m at 80 km/h, "
+        "left-hand and right-hand: what the car does with the steering wheel held, how the driver corrects it, where "
+        "he is after 1 s. The annex asks for control without abnormal correction and has no numbers: no verdict.",
+    ),
+    left_out=(
+        "Which faults there are is for manufacturer and technical service: here what a controller moves and what it "
+        "hears fails in all ways that the fault map knows. For how long a fault is tolerated goes by that map's "
+        "limits, which are assumptions and not the regulation's.",
+        "Leaving a curve of 50 m at 50 km/h without unusual vibration, self-centring with the hands off, transient "
+        "tests by the manufacturer, warning signals, energy reserves, annex 6, steering by assistance systems.",
+        f"The radius of the steering wheel, {1000.0 * RIM_RADIUS_M:.0f} mm, and the power assist, a constant fraction "
+        "of the column's torque, are assumptions. The turning radius is that of the centre of gravity's path.",
+        "The car is driven as its file has it, not at its greatest mass: --set load.payload_kg loads it.",
+    ),
+    examine=_examine,
+)
+"""UN R79."""

@@ -1,0 +1,117 @@
+"""UN R79: steering effort of a known spiral, its limits, and the circle with faults."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from activesteer.files import json_text
+from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.standards.examination import examine
+from activesteer.standards.r79_circle import EFFORTS, RIM_RADIUS_M, STANDARD, reached
+from activesteer.standards.standard import Run
+from activesteer.studies.fault_map import FIGURES, PRESETS
+from tests.unit.standards.signals import run_of, times
+
+SPEED_MPS = 10.0 / 3.6
+
+
+def spiral(tightest_m: float, force_N: float, side: float = 1.0) -> Run:
+    """The curvature rises steadily for 4 s, and the force at the rim with it, to that at the end."""
+    rising = np.clip(times(5.0) - 0.5, 0.0, 4.0) / 4.0
+    return run_of({
+        "yaw_rate_radps": side * SPEED_MPS / tightest_m * rising, "vx_mps": np.full_like(rising, SPEED_MPS),
+        "hand_torque_Nm": side * RIM_RADIUS_M * force_N * rising, "steering_wheel_rad": side * rising,
+    })  # fmt: skip
+
+
+class SpiralGround:
+    """A car whose steering effort and whose faults are written down."""
+
+    def __init__(self, tightest_m: float = 9.0, force_N: float = 100.0) -> None:
+        self._spiral = tightest_m, force_N
+        self.asked: list[dict[str, Any]] = []
+
+    def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
+        return resolve(maneuver, "compact", overrides)
+
+    def drive(
+        self,
+        series: str,
+        maneuver: FileOrTable,
+        cases: Sequence[Mapping[str, Any]],
+        overrides: Mapping[str, Any] | None = None,
+        curves: Sequence[str] = (),
+    ) -> list[Run]:
+        for case in cases:
+            resolve(maneuver, "compact", {**(overrides or {}), **case})
+        self.asked += [dict(case) for case in cases]
+        return [spiral(*self._spiral, math.copysign(1.0, case["steer.rate_degps"])) for case in cases]
+
+    def fault_map(self, preset: str) -> list[dict[str, Any]]:
+        one = dict.fromkeys(FIGURES, 0.1) | {"fault": "rear:stuck", "fault_tolerant_time_s": None}
+        lost = dict.fromkeys(FIGURES, math.nan) | {"fault": "rear:float", "error": "the car tips over"}
+        return [row | {"situation": situation} for row in (one, lost) for situation in PRESETS[preset].situations]
+
+
+def test_force_until_the_radius_of_a_known_spiral():
+    """1/12 m of 1/9 m is reached after 3 s of 4, and with it 75 of 100 N."""
+    found = reached(spiral(9.0, 100.0, -1.0), 12.0)
+    assert found.time_s == pytest.approx(3.0, abs=0.02)
+    assert found.effort_N == pytest.approx(75.0, abs=0.5)
+    assert math.isnan(reached(spiral(13.0, 100.0), 12.0).effort_N)
+
+
+def test_intact_and_without_power_assist_to_both_sides():
+    ground = SpiralGround()
+    found = STANDARD.examine(ground)
+    assert found.passed is True
+    assert [row["direction"] for row in found.values["efforts"]] == ["left", "right"] * 2
+    assert [case.get("steering.assist_fraction") for case in ground.asked] == [None, None, 0.0, 0.0]
+    # To 12 m the wheel is turned further than to 20 m, by as much as the circle is tighter.
+    assert ground.asked[0]["steer.rate_degps"] == pytest.approx(20.0 / 12.0 * ground.asked[2]["steer.rate_degps"])
+
+
+@pytest.mark.parametrize(
+    ("force_N", "steering"), [(200.1, ["intact"] * 2), (700.0, ["intact"] * 2 + ["power_assist_failed"] * 2)]
+)
+def test_more_than_the_effort_that_is_allowed_fails(force_N, steering):
+    """To 12 m are three quarters of the force at 9 m needed, to 20 m 9 / 20 of it."""
+    found = STANDARD.examine(SpiralGround(force_N=force_N))
+    assert found.passed is False
+    assert [row["steering"] for row in found.values["efforts"] if not row["pass"]] == steering
+    assert STANDARD.examine(SpiralGround(force_N=195.0)).passed is True
+
+
+def test_a_radius_that_is_not_reached_fails():
+    found = STANDARD.examine(SpiralGround(tightest_m=15.0))
+    assert found.passed is False
+    assert "12 m are not reached in 4 s" in found.summary
+
+
+def test_a_fault_that_ends_the_run_is_a_row_and_no_verdict():
+    found = STANDARD.examine(SpiralGround())
+    rows = {(row["fault"], row["direction"]): row for row in found.values["faults"]}
+    assert rows["rear:float", "right"]["error"] == "the car tips over"
+    assert "2 of 4 faults did not come to their end" in found.summary
+    assert found.tables[1].outside == {2, 3}
+    json.loads(json_text(found.values))
+
+
+def test_the_compact_is_steered_alike_to_both_sides_and_corrected_in_both_circles(monkeypatch):
+    monkeypatch.setattr("activesteer.studies.fault_map.usual_faults", lambda _: ["rear:offset=1deg"])
+    found = examine("r79-circle", ["ars"], jobs=1).findings["ars"]
+    efforts = {(row["steering"], row["direction"]): row["effort_N"] for row in found.values["efforts"]}
+    for name in EFFORTS:
+        assert efforts[name, "left"] == pytest.approx(efforts[name, "right"], rel=1e-3)
+    left, right = found.values["faults"]
+    assert [left["direction"], right["direction"]] == ["left", "right"]
+    # Rear wheels to the left turn the car to the right: out of a left-hand circle, into a right-hand one.
+    for row in (left, right):
+        assert row["lateral_offset_1s_m"] < -0.1
+        assert math.radians(3.0) < row["steering_correction_rad"] < math.radians(20.0)
