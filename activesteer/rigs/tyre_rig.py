@@ -338,5 +338,5 @@ class TyreRig:
             np.array(motion.spin_radps),
             np.array(deflections_m[0]),
             np.array(deflections_m[1]),
-            np.array(self._data.userdata[fb.U_LIMITED]),
+            np.array(fb.wheel_outputs(self._data, 1)["limited"][0]),
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 import mujoco
+import numpy as np
 
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
@@ -53,31 +54,27 @@ def compile_rig(
     wheel = model.body("wheel").id
     carrier = model.body("carrier").id
     chain = chain_to(model, wheel)
-    block = fb.ForceBlock(
-        model=model,
-        chassis_body=carrier,
-        chassis_chain=[],
-        drag_Ns2pm2=0.0,
-        aero_point_m=(0.0, 0.0, 0.0),
-    )
     states = [int(address) for address in model.actuator_actadr]
-    block.wheels.append(
-        fb.WheelEntry(
-            body=wheel,
-            root=int(model.body_rootid[wheel]),
-            act_x=states[0],
-            act_y=states[1],
-            act_z=states[2],
-            mu=mu,
-            pressure_Pa=pressure_Pa,
-            low_speed_mps=low_speed_mps,
-            low_speed_damping_Nspm=low_speed_damping_Nspm,
-            chain=chain,
-            tyre=tyre.record,
-        )
+    mounted = fb.filled(
+        fb.WHEEL,
+        body=wheel,
+        root=int(model.body_rootid[wheel]),
+        act_x=states[0],
+        act_y=states[1],
+        act_z=states[2],
+        mu=mu,
+        pressure_Pa=pressure_Pa,
+        low_speed_mps=low_speed_mps,
+        low_speed_damping_Nspm=low_speed_damping_Nspm,
+        chain_length=len(chain),
+        chain=chain,
     )
-    for address, slot in zip(states, (fb.U_RATE_X, fb.U_RATE_Y, fb.U_RATE_Z), strict=True):
-        block.actuators.append((fb.KIND_SLIP, float(address), float(slot), 0.0, 0.0, 0.0))
-    array = block.to_array()
+    rates = ("deflection_x_rate_mps", "deflection_y_rate_mps", "deflection_z_rate_radps")
+    actuators = [
+        fb.filled(fb.ACTUATOR, kind=fb.KIND_SLIP, act=address, slot=fb.output_slot(0, rate), **fb.IN_ORDER)
+        for address, rate in zip(states, rates, strict=True)
+    ]
+    sections = {"wheels": [mounted], "tyres": [np.atleast_1d(tyre.record)], "actuators": actuators}
+    array = fb.pack(fb.new_header(model, carrier, []), sections)
     spec.add_numeric(name=fb.BLOCK_NAME, size=array.size + fb.TRAILER_SIZE, data=fb.with_trailer(array, 0))
     return spec.compile()

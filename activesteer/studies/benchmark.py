@@ -248,14 +248,13 @@ def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
     scenario = resolve("straight_line")
     simulation = ClosedLoop(scenario)
     model, data = simulation.vehicle.model, simulation.vehicle.data
-    numbers = model.numeric_data
-    count = int(numbers[-fb.TRAILER_SIZE]) + fb.N_WHEELS
-    wheels = numbers[count]
+    header = fb.header_of(model)
+    wheels = float(header["n_wheels"][0])
     with_tyres: list[float] = []
     without: list[float] = []
     for _ in range(rounds):
         for measured, present in ((with_tyres, wheels), (without, 0.0)):
-            numbers[count] = present
+            header["n_wheels"] = present
             measured.append(_per_step_us(lambda: _repeat(mujoco.mj_passive, model, data, _CALLS), _CALLS))
     return tyre_bench(scenario.car.tyres[0], rounds) | {"four_tyres_us": min(with_tyres) - min(without)}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -23,27 +24,28 @@ class ActuatorRecords:
             rear: Actuators of the left and the right rear wheel.
         """
         self._model = model
-        self._block = model.numeric_data[int(model.numeric_data[-fb.TRAILER_SIZE]) :]
+        self._actuators = fb.section_of(model, "actuators")
+        self._links, self._screws = fb.section_of(model, "links"), fb.section_of(model, "screws")
         self._rear = rear
 
-    def of(self, actuator: int) -> NDArray[np.float64]:
-        """The record of an actuator, shape (ACTUATOR_SIZE,)."""
-        start = int(self._block[fb.ACTUATORS_START]) + actuator * fb.ACTUATOR_SIZE
-        return self._block[start : start + fb.ACTUATOR_SIZE]
+    def of(self, actuator: int) -> NDArray[Any]:
+        """The `ACTUATOR` record of an actuator, shape (1,)."""
+        return self._actuators[actuator : actuator + 1]
 
-    def screw(self, actuator: int) -> tuple[NDArray[np.float64], ...]:
+    def screw(self, actuator: int) -> tuple[NDArray[Any], ...]:
         """The records of link and screw of an actuator, that of its motor alone where no link follows, or nothing."""
         record = self.of(actuator)
-        if record[fb.A_KIND] == fb.KIND_SCREW:
-            return (self._part(record, fb.SCREW_SIZE),)
-        if record[fb.A_KIND] != fb.KIND_LINK:
+        place = int(record["record"][0])
+        if record["kind"] == fb.KIND_SCREW:
+            return (self._screws[place : place + 1],)
+        if record["kind"] != fb.KIND_LINK:
             return ()
         names = {self._model.actuator(index).name for index in range(self._model.nu)}
         own = self._model.actuator(actuator).name[:2] + SCREW
         screw = self._model.actuator(own if own in names else f"rear{SCREW}").id
-        return self._part(record, fb.LINK_SIZE), self._part(self.of(screw), fb.SCREW_SIZE)
+        return self._links[place : place + 1], *self.screw(screw)
 
-    def rear_screws(self) -> Iterator[tuple[NDArray[np.float64], ...]]:
+    def rear_screws(self) -> Iterator[tuple[NDArray[Any], ...]]:
         """Records of link and screw of every rear wheel that has a screw."""
         for actuator in self._rear:
             if records := self.screw(actuator):
@@ -57,13 +59,9 @@ class ActuatorRecords:
             if records := self.screw(actuator):
                 link, screw = records
                 powers = angle_rad ** np.arange(1, fb.POWERS + 1)
-                travel = float(screw[fb.S_TRAVEL : fb.S_TRAVEL + fb.POWERS] @ powers)
-                states[int(screw[fb.S_ACT])] = travel
-                states[address] = float(link[fb.L_SIGN]) * travel
+                travel = float(screw["travel"][0] @ powers)
+                states[int(screw["act"][0])] = travel
+                states[address] = float(link["sign"][0]) * travel
             else:
                 states[address] = angle_rad
         return states
-
-    def _part(self, record: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-        start = int(self._block[fb.SCREWS_START]) + int(record[fb.A_FIRST])
-        return self._block[start : start + size]

@@ -148,9 +148,7 @@ class Vehicle:
             model, data, self.live_arrays(), self._places, self._wheels, ratio, self._sensors, brakes
         )
         self._plan_address = self._plan.ctypes.data
-        block = int(model.numeric_data[-fb.TRAILER_SIZE])
-        self._areas_felt = model.numeric_data[block + fb.AREAS_FELT : block + fb.AREAS_FELT + 1]
-        self._block_gear = model.numeric_data[block + fb.GEAR : block + fb.GEAR + 1]
+        self._forces = fb.header_of(model)
         self._gear: float = CLUTCH_OPEN
         self._root = int(model.jnt_qposadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
         self._root_dof = int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
@@ -165,7 +163,7 @@ class Vehicle:
         """Static equilibrium at the origin of the world, heading along x."""
         mujoco.mj_resetData(self.model, self.data)
         held = [self._root_dof, self._root_dof + 1, self._root_dof + 5, *self._spins]
-        plays = [link[fb.L_BACKLASH_m : fb.L_BACKLASH_m + 1] for link, _ in self.actuators.rear_screws()]
+        plays = [link["backlash_m"] for link, _ in self.actuators.rear_screws()]
         given = [play.copy() for play in plays]
         for play in plays:
             play[:] = 0.0  # the search finds its way by slopes, and within a play there is none
@@ -196,7 +194,7 @@ class Vehicle:
             The first measurement.
         """
         data = self.data
-        self._areas_felt[0] = 0.0
+        self._forces["areas_felt"] = 0.0
         self._place()
         data.qvel[self._root_dof] = speed_mps
         for index, dof in enumerate(self._spins):
@@ -210,7 +208,7 @@ class Vehicle:
 
     def _effective_radii(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
         """Rolling radii under the loads of standing still, as measured when the sensors are fitted [m]."""
-        loads_N = self.data.userdata[fb.U_FZ :: fb.USERDATA_PER_WHEEL][: len(CORNERS)]
+        loads_N = fb.wheel_outputs(self.data, len(CORNERS))["fz_N"]
         axles = (tyres[0], tyres[0], tyres[1], tyres[1])
         return [
             float(MagicFormula(tyre).evaluate(load_N, 0.0, 0.0, vx_mps=_CALIBRATED_AT_MPS).effective_radius_m)
@@ -252,7 +250,7 @@ class Vehicle:
         data.qvel[self._root_dof] = cos * vx + sin * vy
         data.qvel[self._root_dof + 1] = -sin * vx + cos * vy
         data.time = 0.0
-        self._areas_felt[0] = 1.0
+        self._forces["areas_felt"] = 1.0
         mujoco.mj_forward(self.model, data)
 
     def _cg_offset(self) -> tuple[float, float]:
@@ -297,7 +295,8 @@ class Vehicle:
 
     def _engage(self, gear: int) -> None:
         """Couples the engine to the driven wheels, each of which then carries its part of the inertia, or frees it."""
-        self._gear = self._block_gear[0] = gear
+        self._gear = gear
+        self._forces["gear"] = gear
         powertrain = self.parameters.powertrain
         inertia_kgm2 = 0.0 if gear == CLUTCH_OPEN else powertrain.inertia_kgm2
         for dof, own, fraction in zip(self._spins, self._spin_armature_kgm2, powertrain.wheel_fractions, strict=True):

@@ -260,33 +260,32 @@ class ChannelMap:
     def _corners(self) -> list[Signal]:
         signals: list[Signal] = []
         for index, corner in enumerate(CORNERS):
-            first = index * fb.USERDATA_PER_WHEEL
             words = _CORNER_WORDS[corner]
 
             def user(
-                slot: int, name: str, unit: str, meaning: str, *, first: int = first, corner: str = corner,
+                field: str, name: str, unit: str, meaning: str, *, index: int = index, corner: str = corner,
                 words: str = words,
             ) -> Signal:  # fmt: skip
                 channel = Channel(f"{corner}_{name}", unit, f"{meaning}, {words}", "corners")
-                return Signal(channel, Column("userdata", first + slot))
+                return Signal(channel, Column("userdata", fb.output_slot(index, field)))
 
             signals += [
-                user(fb.U_FX, "tyre_fx_N", "N", "longitudinal tyre force at the contact point, ISO-W"),
-                user(fb.U_FY, "tyre_fy_N", "N", "lateral tyre force at the contact point, ISO-W, left positive"),
-                user(fb.U_FZ, "tyre_fz_N", "N", "vertical tyre force"),
-                user(fb.U_MX, "tyre_mx_Nm", "Nm", "overturning moment"),
-                user(fb.U_MY, "tyre_my_Nm", "Nm", "rolling resistance moment, negative rolling forward"),
-                user(fb.U_MZ, "tyre_mz_Nm", "Nm", "aligning moment"),
-                user(fb.U_SLIP_RATIO, "slip_ratio", "", "transient longitudinal slip, positive drives"),
-                user(fb.U_SLIP_ANGLE, "slip_angle_rad", "rad", "transient slip angle, positive gives negative force"),
-                user(fb.U_INCLINATION, "inclination_rad", "rad", "inclination of the wheel against the road about +x"),
-                user(fb.U_LOADED_RADIUS, "loaded_radius_m", "m", "distance of wheel centre and contact point"),
-                user(fb.U_LIMITED, "tyre_limited", "", "1 where the tyre is outside its file's range of validity"),
-                user(fb.U_CONTACT_X, "contact_x_m", "m", "contact point with the road, world x"),
-                user(fb.U_CONTACT_Y, "contact_y_m", "m", "contact point with the road, world y"),
-                user(fb.U_MU, "mu", "", "friction of the road at the contact point"),
+                user("fx_N", "tyre_fx_N", "N", "longitudinal tyre force at the contact point, ISO-W"),
+                user("fy_N", "tyre_fy_N", "N", "lateral tyre force at the contact point, ISO-W, left positive"),
+                user("fz_N", "tyre_fz_N", "N", "vertical tyre force"),
+                user("mx_Nm", "tyre_mx_Nm", "Nm", "overturning moment"),
+                user("my_Nm", "tyre_my_Nm", "Nm", "rolling resistance moment, negative rolling forward"),
+                user("mz_Nm", "tyre_mz_Nm", "Nm", "aligning moment"),
+                user("slip_ratio", "slip_ratio", "", "transient longitudinal slip, positive drives"),
+                user("slip_angle_rad", "slip_angle_rad", "rad", "transient slip angle, positive gives negative force"),
+                user("inclination_rad", "inclination_rad", "rad", "inclination of the wheel against the road about +x"),
+                user("loaded_radius_m", "loaded_radius_m", "m", "distance of wheel centre and contact point"),
+                user("limited", "tyre_limited", "", "1 where the tyre is outside its file's range of validity"),
+                user("contact_x_m", "contact_x_m", "m", "contact point with the road, world x"),
+                user("contact_y_m", "contact_y_m", "m", "contact point with the road, world y"),
+                user("mu", "mu", "", "friction of the road at the contact point"),
                 user(
-                    fb.U_FRICTION_UTILISATION,
+                    "friction_utilisation",
                     "friction_utilisation",
                     "",
                     "fraction of the tyre's peak friction at its load that is used",

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from activesteer.config import Range
-from activesteer.vehicle import force_block as fb
 
 Positive = Annotated[float, Range(1e-9)]
 
@@ -48,20 +47,20 @@ class ElectricActuator:
         """Supply over nominal voltage [-]."""
         return known(self.supply_voltage_V) / known(self.nominal_voltage_V)
 
-    def motor_numbers(self) -> dict[int, float]:
-        """What of a record (`force_block`) follows from these, by its index."""
+    def motor_numbers(self) -> dict[str, float]:
+        """What of a `SCREW` record follows from these."""
         ratio = self.voltage_ratio
         return {
-            fb.S_INERTIA_kgm2: known(self.rotor_inertia_kgm2),
-            fb.S_POSITION_GAIN_1ps: known(self.position_gain_1ps),
-            fb.S_SPEED_GAIN_1ps: known(self.speed_gain_1ps),
-            fb.S_SPEED_LIMIT_radps: known(self.speed_limit_radps),
-            fb.S_PEAK_Nm: known(self.peak_torque_Nm) if ratio > 0.0 else 0.0,
-            fb.S_STALL_Nm: known(self.stall_torque_Nm) * ratio,
-            fb.S_SLOPE_Nmsprad: known(self.stall_torque_Nm) / known(self.no_load_speed_radps),
-            fb.S_POWER_W: known(self.supply_power_W),
-            fb.S_FRICTION_Nm: known(self.friction_torque_Nm),
-            fb.S_LOAD_FRICTION: known(self.load_friction),
+            "inertia_kgm2": known(self.rotor_inertia_kgm2),
+            "position_gain_1ps": known(self.position_gain_1ps),
+            "speed_gain_1ps": known(self.speed_gain_1ps),
+            "speed_limit_radps": known(self.speed_limit_radps),
+            "peak_Nm": known(self.peak_torque_Nm) if ratio > 0.0 else 0.0,
+            "stall_Nm": known(self.stall_torque_Nm) * ratio,
+            "slope_Nmsprad": known(self.stall_torque_Nm) / known(self.no_load_speed_radps),
+            "power_W": known(self.supply_power_W),
+            "friction_Nm": known(self.friction_torque_Nm),
+            "load_friction": known(self.load_friction),
         }
 
 

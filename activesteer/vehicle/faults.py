@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 from activesteer.errors import ManeuverError
 from activesteer.faults import ACTUATORS, ANGLE_SENSOR, SENSORS, Fault
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
-from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.named_parts import find
 
 Step = Callable[[DriverCommand, ActuatorCommand, int], tuple[Measurement, Motion]]
-_STOPS: Final = {"left": fb.A_HIGH, "right": fb.A_LOW}
+_STOPS: Final = {"left": "high", "right": "low"}
 
 
 class Stretch(NamedTuple):
@@ -169,26 +168,26 @@ class _ActuatorFault:
         """Lets the fault act."""
         record, kind = self._record, self.fault.kind
         if self._screw and kind == "stuck":
-            self._screw[-1][fb.S_SEIZED] = 1.0
+            self._screw[-1]["seized"] = 1.0
         elif len(self._screw) == 2 and kind == "float":
             # The nut is off its thread, and plays as far as the end stops let it.
-            self._screw[0][fb.L_BACKLASH_m] = 4.0 * self._screw[1][fb.S_STOP_m]
+            self._screw[0]["backlash_m"] = 4.0 * self._screw[1]["stop_m"]
         elif kind == "stuck" and ACTUATORS[self.fault.part].is_brake:
             if not self.memory:
                 self.memory.append(float(self._ctrl[self._index]))
-            record[fb.A_SCALE], record[fb.A_OFFSET] = 0.0, self.memory[0]
+            record["scale"], record["offset"] = 0.0, self.memory[0]
         elif kind == "stuck":
             # No rate: the servo holds the angle that it has reached, with its stiffness and its strength.
-            record[fb.A_SECOND] = 0.0
+            record["rate_limit"] = 0.0
         elif kind == "float":
             self._model.actuator_gainprm[self._index] = self._model.actuator_biasprm[self._index] = 0.0
         elif kind == "reversed":
-            record[fb.A_SCALE] = -1.0
+            record["scale"] = -1.0
         elif kind == "offset":
-            record[fb.A_OFFSET] = self._offset
+            record["offset"] = self._offset
         else:
             stop = record[_STOPS[self.fault.side or "left"]]
-            record[fb.A_SCALE], record[fb.A_OFFSET] = 0.0, stop if kind == "runaway" else 0.0
+            record["scale"], record["offset"] = 0.0, stop if kind == "runaway" else 0.0
 
     def release(self) -> None:
         """The actuator works as built."""
@@ -199,8 +198,8 @@ class _ActuatorFault:
 
     def before_step(self) -> None:
         """Gives the actuator the demand of a while ago."""
-        if self._record[fb.A_SCALE] == 0.0:
-            self._record[fb.A_OFFSET] = self.memory[0] if self.memory else self._ctrl[self._index]
+        if self._record["scale"] == 0.0:
+            self._record["offset"] = self.memory[0] if self.memory else self._ctrl[self._index]
 
     def after_step(self) -> None:
         """Keeps the demand."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import mujoco
 import numpy as np
@@ -60,30 +60,30 @@ def fit_guides(spec: mujoco.MjSpec, curves: Curves) -> None:
                 tendon.wrap_joint("rack", -side * float(along @ by_rack))
 
 
-def guide_records(model: mujoco.MjModel, curves: Curves) -> list[float]:
-    """The records of all guided wheels, and behind them the tables of their curves.
+def guide_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDArray[Any]], list[NDArray[np.float64]]]:
+    """The records of all guided wheels, and the tables of their curves.
 
     Args:
         model: The car with its tendons, compiled.
         curves: The curves of its axles.
 
     Returns:
-        The numbers; empty where no axle is guided.
+        `GUIDE` records, and tables to stand one behind the other; both empty where no axle is guided.
     """
-    corners = [corner for corner in CORNERS if curves.axle(corner) is not None]
-    records: list[float] = []
-    tables: list[float] = []
+    records: list[NDArray[Any]] = []
+    tables: list[NDArray[np.float64]] = []
     places: dict[str, tuple[int, int]] = {}
-    for corner in corners:
+    for corner in CORNERS:
         axle = curves.axle(corner)
-        assert axle is not None
+        if axle is None:
+            continue
         if corner[0] not in places:
-            start = len(corners) * fb.GUIDE_SIZE + len(tables)
+            start = sum(table.size for table in tables)
             travel, rack = _table(axle.travel_m, axle.over_travel()), _table(axle.rack_m, axle.over_rack())
-            places[corner[0]] = start, start + len(travel)
-            tables += [*travel, *rack]
-        records += _record(model, corner, axle, places[corner[0]])
-    return [*records, *tables]
+            places[corner[0]] = start, start + travel.size
+            tables += [travel, rack]
+        records.append(_record(model, corner, axle, places[corner[0]]))
+    return records, tables
 
 
 def _joints(model: mujoco.MjModel, corner: str) -> tuple[int, int]:
@@ -118,10 +118,10 @@ def _slopes(axle: AxleCurves) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     return by_travel, by_rack
 
 
-def _table(points: tuple[float, ...], values: NDArray[np.float64]) -> list[float]:
+def _table(points: tuple[float, ...], values: NDArray[np.float64]) -> NDArray[np.float64]:
     """A spline through the points on even intervals, as cubics of the place in each interval."""
     if not points:
-        return []
+        return np.zeros(0)
     spline = _spline(points, values)
     ends = np.linspace(points[0], points[-1], _INTERVALS + 1)
     step = ends[1] - ends[0]
@@ -129,10 +129,11 @@ def _table(points: tuple[float, ...], values: NDArray[np.float64]) -> list[float
     rise = np.diff(value, axis=1)
     first, last = slope[:, :-1], slope[:, 1:]
     cubics = np.stack([value[:, :-1], first, 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise], axis=-1)
-    return [points[0], 1.0 / step, float(_INTERVALS), float(len(values)), *cubics.transpose(1, 0, 2).ravel()]
+    head = fb.filled(fb.CURVE_TABLE, start_m=points[0], per_m=1.0 / step, intervals=_INTERVALS, count=len(values))
+    return np.concatenate([head.view(np.float64), cubics.transpose(1, 0, 2).ravel()])
 
 
-def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[int, int]) -> list[float]:
+def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[int, int]) -> NDArray[Any]:
     qpos, dof = _joints(model, corner)
     side = _side(corner)
     rack, rack_dof = -1.0, -1.0
@@ -146,16 +147,26 @@ def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[
         along = _mirror(side) * [arms[f"{corner}_{name}"] for name in COORDINATES]
         stiffness += model.tendon_stiffness[tendon] * np.outer(along, along)
         damping += model.tendon_damping[tendon] * np.outer(along, along)
-    record = np.zeros(fb.GUIDE_SIZE)
-    record[: fb.G_STIFFNESS] = qpos, dof, side, rack, rack_dof, *tables
-    record[fb.G_STIFFNESS : fb.G_DAMPING] = stiffness.ravel()
-    # The engine's step is implicit in its tendons, which is a damping of step times stiffness along them. Where a curve
-    # is no longer as steep as in the design position, the difference would brake the wheel's travel: it is taken along.
-    record[fb.G_DAMPING : fb.G_SQUARE] = (damping + model.opt.timestep * stiffness).ravel()
-    record[fb.G_SQUARE : fb.G_HARDENING] = axle.hardening_square
-    record[fb.G_HARDENING : fb.G_TRAVEL_SLOPE] = axle.hardening or 0.0
-    record[fb.G_TRAVEL_SLOPE : fb.G_RACK_SLOPE], record[fb.G_RACK_SLOPE :] = _slopes(axle)
-    return record.tolist()
+    by_travel, by_rack = _slopes(axle)
+    return fb.filled(
+        fb.GUIDE,
+        qpos=qpos,
+        dof=dof,
+        side=side,
+        rack=rack,
+        rack_dof=rack_dof,
+        travel_table=tables[0],
+        rack_table=tables[1],
+        stiffness=stiffness.ravel(),
+        # The engine's step is implicit in its tendons, which is a damping of step times stiffness along them. Where a
+        # curve is no longer as steep as in the design position, the difference would brake the wheel's travel: it is
+        # taken along.
+        damping=(damping + model.opt.timestep * stiffness).ravel(),
+        square=axle.hardening_square,
+        hardening=np.ravel(axle.hardening),
+        travel_slope=by_travel,
+        rack_slope=by_rack,
+    )
 
 
 def _unsprung_mass(model: mujoco.MjModel, corner: str) -> NDArray[np.float64]:

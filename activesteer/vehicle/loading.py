@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError
@@ -20,14 +22,18 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.guide_model import fit_guides, guide_records
 from activesteer.vehicle.load import apply_load
 from activesteer.vehicle.named_parts import find
-from activesteer.vehicle.parameters import VIBRATION_AT_MPS, DamperCurve, VehicleParameters
+from activesteer.vehicle.parameters import VIBRATION_AT_MPS, VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.vehicle.superposition_actuator import MOTOR, NAME, fit_motor, motor_record
-from activesteer.vehicle.toe_link_screws import fit_screws, flattened, screw_records, sensor_range
+from activesteer.vehicle.toe_link_screws import fit_screws, screw_records, sensor_range
 
 _USER_DYNAMICS: Final = int(mujoco.mjtDyn.mjDYN_USER)
-_RATES: Final = {"slip_x": fb.U_RATE_X, "slip_y": fb.U_RATE_Y, "slip_z": fb.U_RATE_Z}
-"""Relaxation state of a tyre, as its actuator is called behind the corner -> where the callback leaves its rate."""
+_RATES: Final = {
+    "slip_x": "deflection_x_rate_mps",
+    "slip_y": "deflection_y_rate_mps",
+    "slip_z": "deflection_z_rate_radps",
+}
+"""Relaxation state of a tyre, as its actuator is called behind the corner -> the output that holds its rate."""
 
 
 _compiled: deque[tuple[tuple[Any, ...], mujoco.MjModel]] = deque(maxlen=4)
@@ -93,7 +99,7 @@ def _compile(
         fit_guides(spec, parameters.curves)
         _fit_actuators(spec, parameters)
         apply_load(spec, parameters)
-        block = _force_block(spec.compile(), parameters, tyres, road).to_array()
+        block = _force_block(spec.compile(), parameters, tyres, road)
         start = sum(len(numeric.data) for numeric in spec.numerics)
         spec.add_numeric(name=fb.BLOCK_NAME, size=block.size + fb.TRAILER_SIZE, data=fb.with_trailer(block, start))
         return spec.compile()
@@ -142,52 +148,38 @@ def _force_block(
     parameters: VehicleParameters,
     tyres: tuple[TyreParameters, TyreParameters],
     road: Road,
-) -> fb.ForceBlock:
+) -> NDArray[np.float64]:
     chassis = find(model, mujoco.mjtObj.mjOBJ_BODY, "chassis")
     aero, powertrain = parameters.aerodynamics, parameters.powertrain
-    block = fb.ForceBlock(
-        model=model,
-        chassis_body=chassis,
-        chassis_chain=chain_to(model, chassis),
-        drag_Ns2pm2=0.5 * aero.air_density_kgpm3 * aero.drag_area_m2,
-        aero_point_m=_triple(aero.pressure_point_m),
-        engine=(
-            powertrain.max_torque_Nm,
-            powertrain.max_power_W,
-            powertrain.max_wheel_speed_radps,
-            powertrain.engine_brake_torque_Nm,
-            CLUTCH_OPEN,
-        ),
-    )
-    for corner in CORNERS:
-        front = corner.startswith("f")
-        block.wheels.append(_wheel(model, corner, parameters, tyres[0 if front else 1], road))
-        curve = parameters.dampers.front if front else parameters.dampers.rear
-        block.dampers.append(_damper(model, corner, curve, parameters.factors.damper))
+    header = fb.new_header(model, chassis, chain_to(model, chassis))
+    header["drag_Ns2pm2"] = 0.5 * aero.air_density_kgpm3 * aero.drag_area_m2
+    header["aero_point_m"] = _triple(aero.pressure_point_m)
+    header["engine_torque_Nm"], header["engine_power_W"] = powertrain.max_torque_Nm, powertrain.max_power_W
+    header["engine_limit_radps"] = powertrain.max_wheel_speed_radps
+    header["engine_drag_Nm"], header["gear"] = powertrain.engine_brake_torque_Nm, CLUTCH_OPEN
+    header["screw_sensors"], header["n_screw_sensors"] = sensor_range(model)
     for name in ("rack_friction", *(f"{corner}_damper_friction" for corner in CORNERS)):
         if _friction(name, parameters)[0] > 0.0:
             # Friction in the vehicle file is not to be lost because the model has no place for it.
             find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
-    block.areas.extend(road.areas())
+    sections: dict[str, list[NDArray[Any]]] = {
+        "wheels": [_wheel(model, corner, parameters, _tyre(corner, tyres), road) for corner in CORNERS],
+        "tyres": [np.atleast_1d(_tyre(corner, tyres).record) for corner in CORNERS],
+        "dampers": [_damper(model, corner, parameters) for corner in CORNERS],
+        "areas": [np.array([area], fb.AREA) for area in road.areas()],
+    }
+    sections["guides"], sections["curves"] = guide_records(model, parameters.curves)
     places: dict[str, tuple[float, int]] = {}
     if parameters.rear_actuator.is_screw:
         screws = screw_records(model, parameters.rear_actuator.resolved())
-        block.screws.extend(flattened(screws.records))
+        sections["links"], sections["screws"] = screws.links, screws.screws
         places |= screws.places
     if parameters.superposition_actuator.is_geared:
-        start = float(len(block.screws))
-        places |= {NAME: (fb.KIND_SCREW, int(start)), NAME + MOTOR: (fb.KIND_MOTOR, int(start))}
-        block.screws.extend(motor_record(model, parameters.superposition_actuator.resolved()))
-    block.screw_sensors = sensor_range(model)
-    block.guides = guide_records(model, parameters.curves)
-    block.n_guides = sum(parameters.curves.axle(corner) is not None for corner in CORNERS)
-    for index in range(model.nu):
-        if (place := places.get(model.actuator(index).name)) is None:
-            block.actuators.append(_actuator(model, index, parameters))
-        else:
-            low, high = (float(value) for value in model.actuator_ctrlrange[index])
-            block.actuators.append((place[0], float(model.actuator_actadr[index]), float(place[1]), 0.0, low, high))
-    return block
+        motors = sections.setdefault("screws", [])
+        places |= {NAME: (fb.KIND_SCREW, len(motors)), NAME + MOTOR: (fb.KIND_MOTOR, len(motors))}
+        motors.append(motor_record(model, parameters.superposition_actuator.resolved()))
+    sections["actuators"] = [_actuator(model, index, parameters, places) for index in range(model.nu)]
+    return fb.pack(header, sections)
 
 
 def _triple(values: tuple[float, ...]) -> tuple[float, float, float]:
@@ -198,9 +190,13 @@ def _triple(values: tuple[float, ...]) -> tuple[float, float, float]:
     return values[0], values[1], values[2]
 
 
+def _tyre(corner: str, tyres: tuple[TyreParameters, TyreParameters]) -> TyreParameters:
+    return tyres[0 if corner.startswith("f") else 1].mounted_on("LEFT" if corner.endswith("l") else "RIGHT")
+
+
 def _wheel(
     model: mujoco.MjModel, corner: str, parameters: VehicleParameters, tyre: TyreParameters, road: Road
-) -> fb.WheelEntry:
+) -> NDArray[Any]:
     body = find(model, mujoco.mjtObj.mjOBJ_BODY, f"{corner}_wheel")
     chain = chain_to(model, body)
     if len(chain) > fb.MAX_CHAIN:
@@ -209,7 +205,8 @@ def _wheel(
         )
     fitment = parameters.tyres
     pressure = fitment.front_pressure_Pa if corner.startswith("f") else fitment.rear_pressure_Pa
-    return fb.WheelEntry(
+    return fb.filled(
+        fb.WHEEL,
         body=body,
         root=int(model.body_rootid[body]),
         act_x=_activation(model, f"{corner}_slip_x"),
@@ -219,10 +216,10 @@ def _wheel(
         pressure_Pa=pressure if pressure is not None else tyre["INFLPRES"],
         low_speed_mps=fitment.low_speed_mps,
         low_speed_damping_Nspm=fitment.low_speed_damping_Nspm,
-        spin=int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_spin")]),
+        spin_dof=int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_spin")]),
         drive_fraction=parameters.powertrain.wheel_fractions[CORNERS.index(corner)],
+        chain_length=len(chain),
         chain=chain,
-        tyre=tyre.mounted_on("LEFT" if corner.endswith("l") else "RIGHT").record,
     )
 
 
@@ -234,50 +231,68 @@ def _activation(model: mujoco.MjModel, actuator: str) -> int:
     return address
 
 
-def _damper(model: mujoco.MjModel, corner: str, curve: DamperCurve, factor: float) -> fb.DamperEntry:
+def _damper(model: mujoco.MjModel, corner: str, parameters: VehicleParameters) -> NDArray[Any]:
+    curve = parameters.dampers.front if corner.startswith("f") else parameters.dampers.rear
     tendon = find(model, mujoco.mjtObj.mjOBJ_TENDON, f"{corner}_damper")
     row, length = int(model.ten_J_rowadr[tendon]), int(model.ten_J_rownnz[tendon])
-    chain = [int(dof) for dof in model.ten_J_colind[row : row + length]]
-    return fb.DamperEntry(tendon, row, chain, list(curve.velocity_mps), [factor * force for force in curve.force_N])
+    return fb.filled(
+        fb.DAMPER,
+        tendon=tendon,
+        row=row,
+        length=length,
+        points=len(curve.velocity_mps),
+        chain=model.ten_J_colind[row : row + length],
+        velocity_mps=curve.velocity_mps,
+        force_N=[parameters.factors.damper * force for force in curve.force_N],
+    )
 
 
 def _actuator(
-    model: mujoco.MjModel, index: int, parameters: VehicleParameters
-) -> tuple[float, float, float, float, float, float]:
+    model: mujoco.MjModel, index: int, parameters: VehicleParameters, places: Mapping[str, tuple[float, int]]
+) -> NDArray[Any]:
     """The record of one actuator for the callback that gives its rate."""
     if int(model.actuator_dyntype[index]) != _USER_DYNAMICS:
-        return (fb.KIND_NONE, 0.0, 0.0, 0.0, 0.0, 0.0)
-    name = model.actuator(index).name
-    address = float(model.actuator_actadr[index])
+        return fb.filled(fb.ACTUATOR, kind=fb.KIND_NONE, **fb.IN_ORDER)
+    name, act = model.actuator(index).name, model.actuator_actadr[index]
+    if name in places:
+        kind, place = places[name]
+        low, high = model.actuator_ctrlrange[index]
+        return fb.filled(fb.ACTUATOR, kind=kind, act=act, record=place, low=low, high=high, **fb.IN_ORDER)
+    return fb.filled(fb.ACTUATOR, act=act, **fb.IN_ORDER, **_dynamics(model, index, name, parameters))
+
+
+def _dynamics(model: mujoco.MjModel, index: int, name: str, parameters: VehicleParameters) -> dict[str, float]:
+    """Kind of an actuator, and the fields that it needs."""
     corner, _, state = name.partition("_")
     if state in _RATES:
-        wheel = CORNERS.index(corner)
-        slot = wheel * fb.USERDATA_PER_WHEEL + _RATES[state]
-        return (fb.KIND_SLIP, address, float(slot), 0.0, 0.0, 0.0)
+        return {"kind": fb.KIND_SLIP, "slot": fb.output_slot(CORNERS.index(corner), _RATES[state])}
     if state == "drive":
         fraction = parameters.powertrain.wheel_fractions[CORNERS.index(corner)]
-        return (fb.KIND_DRIVE, address, fraction, parameters.powertrain.lag_s, 0.0, 0.0)
+        return {"kind": fb.KIND_DRIVE, "drive_fraction": fraction, "lag_s": parameters.powertrain.lag_s}
     if name.endswith("_brake"):
         brakes = parameters.brakes
-        maximum = (
-            brakes.front_torque_Nm if corner.startswith("f") else max(brakes.rear_torque_Nm, brakes.parking_torque_Nm)
-        )
-        spin = float(model.jnt_dofadr[int(model.actuator_trnid[index, 0])])
-        return (fb.KIND_BRAKE, address, brakes.stiffness_Nmprad, spin, brakes.drag_torque_Nm, maximum)
+        rear_Nm = max(brakes.rear_torque_Nm, brakes.parking_torque_Nm)
+        low, high = brakes.drag_torque_Nm, brakes.front_torque_Nm if corner.startswith("f") else rear_Nm
+        dof = int(model.jnt_dofadr[int(model.actuator_trnid[index, 0])])
+        return {"kind": fb.KIND_BRAKE, "stiffness": brakes.stiffness_Nmprad, "dof": dof, "low": low, "high": high}
     if name.endswith("_friction"):
-        force, stiffness = _friction(name, parameters)
-        part = int(model.actuator_trnid[index, 0])
-        if int(model.actuator_trntype[index]) == mujoco.mjtTrn.mjTRN_TENDON:
-            vibration, along = parameters.friction.vibration_mps / math.sqrt(VIBRATION_AT_MPS), fb.ALONG_TENDON
-        else:
-            # The rack: what shakes the wheels up and down hardly moves it.
-            vibration, along, part = 0.0, fb.ALONG_JOINT, int(model.jnt_dofadr[part])
-        return (fb.KIND_FRICTION, address, vibration, float(part), force / stiffness, along)
+        return _dry_friction(model, index, name, parameters)
     lag, rate = (float(value) for value in model.actuator_dynprm[index, :2])
     if lag <= 0.0 or rate <= 0.0:
         raise ModelError(
             f"actuator {name!r}: dynprm is {lag:g} {rate:g}; a lag [s] and a rate limit [rad/s] above 0 are needed",
             value=name,
         )
-    low, high = (float(value) for value in model.actuator_ctrlrange[index])
-    return (fb.KIND_SERVO, address, lag, rate, low, high)
+    low, high = model.actuator_ctrlrange[index]
+    return {"kind": fb.KIND_SERVO, "lag_s": lag, "rate_limit": rate, "low": low, "high": high}
+
+
+def _dry_friction(model: mujoco.MjModel, index: int, name: str, parameters: VehicleParameters) -> dict[str, float]:
+    force, stiffness = _friction(name, parameters)
+    part = int(model.actuator_trnid[index, 0])
+    fields = {"kind": fb.KIND_FRICTION, "wound_limit": force / stiffness}
+    if int(model.actuator_trntype[index]) == mujoco.mjtTrn.mjTRN_TENDON:
+        vibration = parameters.friction.vibration_mps / math.sqrt(VIBRATION_AT_MPS)
+        return fields | {"tendon": part, "dof": -1.0, "vibration": vibration}
+    # The rack: what shakes the wheels up and down hardly moves it.
+    return fields | {"tendon": -1.0, "dof": int(model.jnt_dofadr[part])}

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
-from numba import carray, types
+from numba import carray, from_dtype, types
 from numba.extending import intrinsic
 
 from activesteer.compilation import inlined
@@ -42,3 +43,14 @@ def word(address):
 def array_at(struct, offset, size):
     """The float64 array whose pointer stands `offset` bytes into a struct, as a 1-D view of `size` elements."""
     return carray(f64_pointer(word(struct + offset)), (size,))
+
+
+def records_at(kind: np.dtype[Any]) -> Any:
+    """Compiled code: address, a distance from it in numbers, how many -> records of float64, as an array."""
+    pointer = pointer_to(from_dtype(kind))
+
+    @inlined
+    def records(address, distance, count):
+        return carray(pointer(address + 8 * int(distance)), (int(count),))
+
+    return records

@@ -7,9 +7,10 @@ needs the hands must hold. Motor and gear take the place of the servo's lag and 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import mujoco
+from numpy.typing import NDArray
 
 from activesteer.config import Range
 from activesteer.errors import ModelError, ParameterError
@@ -105,32 +106,28 @@ def fit_motor(spec: mujoco.MjSpec) -> None:
     spec.nuserdata += 2
 
 
-def motor_record(model: mujoco.MjModel, actuator: SuperpositionActuator) -> list[float]:
-    """What the callbacks need (`force_block`).
+def motor_record(model: mujoco.MjModel, actuator: SuperpositionActuator) -> NDArray[Any]:
+    """What the callbacks need: a `SCREW` record.
 
     Args:
         model: The model with the motor, compiled.
         actuator: What the vehicle file says, with all keys.
     """
-    record = [0.0] * fb.SCREW_SIZE
     index, column = model.actuator(NAME).id, model.tendon(_COLUMN).id
     values = actuator.motor_numbers() | {
-        fb.S_ACT: float(model.actuator_actadr[index]),
-        fb.S_MOTOR_ACT: float(model.actuator_actadr[model.actuator(NAME + MOTOR).id]),
-        fb.S_COMMAND: float(index),
-        fb.S_LEAD_mprad: 1.0 / known(actuator.gear),
-        fb.S_STOP_m: _STOP_BEYOND * float(model.actuator_ctrlrange[index, 1]),
-        fb.S_TOLERANCE_m: known(actuator.position_tolerance_rad),
+        "act": float(model.actuator_actadr[index]),
+        "motor_act": float(model.actuator_actadr[model.actuator(NAME + MOTOR).id]),
+        "command": float(index),
+        "lead_mprad": 1.0 / known(actuator.gear),
+        "stop_m": _STOP_BEYOND * float(model.actuator_ctrlrange[index, 1]),
+        "tolerance_m": known(actuator.position_tolerance_rad),
         # What it says stands last of all sensors, before how many faults act.
-        fb.S_OUT: float(model.nuserdata - 3),
-        fb.S_COLUMN: float(column),
-        fb.S_COLUMN_STIFFNESS_Npm: float(model.tendon_stiffness[column]),
-        fb.S_COLUMN_REST_m: float(model.tendon_lengthspring[column, 0]),
-        fb.S_COLUMN_ARM_m: tendon_arms(model, _COLUMN)[NAME],
-        fb.S_TRAVEL: 1.0,
+        "out": float(model.nuserdata - 3),
+        "column": float(column),
+        "column_stiffness_Npm": float(model.tendon_stiffness[column]),
+        "column_rest_m": float(model.tendon_lengthspring[column, 0]),
+        "column_arm_m": tendon_arms(model, _COLUMN)[NAME],
     }
     if actuator.voltage_ratio == 0.0:
-        values[fb.S_FRICTION_Nm] += known(actuator.lock_torque_Nm)
-    for place, value in values.items():
-        record[place] = value
-    return record
+        values["friction_Nm"] += known(actuator.lock_torque_Nm)
+    return fb.filled(fb.SCREW, travel=[1.0], **values)

@@ -17,12 +17,12 @@ part counts as settled, so that it knows load and friction.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.errors import ModelError
 from activesteer.vehicle import force_block as fb
@@ -108,11 +108,13 @@ class Screws:
     """The records of a car's screws, and where its actuators find them.
 
     Attributes:
-        records: What stands in the block: a record for each link, then one for each screw.
-        places: Name of an actuator -> kind and start of its record behind the first.
+        links: A `LINK` record for each rear wheel.
+        screws: A `SCREW` record for each screw.
+        places: Name of an actuator -> kind and place of its record among these.
     """
 
-    records: list[list[float]]
+    links: list[NDArray[Any]]
+    screws: list[NDArray[Any]]
     places: dict[str, tuple[float, int]]
 
 
@@ -135,43 +137,47 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
     central = actuator.arrangement == "central"
     parts = ("rear",) if central else CORNERS
     places: dict[str, tuple[float, int]] = {}
-    records: list[list[float]] = []
+    links: list[NDArray[Any]] = []
+    screws: list[NDArray[Any]] = []
     outs = model.nuserdata - 1 - sensor_range(model)[1]
-    first_screw = len(CORNERS) * fb.LINK_SIZE
     for index, (corner, tendon) in enumerate(zip(CORNERS, names, strict=True)):
         part = "rear" if central else corner
-        sign = -1.0 if central and corner == "rr" else 1.0
-        places[f"{corner}_steer"] = (fb.KIND_LINK, index * fb.LINK_SIZE)
+        places[f"{corner}_steer"] = (fb.KIND_LINK, index)
         tendon_id = model.tendon(tendon).id
-        records.append([
-            tendon_id, float(model.tendon_length0[tendon_id]), float(model.tendon_stiffness[tendon_id]),
-            known(actuator.backlash_m), _act(model, f"{corner}_steer"), _act(model, part + SCREW), sign,
-            outs + index, *maps[index].angle_of_travel,
-        ])  # fmt: skip
+        link = fb.filled(
+            fb.LINK,
+            tendon=tendon_id,
+            rest_m=model.tendon_length0[tendon_id],
+            stiffness_Npm=model.tendon_stiffness[tendon_id],
+            backlash_m=known(actuator.backlash_m),
+            act=_act(model, f"{corner}_steer"),
+            screw_act=_act(model, part + SCREW),
+            sign=-1.0 if central and corner == "rr" else 1.0,
+            out=outs + index,
+            angle=maps[index].angle_of_travel,
+        )
+        links.append(link)
     for index, part in enumerate(parts):
-        start = first_screw + index * fb.SCREW_SIZE
-        places[part + SCREW], places[part + MOTOR] = (fb.KIND_SCREW, start), (fb.KIND_MOTOR, start)
+        places[part + SCREW], places[part + MOTOR] = (fb.KIND_SCREW, index), (fb.KIND_MOTOR, index)
         # One for both: what moves the left link out moves the right one in.
         travel = maps[index].travel_of_angle if not central else (0.5 * (left.travel_of_angle - right.travel_of_angle))
-        links = [0, fb.LINK_SIZE] if central else [index * fb.LINK_SIZE]
-        values = actuator.motor_numbers() | {
-            fb.S_ACT: _act(model, part + SCREW),
-            fb.S_MOTOR_ACT: _act(model, part + MOTOR),
-            fb.S_COMMAND: model.actuator(f"{CORNERS[index]}_steer").id,
-            fb.S_LEAD_mprad: lead,
-            fb.S_STOP_m: STOP_BEYOND * max(mapped.travel_m for mapped in maps),
-            fb.S_TOLERANCE_m: known(actuator.position_tolerance_m),
-            fb.S_OUT: outs + len(CORNERS) + 2 * index,
-            fb.S_N_LINKS: len(links),
-        }
-        record = [0.0] * fb.SCREW_SIZE
-        for place, value in values.items():
-            record[place] = float(value)
-        record[fb.S_LINK : fb.S_LINK + len(links)] = links
-        record[fb.S_TRAVEL :] = travel.tolist()
-        records.append(record)
-    assert all(len(record) in (fb.LINK_SIZE, fb.SCREW_SIZE) for record in records)
-    return Screws(records, places)
+        moved = [0, 1] if central else [index]
+        screw = fb.filled(
+            fb.SCREW,
+            act=_act(model, part + SCREW),
+            motor_act=_act(model, part + MOTOR),
+            command=model.actuator(f"{CORNERS[index]}_steer").id,
+            lead_mprad=lead,
+            stop_m=STOP_BEYOND * max(mapped.travel_m for mapped in maps),
+            tolerance_m=known(actuator.position_tolerance_m),
+            out=outs + len(CORNERS) + 2 * index,
+            n_links=len(moved),
+            links=moved,
+            travel=travel,
+            **actuator.motor_numbers(),
+        )
+        screws.append(screw)
+    return Screws(links, screws, places)
 
 
 def sensor_range(model: mujoco.MjModel) -> tuple[int, int]:
@@ -190,8 +196,3 @@ def _act(model: mujoco.MjModel, actuator: str) -> int:
 def _tendon(model: mujoco.MjModel, corner: str) -> str:
     present = {model.tendon(index).name for index in range(model.ntendon)}
     return next(f"{corner}_{name}" for name in LINKS if f"{corner}_{name}" in present)
-
-
-def flattened(records: Sequence[Sequence[float]]) -> list[float]:
-    """All records, one behind the other."""
-    return [float(number) for record in records for number in record]

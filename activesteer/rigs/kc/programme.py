@@ -67,8 +67,7 @@ def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> M
     Raises:
         ModelError: the car has no equilibrium somewhere.
     """
-    slots = vehicle.data.userdata[: 4 * fb.USERDATA_PER_WHEEL].reshape(4, fb.USERDATA_PER_WHEEL)
-    load_N = slots[:, fb.U_FZ].copy()
+    load_N = fb.wheel_outputs(vehicle.data, 4)["fz_N"].copy()
     stiffness = (
         tyre_stiffness(tyres[0], vehicle.parameters.tyres.front_pressure_Pa, float(load_N[:2].mean())),
         tyre_stiffness(tyres[1], vehicle.parameters.tyres.rear_pressure_Pa, float(load_N[2:].mean())),

@@ -30,7 +30,7 @@ def standing(vehicle: Vehicle, car: Car) -> Iterator[Finding]:
         car: What it was made from.
     """
     model, data = vehicle.model, vehicle.data
-    load = data.userdata[: 4 * fb.USERDATA_PER_WHEEL].reshape(4, fb.USERDATA_PER_WHEEL)[:, fb.U_FZ].copy()
+    load = fb.wheel_outputs(data, 4)["fz_N"].copy()
     body = mass_properties(model)
     yield Finding("standing", "static equilibrium", "ok", "found")
     yield from _loads(load, body.mass_kg)

@@ -49,9 +49,9 @@ def changed_model(folder: Path, file: str, old: str, new: str) -> Path:
     return target / source.name
 
 
-def record(vehicle: Vehicle, corner: str, slot: int) -> float:
+def record(vehicle: Vehicle, corner: str, field: str) -> float:
     """What the callback left for the recorder, of one wheel."""
-    return float(vehicle.data.userdata[CORNERS.index(corner) * fb.USERDATA_PER_WHEEL + slot])
+    return float(vehicle.data.userdata[fb.output_slot(CORNERS.index(corner), field)])
 
 
 def dof(vehicle: Vehicle, joint: str) -> int:

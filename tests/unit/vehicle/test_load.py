@@ -77,8 +77,8 @@ def test_wheel_loads_are_those_of_a_calculation_by_hand(name: str, vehicle: str)
     cg_m = np.asarray(moment) / mass_kg
     loads, places = [], []
     for corner in CORNERS:
-        loads.append(record(loaded, corner, fb.U_FZ))
-        places.append([record(loaded, corner, fb.U_CONTACT_X), record(loaded, corner, fb.U_CONTACT_Y)])
+        loads.append(record(loaded, corner, "fz_N"))
+        places.append([record(loaded, corner, "contact_x_m"), record(loaded, corner, "contact_y_m")])
     total = mass_kg * GRAVITY_MPS2
     assert sum(loads) == pytest.approx(total, abs=1.0)
     by_axle = np.array(places)[:, 0].reshape(2, 2).mean(axis=1)

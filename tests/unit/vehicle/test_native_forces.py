@@ -47,6 +47,9 @@ def applied(vehicle: Vehicle) -> np.ndarray:
     return with_ours - without
 
 
+FORCES_AND_MOMENTS = ("fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm")
+
+
 def wheel_wrench(vehicle: Vehicle, corner: str) -> np.ndarray:
     """Generalised forces of one tyre, by the engine, from its recorded forces at its contact point, shape (nv,)."""
     model, data = vehicle.model, vehicle.data
@@ -60,7 +63,7 @@ def wheel_wrench(vehicle: Vehicle, corner: str) -> np.ndarray:
     down /= np.linalg.norm(down)
     # Along `down` from the centre to the road.
     contact = data.xpos[body] + down * (data.xpos[body, 2] / -down[2])
-    fx, fy, fz, mx, my, mz = (record(vehicle, corner, slot) for slot in range(fb.U_FX, fb.U_MZ + 1))
+    fx, fy, fz, mx, my, mz = (record(vehicle, corner, field) for field in FORCES_AND_MOMENTS)
     result = np.zeros(model.nv)
     force = fx * forward + fy * left + fz * up
     torque = mx * forward + my * left + mz * up
@@ -84,7 +87,7 @@ def test_generalised_force_of_a_tyre_is_the_engine_s_for_the_recorded_wrench(
         if other != corner:
             lift(vehicle, other)
     got = applied(vehicle)
-    assert [record(vehicle, each, fb.U_FZ) > 100.0 for each in CORNERS] == [each == corner for each in CORNERS]
+    assert [record(vehicle, each, "fz_N") > 100.0 for each in CORNERS] == [each == corner for each in CORNERS]
     expected = wheel_wrench(vehicle, corner)
     np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
 
@@ -94,8 +97,8 @@ def test_generalised_forces_of_all_tyres_add_up(rng: np.random.Generator) -> Non
     tilted_and_moving(vehicle, rng)
     got = applied(vehicle)
     expected = sum(wheel_wrench(vehicle, corner) for corner in CORNERS)
-    assert all(record(vehicle, corner, fb.U_FZ) > 100.0 for corner in CORNERS)
-    assert all(abs(record(vehicle, corner, fb.U_FY)) > 10.0 for corner in CORNERS)
+    assert all(record(vehicle, corner, "fz_N") > 100.0 for corner in CORNERS)
+    assert all(abs(record(vehicle, corner, "fy_N")) > 10.0 for corner in CORNERS)
     np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
 
 
@@ -141,7 +144,7 @@ def test_a_lifted_wheel_feels_nothing() -> None:
     vehicle = standing()
     lift(vehicle, "fl")
     mujoco.mj_forward(vehicle.model, vehicle.data)
-    assert [record(vehicle, "fl", slot) for slot in range(fb.U_FX, fb.U_MZ + 1)] == [0.0] * 6
+    assert [record(vehicle, "fl", field) for field in FORCES_AND_MOMENTS] == [0.0] * 6
 
 
 def foreign(numbers: str = "1 2 3") -> mujoco.MjModel:

@@ -11,7 +11,6 @@ from activesteer.road.road import Road, RoadPatch
 from activesteer.scenario import load_car
 from activesteer.tyre.kernels.magic_formula import steady_state
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle import force_block as fb
 from tests.unit.vehicle.cars import record, tilted_and_moving
 
 LEFT, RIGHT = (0, 2), (1, 3)
@@ -26,7 +25,7 @@ def rolling(road: Road) -> Vehicle:
 
 def frictions(vehicle: Vehicle) -> list[float]:
     mujoco.mj_forward(vehicle.model, vehicle.data)
-    return [record(vehicle, corner, fb.U_MU) for corner in CORNERS]
+    return [record(vehicle, corner, "mu") for corner in CORNERS]
 
 
 def move(vehicle: Vehicle, x_m: float, y_m: float = 0.0) -> None:
@@ -62,7 +61,7 @@ def test_the_beginning_belongs_to_a_patch_and_the_end_does_not() -> None:
     vehicle = rolling(Road(0.9))
     vehicle.rebase()
     assert frictions(vehicle) == [0.9] * 4
-    at = [record(vehicle, corner, fb.U_CONTACT_X) for corner in CORNERS]
+    at = [record(vehicle, corner, "contact_x_m") for corner in CORNERS]
     for start, end, expected in (
         (at[0], at[0] + 1.0, 0.3),
         (np.nextafter(at[0], np.inf), at[0] + 1.0, 0.9),
@@ -97,11 +96,11 @@ def test_the_contact_point_lies_in_the_wheel_plane_below_the_centre(rng: np.rand
     for corner in CORNERS:
         body = model.body(f"{corner}_wheel").id
         axis, centre = data.xmat[body].reshape(3, 3)[:, 1], data.xpos[body]
-        contact = np.array([record(vehicle, corner, fb.U_CONTACT_X), record(vehicle, corner, fb.U_CONTACT_Y), 0.0])
+        contact = np.array([record(vehicle, corner, "contact_x_m"), record(vehicle, corner, "contact_y_m"), 0.0])
         assert abs(axis[2]) > 1e-3
         assert (contact - centre) @ axis == pytest.approx(0.0, abs=1e-12)
         assert (contact - centre) @ np.cross(axis, [0.0, 0.0, 1.0]) == pytest.approx(0.0, abs=1e-12)
-        assert np.linalg.norm(contact - centre) == pytest.approx(record(vehicle, corner, fb.U_LOADED_RADIUS), rel=1e-12)
+        assert np.linalg.norm(contact - centre) == pytest.approx(record(vehicle, corner, "loaded_radius_m"), rel=1e-12)
 
 
 @pytest.mark.parametrize("mu", [1.0, 0.4])
@@ -111,14 +110,14 @@ def test_friction_use_is_that_of_the_formula_s_own_peaks(mu: float, rng: np.rand
     tilted_and_moving(vehicle, rng)
     mujoco.mj_forward(vehicle.model, vehicle.data)
     for corner in CORNERS:
-        fx, fy, fz = (record(vehicle, corner, slot) for slot in (fb.U_FX, fb.U_FY, fb.U_FZ))
-        gamma = record(vehicle, corner, fb.U_INCLINATION)
+        fx, fy, fz = (record(vehicle, corner, slot) for slot in ("fx_N", "fy_N", "fz_N"))
+        gamma = record(vehicle, corner, "inclination_rad")
         tyre = given.tyres[0].mounted_on("LEFT" if corner.endswith("l") else "RIGHT").record
         # The formula ends at the greatest load of the file.
         load = min(fz, tyre["FZMAX"])
         assert load > 100.0
         # Friction does not depend on the slips; the formula wants some all the same.
         mu_x, mu_y = steady_state(tyre, load, 0.01, 0.02, gamma, 250e3, 15.0, mu, 0.0)[5:7]
-        use = record(vehicle, corner, fb.U_FRICTION_UTILISATION)
+        use = record(vehicle, corner, "friction_utilisation")
         assert use > 0.02
         assert use == pytest.approx(np.hypot(fx / (mu_x * load), fy / (mu_y * load)), rel=0.02)
