@@ -35,7 +35,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--controllers", metavar="C,C...",
         help="instead: these controllers side by side, with the sensors of production cars, in the five scenarios, a "
-        "step at 120 km/h, the severe lane change, braking on split friction and in a turn",
+        "step at 120 km/h, the severe lane change, braking on split friction and in a turn, a turn across snow",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, metavar="S", help="of the population's sample (default: the stored one's)")
     add_scheduler(parser)

@@ -1,4 +1,4 @@
-"""Any controllers side by side: the paper's five scenarios and four harder ones, behind the sensors of production cars.
+"""Any controllers side by side: the paper's five scenarios and five harder ones, behind the sensors of production cars.
 
 All drive the same scenarios; what is compared are the metrics of their recordings, under the names that they have
 there.
@@ -27,24 +27,26 @@ CASES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "severe_lane_change": ("severe_lane_change", {}),
     "split_mu_braking": ("split_mu_braking", {}),
     "brake_in_turn": ("brake_in_turn", {}),
+    "mu_jump": ("mu_jump", {}),
 }
 """Scenario -> manoeuvre and what is otherwise than in its file."""
 _STEP: Final = ("yaw_rate_response_time_s", "ay_response_time_s", "yaw_rate_overshoot", "sideslip_peak_rad")
-_LANES: Final = ("sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps", "steering_wheel_peak_abs_rad")
+_ALONG_PATH: Final = ("sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps", "steering_wheel_peak_abs_rad")
 SHOWN: Final[dict[str, tuple[str, ...]]] = {
     "step_steer": _STEP,
     "sine_with_dwell": ("yaw_rate_after_1000ms_share", "lateral_displacement_m", "sideslip_peak_abs_rad"),
-    "double_lane_change": _LANES,
+    "double_lane_change": _ALONG_PATH,
     "slalom": ("sideslip_peak_abs_rad", "yaw_rate_rms_radps", "track_amplitude_m", "steering_wheel_peak_abs_rad"),
-    "double_lane_change_low_mu": _LANES,
+    "double_lane_change_low_mu": _ALONG_PATH,
     "step_steer_120_kmh": _STEP,
-    "severe_lane_change": (*_LANES, "lane_overstep_m"),
+    "severe_lane_change": (*_ALONG_PATH, "lane_overstep_m"),
     "split_mu_braking": ("stopping_distance_m", "lateral_deviation_max_m", "yaw_rate_peak_abs_radps"),
     "brake_in_turn": (
         "path_deviation_after_1000ms_m",
         "yaw_rate_deviation_after_1000ms_radps",
         "sideslip_peak_abs_rad",
     ),
+    "mu_jump": (*_ALONG_PATH, "track_deviation_max_m"),
 }
 """Scenario -> metrics that are printed and drawn; those of all are in the JSON."""
 SENSORS: Final = {"sensors.preset": "production", "sensors.seed": 1}

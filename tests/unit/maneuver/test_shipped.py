@@ -17,7 +17,7 @@ def test_all_kinds_that_were_asked_for_are_there():
     asked = {
         "step_steer", "sine_with_dwell", "double_lane_change", "double_lane_change_low_mu", "slalom", "straight_line",
         "sine_sweep", "slowly_increasing_steer", "ramp_steer", "constant_radius", "brake_in_turn", "severe_lane_change",
-        "split_mu_braking",
+        "split_mu_braking", "mu_jump",
     }  # fmt: skip
     assert asked <= set(list_maneuvers())
 
@@ -74,6 +74,17 @@ def test_the_sine_of_the_slalom_asks_for_nearly_what_the_road_gives():
     assert isinstance(maneuver, Slalom)
     asked = maneuver.cones.offset_m * (np.pi * maneuver.speed_mps / maneuver.cones.spacing_m) ** 2
     assert 0.9 < asked / (maneuver.road.mu * 9.81) < 1.0
+
+
+def test_the_snow_of_the_mu_jump_gives_less_than_the_turn_asks_for_and_the_dry_road_more():
+    maneuver = resolve("mu_jump").maneuver
+    assert maneuver.course is not None
+    [snow] = maneuver.road.patches
+    path = maneuver.course.path
+    asked = maneuver.speed_mps**2 * path.curvature_1pm[(path.x_m >= snow.start_m) & (path.x_m < snow.end_m)]
+    assert asked == pytest.approx(maneuver.speed_mps**2 / 100.0, rel=0.01)
+    assert snow.mu * 9.81 < 0.7 * asked.min()
+    assert maneuver.road.mu * 9.81 > 1.5 * asked.max()
 
 
 @pytest.mark.parametrize("name", list_maneuvers())
