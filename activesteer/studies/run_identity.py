@@ -16,8 +16,8 @@ from activesteer.scenario import Scenario, describe
 from activesteer.version import __version__
 
 _DECIDING: Final = (
-    "config", "conventions.py", "signals.py", "theory", "road", "maneuver", "driver", "controllers", "estimation", "tyre",
-    "brakes", "sensors", "faults", "vehicle", "scenario", "simulation", "analysis",
+    "config", "conventions.py", "signals.py", "theory", "road", "maneuver", "driver", "controllers", "estimation",
+    "tyre", "brakes", "sensors", "faults", "vehicle", "scenario", "simulation", "analysis",
 )  # fmt: skip
 """Parts of the package that a result depends on."""
 
