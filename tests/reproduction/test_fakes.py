@@ -10,6 +10,7 @@ import pytest
 
 from activesteer import ActuatorCommand, simulate
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Fake
+from activesteer.analysis.claims.noticeable import STEER_RAD
 from activesteer.controllers import load_controller
 from activesteer.recording import Recording
 
@@ -19,6 +20,10 @@ IDLE = {
     "controllers.ars.corrector.proportional_gain_s": 0.0,
     "controllers.afs.corrector.proportional_gain_s": 0.0,
 }
+
+
+NOISE_RADPS, SAMPLE_STEPS = np.radians(0.1), 10
+"""Noise of a production yaw rate sensor, rms, and how many steps lie between its samples."""
 
 
 class TurnedRound:
@@ -42,6 +47,22 @@ def turned_round(system: str) -> Any:
         return TurnedRound(system, setup)
 
     return make
+
+
+class OnNoise:
+    """A controller with the gain of the paper that acts on the noise of a production yaw rate sensor alone."""
+
+    def __init__(self, system: str, setup: Any) -> None:
+        self._gain_s = getattr(setup.gains, system).corrector.proportional_gain_s
+        self._word = {"ars": "rear_steer_demand_rad", "afs": "superposition_demand_rad"}[system]
+        self._rng, self._steps = np.random.default_rng(5), 0
+        self._command = ActuatorCommand()
+
+    def step(self, command: Any, measurement: Any) -> ActuatorCommand:
+        if self._steps % SAMPLE_STEPS == 0:
+            self._command = ActuatorCommand(**{self._word: self._gain_s * self._rng.normal(0.0, NOISE_RADPS)})
+        self._steps += 1
+        return self._command
 
 
 def cut(recording: Recording, end_s: float) -> Recording:
@@ -69,6 +90,16 @@ def test_other_runs_in_place_of_the_systems_prove_nothing(runs: Runs, scenario: 
 def test_a_system_turned_round_has_none_of_the_effects(runs: Runs, scenario: str) -> None:
     fakes = {system: simulate(scenario, turned_round(system)) for system in ("ars", "afs")}
     assert passed(SCENARIOS[scenario]({"none": runs[scenario]["none"], **fakes}), Fake.REVERSED) == []
+
+
+def test_who_acts_on_noise_alone_does_not_act(runs: Runs) -> None:
+    scenario = "double_lane_change"
+    fakes = {
+        system: simulate(scenario, lambda setup, system=system: OnNoise(system, setup)) for system in ("ars", "afs")
+    }
+    for system, demand in (("ars", "rear_steer_demand_rad"), ("afs", "superposition_demand_rad")):
+        assert np.abs(fakes[system][demand]).max() > STEER_RAD  # in an instant
+    assert passed(SCENARIOS[scenario]({"none": runs[scenario]["none"], **fakes}), Fake.NOISE) == []
 
 
 def test_gains_at_zero_are_no_system(runs: Runs) -> None:

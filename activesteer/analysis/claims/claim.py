@@ -36,11 +36,13 @@ class Fake(StrEnum):
     REVERSED = "both systems with their signs turned round"
     ONE_REVERSED = "one of the systems with its sign turned round"
     NO_GAIN = "both systems with gains at zero"
+    NOISE = "both systems answer to the noise of their sensors and to nothing else"
     CUT_SHORT = "runs that end too early"
 
 
-_NO_PROOF: Final = frozenset({Fake.NONE_AS_BOTH, Fake.EXCHANGED, Fake.NO_GAIN, Fake.CUT_SHORT})
-"""What every statement rejects: no claim passes but on whole runs in which each system acts as what it is."""
+_NO_PROOF: Final = frozenset({Fake.NONE_AS_BOTH, Fake.EXCHANGED, Fake.NO_GAIN, Fake.NOISE, Fake.CUT_SHORT})
+"""What every statement rejects: no claim passes but on whole runs in which each system acts as what it is,
+and on the manoeuvre."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,8 @@ import math
 from typing import Final
 
 STEER_RAD: Final = math.radians(0.05)
-"""Angle of a road wheel that is turned or added [rad]: workshops set wheel alignment to some 3 minutes of arc."""
+"""Angle of a road wheel that is turned or added [rad]: workshops set wheel alignment to some 3 minutes of arc. One
+that is demanded counts as `action` says, so that no noise passes for it."""
 SETTLED_SIDESLIP_RAD: Final = math.radians(0.05)
 """Difference of a sideslip angle that is the mean over a second [rad]: half of an optical sensor's +-0.1 deg."""
 SIDESLIP_RAD: Final = math.radians(0.1)

@@ -49,7 +49,8 @@ def _kept_statement(number: str, system: str, text: str) -> Statement:
         text,
         f"The magnitude of the yaw rate of {system} is at most {_LIMITS} after the completion of steer, of its first "
         f"peak after the steering reversal (FMVSS 126), and its sideslip stays within "
-        f"{math.degrees(KEPT_SIDESLIP_RAD):.0f} deg; none does not keep these limits.",
+        f"{math.degrees(KEPT_SIDESLIP_RAD):.0f} deg; none does not keep these limits, and the peak of its sideslip is "
+        f"at least {math.degrees(SIDESLIP_RAD):g} deg larger.",
         Fake.NO_EFFECT,
         Fake.REVERSED,
     )
@@ -118,7 +119,8 @@ def _kept(trio: Trio, statement: Statement, system: str) -> Claim:
     values = {
         f"{run}_{metric}": trio.metrics[run][metric] for metric in (*RATIOS, SIDESLIP) for run in ("none", system)
     }
-    return trio.judge(statement, _keeps(trio, system) and not _keeps(trio, "none"), values)
+    kept = _keeps(trio, system) and not _keeps(trio, "none")
+    return trio.judge(statement, kept and trio.lowers(system, SIDESLIP, 1.0, SIDESLIP_RAD), values)
 
 
 def _keeps(trio: Trio, system: str) -> bool:

@@ -11,6 +11,7 @@ from typing import Final
 
 from activesteer.analysis import path_following
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.noticeable import TRACK_M
 from activesteer.analysis.claims.path_following import CONES_HIT, LARGE_STEERING_WHEEL_RAD, held, held_statement
 from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.series import rms
@@ -36,7 +37,8 @@ def _stays_statement(number: str, system: str, text: str) -> Statement:
         Kind.DRIVER,
         number,
         text,
-        f"The whole body of {system} goes through every lane and never gets beyond a side, and that of none does not.",
+        f"The whole body of {system} goes through every lane and never gets beyond a side; that of none does "
+        f"not, and gets at least {TRACK_M:g} m further out.",
         Fake.NO_EFFECT,
         Fake.REVERSED,
     )
@@ -97,8 +99,9 @@ def _leaves(trio: Trio) -> Claim:
 
 def _stays(trio: Trio, statement: Statement, system: str) -> Claim:
     names = (OVERSTEP, IN_LANES, CONES_HIT)
+    none, kept = trio.metrics["none"], trio.metrics[system]
     return trio.judge(
         statement,
-        trio.metrics[system][IN_LANES] == 1.0 and trio.metrics["none"][IN_LANES] == 0.0,
+        kept[IN_LANES] == 1.0 and none[IN_LANES] == 0.0 and none[OVERSTEP] - kept[OVERSTEP] >= TRACK_M,
         {f"{run}_{name}": trio.metrics[run][name] for name in names for run in ("none", system)},
     )

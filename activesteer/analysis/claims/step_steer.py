@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from activesteer.analysis import step_response
+from activesteer.analysis.claims.action import mean_straight_ahead
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
 from activesteer.analysis.claims.noticeable import SETTLED_SIDESLIP_RAD, STEER_RAD, TIME_S, YAW_RATE_RADPS
 from activesteer.analysis.claims.trio import Trio
@@ -31,6 +32,8 @@ _LOWER: Final = (
 )
 _HELPS: Final = f"the peak yaw rate of {{}} is {_LOWER}"
 """What a system must do for its angles and its sideslip to say something about it: one that does harm is another."""
+TURNED: Final = (("rear_steer", "rad"), ("superposition", "rad"), ("sideslip", "rad"))
+"""Settled angles that count from straight ahead: the offset of a sensor turns wheels there too."""
 
 S1: Final = Statement.about(
     Kind.SYSTEMS,
@@ -53,24 +56,26 @@ S3: Final = Statement.about(
     Kind.SYSTEMS,
     "S3",
     "The rear wheels settle turned against the front wheels.",
-    "The steady-state rear angle of ars, less that of none (the give of the hinges), has the sign opposite to that of "
-    f"the front wheels, and at least {math.degrees(STEER_RAD):g} deg; {_HELPS.format('ars')}.",
+    "The steady-state rear angle of ars, counted from straight ahead, less that of none (the give of the "
+    f"hinges), has the sign opposite to that of the front wheels, and at least {math.degrees(STEER_RAD):g} deg; "
+    f"{_HELPS.format('ars')}.",
     Fake.REVERSED,
 )
 S4: Final = Statement.about(
     Kind.SYSTEMS,
     "S4",
     "The superposed angle adds to the driver's.",
-    "The steady-state superposition angle of afs, less that of none (the give of the gear), has the sign of the "
-    f"steering wheel angle, and at least {math.degrees(STEER_RAD):g} deg; {_HELPS.format('afs')}.",
+    "The steady-state superposition angle of afs, counted from straight ahead, less that of none (the give of "
+    f"the gear), has the sign of the steering wheel angle, and at least {math.degrees(STEER_RAD):g} deg; "
+    f"{_HELPS.format('afs')}.",
     Fake.REVERSED,
 )
 S5: Final = Statement.about(
     Kind.SYSTEMS,
     "S5",
     "Rear steering makes the sideslip angle larger.",
-    "The magnitude of the steady-state sideslip angle of ars is above those of none and of afs by at least "
-    f"{math.degrees(SETTLED_SIDESLIP_RAD):g} deg; {_HELPS.format('ars')}.",
+    "The magnitude of the steady-state sideslip angle of ars, counted from straight ahead, is above those of none "
+    f"and of afs by at least {math.degrees(SETTLED_SIDESLIP_RAD):g} deg; {_HELPS.format('ars')}.",
     Fake.NO_EFFECT,
     Fake.REVERSED,
 )
@@ -132,7 +137,10 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
 
 
 def _metrics(recording: RecordingLike) -> dict[str, float]:
-    return step_response.metrics(recording) | {PEAK: float(np.abs(recording["yaw_rate_radps"]).max())}
+    values = step_response.metrics(recording)
+    for name, unit in TURNED:
+        values[f"{name}_steady_state_{unit}"] -= mean_straight_ahead(recording, f"{name}_{unit}")
+    return values | {PEAK: float(np.abs(recording["yaw_rate_radps"]).max())}
 
 
 def _added(trio: Trio, system: str, metric: str) -> float:

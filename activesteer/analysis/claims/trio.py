@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from activesteer.analysis.claims.action import MEAN_S, largest_action
 from activesteer.analysis.claims.claim import SYSTEMS, SYSTEMS_WITH_CONTROL, Claim, Statement, check_systems
 from activesteer.analysis.claims.noticeable import STEER_RAD
 from activesteer.analysis.series import timestep
@@ -25,8 +26,10 @@ class Trio:
         metrics: Their metrics, by system; nan for one that a run cut short does not have.
         whole: Whether all three came to the end of their manoeuvre.
         obstacle: Why no claim can pass on these runs, a sentence; empty where nothing stands against it. A run must
-            be whole. That of ars must turn the rear wheels and that of afs the superposition gear, each alone and by
-            `noticeable.STEER_RAD` at some time, that of none neither: what a system did not do proves nothing about it.
+            be whole. That of ars must turn the rear wheels and that of afs the superposition gear, by
+            `noticeable.STEER_RAD` more than straight ahead and for longer than noise does (`action.largest_action`);
+            neither may ask the other for as much in any instant, and none asks nobody: what a system did not do proves
+            nothing about it.
     """
 
     def __init__(
@@ -127,9 +130,10 @@ def _pretence(recordings: Mapping[str, RecordingLike]) -> str:
     """What a run does that its system does not, or does not do that it should, a sentence; empty where all fits."""
     for system in SYSTEMS:
         for name, owner in (("rear_steer", "ars"), ("superposition", "afs")):
-            maximum = float(np.abs(recordings[system][f"{name}_demand_rad"]).max())
-            if (maximum >= STEER_RAD) is not (system == owner):
-                words = "asks for" if maximum >= STEER_RAD else "never asks for"
-                angle = f"{math.degrees(STEER_RAD):.2f} deg of {name.replace('_', ' ')}"
-                return f"the run {system} {words} {angle}"
+            demand = f"{name}_demand_rad"
+            angle = f"{math.degrees(STEER_RAD):.2f} deg of {name.replace('_', ' ')}"
+            if system != owner and float(np.abs(recordings[system][demand]).max()) >= STEER_RAD:
+                return f"the run {system} asks for {angle}"
+            if system == owner and not largest_action(recordings[system], demand) >= STEER_RAD:
+                return f"the run {system} never asks for {angle} more than straight ahead, as a mean over {MEAN_S:g} s"
     return ""

@@ -107,6 +107,26 @@ def test_the_give_of_a_hinge_is_no_added_rear_angle():
     assert not {claim.id: claim for claim in SCENARIOS["step_steer"](runs)}["S3"].passed
 
 
+@pytest.mark.parametrize(("number", "system", "name"), [("S3", "ars", "rear_steer"), ("S4", "afs", "superposition")])
+def test_what_the_offset_of_a_sensor_adds_straight_ahead_too_is_nothing_added(number, system, name):
+    runs = runs_of("step_steer", good("step_steer"))
+    channel = runs[system].channels[f"{name}_rad"]
+    runs[system].channels[f"{name}_rad"] = np.full_like(channel, channel[-1])
+    assert not {claim.id: claim for claim in SCENARIOS["step_steer"](runs)}[number].passed
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_a_system_that_does_as_much_straight_ahead_does_not_act(scenario):
+    for system, demand in (("ars", "rear_steer_demand_rad"), ("afs", "superposition_demand_rad")):
+        runs = runs_of(scenario, good(scenario))
+        run = runs[system]
+        ahead, largest_rad = run.time_s < 0.5, np.abs(run[demand]).max()
+        run.channels["steering_wheel_rad"] = np.where(ahead, 0.0, run["steering_wheel_rad"])
+        run.channels[demand] = np.where(ahead, largest_rad, run[demand])
+        obstacles = {claim.obstacle for claim in SCENARIOS[scenario](runs)}
+        assert all(obstacle.startswith(f"the run {system} never asks for") for obstacle in obstacles)
+
+
 def test_claims_are_found_by_the_name_of_the_manoeuvre():
     run = along_path()
     run.metadata["maneuver"] = {"kind": "lane_change", "name": "double_lane_change_low_mu"}

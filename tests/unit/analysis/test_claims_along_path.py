@@ -80,6 +80,17 @@ def test_only_the_broken_one_of_the_slippery_lane_change_fails(broken, system, c
     assert failing("double_lane_change_low_mu", arguments) == broken
 
 
+@pytest.mark.parametrize(("number", "system"), [("W2", "ars"), ("W3", "afs")])
+def test_who_keeps_a_lane_by_less_than_can_be_measured_has_not_kept_it(number, system):
+    arguments = good("double_lane_change_low_mu")
+    arguments[system]["track"] = wider(1.06)  # 1 cm inside
+    for share, outside_m, holds in ((1.07, 0.03, False), (1.08, 0.07, True)):
+        arguments["none"]["track"] = wider(share)
+        claim = check("double_lane_change_low_mu", arguments)[number]
+        assert claim.values["none_lane_overstep_m"] == pytest.approx(outside_m, abs=0.005)
+        assert claim.passed is holds
+
+
 def test_nothing_to_calm_is_nothing_calmed():
     arguments = good("double_lane_change")
     for words in arguments.values():
