@@ -114,8 +114,9 @@ def _compare(options: argparse.Namespace) -> int:
     if options.json:
         print_json({**made.to_json(), "figures": [str(path) for path in figures]})
     else:
-        print(made.to_text())
-        print("\n".join(f"figure: {path}" for path in figures))
+        print(coloured(made.to_text()))
+        for path in figures:
+            print(f"figure: {path}")
     return 1 if made.failures else 0
 
 

@@ -6,11 +6,15 @@ there.
 
 from __future__ import annotations
 
+import functools
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
+
+import numpy as np
 
 from activesteer.analysis.claims import SCENARIOS
 from activesteer.controllers import find_controller
@@ -18,8 +22,12 @@ from activesteer.errors import ParameterError
 from activesteer.files import make_folder
 from activesteer.quantities import metric_label
 from activesteer.recording import Recording, check_target
+from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, resolve
+from activesteer.studies.comparison_targets import Target, targets, targets_text
+from activesteer.studies.envelope import LINES, entry_speed
 from activesteer.studies.reproduction import Progress, drive
+from activesteer.studies.workers import in_parallel
 
 CASES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     **{name: (name, {}) for name in SCENARIOS},
@@ -32,6 +40,7 @@ CASES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
 """Scenario -> manoeuvre and what is otherwise than in its file."""
 _STEP: Final = ("yaw_rate_response_time_s", "ay_response_time_s", "yaw_rate_overshoot", "sideslip_peak_rad")
 _ALONG_PATH: Final = ("sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps", "steering_wheel_peak_abs_rad")
+_ENTRY: Final = ("entry_speed_min_mps", "entry_speed_mps", "entry_speed_max_mps")
 SHOWN: Final[dict[str, tuple[str, ...]]] = {
     "step_steer": _STEP,
     "sine_with_dwell": ("yaw_rate_after_1000ms_share", "lateral_displacement_m", "sideslip_peak_abs_rad"),
@@ -39,7 +48,7 @@ SHOWN: Final[dict[str, tuple[str, ...]]] = {
     "slalom": ("sideslip_peak_abs_rad", "yaw_rate_rms_radps", "track_amplitude_m", "steering_wheel_peak_abs_rad"),
     "double_lane_change_low_mu": _ALONG_PATH,
     "step_steer_120_kmh": _STEP,
-    "severe_lane_change": (*_ALONG_PATH, "lane_overstep_m"),
+    "severe_lane_change": (*_ALONG_PATH, "lane_overstep_m", *_ENTRY),
     "split_mu_braking": ("stopping_distance_m", "lateral_deviation_max_m", "yaw_rate_peak_abs_radps"),
     "brake_in_turn": (
         "path_deviation_after_1000ms_m",
@@ -51,6 +60,12 @@ SHOWN: Final[dict[str, tuple[str, ...]]] = {
 """Scenario -> metrics that are printed and drawn; those of all are in the JSON."""
 SENSORS: Final = {"sensors.preset": "production", "sensors.seed": 1}
 """What all of them see the car through."""
+ENTRY_SEEDS: Final = (1, 2, 3)
+"""Sensors with which the highest entry speed of the severe lane change is looked for."""
+_LANE_CHANGE: Final = "severe_lane_change"
+_LABEL: Final = 41
+_COLUMN: Final = 7
+"""Widths of the table: that of a label, and the least of a number."""
 
 
 class Row(NamedTuple):
@@ -96,22 +111,32 @@ class Comparison:
         order = list(CASES)
         return sorted((line for line in found if line[2]), key=lambda line: order.index(line[0]))
 
+    @property
+    def targets(self) -> list[Target]:
+        """What became of what the controllers beyond the paper's are asked for."""
+        return targets(self.controllers, self.rows)
+
     def to_text(self) -> str:
-        """The metrics of `SHOWN` as a table."""
-        lines = [f"{'':62}" + "".join(f"{name:>13}" for name in self.controllers)]
-        before = ""
+        """The metrics of `SHOWN` as a table, and the targets."""
+        columns = [max(_COLUMN, len(name) + 1) for name in self.controllers]
+        heads = "".join(f"{name:>{width}}" for name, width in zip(self.controllers, columns, strict=True))
+        lines, before = [" " * _LABEL + heads], ""
         for scenario, metric, values in self.shown():
-            label, unit, factor = metric_label(metric)
-            label = f"{label} [{unit}]"
-            cells = (f"{values[name] * factor:13.3g}" if name in values else f"{'-':>13}" for name in self.controllers)
-            lines.append(f"{scenario if scenario != before else '':26}{label:36}" + "".join(cells))
+            if scenario != before:
+                lines.append(scenario)
             before = scenario
-        return "\n".join(lines)
+            words, unit, factor = metric_label(metric)
+            label = f"  {words} [{unit}]"
+            shown = [f"{values[name] * factor:.3g}" if name in values else "-" for name in self.controllers]
+            cells = "".join(f"{text:>{width}}" for text, width in zip(shown, columns, strict=True))
+            lines.append(f"{label:{_LABEL}}{cells}")
+        return "\n".join([*lines, *(["", targets_text(self.targets)] if self.targets else [])])
 
     def to_json(self) -> dict[str, Any]:
         """All numbers."""
         return {
             "table": [row._asdict() for row in self.rows],
+            "targets": [target._asdict() for target in self.targets],
             "files": [str(file) for file in self.files],
             "failures": {f"{scenario} {name}": problem for (scenario, name), problem in self.failures.items()},
         }
@@ -125,7 +150,10 @@ def compare(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Drives `CASES` with every controller.
+    """Drives `CASES` with every controller, and looks for their entry speeds in the severe lane change.
+
+    `entry_speed_mps` is the middle one over `ENTRY_SEEDS`; `entry_speed_min_mps` and `entry_speed_max_mps` are its
+    spread.
 
     Args:
         controllers: As for `simulate`.
@@ -146,17 +174,40 @@ def compare(
     for systems in paths.values():
         for path in systems.values():
             check_target(path)
-    made, total = Comparison(tuple(labels)), len(scenarios) * len(labels)
+    searches = [(given, seed) for given in controllers for seed in ENTRY_SEEDS] if _LANE_CHANGE in CASES else []
+    made, runs = Comparison(tuple(labels)), len(scenarios) * len(labels)
+
+    def tell(what: str, done: int) -> None:
+        if progress is not None:
+            progress(what, done, runs + len(searches))
+
     named = {given: label for label, given in labels.items()}
     for done, (scenario, given, problem) in enumerate(drive(scenarios, paths, jobs), 1):
         if problem:
             made.failures[scenario, named[given]] = problem
-        if progress is not None:
-            progress(f"{scenario} {named[given]}" + (" FAILED" if problem else ""), done, total)
+        tell(f"{scenario} {named[given]}" + (" FAILED" if problem else ""), done)
     for scenario, systems in paths.items():
         for given, path in systems.items():
             if (scenario, named[given]) not in made.failures:
                 made.files.append(path)
                 found = Recording.open(path).metrics
                 made.rows += [Row(scenario, named[given], metric, value) for metric, value in found.items()]
+    search = functools.partial(_entry_speed, vehicle)
+    speeds = in_parallel(search, searches, jobs, lambda _, done: tell("entry speeds", runs + done))
+    for given, label in named.items():
+        own = [speed for (other, _), speed in zip(searches, speeds, strict=True) if other == given]
+        made.rows += _entry_speeds(label, own)
     return made
+
+
+def _entry_speed(vehicle: FileOrTable, controller: str, seed: int) -> float:
+    overrides = SENSORS | {"sensors.seed": seed}
+    found = entry_speed(_LANE_CHANGE, vehicle, overrides, LINES["lane_change"], DEFAULT_DRIVER, controller)
+    return math.nan if found is None else found / 3.6
+
+
+def _entry_speeds(controller: str, speeds_mps: Sequence[float]) -> list[Row]:
+    if not speeds_mps:
+        return []
+    values = np.min(speeds_mps), np.median(speeds_mps), np.max(speeds_mps)
+    return [Row(_LANE_CHANGE, controller, name, float(value)) for name, value in zip(_ENTRY, values, strict=True)]

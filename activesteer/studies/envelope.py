@@ -229,7 +229,7 @@ def envelope(
         return lambda done, total: progress(what, done, total) if progress else None
 
     pairs = [(driver, controller) for driver in drivers for controller in controllers]
-    search = functools.partial(_entry_speed, maneuver, vehicle, given, line)
+    search = functools.partial(entry_speed, maneuver, vehicle, given, line)
     tell = report("entry speeds")
     found = in_parallel(search, pairs, jobs, lambda _, done: tell(done, len(pairs)))
     entry_speeds = [
@@ -280,7 +280,7 @@ def _map_row(driver: str, line: Line, row: Mapping[str, Any]) -> dict[str, Any]:
     return {**place, "kept": status == Status.OK and line.kept(row), **metrics}
 
 
-def _entry_speed(
+def entry_speed(
     maneuver: FileOrTable,
     vehicle: FileOrTable,
     overrides: Mapping[str, Any],
@@ -288,7 +288,23 @@ def _entry_speed(
     driver: FileOrTable,
     controller: str,
 ) -> float | None:
-    """Bisection between a speed at which the car gets through and one at which it does not [km/h]."""
+    """The highest speed at which a car gets through, by bisection.
+
+    Args:
+        maneuver: Name, path, or table of a lane change or a slalom.
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key -> value; neither speed nor duration.
+        line: The manoeuvre's, of `LINES`.
+        driver: Who drives.
+        controller: As for `simulate`.
+
+    Returns:
+        To `RESOLUTION_KMH` below the lowest speed at which it does not [km/h]; None where it does at none of
+        `RANGE_KMH`, the upper end where it does at all.
+
+    Raises:
+        ActiveSteerError: an input is wrong.
+    """
 
     def keeps(speed_kmh: float) -> bool:
         duration_s = _duration_s(maneuver, vehicle, overrides, speed_kmh)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import pytest
 
@@ -11,7 +12,7 @@ from activesteer.controllers import find_controller
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.studies import comparison
-from activesteer.studies.comparison import CASES, SHOWN, compare
+from activesteer.studies.comparison import CASES, SHOWN, Comparison, Row, compare
 
 
 @pytest.fixture
@@ -45,6 +46,41 @@ def test_every_scenario_has_metrics_to_show():
 def test_controllers_and_population_do_not_go_together(capsys):
     assert main(["reproduce", "--controllers", "none", "--population", "4"]) == 1
     assert "--population" in capsys.readouterr().err
+
+
+def made_up(**values: tuple[float, float, float]) -> Comparison:
+    """Controllers with overshoot of a step, amplitude of a slalom, and entry speed."""
+    places = [
+        ("step_steer", "yaw_rate_overshoot"),
+        ("slalom", "track_amplitude_m"),
+        ("severe_lane_change", "entry_speed_mps"),
+    ]
+    rows = [
+        Row(scenario, name, metric, number)
+        for name, numbers in values.items()
+        for (scenario, metric), number in zip(places, numbers, strict=True)
+    ]
+    return Comparison(tuple(values), rows)
+
+
+def test_targets_are_for_those_beyond_the_paper_and_bounds_are_kept_as_they_are_said():
+    made = made_up(none=(0.1, 2.2, 14.0), ars=(0.2, 2.0, 20.0), lqr=(0.03, 2.2, 14.0), mpc=(0.031, 2.1, 14.5))
+    assert {target.controller for target in made.targets} == {"lqr", "mpc"}
+    passed = {name: [target.passed for target in made.targets if target.controller == name] for name in ("lqr", "mpc")}
+    assert passed["lqr"] == [True, False, False]  # as large as without control is not below, and as fast not faster
+    assert passed["mpc"] == [False, True, True]
+    assert "FAILED  slalom: track amplitude 2.2 m, asked for < 2.2 m of none" in made.to_text()
+
+
+def test_a_run_without_the_metric_fails_its_target():
+    made = made_up(none=(0.1, 2.2, 14.0), lqr=(0.01, math.nan, math.nan))
+    assert [target.passed for target in made.targets] == [True, False, False]
+
+
+def test_the_table_of_seven_controllers_fits_a_terminal():
+    names = ("none", "ars", "afs", "esc", "lqr", "mpc", "integrated")
+    made = made_up(**dict.fromkeys(names, (0.1, 2.2, 14.0)))
+    assert max(map(len, made.to_text().splitlines())) <= 100
 
 
 @pytest.mark.parametrize("name", ["ars_sideslip", "lqr", "esc", "integrated", "mpc"])

@@ -24,7 +24,7 @@ def entry_speed(monkeypatch: pytest.MonkeyPatch, most_kmh: float) -> float | Non
         return SimpleNamespace(metrics={"stays_in_lanes": float(3.6 * scenario.maneuver.speed_mps <= most_kmh)})
 
     monkeypatch.setattr(module, "run_scenario", drive)
-    return module._entry_speed("double_lane_change", "compact", {}, LANES, "typical", "none")
+    return module.entry_speed("double_lane_change", "compact", {}, LANES, "typical", "none")
 
 
 @pytest.mark.parametrize("most_kmh", [41.3, 77.7, 149.9])
@@ -46,10 +46,10 @@ def test_a_run_that_ends_early_is_lost_and_a_wrong_input_is_an_error(monkeypatch
         raise error
 
     monkeypatch.setattr(module, "run_scenario", diverge)
-    assert module._entry_speed("slalom", "compact", {}, LINES["slalom"], "typical", "none") is None
+    assert module.entry_speed("slalom", "compact", {}, LINES["slalom"], "typical", "none") is None
     monkeypatch.setattr(module, "run_scenario", lambda *_: (_ for _ in ()).throw(ParameterError("no such controller")))
     with pytest.raises(ParameterError):
-        module._entry_speed("slalom", "compact", {}, LINES["slalom"], "typical", "none")
+        module.entry_speed("slalom", "compact", {}, LINES["slalom"], "typical", "none")
 
 
 def row(controller: str, speed: float, line: float, kept: bool) -> dict[str, Any]:
