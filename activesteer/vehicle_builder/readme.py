@@ -24,7 +24,7 @@ def readme_text(car: Car, trimmed: Trimmed, table_name: str) -> str:
     """
     kinds = " and ".join(f"{axle.kind.name.replace('_', ' ')} {axle.name}" for axle in car.axles)
     rows = [f"| `{item.key}` | {item.value} | {item.rule} |" for item in car.assumptions]
-    trim_rows = [_trim_row(car, trimmed, axle.name) for axle in car.axles]
+    trim_rows = [_trim_row(trimmed, axle.name) for axle in car.axles]
     return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
         name=car.name,
         kinds=kinds,
@@ -63,7 +63,7 @@ def _open(rows: list[str]) -> str:
     return head + "| Key | Value | Rule |\n|---|---|---|\n" + "\n".join(rows) + "\n"
 
 
-def _trim_row(car: Car, trimmed: Trimmed, name: str) -> str:
+def _trim_row(trimmed: Trimmed, name: str) -> str:
     found = trimmed.axle(name)
     speeds, forces = found.damper_velocity_mps, found.damper_force_N
     at = next(index for index, speed in enumerate(speeds) if speed >= 0.0)

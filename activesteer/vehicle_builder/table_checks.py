@@ -48,7 +48,7 @@ def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source)
         *_axle_contradictions("front", table.front),
         *_axle_contradictions("rear", table.rear),
         *_car_contradictions(table),
-        *_length_problems(table, source),
+        *_length_problems(table),
         *_unit_problems(table),
     ]
     if problems:
@@ -119,7 +119,7 @@ def all_points(table: CarTable) -> Iterator[tuple[str, Point]]:
                 yield f"{part}.{name}", point
 
 
-def _length_problems(table: CarTable, source: Source) -> Iterator[str]:
+def _length_problems(table: CarTable) -> Iterator[str]:
     for key, point in (*all_points(table), ("origin", table.origin)):
         if len(point) != 3:
             yield f"{key}: {len(point)} numbers given; x, y, z are needed"

@@ -85,7 +85,7 @@ def test_an_edit_in_the_formula_of_a_tyre_counts(tmp_path: Path) -> None:
     call = (
         "from activesteer.tyre import load_tir\n"
         "from activesteer.tyre.kernels.magic_formula import slip_stiffnesses\n"
-        f"print(slip_stiffnesses(load_tir({str(tyre)!r}).record, 4000.0, 0.0, 2.2e5, 1.0)[1])"
+        f"print(slip_stiffnesses(load_tir({str(tyre)!r}).record, 4000.0, 0.0, 2.2e5)[1])"
     )
     before, _ = _run(call, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "kept"))
     edited = tmp_path / _PACKAGE.name / "tyre" / "kernels" / "pure_slip.py"

@@ -132,7 +132,7 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     damping_slip_y = 0.0
     if speed < low_speed_mps:
         fraction = 0.5 * (1.0 + math.cos(math.pi * speed / low_speed_mps))
-        stiffness_x, stiffness_y = slip_stiffnesses(p, fz, gamma, pressure_Pa, mu)
+        stiffness_x, stiffness_y = slip_stiffnesses(p, fz, gamma, pressure_Pa)
         stiffness_x = abs(stiffness_x)
         stiffness_y = abs(stiffness_y)
         sliding = _SLIDING_TO_LINEAR * mu / p.REFERENCE_FRICTION * fz

@@ -226,15 +226,14 @@ def magic_formula(
 
 
 @compiled
-def slip_stiffnesses(p, fz_N: float, gamma_rad: float, pressure_Pa: float, mu: float):
-    """Slopes of the forces at zero slip.
+def slip_stiffnesses(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
+    """Slopes of the forces at zero slip, on which the friction of the road has no influence.
 
     Args:
         p: Record of the tyre.
         fz_N: Load [N].
         gamma_rad: Camber [rad].
         pressure_Pa: Inflation pressure [Pa].
-        mu: Friction of the road; without influence on the slopes, kept so that all kernels are called alike.
 
     Returns:
         Slip stiffness K_xkappa [N], > 0, and cornering stiffness K_yalpha [N/rad], < 0 in ISO-W axes.

@@ -93,7 +93,7 @@ def test_slip_stiffness_is_the_slope_at_the_origin_of_the_curve() -> None:
         **dict.fromkeys(["PHX1", "PHX2", "PVX1", "PVX2", "PHY1", "PHY2", "PVY1", "PVY2"], 0.0)
     )
     p, step = symmetric.record, 1e-5
-    k_x, k_y = slip_stiffnesses(p, 4000.0, 0.0, 230e3, 1.0)
+    k_x, k_y = slip_stiffnesses(p, 4000.0, 0.0, 230e3)
 
     def slope(kappa: float, alpha: float, place: int) -> float:
         plus = magic_formula(p, 4000.0, kappa, alpha, 0.0, 230e3, 15.0, 1.0)[place]
