@@ -6,6 +6,7 @@ Everything is SI and radians inside; whatever is printed, plotted or drawn takes
 from __future__ import annotations
 
 import math
+import re
 from typing import Final, NamedTuple
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
@@ -124,7 +125,9 @@ def metric_label(name: str) -> tuple[str, str, float]:
     return words, unit.name, unit.factor
 
 
-_COUNTS: Final = frozenset({"cones_hit", "cones_missed", "stays_in_lanes"})
+_COUNTS: Final = frozenset({"cones_hit", "cones_missed"})
+_YES_OR_NO: Final = frozenset({"stays_in_lanes"})
+_NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
 
 
 def metric_number(name: str, value: float) -> str:
@@ -136,7 +139,19 @@ def metric_number(name: str, value: float) -> str:
     """
     if math.isnan(value):
         return "-"
-    return f"{value:.0f}" if name in _COUNTS else f"{value * metric_label(name)[2]:.3f}"
+    if name in _YES_OR_NO:
+        return "yes" if value else "no"
+    return f"{value:.0f}" if is_count(name) else f"{value * metric_label(name)[2]:.3f}"
+
+
+def is_count(name: str) -> bool:
+    """Whether a metric is a whole number, or yes (1) or no (0)."""
+    return name in _COUNTS or name in _YES_OR_NO
+
+
+def typeset(text: str) -> str:
+    """A text of numbers as a page shows it: minus signs, not hyphens, before numbers, and m/s² with its superscript."""
+    return _NEGATIVE.sub("\N{MINUS SIGN}", text).replace("m/s2", "m/s²")
 
 
 def _row(

@@ -8,6 +8,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.quantities import typeset
 from activesteer.version import __version__
 
 
@@ -34,6 +36,8 @@ def _environment() -> Environment:
     # The filter escapes `<`, `>`, `&` and quotes; JSON has no nan, which must not come out as something else.
     environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "separators": (",", ":"), "allow_nan": False}
     environment.globals |= {"version": __version__, "asset": _asset}
+    environment.globals |= {"run_colours": RUN_COLOURS, "run_colours_on_dark": RUN_COLOURS_ON_DARK}
+    environment.filters["typeset"] = typeset
     return environment
 
 

@@ -46,12 +46,24 @@ class Course:
 
     def on_lane_side(self) -> NDArray[np.bool_]:
         """Which cones stand on the side of a lane, so that they mark its width; shape (number of cones,)."""
+        return self._outward() != 0.0
+
+    def cone_centres_m(self) -> Array:
+        """World x and y of the middle of the cones' bases [m], shape (number of cones, 2).
+
+        A lane is measured between its cones, so that those beside it stand outside it.
+        """
+        return np.column_stack([self.cones_m[:, 0], self.cones_m[:, 1] + CONE_RADIUS_M * self._outward()])
+
+    def _outward(self) -> Array:
+        """1 for a cone on the left side of a lane, -1 on the right one, 0 elsewhere; shape (number of cones,)."""
         x, y = self.cones_m.T
-        marks = np.zeros(len(x), dtype=bool)
+        outward = np.zeros(len(x))
         for lane in self.lanes:
             along = (x >= lane.start_x_m - _ON_SIDE_M) & (x <= lane.end_x_m + _ON_SIDE_M)
-            marks |= along & (np.minimum(np.abs(y - lane.right_y_m), np.abs(y - lane.left_y_m)) < _ON_SIDE_M)
-        return marks
+            outward[along & (np.abs(y - lane.left_y_m) < _ON_SIDE_M)] = 1.0
+            outward[along & (np.abs(y - lane.right_y_m) < _ON_SIDE_M)] = -1.0
+        return outward
 
     def to_table(self) -> dict[str, Any]:
         """The same as plain tables, ready for JSON; kept with a recording as `course`."""

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from activesteer.analysis.report import write_report
-from activesteer.conventions import RUN_COLOURS
+from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from tests.contrast import contrast
 from tests.unit.analysis.synthetic_files import lane_changes, step_steers
 
 if TYPE_CHECKING:
@@ -21,9 +22,11 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.render
 
-DESK = {"viewport": {"width": 1280, "height": 900}}
+DESK = {"viewport": {"width": 1280, "height": 800}}
 PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
+DARK = DESK | {"color_scheme": "dark"}
 DURATION_S = 7.0
+LOST = {"stays_in_lanes": 0.0, "lane_overstep_m": 1.2, "cones_hit": 2.0, "sideslip_peak_abs_rad": 0.8}
 
 # How many pixels of a canvas have about a colour; blending with white makes others of it.
 COUNT = """(canvas, [r, g, b, tolerance]) => {
@@ -36,6 +39,27 @@ COUNT = """(canvas, [r, g, b, tolerance]) => {
   let found = 0;
   for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 200 && near(i)) found++;
   return found;
+}"""
+# Colour of each text and of what lies behind it, once for each pair.
+TEXT_COLOURS = """() => {
+  const two = (part) => (+part).toString(16).padStart(2, "0");
+  const hex = (colour) => "#" + colour.match(/[\\d.]+/g).slice(0, 3).map(two).join("");
+  const behind = (part) => {
+    for (; part; part = part.parentElement) {
+      const colour = getComputedStyle(part).backgroundColor;
+      if (!/, 0\\)$/.test(colour)) return colour;
+    }
+    return "rgb(255, 255, 255)";
+  };
+  const found = new Map();
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const part = walker.currentNode.parentElement, text = walker.currentNode.textContent.trim();
+    if (!text || !part.checkVisibility()) continue;
+    const pair = [hex(getComputedStyle(part).color), hex(behind(part))];
+    found.set(pair.join(), [...pair, text]);
+  }
+  return [...found.values()];
 }"""
 TELL_WIDTHS = """() => {
   const widths = () => [...document.querySelectorAll(".uplot")].map((plot) => plot.clientWidth);
@@ -61,7 +85,10 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
-    return write_report({**step_steers(), **lane_changes()}, path)
+    lanes = lane_changes()
+    lanes["lanes-none.mcap"].metrics.update(LOST)
+    lanes["lanes-ars.mcap"].metrics.update({"stays_in_lanes": 1.0, "cones_hit": 0.0, "sideslip_peak_abs_rad": 0.1})
+    return write_report({**step_steers(), **lanes}, path)
 
 
 @pytest.fixture
@@ -123,6 +150,76 @@ def test_plots_show_the_curves_of_all_runs(open_page):
     assert "stretched" in track.inner_text()
 
 
+def test_first_screen_says_what_came_out(open_page):
+    page = open_page(**DESK)
+    # Inner text is what is shown; the first paragraphs say what was run.
+    for words in (
+        "vehicle synthetic",
+        "lost at 46 deg of sideslip, leaves the lane by 1.20 m, hits 2 cones",
+        "stays in the lanes",
+    ):
+        box = page.get_by_text(words).first.bounding_box()
+        assert box
+        assert box["y"] + box["height"] < 800.0, words
+    red, green = (page.locator(f"header .chip.{kind}").first for kind in ("failed", "passed"))
+    assert (red.inner_text()[0], green.inner_text()[0]) == ("\N{BALLOT X}", "\N{CHECK MARK}")
+
+
+@pytest.mark.parametrize("device", [DESK, DARK], ids=["light", "dark"])
+def test_every_text_can_be_read(open_page, device):
+    page = open_page(**device)
+    for details in page.locator("details").all():
+        details.evaluate("(details) => { details.open = true; }")
+    found = page.evaluate(TEXT_COLOURS)
+    assert len(found) >= 6
+    for ink, paper, text in found:
+        assert contrast(ink, paper) >= 4.5, text
+
+
+def test_dark_pictures_are_dark_and_as_complete_as_light_ones(open_page):
+    page = open_page(**DARK)
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(22, 24, 27)"
+    yaw_rate, track = plot(page, "Yaw rate"), plot(page, "Track of the front axle centre", 2)
+    assert all(pixels(yaw_rate, colour, 60) > 100 for colour in RUN_COLOURS_ON_DARK[:3])
+    assert pixels(yaw_rate, "#ffffff") == pixels(track, "#f3ead0") == 0
+    assert pixels(track, "#35301f") > 5000
+
+
+def test_a_curve_below_others_is_seen_through_their_gaps(open_page):
+    page = open_page(**DESK)
+    # Steered by the same table: three curves on one line.
+    steering = plot(page, "Steering wheel angle")
+    assert all(pixels(steering, colour, 130) > 150 for colour in RUN_COLOURS[:3])
+
+
+def test_pointing_at_a_run_makes_the_others_pale(open_page):
+    page = open_page(**DESK)
+    yaw_rate = plot(page, "Yaw rate")
+    before = [pixels(yaw_rate, colour) for colour in RUN_COLOURS[:3]]
+    page.locator("#group-1 button", has_text="2 active rear steering").hover()
+    none, ars, afs = (pixels(yaw_rate, colour) for colour in RUN_COLOURS[:3])
+    assert (none, afs) == (0, 0)
+    assert ars >= before[1]
+    page.mouse.move(0, 0)
+    assert [pixels(yaw_rate, colour) for colour in RUN_COLOURS[:3]] == before
+
+
+def test_nothing_lies_over_anything_else(open_page):
+    for device in (DESK, PHONE):
+        page = open_page(**device)
+        boxes = [
+            box
+            for part in page.locator("figure, .results, .verdicts, .metrics, h1, h2, h3").all()
+            if (box := part.bounding_box())
+        ]
+        boxes.sort(key=lambda box: box["y"])
+        for place, box in enumerate(boxes):
+            for other in boxes[place + 1 :]:
+                below = other["y"] >= box["y"] + box["height"] - 0.5
+                beside = other["x"] >= box["x"] + box["width"] - 0.5 or box["x"] >= other["x"] + other["width"] - 0.5
+                assert below or beside, (box, other)
+
+
 def test_cursor_is_in_all_plots_at_once_and_tells_the_values(open_page):
     page = open_page(**DESK)
     hover(page, plot(page, "Yaw rate"), 6.0 / DURATION_S)
@@ -152,9 +249,9 @@ def test_nothing_moves_when_values_are_told(open_page):
 def test_place_of_the_cars_at_the_cursor_is_on_the_track_and_back(open_page):
     page = open_page(**DESK)
     track, yaw_rate = plot(page, "Track of the front axle centre", 2), plot(page, "Yaw rate", 2)
-    assert track.locator(".dot:visible").count() == 0
+    assert track.locator(".car:not([hidden])").count() == 0
     hover(page, yaw_rate, 0.4)
-    assert track.locator(".dot:visible").count() == 2
+    assert track.locator(".car:not([hidden])").count() == 2
     # At 80 m, after 4 s at 20 m/s, of 10 m to 205 m that are shown.
     hover(page, track, 70.0 / 195.0)
     assert float(told(yaw_rate)[0]) == pytest.approx(4.0, abs=0.05)
@@ -183,6 +280,7 @@ def test_runs_can_be_hidden(open_page):
     assert button.get_attribute("aria-pressed") == "false"
     assert pixels(yaw_rate, RUN_COLOURS[1]) == 0
     button.click()
+    page.mouse.move(0, 0)
     assert pixels(yaw_rate, RUN_COLOURS[1]) == before
 
 
@@ -244,7 +342,9 @@ def test_plots_follow_the_width_of_the_window(open_page):
 def test_printed_plots_fit_the_paper(open_page):
     page = open_page(**DESK)
     page.evaluate(TELL_WIDTHS)
-    assert page.pdf(format="A4").startswith(b"%PDF")
+    pdf = page.pdf(format="A4")
+    # Two manoeuvres, five runs.
+    assert 2 <= len(re.findall(rb"/Type\s*/Page\b(?!s)", pdf)) <= 6
     # A4 less its margins is 182 mm, 688 px of CSS.
     assert set(page.evaluate("window.printed")) == {660, 322}
     box = plot(page, "Yaw rate").locator(".uplot").bounding_box()

@@ -25,3 +25,13 @@ TRACK_M: Final = 0.05
 """Difference of two tracks [m]: each is known to 0.02 m with differential satellite positioning."""
 STEERING_WHEEL_RAD: Final = math.radians(5.0)
 """Difference of two steering wheel angles [rad]: about what a driver can tell apart while he turns the wheel."""
+
+
+def noticeable(metric: str) -> float:
+    """The size for a metric, by its name [SI]; 0 where none of these sizes is meant for it."""
+    if metric.startswith("steering_wheel") and metric.endswith("_rad"):
+        return STEERING_WHEEL_RAD
+    return next((size for suffix, size in _BY_SUFFIX.items() if metric.endswith(suffix)), 0.0)
+
+
+_BY_SUFFIX: Final = {"_radps": YAW_RATE_RADPS, "_srad": 0.0, "_rad": SIDESLIP_RAD, "_s": TIME_S, "_m": TRACK_M}

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.course_view import view_of
+from activesteer.analysis.lanes import cone_distances
 from activesteer.analysis.report.groups import Group, Run
-from activesteer.analysis.source import read_course
+from activesteer.analysis.source import read_course, read_footprint
 from activesteer.analysis.track import front_axle, path_distance
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import RecordingError
 from activesteer.quantities import ESTIMATED, MEASURED, Quantity, quantity_of
 from activesteer.recording import Recording
-from activesteer.road.course import Course
+from activesteer.road.course import CONE_RADIUS_M, Course
 
 RATE_HZ: Final = 200.0
 """Most samples of a signal in a second; the car's own motion ends below 20 Hz."""
@@ -25,6 +27,8 @@ MAX_SAMPLES: Final = 4000
 """Most samples of a signal in all: twice what the widest screen shows, until one zooms in."""
 MAX_STEP_S: Final = 0.02
 """Most from one sample to the next as long as samples can stand for the signal [s]: 25 Hz are seen at this rate."""
+OFF_COURSE_M: Final = 6.0
+"""How far beside the course a car that leaves it stays in the picture [m]."""
 DIGITS: Final = 4
 """Digits after the first of a signal's range; more cannot be seen."""
 
@@ -35,9 +39,9 @@ class Panel(NamedTuple):
     Attributes:
         title: What it shows.
         quantity: In which unit, and how small its axis may be.
-        signals: From a recording to what is drawn of it, SI; the first is a full line, others are dashed. One that a
-            recording does not have raises `RecordingError`, one that says nothing is None.
-        note: What a dashed line is.
+        signals: From a recording to what is drawn of it, SI; the first is the run's own line, others are dotted. One
+            that a recording does not have raises `RecordingError`, one that says nothing is None.
+        note: What a dotted line is.
     """
 
     title: str
@@ -70,7 +74,7 @@ def _beside_truth(word: str, channel: str) -> Panel:
     def truth(recording: Recording) -> Array | None:
         return recording[channel] if f"{word}_{channel}" in recording else None
 
-    return _of(f"{word}_{channel}", truth, note="dashed: true")
+    return _of(f"{word}_{channel}", truth, note="dotted: true")
 
 
 def _over_corners(channel: str, choose: np.ufunc) -> Callable[[Recording], Array]:
@@ -87,11 +91,11 @@ _USE = "friction_utilisation"
 
 PANELS: Final = (
     _of("steering_wheel_rad"),
-    _of("yaw_rate_radps", _desired, note="dashed: desired by the controller"),
+    _of("yaw_rate_radps", _desired, note="dotted: desired by the controller"),
     _of("sideslip_rad"),
     _of("ay_mps2"),
     Panel("Added angle at the wheels", quantity_of("rear_steer_rad"), (_added("rear_steer"), _added("superposition")),
-          "full: rear wheels, dashed: front superposition"),
+          "rear wheels, dotted: front superposition"),
     Panel(_DISTANCE.label.capitalize(), _DISTANCE, (_from_path,)),
     _of("roll_rad"),
     _of("speed_mps"),
@@ -118,7 +122,10 @@ def plots(group: Group) -> dict[str, Any]:
         "step_s": float(grid[1] - grid[0]) if len(grid) > 1 else 0.0,
         "start_s": float(grid[0]),
         "samples": len(grid),
-        "runs": [{"name": run.name, "label": run.look.label, "colour": run.look.colour} for run in group.runs],
+        "runs": [
+            {"name": run.name, "label": run.look.label, "place": run.look.place, "dashes": run.look.dashes}
+            for run in group.runs
+        ],
         "panels": panels,
         "marks": _marks(group),
         "track": _track(group, grid),
@@ -151,8 +158,8 @@ def _panel(panel: Panel, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
                 continue
             if values is not None:
                 sampled = _reduced(run.recording.time_s, values * panel.quantity.factor, grid)
-                series.append({"run": number, "dashed": line > 0, "values": _rounded(sampled)})
-    note = panel.note if any(item["dashed"] for item in series) else ""
+                series.append({"run": number, "dotted": line > 0, "values": _rounded(sampled)})
+    note = panel.note if any(item["dotted"] for item in series) else ""
     shown = panel.quantity
     return {"title": panel.title, "unit": shown.unit.name, "note": note, "min_span": shown.min_span, "series": series}
 
@@ -212,18 +219,23 @@ def _marks(group: Group) -> list[dict[str, Any]]:
 
 
 def _track(group: Group, grid: Array) -> dict[str, Any] | None:
-    """Course and tracks of the front axle centre [m]."""
+    """Course, tracks of the front axle centre [m], heading [rad] and sizes of the cars [m]."""
     tracks = []
     for number, run in enumerate(group.runs):
         try:
             x, y = (_sampled(run.recording.time_s, values, grid) for values in front_axle(run.recording))
         except RecordingError:
             continue
-        tracks.append({"run": number, "x": _rounded(x, 2), "y": _rounded(y, 3)})
+        track: dict[str, Any] = {"run": number, "x": _rounded(x, 2), "y": _rounded(y, 3)}
+        with suppress(RecordingError):
+            yaw = _rounded(_sampled(run.recording.time_s, run.recording["yaw_rad"], grid), 3)
+            car = read_footprint(run.recording)
+            track |= {"yaw": yaw, "car": {"ends": [car.rear_m, car.front_m], "width": car.width_m}}
+        tracks.append(track)
     if not tracks:
         return None
     course = next(_courses(group), None)
-    table = {"lanes": [], "cones": [], "path": None, "view": None} if course is None else _course(course)
+    table = {"lanes": [], "cones": [], "path": None, "view": None} if course is None else _course(course, group)
     return {"tracks": tracks, **table}
 
 
@@ -236,13 +248,27 @@ def _courses(group: Group) -> Iterator[Course]:
             continue
 
 
-def _course(course: Course) -> dict[str, Any]:
+def _course(course: Course, group: Group) -> dict[str, Any]:
     view = view_of(course)
+    hit = np.zeros(len(course.cones_m), dtype=bool)
+    low, high = view.y_m
+    for run in group.runs:
+        with suppress(RecordingError):
+            hit |= cone_distances(run.recording, course, read_footprint(run.recording)) <= 0.0
+        with suppress(RecordingError):
+            x, y = front_axle(run.recording)
+            seen = y[(x >= view.x_m[0]) & (x <= view.x_m[1]) & np.isfinite(y)]
+            low = min(low, max(seen.min(initial=low), view.y_m[0] - OFF_COURSE_M))
+            high = max(high, min(seen.max(initial=high), view.y_m[1] + OFF_COURSE_M))
     return {
         "lanes": [
             {"name": name, "x": [start, end], "y": [below, above]} for name, start, end, below, above in course.lanes
         ],
-        "cones": [[round(x, 3), round(y, 3)] for x, y in course.cones_m.tolist()],
+        "cones": [
+            [round(x, 3), round(y, 3), struck]
+            for (x, y), struck in zip(course.cone_centres_m().tolist(), hit.tolist(), strict=True)
+        ],
+        "cone_radius": CONE_RADIUS_M,
         "path": {"x": _rounded(view.path_x_m, 2), "y": _rounded(view.path_y_m, 3)},
-        "view": {"x": list(view.x_m), "y": list(view.y_m)},
+        "view": {"x": list(view.x_m), "y": [float(low), float(high)]},
     }

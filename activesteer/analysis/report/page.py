@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from datetime import date
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -13,7 +14,15 @@ from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import Group, entry, groups_of
 from activesteer.analysis.report.judgement import Judgement, judge
 from activesteer.analysis.report.parameter_table import Row, rows
-from activesteer.analysis.report.tables import MetricRow, file_rows, metric_rows, metric_titles, verdict_counts
+from activesteer.analysis.report.results import HEADLINE, Change, Result, key_titles, results
+from activesteer.analysis.report.tables import (
+    MetricRow,
+    changed_parameters,
+    file_rows,
+    metric_rows,
+    metric_titles,
+    verdict_counts,
+)
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
 from activesteer.pages import render
@@ -26,6 +35,19 @@ _VERDICT_CLASS: Final = {
     Verdict.NOT_REPRODUCED: "known",
     Verdict.UNEXPECTED: "passed",
 }
+_VERDICT_MARK: Final = {
+    Verdict.PASSED: "\N{CHECK MARK}",
+    Verdict.FAILED: "\N{BALLOT X}",
+    Verdict.NOT_REPRODUCED: "\N{NOT EQUAL TO}",
+    Verdict.UNEXPECTED: "\N{CHECK MARK}",
+}
+_CHANGE_MARK: Final = {
+    Change.BETTER: "\N{CHECK MARK}",
+    Change.WORSE: "\N{BALLOT X}",
+    Change.SAME: "\N{ALMOST EQUAL TO}",
+    Change.OTHER: "",
+}
+"""Colour alone would not do."""
 
 
 class _Section(NamedTuple):
@@ -34,6 +56,9 @@ class _Section(NamedTuple):
     anchor: str
     group: Group
     judgement: Judgement
+    changed: list[str]
+    key_titles: list[str]
+    results: list[Result]
     metric_titles: list[str]
     metrics: list[MetricRow]
     parameters: list[Row]
@@ -57,11 +82,12 @@ def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[st
     return write_text(path, report_page(recordings), ParameterError)
 
 
-def report_page(recordings: Mapping[str, Recording]) -> str:
-    """The report of runs, HTML: the same recordings give the same page.
+def report_page(recordings: Mapping[str, Recording], made: date | None = None) -> str:
+    """The report of runs, HTML: the same recordings and date give the same page.
 
     Args:
         recordings: By where they come from.
+        made: The date that it bears; today's where there is none.
 
     Raises:
         ParameterError: there is no recording.
@@ -81,11 +107,15 @@ def report_page(recordings: Mapping[str, Recording]) -> str:
     return render(
         "report.html",
         title=TITLE if several else f"{TITLE}: {groups[0].title}",
+        heading=f"Report: {len(groups)} manoeuvres" if several else groups[0].title,
+        headline=HEADLINE if any(HEADLINE in section.key_titles for section in sections) else "",
+        facts=_facts(groups, made or date.today()),
         runs=runs,
         sections=sections,
-        vehicles=list(dict.fromkeys(entry(recording, "vehicle", "name") or "?" for recording in every)),
         verdicts=verdict_counts(cards),
         verdict_class=_VERDICT_CLASS,
+        verdict_mark=_VERDICT_MARK,
+        change_mark=_CHANGE_MARK,
         by_share=everything.by_share(),
         population=everything.population,
         number_lines=number_lines,
@@ -105,8 +135,29 @@ def _section(group: Group, anchor: str) -> _Section:
         anchor,
         group,
         judge(group),
+        list(dict.fromkeys(filter(None, map(changed_parameters, group.runs)))),
+        key_titles(group),
+        results(group),
         metric_titles(group),
         metric_rows(group),
         rows(recordings, "controller", "maneuver", "timestep_s"),
         [run.name for run in group.runs],
     )
+
+
+def _facts(groups: Sequence[Group], made: date) -> list[str]:
+    """Date, car, driver, program."""
+    recordings = [run.recording for group in groups for run in group.runs]
+
+    def every(table: str, key: str) -> str:
+        return ", ".join(dict.fromkeys(value for run in recordings if (value := entry(run, table, key))))
+
+    facts = [made.isoformat()]
+    for word, value in (
+        ("vehicle", every("vehicle", "name")),
+        ("driver", every("driver", "name")),
+        ("activesteer", every("versions", "activesteer")),
+        ("MuJoCo", every("versions", "mujoco")),
+    ):
+        facts += [f"{word} {value}"] if value else []
+    return facts

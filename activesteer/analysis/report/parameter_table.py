@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from activesteer.quantities import display_unit
+from activesteer.quantities import display_unit, typeset
 from activesteer.recording import Recording
 
 
@@ -62,5 +62,5 @@ def _text(key: str, value: Any) -> str:
         return str(value).lower() if value is not None else "none"
     if isinstance(value, int | float):
         unit, factor = display_unit(key)
-        return f"{value:.6g}" if factor == 1.0 else f"{value:.6g} ({value * factor:.4g} {unit})"
+        return typeset(f"{value:.6g}" if factor == 1.0 else f"{value:.6g} ({value * factor:.4g} {unit})")
     return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

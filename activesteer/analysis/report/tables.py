@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from activesteer.analysis.claims.noticeable import noticeable
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict
 from activesteer.analysis.report.groups import Group, Run, entry
-from activesteer.quantities import metric_label
+from activesteer.quantities import is_count, metric_label, metric_number, typeset
 
 
 class Cell(NamedTuple):
@@ -41,7 +42,7 @@ def verdict_counts(scorecards: Iterable[Scorecard]) -> dict[Verdict, int]:
 def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
     """What was run: titles of the columns, and a row for each run."""
     runs = [(group, run) for group in groups for run in group.runs]
-    changed = [_changed(run) for _, run in runs]
+    changed = [changed_parameters(run) for _, run in runs]
     titles = ["File", "Manoeuvre", "Controller", "Vehicle", "Duration", *(["Changed"] if any(changed) else [])]
     rows = []
     for (group, run), overrides in zip(runs, changed, strict=True):
@@ -52,8 +53,8 @@ def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
     return titles, rows
 
 
-def _changed(run: Run) -> str:
-    """The parameters that the user replaced."""
+def changed_parameters(run: Run) -> str:
+    """The parameters that the user replaced, with their values; empty where there are none."""
     changed: Any = run.recording.metadata.get("overrides")
     return ", ".join(f"{key} = {value}" for key, value in changed.items()) if isinstance(changed, Mapping) else ""
 
@@ -69,35 +70,44 @@ def metric_rows(group: Group) -> list[MetricRow]:
     values = [run.recording.metrics for run in group.runs]
     rows = []
     for name in dict.fromkeys(name for metrics in values for name in metrics):
-        words, unit, factor = metric_label(name)
-        first, *others = (factor * metrics.get(name, math.nan) for metrics in values)
-        cells = [Cell(number(first))]
+        words, unit, _ = metric_label(name)
+        first, *others = (metrics.get(name, math.nan) for metrics in values)
+        cells = [Cell(number(name, first))]
         for value in others:
-            cells += [Cell(number(value)), _difference(value, first)]
-        rows.append(MetricRow(words, unit, tuple(cells)))
+            cells += [Cell(number(name, value)), difference_text(name, value, first)]
+        rows.append(MetricRow(words, unit.removesuffix("-"), tuple(cells)))
     return rows
 
 
-def number(value: float) -> str:
-    """A value with three decimals, fewer where it is large; a dash where it does not exist."""
+def number(name: str, value: float) -> str:
+    """The value of a metric [SI] in the unit that is shown: three decimals, fewer where large; a dash for none."""
     if not math.isfinite(value):
         return "\N{EN DASH}"
-    decimals = next((decimals for top, decimals in ((10.0, 3), (100.0, 2), (1000.0, 1)) if abs(value) < top), 0)
-    return _with_minus(f"{value:.{decimals}f}")
+    return metric_number(name, value) if is_count(name) else _decimal(value * metric_label(name)[2])
 
 
-def _difference(value: float, first: float) -> Cell:
+def difference_text(name: str, value: float, first: float) -> Cell:
+    """By how much the value of a metric [SI] differs from that of the first run.
+
+    In percent too, where that value is more than a driver or a sensor would miss.
+    """
     if not (math.isfinite(value) and math.isfinite(first)):
-        return Cell(number(math.nan))
-    difference = value - first
+        return Cell("\N{EN DASH}")
+    _, unit, unit_factor = metric_label(name)
+    difference = (value - first) * unit_factor
+    if is_count(name):
+        return Cell(typeset(f"{difference:+.0f}") if difference else "0")
     if abs(difference) < 0.0005:
         return Cell("0")
-    text = f"{'+' if difference > 0.0 else ''}{number(difference)}"
-    fraction = difference / abs(first) if first else math.inf
-    if not 0.005 <= abs(fraction) < 10.0:
+    text = f"{'+' if difference > 0.0 else ''}{_decimal(difference)}"
+    nearly_nothing = max(noticeable(name) * unit_factor, 0.01)
+    if unit == "%" or abs(first) * unit_factor <= nearly_nothing:
         return Cell(text)
-    return Cell(text, f"{_with_minus(f'{fraction * 100.0:+.0f}')}\N{NO-BREAK SPACE}%")
+    if not 0.005 <= abs(share := (value - first) / abs(first)) < 10.0:
+        return Cell(text)
+    return Cell(text, typeset(f"{share * 100.0:+.0f}\N{NO-BREAK SPACE}%"))
 
 
-def _with_minus(text: str) -> str:
-    return text.replace("-", "\N{MINUS SIGN}")
+def _decimal(value: float) -> str:
+    decimals = next((decimals for top, decimals in ((10.0, 3), (100.0, 2), (1000.0, 1)) if abs(value) < top), 0)
+    return typeset(f"{value:.{decimals}f}")

@@ -3,11 +3,18 @@
 "use strict";
 (() => {
   const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
-  const QUIET = "#656b73", GRID = "#eceef0", LANE = "#f3ead0", CONE = "#d98200", PATH = "#8a9097";
-  const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290;
+  // Colours are those of the stylesheet, light or dark; looked up anew when that changes.
+  const PAINTS = ["quiet", "grid", "lane", "cone", "struck", "path", ...Array.from({ length: 6 }, (_, i) => `run-${i}`)];
+  const paint = {};
+  const mix = () => { const style = getComputedStyle(document.documentElement); for (const name of PAINTS) paint[name] = style.getPropertyValue(`--${name}`).trim(); };
+  mix();
+  const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
+  // Cars and cones are drawn in their true size, but a cone with no less than this [px]; cars at instants this far apart [px].
+  const LEAST_CONE = 2, CARS_APART = 110;
   // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
-  const PRINTED = 660, PRINTED_GAP = 16;
+  const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 118, PRINTED_TRACK_HEIGHT = 190;
 
+  const SVG = "http://www.w3.org/2000/svg";
   const element = (name, attributes = {}, ...children) => {
     const made = document.createElement(name);
     for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
@@ -16,8 +23,12 @@
   };
   // Axis labels with a real minus sign, and without the digits that floating point leaves.
   const labels = (unit) => (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit));
-  const axis = (size, unit = "") => ({ values: labels(unit), stroke: QUIET, font: FONT, size, gap: 4, grid: { stroke: GRID, width: 1 }, ticks: { show: false } });
+  const axis = (size, unit = "") => ({ values: labels(unit), stroke: () => paint.quiet, font: FONT, size, gap: 4, grid: { stroke: () => paint.grid, width: 1 }, ticks: { show: false } });
   const shown = (number) => (number == null ? "–" : number.toFixed(Math.abs(number) < 10 ? 2 : Math.abs(number) < 1000 ? 1 : 0).replace("-", "−"));
+
+  const dashed = (run, width) => run.dashes.map((length) => length * width);
+  // Later runs lie over earlier ones: thinner and dashed, they let them be seen.
+  const lineWidth = (run) => Math.max(1.5, 2.6 - 0.4 * run);
 
   // Limits of a vertical axis, with some room, and no closer than `least`.
   function padded(low, high, least) {
@@ -31,6 +42,7 @@
       this.data = data;
       this.plots = [];
       this.visible = data.runs.map(() => true);
+      this.focus = null;
       this.time = Array.from({ length: data.samples }, (_, i) => data.start_s + i * data.step_s);
       this.box = document.querySelector(`.plots[data-group="${data.anchor}"]`);
       this.toolbar();
@@ -40,17 +52,34 @@
       this.zoom(null);
     }
 
-    figure(title, wide, name) {
+    // Colour of a run; pale while another one is pointed at.
+    colour(run) {
+      return paint[`run-${this.data.runs[run].place}`] + (this.focus == null || this.focus === run ? "" : "2e");
+    }
+
+    pointAtRun(run) {
+      this.focus = run;
+      for (const plot of this.plots) plot.redraw(false);
+      if (this.track) this.track.redraw();
+    }
+
+    figure(title, shape, name) {
       const values = element("span", { class: "values" });
       const holder = element("div", { role: "img", "aria-label": name });
-      this.box.append(element("figure", { class: wide ? "plot wide" : "plot" }, element("figcaption", {}, ...title, values), holder));
+      this.box.append(element("figure", { class: `plot ${shape}` }, element("figcaption", {}, ...title, values), holder));
       return [holder, values];
     }
 
     toolbar() {
       const bar = document.querySelector(`.toolbar[data-group="${this.data.anchor}"]`);
       this.data.runs.forEach((run, i) => {
-        const swatch = element("span", { class: "swatch", style: `background:${run.colour}` });
+        const swatch = document.createElementNS(SVG, "svg");
+        swatch.setAttribute("class", "swatch");
+        swatch.setAttribute("viewBox", "0 0 28 6");
+        swatch.style.setProperty("--run", `var(--run-${run.place})`);
+        const line = swatch.appendChild(document.createElementNS(SVG, "path"));
+        line.setAttribute("d", "M0 3h28");
+        line.setAttribute("stroke-dasharray", dashed(run, 2).join(" "));
         const button = element("button", { type: "button", "aria-pressed": "true" }, swatch, run.label);
         button.addEventListener("click", () => {
           this.visible[i] = !this.visible[i];
@@ -60,20 +89,24 @@
           }
           if (this.track) this.track.redraw();
         });
+        for (const [name, run] of [["mouseenter", i], ["focus", i], ["mouseleave", null], ["blur", null]]) {
+          button.addEventListener(name, () => this.pointAtRun(run != null && this.visible[run] ? run : null));
+        }
         bar.append(button);
       });
       const reset = element("button", { type: "button", class: "reset" }, "Whole run");
       reset.addEventListener("click", () => { this.zoom(null); if (this.track) this.track.whole(); });
       const touch = matchMedia("(pointer: coarse)").matches;
-      bar.append(reset, element("span", { class: "hint" }, touch ? "Pinch to zoom, slide to read values." : "Drag to zoom, double-click for the whole run."));
+      bar.append(reset, element("span", { class: "hint" }, touch ? "Pinch to zoom, slide to read values, tap a run to hide it." : "Drag to zoom, double-click for the whole run; point at a run to see it alone, click to hide it."));
     }
 
     panel(panel) {
       const { runs } = this.data;
       const title = [element("b", {}, panel.title), element("span", { class: "quiet" }, `${panel.unit}${panel.note ? ", " + panel.note : ""}`)];
-      const [holder, values] = this.figure(title, false, `${panel.title} over time`);
+      const [holder, values] = this.figure(title, "", `${panel.title} over time`);
       const lines = panel.series.map((series) => ({
-        stroke: runs[series.run].colour, width: series.dashed ? 1 : 1.6, dash: series.dashed ? [4, 4] : undefined, points: { show: false },
+        stroke: () => this.colour(series.run), points: { show: false },
+        width: series.dotted ? 1.2 : lineWidth(series.run), dash: series.dotted ? [1.5, 3] : dashed(runs[series.run], 1.5), cap: "butt",
       }));
       const plot = new uPlot({
         width: holder.clientWidth, height: PLOT_HEIGHT, padding: [6, 18, 0, 0], legend: { show: false }, pxAlign: 0,
@@ -99,7 +132,7 @@
       panel.series.forEach((series, k) => {
         // Of each run the first curve: what is desired beside it is not told.
         if (panel.series.findIndex((other) => other.run === series.run) !== k || !this.visible[series.run]) return;
-        values.append(" ", element("span", { style: `color:${this.data.runs[series.run].colour}` }, shown(series.values[i])));
+        values.append(" ", element("span", { style: `--run: var(--run-${this.data.runs[series.run].place})` }, shown(series.values[i])));
       });
       if (this.track) this.track.at(i);
     }
@@ -108,7 +141,7 @@
       const { ctx, bbox } = u;
       ctx.save();
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
-      ctx.strokeStyle = ctx.fillStyle = QUIET;
+      ctx.strokeStyle = ctx.fillStyle = paint.quiet;
       ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
       ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
       ctx.textBaseline = "top"; ctx.textAlign = "left";
@@ -137,10 +170,12 @@
     fit(width = null) {
       for (const plot of this.plots) {
         const room = width == null ? plot.root.parentElement.clientWidth : (width - PRINTED_GAP) / 2;
-        if (room > 0 && room !== plot.width) plot.setSize({ width: room, height: PLOT_HEIGHT });
+        if (room > 0 && room !== plot.width) plot.setSize({ width: room, height: width == null ? PLOT_HEIGHT : PRINTED_PLOT_HEIGHT });
       }
       if (this.track) this.track.fit(width);
     }
+
+    repaint() { for (const plot of this.plots) plot.redraw(false); if (this.track) this.track.redraw(); }
   }
 
   // The road from above. uPlot gives axes and zoom; what lies in them is drawn here.
@@ -150,12 +185,15 @@
       this.data = data;
       const note = this.note = element("span", { class: "quiet" });
       const title = [element("b", {}, "Track of the front axle centre"), note];
-      const [holder] = group.figure(title, true, "Tracks from above, with lanes and cones");
       const finite = (key) => data.tracks.flatMap((track) => track[key]).filter((value) => value != null);
       this.limits = data.view || { x: this.ends(finite("x")), y: this.ends(finite("y")) };
+      // A course and a long track fill the width; what is as wide as long stands beside two plots.
+      const span = ([low, high]) => high - low;
+      this.tall = !data.view && span(this.limits.x) < 3 * span(this.limits.y);
+      const [holder] = group.figure(title, this.tall ? "tall" : "wide", "Tracks from above, with lanes, cones and cars");
       const { x, y } = this.limits;
       this.plot = new uPlot({
-        width: holder.clientWidth, height: TRACK_HEIGHT, padding: [6, 18, 0, 0], legend: { show: false },
+        width: holder.clientWidth, height: this.height(), padding: [6, 18, 0, 0], legend: { show: false },
         cursor: { drag: { x: true, y: true, uni: 20 }, points: { show: false }, x: false, y: false },
         scales: { x: { time: false, range: (u) => this.range(u, "x") }, y: { range: (u) => this.range(u, "y") } },
         axes: [axis(26, " m"), axis(46, " m")],
@@ -166,13 +204,21 @@
           setScale: [() => this.place()],
         },
       }, [x, y], holder);
-      this.dots = data.tracks.map((track) => {
-        const dot = element("div", { class: "dot", style: `background:${group.data.runs[track.run].colour}` });
-        dot.hidden = true;
-        this.plot.over.append(dot);
-        return dot;
+      const cars = this.plot.over.appendChild(document.createElementNS(SVG, "svg"));
+      cars.setAttribute("class", "cars");
+      this.cars = data.tracks.map((track) => {
+        const car = cars.appendChild(document.createElementNS(SVG, "path"));
+        car.setAttribute("class", "car");
+        car.style.setProperty("--run", `var(--run-${group.data.runs[track.run].place})`);
+        car.toggleAttribute("hidden", true);
+        return car;
       });
       touchable(this.plot, (range) => (range ? this.plot.setScale("x", range) : this.whole()));
+    }
+
+    height(printed = false) {
+      const [plot, track, gap] = printed ? [PRINTED_PLOT_HEIGHT, PRINTED_TRACK_HEIGHT, 4] : [PLOT_HEIGHT, TRACK_HEIGHT, PLOT_GAP];
+      return this.tall ? 2 * plot + PLOT_HEAD + gap : track;
     }
 
     ends(values) {
@@ -205,8 +251,8 @@
     redraw() { this.plot.redraw(false, false); this.place(); }
 
     fit(width) {
-      const room = width == null ? this.plot.root.parentElement.clientWidth : width;
-      if (room > 0 && room !== this.plot.width) { this.plot.setSize({ width: room, height: TRACK_HEIGHT }); this.whole(); }
+      const room = width == null ? this.plot.root.parentElement.clientWidth : this.tall ? (width - PRINTED_GAP) / 2 : width;
+      if (room > 0 && room !== this.plot.width) { this.plot.setSize({ width: room, height: this.height(width != null) }); this.whole(); }
     }
 
     draw(u) {
@@ -217,7 +263,7 @@
       ctx.save();
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
       ctx.lineJoin = "round";
-      ctx.fillStyle = LANE;
+      ctx.fillStyle = paint.lane;
       for (const { x, y } of this.data.lanes) ctx.fillRect(px(x[0]), py(y[1]), px(x[1]) - px(x[0]), py(y[0]) - py(y[1]));
       const line = ({ x, y }, colour, width, dash) => {
         ctx.strokeStyle = colour; ctx.lineWidth = width * dpr; ctx.setLineDash(dash.map((length) => length * dpr));
@@ -230,29 +276,65 @@
         }
         ctx.stroke();
       };
-      if (this.data.path) line(this.data.path, PATH, 1.2, [2, 4]);
-      for (const track of this.data.tracks) {
-        if (this.group.visible[track.run]) line(track, this.group.data.runs[track.run].colour, 1.6, []);
+      if (this.data.path) line(this.data.path, paint.path, 1.2, [2, 4]);
+      for (const { run, x, y, ...track } of this.data.tracks) {
+        if (!this.group.visible[run]) continue;
+        const colour = this.group.colour(run), look = this.group.data.runs[run];
+        line({ x, y }, colour, lineWidth(run), dashed(look, 1.5));
+        this.along({ x, y }, (i) => {
+          if (!track.car || track.yaw[i] == null) return;
+          ctx.setLineDash([]); ctx.lineWidth = dpr; ctx.strokeStyle = colour;
+          ctx.stroke(new Path2D(this.outline({ x, y, ...track }, i, true)));
+        });
       }
-      ctx.fillStyle = CONE;
-      for (const [x, y] of this.data.cones) {
-        const [cx, cy, r] = [px(x), py(y), 4 * dpr];
-        ctx.beginPath(); ctx.moveTo(cx, cy - r); ctx.lineTo(cx + r, cy + r); ctx.lineTo(cx - r, cy + r); ctx.fill();
+      for (const [x, y, struck] of this.data.cones) {
+        const r = this.data.cone_radius, wide = Math.max(r * metre, LEAST_CONE * dpr), high = Math.max(r * metre * stretch, LEAST_CONE * dpr);
+        ctx.setLineDash([]);
+        ctx.beginPath(); ctx.ellipse(px(x), py(y), wide, high, 0, 0, 2 * Math.PI);
+        ctx.fillStyle = struck ? paint.struck : paint.cone; ctx.fill();
+        if (!struck) continue;
+        // A cone that a car hits is crossed out.
+        const arm = 5 * dpr;
+        ctx.strokeStyle = paint.struck; ctx.lineWidth = 1.6 * dpr;
+        ctx.beginPath();
+        for (const side of [-1, 1]) { ctx.moveTo(px(x) - arm, py(y) - side * arm); ctx.lineTo(px(x) + arm, py(y) + side * arm); }
+        ctx.stroke();
       }
       ctx.restore();
+    }
+
+    // Instants at which cars are drawn: as far apart on the screen as not to hide each other.
+    along({ x, y }, draw) {
+      const apart = CARS_APART * devicePixelRatio;
+      let from = null;
+      for (let i = 0; i < x.length; i++) {
+        if (x[i] == null || y[i] == null) continue;
+        const at = [this.plot.valToPos(x[i], "x", true), this.plot.valToPos(y[i], "y", true)];
+        if (from && Math.hypot(at[0] - from[0], at[1] - from[1]) < apart) continue;
+        from = at;
+        draw(i);
+      }
+    }
+
+    // The body of a car from above as an SVG path, in pixels of the screen or of the canvas.
+    outline({ x, y, yaw, car }, i, canvas) {
+      const cos = Math.cos(yaw[i]), sin = Math.sin(yaw[i]), [rear, front] = car.ends, half = car.width / 2;
+      const corners = [[rear, half], [front - 0.4, half], [front, 0.6 * half], [front, -0.6 * half], [front - 0.4, -half], [rear, -half]];
+      return `M${corners.map(([ahead, left]) => [
+        this.plot.valToPos(x[i] + ahead * cos - left * sin, "x", canvas), this.plot.valToPos(y[i] + ahead * sin + left * cos, "y", canvas),
+      ].map((at) => at.toFixed(1)).join(" ")).join("L")}Z`;
     }
 
     // Where the cars are at the instant under the cursor of the plots over time.
     at(i) { this.instant = i; this.place(); }
 
     place() {
-      if (!this.dots) return;
+      if (!this.cars) return;
+      const i = this.instant;
       this.data.tracks.forEach((track, k) => {
-        const i = this.instant, x = i == null ? null : track.x[i];
-        this.dots[k].hidden = x == null || !this.group.visible[track.run];
-        if (x == null) return;
-        this.dots[k].style.left = `${this.plot.valToPos(x, "x")}px`;
-        this.dots[k].style.top = `${this.plot.valToPos(track.y[i], "y")}px`;
+        const there = i != null && track.x[i] != null && track.car && track.yaw[i] != null && this.group.visible[track.run];
+        this.cars[k].toggleAttribute("hidden", !there);
+        if (there) this.cars[k].setAttribute("d", this.outline(track, i, false));
       });
     }
 
@@ -305,9 +387,13 @@
   }
 
   const groups = JSON.parse(document.getElementById("data").textContent).map((data) => new Group(data));
+  const repaint = () => { mix(); for (const group of groups) group.repaint(); };
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   addEventListener("beforeprint", () => {
+    document.documentElement.classList.add("paper");
+    repaint();
     for (const details of document.querySelectorAll(".group details")) details.open = true;
     for (const group of groups) group.fit(PRINTED);
   });
-  addEventListener("afterprint", () => { for (const group of groups) group.fit(); });
+  addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); repaint(); for (const group of groups) group.fit(); });
 })();

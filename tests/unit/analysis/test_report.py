@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from datetime import date
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -12,16 +13,20 @@ import pytest
 
 from activesteer.analysis.report import open_all, report_page, write_report
 from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
-from activesteer.analysis.report.groups import MAX_RUNS, groups_of
+from activesteer.analysis.report.groups import MAX_RUNS, Group, groups_of
 from activesteer.analysis.report.judgement import judge
 from activesteer.analysis.report.parameter_table import rows
+from activesteer.analysis.report.results import Change, Result, results
+from activesteer.analysis.report.tables import difference_text, number
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
+from activesteer.road.course import CONE_RADIUS_M
 from activesteer.signals import Channel
 from tests.raising import raises
-from tests.unit.analysis.synthetic import step_steer
+from tests.unit.analysis.synthetic import along_path, offset_track, step_steer
 from tests.unit.analysis.synthetic_files import lane_changes, recording_of, sines, step_steers
 
+MADE = date(2026, 1, 2)
 VOID = {"meta", "link", "br"}
 
 
@@ -72,7 +77,7 @@ def data_of(page: str) -> list[dict[str, Any]]:
 
 @pytest.fixture(scope="module")
 def page() -> str:
-    return report_page({**lane_changes(), **step_steers(), **sines()})
+    return report_page({**lane_changes(), **step_steers(), **sines()}, MADE)
 
 
 def test_page_needs_nothing_but_itself(page):
@@ -87,12 +92,13 @@ def test_page_needs_nothing_but_itself(page):
 
 
 def test_same_runs_give_the_same_page(page):
-    assert report_page({**lane_changes(), **step_steers(), **sines()}) == page
+    assert report_page({**lane_changes(), **step_steers(), **sines()}, MADE) == page
 
 
 def test_runs_are_grouped_by_manoeuvre_in_the_papers_order(page):
     words = Page(page).words
-    assert "6 runs of 3 manoeuvres, vehicle synthetic." in words
+    assert "vehicle synthetic" in words
+    assert "6 runs of 3 manoeuvres" in words
     data = data_of(page)
     assert [group["name"] for group in data] == ["step_steer", "sine_with_dwell", "cones"]
     assert [run["name"] for run in data[0]["runs"]] == ["none", "ars", "afs"]
@@ -103,6 +109,79 @@ def test_metrics_are_told_with_their_difference_to_the_first_run(page):
     words = Page(page).words
     # 0.25, 0.2 and 0.22 rad/s
     assert "yaw rate peak deg/s 14.32 11.46 -2.865 (-20 %) 12.61 -1.719 (-12 %)" in words
+
+
+def told(group: Group) -> dict[str, Result]:
+    return {found.run.name: found for found in results(group)}
+
+
+def through_cones(**metrics: dict[str, float]) -> Group:
+    runs = {name: recording_of(step_steer(), name, metrics=values) for name, values in metrics.items()}
+    return groups_of(runs)[0]
+
+
+LANES_KEPT = {"stays_in_lanes": 1.0, "lane_overstep_m": -0.1, "cones_hit": 0.0, "sideslip_peak_abs_rad": 0.05}
+
+
+def test_what_went_wrong_stands_at_the_top_in_words():
+    lost = {"stays_in_lanes": 0.0, "lane_overstep_m": 1.324, "cones_hit": 1.0, "sideslip_peak_abs_rad": 0.8}
+    found = told(through_cones(none=lost, ars=LANES_KEPT))
+    assert found["none"].losses == ("lost at 46 deg of sideslip", "leaves the lane by 1.32 m", "hits 1 cone")
+    assert found["ars"].losses == ()
+    assert found["ars"].kept == ("stays in the lanes", "hits no cone")
+
+
+def test_car_that_turns_round_before_the_last_lane_has_not_kept_to_the_lanes():
+    found = told(through_cones(none=LANES_KEPT | {"stays_in_lanes": 0.0}))
+    assert found["none"].losses == ("does not get through the lanes",)
+
+
+def test_nothing_is_said_of_lanes_and_loss_where_the_manoeuvre_cannot_tell():
+    found = told(through_cones(none={"stopping_distance_m": 40.0}))
+    assert (found["none"].losses, found["none"].kept) == ((), ())
+
+
+def test_run_that_ended_early_is_a_loss():
+    runs = {"a.mcap": recording_of(step_steer(), complete=False, error="SimulationDiverged: too much")}
+    assert told(groups_of(runs)[0])["none"].losses == ("incomplete",)
+
+
+@pytest.mark.parametrize(
+    ("metric", "first", "other", "change"),
+    [
+        ("cones_hit", 2.0, 1.0, Change.BETTER),
+        ("sideslip_peak_rad", -0.02, 0.03, Change.WORSE),  # its magnitude counts
+        ("sideslip_peak_rad", -0.0200, 0.0205, Change.SAME),  # 0.03 deg: no sensor could tell
+        ("mean_deceleration_mps2", 5.0, 6.0, Change.BETTER),
+        ("lane_overstep_m", -0.2, 0.2, Change.WORSE),
+        ("yaw_rate_steady_state_radps", 0.2, 0.3, Change.OTHER),
+    ],
+)
+def test_key_figures_are_better_or_worse_only_where_one_could_tell(metric, first, other, change):
+    found = told(through_cones(none={metric: first}, ars={metric: other}))
+    assert [figure.change for figure in found["ars"].figures] == [change]
+    assert found["none"].figures[0].difference == ""
+
+
+def test_numbers_are_whole_where_they_count_and_shares_are_of_something():
+    assert number("cones_hit", 8.0) == "8"
+    assert (number("stays_in_lanes", 1.0), number("stays_in_lanes", 0.0)) == ("yes", "no")
+    assert number("ay_peak_mps2", -3.0) == "\N{MINUS SIGN}3.000"
+    assert difference_text("cones_hit", 10.0, 8.0) == ("+2", "")
+    assert difference_text("sideslip_gates_rms_rad", 0.0002, 0.0001).percent == ""  # 0.006 deg are nearly nothing
+    assert difference_text("yaw_rate_peak_radps", 0.2, 0.25).percent == "\N{MINUS SIGN}20\N{NO-BREAK SPACE}%"
+    assert difference_text("yaw_rate_overshoot", 0.12, 0.1) == ("+2.000", "")  # points, no percent of percent
+
+
+def test_page_says_at_its_top_what_was_lost_and_what_was_driven_otherwise():
+    runs = step_steers()
+    runs["runs/step-none.mcap"].metadata["overrides"] = {"maneuver.speed_kmh": 95}
+    runs["runs/step-none.mcap"].metrics["sideslip_peak_rad"] = 1.0
+    top = Page(report_page(runs, date(2026, 1, 2))).words.partition("Metrics")[0]
+    assert "2026-01-02" in top
+    assert "lost at 57 deg of sideslip" in top
+    assert "maneuver.speed_kmh = 95" in top
+    assert top.count("keeps the car") == 2
 
 
 def test_claims_are_judged_where_the_three_systems_are_there(page):
@@ -168,17 +247,17 @@ def test_curves_are_in_degrees_and_thinned(page):
 
 def test_added_angles_are_those_of_the_systems_that_add_any(page):
     panel = next(panel for panel in data_of(page)[0]["panels"] if panel["title"].startswith("Added"))
-    assert [(series["run"], series["dashed"]) for series in panel["series"]] == [(1, False), (2, True)]
+    assert [(series["run"], series["dotted"]) for series in panel["series"]] == [(1, False), (2, True)]
 
 
-def test_what_sensors_say_is_drawn_with_the_truth_dashed_where_it_was_recorded():
+def test_what_sensors_say_is_drawn_with_the_truth_dotted_where_it_was_recorded():
     ideal = step_steer()
     real = step_steer()
     real.channels["measured_yaw_rate_radps"] = 1.1 * real.channels["yaw_rate_radps"]
     pages = {name: recording_of(run, metrics={}) for name, run in (("ideal.mcap", ideal), ("real.mcap", real))}
     panels = {panel["title"]: panel for panel in data_of(report_page(pages))[0]["panels"]}
     said, truth = panels["Measured yaw rate"]["series"]
-    assert [(series["run"], series["dashed"]) for series in (said, truth)] == [(1, False), (1, True)]
+    assert [(series["run"], series["dotted"]) for series in (said, truth)] == [(1, False), (1, True)]
     assert said["values"][-1] == pytest.approx(1.1 * truth["values"][-1], rel=1e-3)
     assert panels["Measured yaw rate"]["unit"] == "deg/s"
     assert "Measured lateral acceleration" not in panels
@@ -187,11 +266,30 @@ def test_what_sensors_say_is_drawn_with_the_truth_dashed_where_it_was_recorded()
 def test_track_has_lanes_cones_and_path(page):
     track = data_of(page)[2]["track"]
     assert [lane["name"] for lane in track["lanes"]] == ["entry", "offset", "exit"]
-    assert len(track["cones"]) == 4
+    # At (30, 1.2) and so on, inside the lane and so in their place; the car, 1.8 m wide, passes those.
+    assert track["cones"] == [[30, 1.2, False], [45, 1.2, False], [30, -1.2, False], [45, -1.2, False]]
     assert track["path"]["x"][-2] == pytest.approx(299.5)
     assert (track["path"]["x"][-1] > 400.0, track["path"]["y"][-1]) == (True, 0)  # straight on
     assert track["tracks"][1]["run"] == 1
     assert track["view"]["x"] == [10.0, 205.0]
+
+
+def test_track_shows_which_cones_are_hit_and_the_cars_in_their_size():
+    cones = ((30.0, 1.6), (45.0, 0.5))
+    page = report_page({"a.mcap": recording_of(along_path(cones=cones), maneuver={"name": "cones"})})
+    track = data_of(page)[0]["track"]
+    # The first stands on the side of the lane, and so outside it by its radius; the second in the way.
+    assert track["cones"] == [[30, pytest.approx(1.6 + CONE_RADIUS_M), False], [45, 0.5, True]]
+    assert track["cone_radius"] == CONE_RADIUS_M
+    assert track["tracks"][0]["car"] == {"ends": [pytest.approx(-2.6 - 0.75), 0.85], "width": 1.8}
+
+
+def test_car_that_leaves_the_course_stays_in_the_picture():
+    page = report_page(
+        {"a.mcap": recording_of(along_path(lambda x: 0.1 * x, path=offset_track), maneuver={"name": "cones"})}
+    )
+    view = data_of(page)[0]["track"]["view"]
+    assert view["y"][1] == pytest.approx(5.1 + 2.0 + 6.0)  # the lane, beside it, and how far off is shown at most
 
 
 def test_instants_of_the_standard_are_marked(page):

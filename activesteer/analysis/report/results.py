@@ -1,0 +1,175 @@
+"""What came out of runs, for the top of a report: what went wrong, and the key figures beside each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from enum import StrEnum
+from typing import Final, NamedTuple
+
+from activesteer.analysis.claims.noticeable import noticeable
+from activesteer.analysis.loss import CONES_MISSED, IN_LANES, SIDESLIP_PEAKS, has_spun
+from activesteer.analysis.report.groups import Group, Run
+from activesteer.analysis.report.tables import difference_text, number
+from activesteer.quantities import metric_label
+
+LANE_OVERSTEP: Final = "lane_overstep_m"
+CONES_HIT: Final = "cones_hit"
+MAX_FIGURES: Final = 6
+"""More key figures than this are no longer read at a glance."""
+
+
+class Change(StrEnum):
+    """What a difference to the first run is worth."""
+
+    BETTER = "better"
+    WORSE = "worse"
+    SAME = "same"
+    """Neither a driver nor a sensor in a test car could tell it."""
+    OTHER = "other"
+    """A difference, and no better or worse for it."""
+
+
+class KeyFigure(NamedTuple):
+    """What a run is first looked at for.
+
+    Attributes:
+        title: Its name.
+        metrics: Names of metrics; the first that a run has is it.
+        size: What of a value is the better the less it is [SI]; its magnitude is shown where that counts. None where
+            neither less nor more is better.
+    """
+
+    title: str
+    metrics: tuple[str, ...]
+    size: Callable[[float], float] | None = abs
+
+
+class Figure(NamedTuple):
+    """A key figure of a run, as text.
+
+    Attributes:
+        text: Its value.
+        difference: To the first run; empty for that one itself and where there is none.
+        change: What the difference is worth.
+    """
+
+    text: str
+    difference: str = ""
+    change: Change = Change.OTHER
+
+
+class Result(NamedTuple):
+    """What came out of a run.
+
+    Attributes:
+        run: The run.
+        losses: What went wrong, in words; empty where nothing did.
+        kept: What went right, in words; empty where nothing was to be kept.
+        figures: Its key figures.
+    """
+
+    run: Run
+    losses: tuple[str, ...]
+    kept: tuple[str, ...]
+    figures: tuple[Figure, ...]
+
+
+KEY_FIGURES: Final = (
+    KeyFigure("Cones hit", (CONES_HIT,)),
+    KeyFigure("Cones missed", (CONES_MISSED,)),
+    KeyFigure("Beyond the lane", (LANE_OVERSTEP,), float),
+    KeyFigure("Stopping distance", ("stopping_distance_m",)),
+    KeyFigure("Peak sideslip", SIDESLIP_PEAKS),
+    KeyFigure("Settled yaw rate", ("yaw_rate_steady_state_radps",), None),
+    KeyFigure("Yaw rate overshoot", ("yaw_rate_overshoot",), float),
+    KeyFigure("Yaw rate response time", ("yaw_rate_response_time_s",)),
+    KeyFigure("Yaw rate left at 1.75 s", ("yaw_rate_after_1750ms_share",)),
+    KeyFigure("Yaw rate error at 1 s", ("yaw_rate_deviation_after_1000ms_radps",)),
+    KeyFigure("Peak yaw rate", ("yaw_rate_peak_abs_radps", "yaw_rate_peak_radps"), None),
+    KeyFigure("Mean deceleration", ("mean_deceleration_mps2",), float.__neg__),
+    KeyFigure("Off the path", ("track_deviation_max_m",)),
+    KeyFigure("Steering effort, rms rate", ("steering_wheel_rate_rms_radps",)),
+)
+"""In the order of their columns; a manoeuvre has some of them."""
+
+
+HEADLINE: Final = "Peak sideslip [deg]"
+"""Title of the one that stands for all where there is room for one."""
+
+
+def key_titles(group: Group) -> list[str]:
+    """Titles of the columns of key figures, with their units."""
+    return [f"{figure.title} [{unit}]" if (unit := _unit(name)) else figure.title for figure, name in _chosen(group)]
+
+
+def results(group: Group) -> list[Result]:
+    """What came out of each run of a group, beside the first of them."""
+    chosen = list(_chosen(group))
+    first = group.runs[0].recording.metrics
+    losses = [tuple(_losses(run)) for run in group.runs]
+    found = []
+    for place, run in enumerate(group.runs):
+        metrics = run.recording.metrics
+        kept = tuple(_kept(metrics)) or (("keeps the car",) if any(losses) and not losses[place] else ())
+        figures = [_figure(figure, name, metrics, first if place else None) for figure, name in chosen]
+        found.append(Result(run, losses[place], kept, tuple(figures)))
+    return found
+
+
+def _unit(metric: str) -> str:
+    return metric_label(metric)[1].removesuffix("-")
+
+
+def _chosen(group: Group) -> Iterator[tuple[KeyFigure, str]]:
+    """The key figures that any run has, with the metric that tells it."""
+    names = {name for run in group.runs for name in run.recording.metrics}
+    having = (
+        (figure, name) for figure in KEY_FIGURES if (name := next(filter(names.__contains__, figure.metrics), ""))
+    )
+    yield from list(having)[:MAX_FIGURES]
+
+
+def _losses(run: Run) -> Iterator[str]:
+    metrics = run.recording.metrics
+    if run.problem:
+        yield "incomplete"
+    peak = next((abs(metrics[name]) for name in SIDESLIP_PEAKS if name in metrics), None)
+    if peak is not None and has_spun(metrics):
+        yield f"lost at {math.degrees(peak):.0f} deg of sideslip" if math.isfinite(peak) else "lost"
+    if IN_LANES in metrics and metrics[IN_LANES] != 1.0:
+        beyond = metrics.get(LANE_OVERSTEP, math.nan)
+        yield f"leaves the lane by {beyond:.2f} m" if beyond > 0.0 else "does not get through the lanes"
+    if missed := metrics.get(CONES_MISSED):
+        yield f"misses {_cones(missed)}"
+    if hit := metrics.get(CONES_HIT):
+        yield f"hits {_cones(hit)}"
+
+
+def _kept(metrics: Mapping[str, float]) -> Iterator[str]:
+    if metrics.get(IN_LANES) == 1.0:
+        yield "stays in the lanes"
+    if metrics.get(CONES_MISSED) == 0.0:
+        yield "passes all cones"
+    if metrics.get(CONES_HIT) == 0.0:
+        yield "hits no cone"
+
+
+def _cones(count: float) -> str:
+    return "some cones" if math.isnan(count) else f"{count:.0f} cone{'s' if count != 1.0 else ''}"
+
+
+def _figure(figure: KeyFigure, name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> Figure:
+    sizes = abs if figure.size is abs else float
+    value = sizes(metrics.get(name, math.nan))
+    text = number(name, value)
+    before = math.nan if first is None else sizes(first.get(name, math.nan))
+    if not math.isfinite(value - before):
+        return Figure(text)
+    difference = difference_text(name, value, before)
+    if abs(value - before) <= noticeable(name) or difference.text == "0":
+        return Figure(text, difference.text, Change.SAME)
+    shown = difference.percent or difference.text
+    if figure.size is None:
+        return Figure(text, shown)
+    return Figure(text, shown, Change.BETTER if figure.size(value) < figure.size(before) else Change.WORSE)
