@@ -30,6 +30,10 @@ PINION_M: Final = 0.0075
 """Chosen: the source has no rack; the angle of the steering wheel times this stands for it."""
 TRAVEL_M: Final = np.linspace(-0.08, 0.08, 33)
 FORCE_N: Final = np.linspace(-4000.0, 4000.0, 17)
+TYRE_WIDTH_M: Final = 0.245
+WHEEL_KG: Final = 23.57
+"""Of each wheel: `Iwf` and `Iwr` are those of a disc of 47.15 kg with the radius `r_stat0`, and that is what the
+regression of the source's institute gives for both wheels of an axle (TUMFTM/TOTEM, after Fuchs, TUM 2014)."""
 
 
 def main() -> None:
@@ -178,8 +182,8 @@ def car_table(given: dict[str, Any]) -> str:
         "aerodynamics": {"drag_area_m2": given["cx"], "pressure_point_m": [-1.48, 0.0, 0.6]},
     }  # fmt: skip
     for axle, end, x in (("front", "F", 0.0), ("rear", "R", -given["l"])):
-        wheel, carrier = 28.0, 0.0 if axle == "front" else 6.0
-        knuckle = round(0.5 * unsprung[axle] - wheel - carrier, 2)
+        carrier = 0.0 if axle == "front" else 6.0
+        knuckle = round(0.5 * unsprung[axle] - WHEEL_KG - carrier, 2)
         # Bars and dampers of the source are those of an axle, as its springs are: csF is twice a wheel's rate.
         compression, rebound = (-0.5 * given[f"dd{end}_{way}"][0] for way in ("comp", "reb"))
         table[axle] = {
@@ -193,9 +197,9 @@ def car_table(given: dict[str, Any]) -> str:
             "damper_velocity_mps": [-2.0, 0.0, 2.0],
             "damper_force_N": [round(-2.0 * rebound, 1), 0.0, round(2.0 * compression, 1)],
             "damper_friction_N": 40.0,
-            "wheel_mass_kg": wheel,
-            "wheel_spin_inertia_kgm2": round(given[f"Iw{end.lower()}"], 4),
-            "wheel_inertia_kgm2": 1.5,
+            "wheel_mass_kg": WHEEL_KG,
+            "wheel_spin_inertia_kgm2": round(0.5 * given[f"Iw{end.lower()}"], 4),
+            "wheel_inertia_kgm2": round(0.25 * given[f"Iw{end.lower()}"] + WHEEL_KG * TYRE_WIDTH_M**2 / 12.0, 4),
             "knuckle_mass_kg": knuckle,
             "points": {"wheel_centre": [x, 0.5 * tracks[axle], centre]},
         }

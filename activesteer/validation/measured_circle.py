@@ -1,7 +1,8 @@
 """A car against the road: the steering wheel angle that it needs on a circle, beside what was measured on a real one.
 
 Nothing of the car is fitted to the measurement. What is uncertain is drawn: mass, lateral acceleration, tyre, radius.
-What the car's data leave open, and somebody had to decide, is turned over one by one, to see what hangs on it.
+What makes the angle is switched off one by one, and what the car's data leave open, and somebody had to decide, is
+turned over one by one, to see what hangs on it (`circle_variations`).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from activesteer.files import is_file
 from activesteer.resources import find_vehicle, models_dir
 from activesteer.simulation.runner import simulate
 from activesteer.studies.workers import in_parallel
-from activesteer.vehicle.axle_curves import COORDINATES, upper_triangle
+from activesteer.validation.circle_variations import EFFECTS, READINGS
 
 DATA: Final = "measured_circle.json"
 TOLERANCE_DEG: Final = 5.0
@@ -34,12 +35,11 @@ _SEED: Final = 20121121
 _ENTRY_S: Final = 3.0
 _SETTLED_S: Final = 2.0
 _RISE_MPS2: Final = 0.15
-_TOE: Final = COORDINATES.index("toe")
 
 
 @dataclass(frozen=True)
-class Decision:
-    """A decision that the data left open, turned over.
+class Variation:
+    """The car with one thing different.
 
     Attributes:
         name: What is different.
@@ -59,6 +59,7 @@ class CircleResult:
         measured_deg: Measured steering wheel angles, shape (n,).
         nominal_deg: Ours with every uncertain value at its middle.
         samples_deg: Ours of the samples, shape (m,).
+        effects: The angles without one effect each.
         decisions: What open decisions are worth.
     """
 
@@ -66,7 +67,8 @@ class CircleResult:
     measured_deg: Array
     nominal_deg: float
     samples_deg: Array
-    decisions: tuple[Decision, ...]
+    effects: tuple[Variation, ...]
+    decisions: tuple[Variation, ...]
 
     @property
     def difference_deg(self) -> float:
@@ -101,6 +103,10 @@ class CircleResult:
         least = np.minimum(gaussian_kde(self.samples_deg)(grid), gaussian_kde(self.measured_deg)(grid))
         return float(least.sum() * (grid[1] - grid[0]))
 
+    def worth_deg(self, effect: Variation) -> float:
+        """What an effect adds to the nominal angle."""
+        return self.nominal_deg - effect.angle_deg
+
     def as_table(self) -> dict[str, Any]:
         """For JSON."""
         return {
@@ -114,6 +120,7 @@ class CircleResult:
             },
             "difference_deg": self.difference_deg, "tolerance_deg": self.tolerance_deg, "inside": self.inside,
             "area_metric_deg": self.area_metric_deg, "overlap": self.overlap,
+            "effects": {effect.name: self.worth_deg(effect) for effect in self.effects},
             "decisions": {decision.name: decision.angle_deg for decision in self.decisions},
         }  # fmt: skip
 
@@ -128,7 +135,9 @@ class CircleResult:
             f"  difference {self.difference_deg:+7.1f} deg, tolerance of ISO 19364 {self.tolerance_deg:.1f} deg: "
             + ("inside" if self.inside else "OUTSIDE"),
             f"  area metric {self.area_metric_deg:.1f} deg, overlap of the distributions {100.0 * self.overlap:.0f} %",
-            "what open decisions are worth, one at a time:",
+            "what makes the angle, by switching it off alone:",
+            *(f"  {effect.name:66} {self.worth_deg(effect):+7.1f} deg" for effect in self.effects),
+            "the angle with open decisions turned over, one at a time:",
             *(f"  {decision.name:66} {decision.angle_deg:7.1f} deg" for decision in self.decisions),
         ]
         return "\n".join(lines)
@@ -172,8 +181,8 @@ def validate_circle(
     table, _ = read_toml(find_vehicle(name))
     table["name"] = name
     draws = np.random.default_rng(_SEED).normal(size=(samples, 4))
-    calls = [(table, radius, ay, 1.0, 1.0)]
-    calls += [(changed, radius, ay, 1.0, 1.0) for changed in (change(table) for change in _DECISIONS.values())]
+    variations = [*EFFECTS.items(), *READINGS.items()]
+    calls = [(changed, radius, ay, 1.0, 1.0) for changed in (table, *(change(table) for _, change in variations))]
     calls += [
         (table, radius * (1.0 + _SIGMAS["radius"] * r), ay + _SIGMAS["ay_mps2"] * a, 1.0 + _SIGMAS["mass"] * m,
          1.0 + _SIGMAS["tyre"] * t)
@@ -182,13 +191,14 @@ def validate_circle(
     angles = in_parallel(
         steering_wheel_deg, calls, jobs, lambda _place, done: progress(done / len(calls), "circle"), scheduler=scheduler
     )
-    first = 1 + len(_DECISIONS)
-    decisions = tuple(Decision(what, angle) for what, angle in zip(_DECISIONS, angles[1:first], strict=True))
-    return CircleResult(name, np.array(data["steering_wheel_deg"]), angles[0], np.array(angles[first:]), decisions)
+    varied, sampled = angles[1 : 1 + len(variations)], np.array(angles[1 + len(variations) :])
+    found = [Variation(what, angle) for (what, _), angle in zip(variations, varied, strict=True)]
+    effects, decisions = tuple(found[: len(EFFECTS)]), tuple(found[len(EFFECTS) :])
+    return CircleResult(name, np.array(data["steering_wheel_deg"]), angles[0], sampled, effects, decisions)
 
 
 def steering_wheel_deg(table: Mapping[str, Any], radius_m: float, ay_mps2: float, mass: float, tyre: float) -> float:
-    """Mean of the angles to the left and to the right that hold a car on a circle.
+    """The angle that holds a car, which is alike on both sides, on a circle.
 
     Args:
         table: The vehicle file.
@@ -217,49 +227,3 @@ def steering_wheel_deg(table: Mapping[str, Any], radius_m: float, ay_mps2: float
     # A circle of some metres' width: the angle over lateral acceleration is a straight line.
     line = np.polyfit(np.abs(run["ay_mps2"][late]), np.degrees(np.abs(run["steering_wheel_rad"][late])), 1)
     return float(np.polyval(line, ay_mps2))
-
-
-def _without_aligning_compliance(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Toe gives way to side force as measured, and to aligning moment no more than that needs."""
-    curves = {}
-    for axle, given in table["curves"].items():
-        matrix = np.zeros((5, 5))
-        matrix[np.triu_indices(5)] = given["stiffness"]
-        compliance = np.linalg.inv(matrix + np.triu(matrix, 1).T)
-        others = [index for index in range(5) if index != _TOE]
-        coupling = compliance[_TOE, others]
-        compliance[_TOE, _TOE] = 1.05 * float(coupling @ np.linalg.solve(compliance[np.ix_(others, others)], coupling))
-        curves[axle] = given | {"stiffness": list(upper_triangle(np.asarray(np.linalg.inv(compliance), np.float64)))}
-    return {**table, "curves": curves}
-
-
-def _ratio_by_letter(table: Mapping[str, Any]) -> dict[str, Any]:
-    """`isteerR` as the right wheel's: with `isteerL`, 4.2 % more angle at the wheels."""
-    front = table["curves"]["front"]
-    scale = 0.5 * (0.0646 + 0.070055) / 0.0646
-    steer = [scale * value for value in front["rack_steer_deg"]]
-    return {**table, "curves": {**table["curves"], "front": front | {"rack_steer_deg": steer}}}
-
-
-def _front_toe_turned_round(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Side force towards the middle of the car toes the front wheels in."""
-    turned = np.ones(5)
-    turned[_TOE] = -1.0
-    front = table["curves"]["front"]
-    matrix = np.zeros((5, 5))
-    matrix[np.triu_indices(5)] = front["stiffness"]
-    upper = upper_triangle(matrix * np.outer(turned, turned))
-    return {**table, "curves": {**table["curves"], "front": front | {"stiffness": list(upper)}}}
-
-
-_DECISIONS: Final[dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]]] = {
-    "no compliance to aligning moment (assumed: as the compact's)": _without_aligning_compliance,
-    "isteerR by the letter (read: the mirror image of isteerL)": _ratio_by_letter,
-    "anti-roll bars twice as stiff (read: of an axle, as the springs)": lambda table: {
-        **table,
-        "factors": {"anti_roll_bar": 2.0},
-    },
-    "elkin_y_toe_f the other way round (read: understeering)": _front_toe_turned_round,
-    "the first two": lambda table: _ratio_by_letter(_without_aligning_compliance(table)),
-}
-"""Decision -> the vehicle file with it turned over."""
