@@ -7,7 +7,9 @@ number, and in models/reference/tesla_model_s/README.md.
 
 from __future__ import annotations
 
+import datetime
 import json
+import re
 import shutil
 import tempfile
 from pathlib import Path
@@ -18,6 +20,7 @@ import numpy as np
 from activesteer.config import toml_text
 from activesteer.conventions import Array
 from activesteer.resources import models_dir
+from activesteer.studies.identification import RADIUS_TEST, identify, write_single_track
 from activesteer.vehicle_builder import new_vehicle
 
 SOURCE: Final = "TUMFTM/VVUQ-Framework; Danquah et al., Applied Sciences 11 (2021) 3, and Danquah's dissertation (TUM)"
@@ -55,8 +58,31 @@ def main() -> None:
         text = made.vehicle_file.read_text(encoding="utf-8").replace(
             f'mjcf = "{NAME}.xml"', f'mjcf = "{NAME}/{NAME}.xml"'
         )
-        (models_dir() / "vehicles" / f"{NAME}.toml").write_text(text, encoding="utf-8")
+        file = models_dir() / "vehicles" / f"{NAME}.toml"
+        file.write_text(text, encoding="utf-8")
         print(*made.questions, sep="\n")
+    tell_controllers(file)
+
+
+def tell_controllers(file: Path) -> None:
+    """What controllers believe of the car: as driven, by the compact's rules (`models/vehicles/compact.toml`)."""
+    found = identify(NAME)
+    write_single_track(file, found, "python tools/make_tesla_model_s.py", datetime.date.today().isoformat())
+    text = file.read_text(encoding="utf-8")
+    start = text.index("# Controllers of the compact")
+    controllers = re.sub(r"^#.*\n", "", text[start:], flags=re.MULTILINE).replace(
+        "max_lateral_acceleration_mps2 = 7.74",
+        f"max_lateral_acceleration_mps2 = {0.9 * found.tests[RADIUS_TEST].limit_acceleration_mps2:.2f}",
+    )
+    model = found.single_track
+    rear = model.rear_stiffness_Nprad * model.cg_to_rear_m / model.yaw_inertia_kgm2
+    front = model.front_stiffness_Nprad * model.cg_to_front_m / model.yaw_inertia_kgm2
+    note = (
+        "# Chosen: the paper's controllers by the compact's rules. a_y_max is what this car reaches with mu 0.9; the gains\n"
+        f"# are the compact's: here yaw rate per rear angle integrates with {rear:.0f} 1/s, per front angle with {front:.0f} "
+        "(there with\n# 105 and 49), so that the phase margins are greater.\n"
+    )
+    file.write_text(text[:start] + note + controllers, encoding="utf-8")
 
 
 def write_tyre(given: dict[str, Any], file: Path) -> None:
