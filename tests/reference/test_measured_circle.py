@@ -113,7 +113,7 @@ def test_without_what_toe_does_the_angle_is_that_of_geometry_and_tyres() -> None
 
 @pytest.mark.slow
 def test_without_lateral_acceleration_the_angle_is_that_of_ackermann() -> None:
-    """On 30 m the wheels ask for 5.64 deg, the ratio is 15.5: a straight line through two low accelerations ends there."""
+    """On 30 m the wheels ask for 5.64 deg, the ratio is 15.5: there a line through two low accelerations ends."""
     table, _ = read_toml(find_vehicle("tesla_model_s"))
     low, high = (steering_wheel_deg({**table, "name": "tesla_model_s"}, 30.0, ay, 1.0, 1.0) for ay in (0.6, 1.2))
     assert low < high
