@@ -79,7 +79,7 @@ def tell_controllers(file: Path) -> None:
     front = model.front_stiffness_Nprad * model.cg_to_front_m / model.yaw_inertia_kgm2
     note = (
         "# Chosen: the paper's controllers by the compact's rules. a_y_max is what this car reaches with mu 0.9; the\n"
-        f"# gains are the compact's: here yaw rate per rear angle integrates with {rear:.0f} 1/s, per front angle with\n"
+        f"# gains are the compact's: here yaw rate per rear angle integrates with {rear:.0f} 1/s, per front with\n"
         f"# {front:.0f} (there with 105 and 49), so that the phase margins are greater.\n"
     )
     file.write_text(text[:start] + note + controllers, encoding="utf-8")
