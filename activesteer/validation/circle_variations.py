@@ -53,7 +53,7 @@ def _compliance(axle: str, change: Callable[[Array], None]) -> Change:
     def changed(table: Mapping[str, Any]) -> dict[str, Any]:
         matrix = np.zeros((5, 5))
         matrix[_ENTRIES] = table["curves"][axle]["stiffness"]
-        compliance = np.linalg.inv(matrix + np.triu(matrix, 1).T)
+        compliance = np.asarray(np.linalg.inv(matrix + np.triu(matrix, 1).T), np.float64)
         change(compliance)
         return _axle(table, axle, stiffness=list(upper_triangle(np.asarray(np.linalg.inv(compliance), np.float64))))
 
