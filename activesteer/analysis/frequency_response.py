@@ -84,18 +84,41 @@ def frequency_response(
     power_u = (np.abs(u[band]) ** 2).sum(axis=1)
     power_y = (np.abs(y[band]) ** 2).sum(axis=1)
     cross = (u[band].conj() * y[band]).sum(axis=1)
-    largest = float((np.abs(u) ** 2).max())
+    return response_of(lines_Hz[places], power_u, power_y, cross, input_channel, float((np.abs(u) ** 2).max()))
+
+
+def response_of(
+    frequency_Hz: NDArray[np.float64],
+    power_u: NDArray[np.float64],
+    power_y: NDArray[np.float64],
+    cross: NDArray[np.complex128],
+    input_channel: str,
+    largest: float,
+) -> FrequencyResponse:
+    """The estimate H1 and the coherence.
+
+    Args:
+        frequency_Hz: Frequencies [Hz], shape (n,).
+        power_u: Power of the input there, shape (n,).
+        power_y: Power of the output, in the same measure, shape (n,).
+        cross: Cross spectrum, the conjugate input times the output, shape (n,).
+        input_channel: What the input is called.
+        largest: Largest power of the input at any frequency.
+
+    Raises:
+        RecordingError: the input does not contain a frequency.
+    """
     missing = ~(power_u > MIN_SPECTRUM**2 * largest)
     if missing.any():
         raise RecordingError(
-            f"the steering ({input_channel}) does not contain {asked[missing][0]:.3g} Hz: "
+            f"the steering ({input_channel}) does not contain {frequency_Hz[missing][0]:.3g} Hz: "
             "no response can be evaluated there",
-            value=float(asked[missing][0]),
+            value=float(frequency_Hz[missing][0]),
         )
     with np.errstate(invalid="ignore"):
         coherence = np.abs(cross) ** 2 / (power_u * power_y)
     # Without any output the response is zero and nothing contradicts it.
-    return FrequencyResponse(lines_Hz[places], cross / power_u, np.where(power_y > 0.0, coherence, 1.0))
+    return FrequencyResponse(frequency_Hz, cross / power_u, np.where(power_y > 0.0, coherence, 1.0))
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:

@@ -7,6 +7,7 @@ from activesteer.maneuver.follow_path import FollowPath
 from activesteer.maneuver.kinds import KINDS, build_maneuver, filled_from_csv, maneuver_class
 from activesteer.maneuver.lane_change import LaneChange
 from activesteer.maneuver.open_loop import OpenLoop
+from activesteer.maneuver.random_steer import RandomSteer
 from activesteer.maneuver.sine_sweep import SineSweep
 from activesteer.maneuver.sine_with_dwell import SineWithDwell
 from activesteer.maneuver.slalom import Slalom
@@ -24,6 +25,7 @@ __all__ = [
     "LaneChange",
     "Maneuver",
     "OpenLoop",
+    "RandomSteer",
     "SineSweep",
     "SineWithDwell",
     "Slalom",

@@ -16,6 +16,7 @@ from activesteer.maneuver.follow_path import FollowPath, with_csv
 from activesteer.maneuver.lane_change import LaneChange
 from activesteer.maneuver.open_loop import OpenLoop
 from activesteer.maneuver.open_loop_tables import with_tables
+from activesteer.maneuver.random_steer import RandomSteer
 from activesteer.maneuver.sine_sweep import SineSweep
 from activesteer.maneuver.sine_with_dwell import SineWithDwell
 from activesteer.maneuver.slalom import Slalom
@@ -29,6 +30,7 @@ KINDS: Final[dict[str, type[Maneuver]]] = {
     "slowly_increasing_steer": SlowlyIncreasingSteer,
     "constant_radius": ConstantRadius,
     "sine_sweep": SineSweep,
+    "random_steer": RandomSteer,
     "sine_with_dwell": SineWithDwell,
     "brake_in_turn": BrakeInTurn,
     "straight_braking": StraightBraking,

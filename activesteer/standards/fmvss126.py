@@ -221,7 +221,7 @@ STANDARD: Final = Standard(
         "With ideal sensors, the default, the three repetitions to a side are the same run.",
         "The car is driven as its file has it; driver and measuring equipment are loaded with --set load. keys. The "
         "mass that decides on 1.83 or 1.52 m is that of the car as driven, not its gross vehicle weight rating.",
-        "Road: even, peak friction 0.9 in the model.",
+        "Road: even, 0.9 times the friction of the tyre file, in place of a peak friction of 0.9 of a reference tyre.",
     ),
     examine=_examine,
 )

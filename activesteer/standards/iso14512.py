@@ -10,7 +10,7 @@ from activesteer.standards.standard import Findings, Ground, Picture, Run, Stand
 AFTER_S: Final = 1.0
 """Time after the brake at which the car is looked at [s]."""
 HIGH, LOW = 0.9, 0.3
-"""Peak friction of the two sides."""
+"""Friction of the two sides, relative to that of the tyre file."""
 _CASES: Final = {
     "high friction on the left": {"road.mu_left": HIGH, "road.mu_right": LOW},
     "high friction on the right": {"road.mu_left": LOW, "road.mu_right": HIGH},
@@ -65,8 +65,8 @@ STANDARD: Final = Standard(
     title="ISO 14512: straight-ahead braking on split friction, steering wheel held",
     edition="ISO 14512:1999, as it is known from the literature; the text itself was not at hand.",
     implemented=(
-        "Full braking from 80 km/h on a road with peak friction 0.9 on one side and 0.3 on the other, either way, "
-        "steering wheel held straight, clutch open, anti-lock system at work.",
+        "Full braking from 80 km/h on a road with 0.9 times the friction of the tyre file on one side and 0.3 times on "
+        "the other, either way, steering wheel held straight, clutch open, anti-lock system at work.",
         "Yaw rate, yaw angle and lateral deviation 1 s after the beginning of braking; deceleration and peaks.",
     ),
     left_out=(

@@ -45,8 +45,8 @@ STANDARD: Final = Standard(
     title="ISO 21994: stopping distance at straight-line braking with an anti-lock system",
     edition="ISO 21994:2007, as it is known from the literature; the text itself was not at hand.",
     implemented=(
-        "Full braking from 100 km/h to standstill on an even dry road (peak friction 0.9), clutch open, pedal pressed "
-        "to the end within 0.1 s, the driver keeps the line.",
+        "Full braking from 100 km/h to standstill on an even dry road (0.9 times the friction of the tyre file), "
+        "clutch open, pedal pressed to the end within 0.1 s, the driver keeps the line.",
         "Stopping distance from the beginning of pedal travel, corrected to 100 km/h with the square of the speed; "
         "mean fully developed deceleration from 80 to 10 % of the speed (UN R13-H).",
     ),

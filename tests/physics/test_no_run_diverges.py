@@ -56,7 +56,7 @@ class Case(NamedTuple):
             table["speed_kmh"] = 3.6 * speed_mps if table["kind"] in COURSES else self.speed_kmh
         if table["kind"] in COURSES:
             table["duration_s"] = min(60.0, COURSES[table["kind"]] / speed_mps + 4.0)
-        elif table["kind"] in ("open_loop", "slowly_increasing_steer", "constant_radius"):
+        elif table["kind"] in ("open_loop", "slowly_increasing_steer", "constant_radius", "random_steer"):
             table["duration_s"] = 6.0
             if "circle" in table:
                 table["circle"]["end_speed_kmh"] = 20.0 + max(95.0, self.speed_kmh)

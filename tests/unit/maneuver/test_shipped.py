@@ -17,7 +17,7 @@ def test_all_kinds_that_were_asked_for_are_there():
     asked = {
         "step_steer", "sine_with_dwell", "double_lane_change", "double_lane_change_low_mu", "slalom", "straight_line",
         "sine_sweep", "slowly_increasing_steer", "ramp_steer", "constant_radius", "brake_in_turn", "severe_lane_change",
-        "split_mu_braking", "mu_jump",
+        "split_mu_braking", "mu_jump", "random_steer",
     }  # fmt: skip
     assert asked <= set(list_maneuvers())
 

@@ -43,6 +43,7 @@ def test_throttle_is_released_two_metres_into_the_entry_lane(side):
 def test_the_compact_gets_through_at_50_and_not_at_65_kmh(monkeypatch):
     monkeypatch.setattr(iso3888_2, "COARSE_KMH", (50.0, 65.0))
     monkeypatch.setattr(iso3888_2, "FINE_KMH", 5.0)
+    monkeypatch.setattr(iso3888_2, "MARGINS_M", (0.1,))
     result = examine("iso3888-2", jobs=1)
     assert result.driver == "expert"
     found = result.findings["none"]

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from activesteer.analysis.frequency_response import FrequencyResponse
 from activesteer.analysis.handling import CarGeometry, evaluate
 from activesteer.errors import ManeuverError, ParameterError, RecordingError
 from activesteer.files import json_text
@@ -86,6 +87,14 @@ def test_a_run_that_ends_early_or_failed_has_no_value():
         failed["y_m"]
 
 
+def test_frequencies_with_weak_coherence_are_said():
+    frequency_Hz = np.array([0.5, 1.0, 1.5, 2.0, 2.5])
+    found = FrequencyResponse(frequency_Hz, np.ones(5, complex), np.array([0.9, 0.99, 0.94, 0.93, 1.0]))
+    assert iso7401.weak_ranges(found) == "0.50 Hz, 1.50 to 2.00 Hz"
+    assert iso7401.weak_ranges(found._replace(coherence=np.ones(5))) == ""
+    assert iso7401.weak_ranges(found._replace(coherence=np.zeros(5))) == "0.50 to 2.50 Hz"
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_understeer_of_a_held_steering_wheel(side):
     """Constant angle: the curvature falls as the speed rises, l k = delta - EG ay."""
@@ -162,15 +171,20 @@ def test_braking_in_a_turn_begins_on_the_circle(monkeypatch):
 
 
 @pytest.mark.slow
-def test_responses_of_the_compact_are_coherent_and_follow_its_step():
+def test_responses_of_the_compact_are_coherent_and_follow_its_step(monkeypatch):
+    monkeypatch.setattr(iso7401, "SEQUENCES", 2)
     found = no_verdict(examine("iso7401", jobs=1))
     left, right = found.values["steps"]
     assert left["ay_steady_state_mps2"] == pytest.approx(iso7401.STEP_MPS2, rel=0.03)
     assert right["yaw_rate_response_time_s"] == pytest.approx(left["yaw_rate_response_time_s"], abs=1e-3)
-    yaw = found.values["responses"]["yaw_rate_radps"]
-    assert min(yaw["coherence"]) > 0.99
+    sweep, random = (found.values["responses"][kind]["yaw_rate_radps"] for kind in ("sweep", "random"))
+    assert min(*sweep["coherence"], *random["coherence"]) > 0.99
     static = left["yaw_rate_steady_state_radps"] / math.radians(found.values["steering_wheel_deg"])
-    assert yaw["gain"][0] == pytest.approx(static, rel=0.05)
+    assert sweep["gain"][0] == pytest.approx(static, rel=0.05)
+    # Both steer by some 0.1 g; dry friction in the steering makes a larger amplitude a little more effective.
+    at_sweep = np.interp(random["frequency_Hz"], sweep["frequency_Hz"], sweep["gain"])
+    assert np.array(random["gain"]) / at_sweep == pytest.approx(1.0, abs=0.04)
+    assert "coherence" not in found.summary
 
 
 @pytest.mark.slow

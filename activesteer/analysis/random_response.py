@@ -1,0 +1,91 @@
+"""Frequency response to random steering by ISO 7401: several runs, averaged spectra, coherence, and the error left.
+
+Source: P. D. Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967) 70-73 (averaged spectra of overlapping
+segments); J. S. Bendat and A. G. Piersol, Random Data (2010), chapters 6 and 9 (the estimate H1, its random error).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy import signal
+
+from activesteer.analysis.frequency_response import INPUT, FrequencyResponse, response_of
+from activesteer.analysis.series import timestep
+from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import Array
+from activesteer.errors import RecordingError
+
+SEGMENT_S: Final = 20.0
+"""Length of a segment [s]: the spectra have a line every 0.05 Hz."""
+_HANN_OVERLAP: Final = 1.0 + 2.0 / 36.0
+"""Segments with Hann windows that overlap by half count for one over this as many independent ones (Welch, 1967)."""
+
+
+class RandomResponse(NamedTuple):
+    """A response that was averaged.
+
+    Attributes:
+        response: The response, and its coherence.
+        gain_error: Standard error of the gain by the coherence and the number of averages, relative, shape (n,); that
+            of the phase is the same in radians.
+        averages: How many independent segments are in it.
+    """
+
+    response: FrequencyResponse
+    gain_error: Array
+    averages: float
+
+
+def random_response(
+    recordings: Sequence[RecordingLike], output: str, lowest_Hz: float, highest_Hz: float, input_channel: str = INPUT
+) -> RandomResponse:
+    """Response of a channel to random steering, at all lines of a range.
+
+    The segments are finite, and what a car does after the end of one is lost: the gain comes out low by some per mille
+    where the response dies away within a second. The error is that of small deviations: coherence above some 0.3.
+
+    Args:
+        recordings: Runs with different random steering, of at least `SEGMENT_S` each.
+        output: Channel.
+        lowest_Hz: Least frequency [Hz].
+        highest_Hz: Greatest frequency [Hz].
+        input_channel: Channel that the response is referred to.
+
+    Returns:
+        The response.
+
+    Raises:
+        RecordingError: there is no run, one is too short, a channel is missing, or the steering does not contain a
+            frequency.
+    """
+    if not recordings:
+        raise RecordingError("there is no run with random steering")
+    total, averages, step_s = np.zeros((3, 1), dtype=np.complex128), 0.0, 1.0
+    for recording in recordings:
+        step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))
+        length = round(SEGMENT_S / step_s)
+        u, y = (np.asarray(recording[name], dtype=np.float64) for name in (input_channel, output))
+        if len(u) < length:
+            raise RecordingError(
+                f"a run of {len(u) * step_s:.3g} s is too short for an average; {SEGMENT_S:g} s are needed",
+                value=len(u) * step_s,
+            )
+        count = 1 + (len(u) - length) // (length - length // 2)
+        pairs = ((u, u), (y, y), (u, y))
+        spectra = count * np.stack(
+            [np.asarray(signal.csd(*pair, fs=1.0 / step_s, nperseg=length)[1]) for pair in pairs]
+        )
+        total = total + spectra
+        averages += count / _HANN_OVERLAP
+    power_u, power_y, cross = total
+    lines_Hz = np.asarray(np.fft.rfftfreq(round(SEGMENT_S / step_s), step_s), dtype=np.float64)
+    inside = (lines_Hz >= lowest_Hz - 1e-9) & (lines_Hz <= highest_Hz + 1e-9)
+    power_u, power_y = power_u.real, power_y.real
+    largest = float(power_u.max())
+    found = response_of(lines_Hz[inside], power_u[inside], power_y[inside], cross[inside], input_channel, largest)
+    with np.errstate(divide="ignore"):
+        error = np.sqrt(0.5 * np.maximum(1.0 / found.coherence - 1.0, 0.0) / averages)
+    return RandomResponse(found, error, averages)
