@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -29,8 +30,8 @@ def add_to(commands: Any) -> None:
     parser.add_argument("--figures", action="store_true", help="also draw the paper's figures, or the comparison's")
     parser.add_argument(
         "--population", type=int, metavar="N",
-        help="instead: in which share of N cars, roads and drivers each claim holds, and what each system does there; "
-        "15 N runs",
+        help="instead: in which share of N cars, roads and drivers each claim holds, and what each system does there, "
+        "15 N runs; with --controllers, what each of these does there",
     )  # fmt: skip
     parser.add_argument(
         "--controllers", metavar="C,C...",
@@ -45,10 +46,9 @@ def add_to(commands: Any) -> None:
 
 def _reproduce(options: argparse.Namespace) -> int:
     # Here, where an interruption finds out what is saved.
-    default = "comparison" if options.controllers else "runs" if options.population is None else "population"
+    given = {"comparison": options.controllers, "population": options.population}
+    default = "_".join(name for name, value in given.items() if value is not None) or "runs"
     options.output = options.output or Path(default)
-    if options.population is not None and options.controllers is not None:
-        raise ParameterError("--controllers drives nominal runs; leave --population out")
     if options.population is not None:
         options.how_to_go_on = "; the same command goes on with it"
         return _population(options)
@@ -95,10 +95,9 @@ def _reproduce(options: argparse.Namespace) -> int:
 def _compare(options: argparse.Namespace) -> int:
     from activesteer.studies.comparison import compare
 
-    controllers = [name.strip() for name in options.controllers.split(",") if name.strip()]
     with ProgressBar("compare", quiet=options.json) as bar:
         made = compare(
-            controllers,
+            _controllers(options),
             options.output,
             options.vehicle,
             jobs=options.jobs,
@@ -138,12 +137,14 @@ def _report(result: Reproduction, folder: Path) -> Path | None:
 
 
 def _population(options: argparse.Namespace) -> int:
+    from activesteer.studies.comparison_population import compare_population
     from activesteer.studies.population import population
 
-    if options.figures:
+    drive = population if options.controllers is None else functools.partial(compare_population, _controllers(options))
+    if options.figures and options.controllers is None:
         raise ParameterError("--figures draws the nominal runs; leave --population out")
     with RunCounter("population", quiet=options.json) as counter:
-        found = population(
+        found = drive(
             options.population,
             seed=options.seed,
             vehicle=options.vehicle,
@@ -152,8 +153,19 @@ def _population(options: argparse.Namespace) -> int:
             scheduler=options.scheduler,
             progress=counter,
         )
+    figures = []
+    if options.figures:
+        from activesteer.studies.comparison_figure import draw_comparison_population
+
+        figures = [draw_comparison_population(found, options.output / "comparison_population.png")]
     if options.json:
-        print_json(found.to_json())
-    else:
-        print(found.to_text())
+        print_json(found.to_json() | ({"figures": [str(path) for path in figures]} if figures else {}))
+        return 0
+    print(coloured(found.to_text()))
+    for path in figures:
+        print(f"figure: {path}")
     return 0
+
+
+def _controllers(options: argparse.Namespace) -> list[str]:
+    return [name.strip() for name in options.controllers.split(",") if name.strip()]

@@ -28,11 +28,12 @@ from activesteer.theory.shares import wilson_interval
 
 STUDY: Final = "population"
 """Name of the study file."""
+STEERING_EFFORT: Final = "steering_wheel_rms_rad"
 CHANGES: Final = (
     *SIDESLIP_PEAKS,
     "yaw_rate_after_gates_rms_radps",
     "yaw_rate_after_1750ms_share",
-    "steering_wheel_rms_rad",
+    STEERING_EFFORT,
 )
 """Metrics whose change by a system is reported: peak of the sideslip, oscillation that is left, steering effort."""
 _RANGE: Final = (0.05, 0.5, 0.95)
@@ -112,7 +113,7 @@ def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim]) -> 
         vehicle=rows[0]["vehicle"] if rows else "",
         versions=versions(),
         claims=tuple(_share(claim.id, claim.passed, first, planned.factors) for claim in nominal),
-        systems=tuple(_effects(rows)),
+        systems=tuple(effects(rows, *SYSTEMS)),
     )
 
 
@@ -148,13 +149,20 @@ def _fraction(held: Sequence[bool]) -> float:
     return sum(held) / len(held) if held else float("nan")
 
 
-def _effects(rows: Sequence[Mapping[str, Any]]) -> list[SystemEffect]:
-    without, *systems = SYSTEMS
+def effects(rows: Sequence[Mapping[str, Any]], without: str, *systems: str) -> list[SystemEffect]:
+    """What each system does in each scenario, against the same samples without it.
+
+    Args:
+        rows: Those of a paired study's table.
+        without: Controller that the others are compared with.
+        systems: The others.
+    """
     found = []
     for scenario in dict.fromkeys(row["maneuver"] for row in rows):
         driven = [row for row in rows if row["maneuver"] == scenario]
         by_system = {
-            system: {row["sample"]: row for row in driven if row["controller"] == system} for system in SYSTEMS
+            system: {row["sample"]: row for row in driven if row["controller"] == system}
+            for system in (without, *systems)
         }
         has = [name for name in driven[0] if any(row[name] is not None for row in driven)]
         metrics = [name for name in CHANGES if name in has]

@@ -43,11 +43,6 @@ def test_every_scenario_has_metrics_to_show():
     assert set(SHOWN) == set(CASES)
 
 
-def test_controllers_and_population_do_not_go_together(capsys):
-    assert main(["reproduce", "--controllers", "none", "--population", "4"]) == 1
-    assert "--population" in capsys.readouterr().err
-
-
 def made_up(**values: tuple[float, float, float]) -> Comparison:
     """Controllers with overshoot of a step, amplitude of a slalom, and entry speed."""
     places = [
