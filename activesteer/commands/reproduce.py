@@ -137,12 +137,12 @@ def _report(result: Reproduction, folder: Path) -> Path | None:
 
 
 def _population(options: argparse.Namespace) -> int:
-    from activesteer.studies.comparison_population import compare_population
+    from activesteer.studies.comparison_population import ComparisonPopulation, compare_population
     from activesteer.studies.population import population
 
-    drive = population if options.controllers is None else functools.partial(compare_population, _controllers(options))
     if options.figures and options.controllers is None:
         raise ParameterError("--figures draws the nominal runs; leave --population out")
+    drive = population if options.controllers is None else functools.partial(compare_population, _controllers(options))
     with RunCounter("population", quiet=options.json) as counter:
         found = drive(
             options.population,
@@ -153,13 +153,14 @@ def _population(options: argparse.Namespace) -> int:
             scheduler=options.scheduler,
             progress=counter,
         )
-    figures = []
-    if options.figures:
+    table, figures = found.to_json(), []
+    if options.figures and isinstance(found, ComparisonPopulation):
         from activesteer.studies.comparison_figure import draw_comparison_population
 
         figures = [draw_comparison_population(found, options.output / "comparison_population.png")]
+        table["figures"] = [str(path) for path in figures]
     if options.json:
-        print_json(found.to_json() | ({"figures": [str(path) for path in figures]} if figures else {}))
+        print_json(table)
         return 0
     print(coloured(found.to_text()))
     for path in figures:

@@ -115,16 +115,9 @@ class Effect:
     @classmethod
     def from_json(cls, table: Mapping[str, Any]) -> Effect:
         """The effect that `to_json` was made of."""
-        return cls(
-            **{
-                key: Share(value["count"], value["number"])
-                if isinstance(value, Mapping)
-                else math.nan
-                if value is None
-                else value
-                for key, value in table.items()
-            }
-        )
+        read: dict[str, Any] = {key: math.nan if value is None else value for key, value in table.items()}
+        read |= {key: Share(read[key]["count"], read[key]["number"]) for key in ("lower", "saved", "spoiled")}
+        return cls(**read)
 
 
 @dataclass(frozen=True)
