@@ -152,7 +152,7 @@ def driver_loops_figure(
     phase.set_xlabel("frequency [rad/s]")
     for axis in (gain, phase):
         axis.set_xlim(frequency_radps[0], 20.0)
-    damping.set_ylim(bottom=min(0.0, *(row["damping_in_run"] for row in rows)))
+    damping.set_ylim(min(0.0, *(row["damping_in_run"] for row in rows)), 1.1)
     damping.set_ylabel("damping [-]\nlines linear, dots runs")
     damping.set_xlabel("speed [km/h]")
     for axis in axes:

@@ -18,7 +18,17 @@ from activesteer.errors import ParameterError
 from activesteer.files import make_folder
 from activesteer.resources import DEFAULT_DRIVER
 
-_COLUMNS = ("speed_kmh", "controller", "damping", "damping_in_run", "phase_margin_deg", "crossover_rad_s")
+_COLUMNS = {
+    "speed_kmh": "km/h",
+    "controller": "controller",
+    "damping": "damping",
+    "damping_in_step": "in a step",
+    "damping_in_run": "in a run",
+    "step_difference_m": "apart m",
+    "phase_margin_deg": "margin deg",
+    "crossover_rad_s": "crossover rad/s",
+}
+"""Key of a loop's figures -> head of its column."""
 
 
 def add_to(commands: Any) -> None:
@@ -27,7 +37,8 @@ def add_to(commands: Any) -> None:
         "driver",
         help="damping and phase margin of driver and car",
         description="Crossover frequency, phase margin and damping of the loop of driver, controller and linearised "
-        "car, the corrector fully active; beside it the damping after a small step of the path in a run.",
+        "car, the corrector fully active; beside it the damping after a small step of the path, of the same loop and "
+        "in a run, and how far the two are apart at most.",
     )
     parser.add_argument(
         "name", nargs="?", default=DEFAULT_DRIVER, metavar="NAME",
@@ -75,9 +86,12 @@ def _driver(options: argparse.Namespace) -> int:
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
-    heads = ("km/h", "controller", "damping", "in a run", "margin deg", "crossover rad/s")
-    lines = [" ".join(f"{head:>15}" for head in heads)]
+    lines = [" ".join(f"{head:>{_width(head)}}" for head in _COLUMNS.values())]
     for row in rows:
-        values = (row[key] for key in _COLUMNS)
-        lines.append(" ".join(f"{value:>15}" if isinstance(value, str) else f"{value:15.3g}" for value in values))
+        cells = ((row[key], _width(head)) for key, head in _COLUMNS.items())
+        lines.append(" ".join(f"{cell:>{w}}" if isinstance(cell, str) else f"{cell:{w}.3g}" for cell, w in cells))
     return "\n".join(lines)
+
+
+def _width(head: str) -> int:
+    return max(10, len(head))

@@ -22,6 +22,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.analysis.source import RecordingLike
 from activesteer.controllers.linear_form import LinearController, linear_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import DriverParameters
@@ -31,7 +32,7 @@ from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.studies.discrete_time_map import OUTPUTS
 from activesteer.studies.linearisation import LinearCar, linear_cars
-from activesteer.studies.small_step import damping_of, small_step
+from activesteer.studies.small_step import DURATION_S, STEP_M, damping_of, small_step
 from activesteer.theory.single_track import SingleTrack
 
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0)
@@ -115,6 +116,17 @@ class DriverLoop:
         s = np.log(complex(values[mode])) / (len(self.c) * self.timestep_s)
         return float(-s.real / abs(s)), float(abs(s))
 
+    def step(self) -> tuple[Array, Array]:
+        """Time [s] and lateral position of the car [m] at each decision, after a step of the path by `STEP_M`."""
+        state = np.zeros(len(self.closed))
+        state[self.offset] = -STEP_M
+        period_s = len(self.c) * self.timestep_s
+        places = np.empty(round(DURATION_S / period_s))
+        for row in range(len(places)):
+            places[row] = state[self.offset] + STEP_M
+            state = self.closed @ state
+        return np.arange(len(places), dtype=np.float64) * period_s, places
+
 
 def driver_loop(
     car: LinearCar, controller: LinearController, driver: DriverParameters, gains: SteeringGains, steering_ratio: float
@@ -186,13 +198,24 @@ class LoopAtSpeed:
         speed_kmh: Speed [km/h].
         controller: The controller.
         loop: The linear loop.
-        damping_in_run: Damping ratio after a small step of the path, friction of the rack and tolerance band included.
+        run: A small step of the path in a run, friction of the rack and tolerance band included.
     """
 
     speed_kmh: float
     controller: str
     loop: DriverLoop
-    damping_in_run: float
+    run: RecordingLike
+
+    @property
+    def damping_in_run(self) -> float:
+        """Damping ratio that is seen after the small step in the run."""
+        return damping_of(self.run.time_s, self.run["y_m"])[0]
+
+    @property
+    def step_difference_m(self) -> float:
+        """How far the linear car and that of the run are apart at most after the small step [m]."""
+        time_s, y_m = self.loop.step()
+        return float(np.abs(np.interp(time_s, self.run.time_s, self.run["y_m"]) - y_m).max())
 
     def to_json(self) -> dict[str, Any]:
         """Its figures."""
@@ -205,7 +228,9 @@ class LoopAtSpeed:
             "natural_frequency_rad_s": natural_radps,
             "phase_margin_deg": math.degrees(margin_rad),
             "crossover_rad_s": crossover_radps,
+            "damping_in_step": damping_of(*self.loop.step())[0],
             "damping_in_run": self.damping_in_run,
+            "step_difference_m": self.step_difference_m,
         }
 
 
@@ -240,6 +265,6 @@ def driver_loops(
         for name in controllers:
             linear = linear_controller(name, setup, car.speed_mps)
             loop = driver_loop(car, linear, who, gains, setup.steering_ratio)
-            damping, _ = damping_of(small_step(car.speed_mps, name, vehicle, overrides, driver))
-            found.append(LoopAtSpeed(3.6 * car.speed_mps, name, loop, damping))
+            run = small_step(car.speed_mps, name, vehicle, overrides, driver)
+            found.append(LoopAtSpeed(3.6 * car.speed_mps, name, loop, run))
     return found

@@ -63,6 +63,7 @@ class Plan:
             folder=None if study.recordings == "none" else folder,
             claims=study.claims,
             curves=study.curves,
+            named=tuple(self._named()),
             expected={},
         )
         _check(study, self.samples, self._values)
@@ -76,6 +77,21 @@ class Plan:
         """Number of runs."""
         shared = self.settings
         return len(shared.maneuvers) * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
+
+    def _named(self) -> Iterator[tuple[int, int, dict[str, Any]]]:
+        """Numbers of manoeuvre and vehicle and overrides, with every combination of texts that may be driven."""
+        study = self.study
+        places = list(itertools.product(range(len(study.maneuvers)), range(len(study.vehicles))))
+        for samples in self.samples:
+            columns = {key: values for key, values in samples.columns.items() if _has_text(values)}
+            rows: Iterable[tuple[Any, ...]] = dict.fromkeys(zip(*columns.values(), strict=True))
+            if study.tune is not None:  # which combines values as the search goes
+                columns = {factor.key: factor.values for factor in study.factors if _has_text(factor.values)}
+                rows = itertools.product(*columns.values())
+            for row in rows if columns else ():
+                sample = samples[0] | dict(zip(columns, row, strict=True))
+                for place in places:
+                    yield *place, study.overrides | self._values.overrides(*place, sample)
 
     def request(self, run: int) -> Request:
         """A run by its number."""
@@ -101,6 +117,10 @@ class Plan:
     def requests(self, runs: Iterable[int]) -> list[Request]:
         """Several runs by their numbers."""
         return [self.request(run) for run in runs]
+
+
+def _has_text(values: Iterable[Any]) -> bool:
+    return any(isinstance(value, str) for value in values)
 
 
 def _labelled(study: StudyFile, key: str, items: Sequence[Any]) -> tuple[tuple[str, Any], ...]:

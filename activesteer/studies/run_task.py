@@ -6,6 +6,7 @@ import contextlib
 import ctypes
 import fnmatch
 import functools
+import itertools
 import tempfile
 import threading
 from collections.abc import Mapping, Sequence
@@ -68,8 +69,10 @@ class Settings:
         folder: Where recordings go.
         claims: Whether the paper's claims are checked for every sample.
         curves: Channels that are kept of every run that was driven to its end.
-        expected: Hash of the files of each pair of manoeuvre and vehicle, of each controller, and the versions, as the
-            study began with them.
+        named: Numbers of manoeuvre and vehicle and overrides, one for each combination of factors that are text: they
+            may name other files.
+        expected: Hash of the files of each pair of manoeuvre and vehicle, with each combination of texts, of each
+            controller, and the versions, as the study began with them.
     """
 
     maneuvers: tuple[tuple[str, FileOrTable], ...]
@@ -84,6 +87,7 @@ class Settings:
     folder: Path | None
     claims: bool
     curves: tuple[str, ...]
+    named: tuple[tuple[int, int, dict[str, Any]], ...]
     expected: dict[str, str]
 
 
@@ -119,13 +123,28 @@ def present_inputs(settings: Settings) -> dict[str, str]:
         ActiveSteerError: something is not found.
     """
     found = {f"{_VERSION}{key}": value for key, value in deciding_versions().items()}
-    for maneuver, maneuver_file in settings.maneuvers:
-        for vehicle, vehicle_file in settings.vehicles:
-            scenario = resolve(maneuver_file, vehicle_file, settings.overrides, settings.driver)
-            found[f"files of {maneuver} and {vehicle}"] = files_digest(scenario)
+    places = itertools.product(range(len(settings.maneuvers)), range(len(settings.vehicles)))
+    for maneuver, vehicle, overrides in (*((*place, settings.overrides) for place in places), *settings.named):
+        scenario = _scenario(settings, maneuver, vehicle, overrides)
+        found[_files_key(settings, maneuver, vehicle, overrides)] = files_digest(scenario)
     for label, controller in settings.controllers:
         found[f"controller {label}"] = controller_digest(controller)
     return found
+
+
+def _scenario(settings: Settings, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> Scenario:
+    return resolve(settings.maneuvers[maneuver][1], settings.vehicles[vehicle][1], overrides, settings.driver)
+
+
+def _files_key(settings: Settings, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> str:
+    """The key of the files in `Settings.expected`."""
+    texts = [
+        f"{key} = {value}"
+        for key, value in sorted(overrides.items())
+        if isinstance(value, str) and value != settings.overrides.get(key)
+    ]
+    words = f"files of {settings.maneuvers[maneuver][0]} and {settings.vehicles[vehicle][0]}"
+    return f"{words} with {', '.join(texts)}" if texts else words
 
 
 def differences(settings: Settings) -> str:
@@ -188,13 +207,11 @@ def _same_drive(a: Request, b: Request) -> bool:
 def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
     """The runs of one sample: the same car on the same road with one controller after the other."""
     first = requests[0]
-    maneuver, vehicle = settings.maneuvers[first.maneuver], settings.vehicles[first.vehicle]
+    place = first.maneuver, first.vehicle, first.overrides
     try:
-        scenario = resolve(maneuver[1], vehicle[1], first.overrides, settings.driver)
-        if not any(isinstance(value, str) for value in first.factors.values()):
-            key = f"files of {maneuver[0]} and {vehicle[0]}"
-            if files_digest(scenario) != settings.expected[key]:
-                raise StudyError(f"{key}: changed while the study ran")
+        scenario, key = _scenario(settings, *place), _files_key(settings, *place)
+        if files_digest(scenario) != settings.expected[key]:
+            raise StudyError(f"{key}: changed while the study ran")
         with amplitude_store.not_on_disk():
             ready = prepared(scenario, settings.timestep_s)
     except ActiveSteerError as error:
@@ -210,7 +227,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
             recordings[label] = recording
         rows.append(row)
     if settings.claims:
-        claims = _claims(maneuver[0], recordings)
+        claims = _claims(settings.maneuvers[first.maneuver][0], recordings)
         for row in rows:
             row.update(claims)
     return rows

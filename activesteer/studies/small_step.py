@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import Array
 from activesteer.errors import StudyError
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable
@@ -19,10 +20,11 @@ STEP_M: Final = 0.5
 linear, and moves the steering wheel further than what the friction of the rack can hide."""
 _CLOSE: Final = 0.1
 """Share of the step that may be left at the end; the friction of the rack hides some."""
-_DURATION_S: Final = 7.0
+DURATION_S: Final = 7.0
+"""Length of the run [s]."""
 _SPACING_M: Final = 15.0
-_EVERY: Final = 10
-"""Of the steps of the run every so many are fitted."""
+_FIT_INTERVAL_S: Final = 0.01
+"""Distance of the samples that are fitted [s]."""
 
 
 def small_step(
@@ -41,26 +43,27 @@ def small_step(
         overrides: Dotted key -> value.
         driver: Who drives.
     """
-    x_m = np.arange(0.0, speed_mps * (_DURATION_S + 6.0), _SPACING_M)
+    x_m = np.arange(0.0, speed_mps * (DURATION_S + 6.0), _SPACING_M)
     path = {"x_m": x_m.tolist(), "y_m": [STEP_M] * len(x_m)}
     table = {
         "kind": "follow_path",
         "name": "small_step",
         "speed_mps": speed_mps,
-        "duration_s": _DURATION_S,
+        "duration_s": DURATION_S,
         "path": path,
     }
     return simulate(table, controller, vehicle, overrides, driver=driver)
 
 
-def damping_of(recording: RecordingLike) -> tuple[float, float]:
+def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
     """Damping ratio and natural frequency of the oscillation about the path, behind the first crossing of it.
 
     The decaying oscillation that fits it best, least squares, which is what the logarithmic decrement gives where one
     decrement is like the next; the friction of the rack makes those of small amplitudes smaller.
 
     Args:
-        recording: A run of `small_step`.
+        time_s: Time since the beginning of a small step [s], equidistant, shape (n,).
+        y_m: Lateral position of the car's centre of gravity [m]; the path is `STEP_M` to the left of where it began.
 
     Returns:
         Damping ratio [-], below 0 where the oscillation grows, and natural frequency [rad/s]; 1 and nan where the car
@@ -71,7 +74,7 @@ def damping_of(recording: RecordingLike) -> tuple[float, float]:
     """
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
-    off = np.asarray(recording["y_m"], dtype=np.float64) / STEP_M - 1.0
+    off = np.asarray(y_m, dtype=np.float64) / STEP_M - 1.0
     beyond = np.flatnonzero(off > 0.0)
     if not beyond.size:
         if off[-1] < -_CLOSE:
@@ -79,8 +82,9 @@ def damping_of(recording: RecordingLike) -> tuple[float, float]:
                 f"the driver does not come to a path {STEP_M} m beside him within the run; is he slower than that?"
             )
         return 1.0, math.nan
-    time_s = np.asarray(recording.time_s, dtype=np.float64)[beyond[0] :: _EVERY]
-    time_s, off = time_s - time_s[0], off[beyond[0] :: _EVERY]
+    every = max(1, round(_FIT_INTERVAL_S / float(time_s[1] - time_s[0])))
+    time_s, off = np.asarray(time_s, dtype=np.float64)[beyond[0] :: every], off[beyond[0] :: every]
+    time_s = time_s - time_s[0]
 
     def residual(p: np.ndarray) -> np.ndarray:
         ratio, natural, sine, cosine, rest = p

@@ -60,7 +60,8 @@ def test_driver_tells_how_stable_the_loop_is_and_draws(tmp_path, capsys):
     for row in rows:
         assert 0.25 < row["damping"] < 1.0
         # In the run the path is not crossed again: there is no swing whose damping could be read.
-        assert row["damping_in_run"] == 1.0
+        assert row["damping_in_run"] == row["damping_in_step"] == 1.0
+        assert row["step_difference_m"] < 0.03
         assert 30.0 < row["phase_margin_deg"] < 60.0
         # From the slow end of what is measured of humans to a little beyond the quick one, 4 rad/s.
         assert 1.5 < row["crossover_rad_s"] < 4.5

@@ -18,6 +18,7 @@ import pytest
 from activesteer import study
 from activesteer.errors import StudyError
 from activesteer.recording import Recording
+from activesteer.resources import find_vehicle, models_dir
 from activesteer.studies.store import Store
 from tests.raising import raises
 from tests.unit.studies.short import MANEUVER, RATIO, short_study, write_controller
@@ -152,8 +153,6 @@ def test_two_processes_do_not_work_on_one_study(tmp_path):
 
 def test_an_input_that_changes_while_the_study_runs_is_noticed(tmp_path):
     vehicle = tmp_path / "mine.toml"
-    from activesteer.resources import find_vehicle  # noqa: PLC0415
-
     vehicle.write_bytes(find_vehicle("compact").read_bytes())
 
     def change(progress):
@@ -163,6 +162,25 @@ def test_an_input_that_changes_while_the_study_runs_is_noticed(tmp_path):
     assert rows[0]["status"] == "ok"
     assert rows[-1]["status"] == "failed"
     assert "changed while the study ran" in rows[-1]["error"]
+
+
+def test_a_file_that_a_factor_names_and_that_changes_while_the_study_runs_is_noticed(tmp_path):
+    tyres = [tmp_path / "one.tir", tmp_path / "other.tir"]
+    for tyre in tyres:
+        tyre.write_bytes((models_dir() / "tyres" / "compact_205_55R16.tir").read_bytes())
+    vehicle = tmp_path / "mine.toml"
+    vehicle.write_bytes(find_vehicle("compact").read_bytes())
+
+    def change(progress):
+        tyres[1].write_text(tyres[1].read_text() + "\n$ changed\n")
+
+    many = short_study(*MANY[:5], vehicles=[str(vehicle)])
+    many["factors"]["tyres.rear"] = {"grid": [str(tyre) for tyre in tyres]}
+    rows = study(many, jobs=1, progress=change).to_pylist()
+    of = {str(tyre): [row for row in rows if row["tyres.rear"] == str(tyre)] for tyre in tyres}
+    assert {row["status"] for row in of[str(tyres[0])]} == {"ok"}
+    assert of[str(tyres[1])][-1]["status"] == "failed"
+    assert "changed while the study ran" in of[str(tyres[1])][-1]["error"]
 
 
 @pytest.mark.parametrize(
