@@ -14,7 +14,7 @@ from activesteer.files import file_word, json_text, make_folder, write_text
 from activesteer.scenario import FileOrTable
 from activesteer.standards.catalogue import standard_of
 from activesteer.standards.proving_ground import ProvingGround
-from activesteer.standards.standard import Findings, Standard
+from activesteer.standards.standard import Findings, NoResult, Standard
 from activesteer.studies.factor_values import label_of
 from activesteer.studies.run_identity import versions
 from activesteer.studies.workers import workers_for
@@ -44,8 +44,8 @@ class Examination:
 
     @property
     def failed(self) -> list[str]:
-        """Controllers whose car breaks a limit."""
-        return [name for name, found in self.findings.items() if found.passed is False]
+        """Controllers whose car breaks a limit, or with which it cannot be tested."""
+        return [name for name, found in self.findings.items() if found.passed is False or found.error]
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values."""
@@ -89,7 +89,7 @@ def examine(
         The examination.
 
     Raises:
-        ActiveSteerError: an input is wrong, or a run failed without which the others make no sense.
+        ActiveSteerError: an input is wrong.
     """
     standard = standard_of(name)
     driver = standard.driver if driver is None else driver
@@ -105,7 +105,10 @@ def examine(
                     progress(label, series, done, total)
 
             ground = ProvingGround(standard.name, vehicle, driver, controller, given, folder, workers, tell)
-            found[label] = standard.examine(ground)
+            try:
+                found[label] = standard.examine(ground)
+            except NoResult as reason:
+                found[label] = Findings.without_result(reason)
     today = datetime.datetime.now(tz=datetime.UTC).date()
     return Examination(standard, label_of(vehicle), label_of(driver), given, found, versions(), today)
 

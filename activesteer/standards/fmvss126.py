@@ -8,8 +8,18 @@ from typing import Any, Final
 
 from activesteer.analysis.sine_with_dwell import DISPLACEMENT_TIME_S, INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.slow_ramp import FIT, REFERENCE_MPS2
-from activesteer.errors import ManeuverError
-from activesteer.standards.standard import SIDES, Curve, Findings, Ground, Panel, Picture, Run, Standard, Table
+from activesteer.standards.standard import (
+    SIDES,
+    Curve,
+    Findings,
+    Ground,
+    NoResult,
+    Panel,
+    Picture,
+    Run,
+    Standard,
+    Table,
+)
 
 RAMP_DEGPS: Final = 13.5
 """Rate of the slowly increasing steer [deg/s]; S7.6."""
@@ -117,7 +127,7 @@ def _reference_angle(ground: Ground) -> tuple[float, dict[str, list[float]]]:
     for run, angle in zip(runs, found, strict=True):
         if math.isnan(angle):
             why = run.error or f"it stays below {FIT[1] * REFERENCE_MPS2:.3g} m/s2"
-            raise ManeuverError(f"A is not found: with {run.case['steer.rate_degps']:g} deg/s of the wheel: {why}")
+            raise NoResult(f"A is not found: with {run.case['steer.rate_degps']:g} deg/s of the wheel: {why}")
     rounded = [round(angle, 1) for angle in found]
     sides = {side: rounded[RAMPS * number :][:RAMPS] for number, side in enumerate(signs)}
     return round(sum(rounded) / len(rounded), 1), sides

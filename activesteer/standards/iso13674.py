@@ -16,6 +16,7 @@ from activesteer.standards.standard import (
     Curve,
     Findings,
     Ground,
+    NoResult,
     Panel,
     Picture,
     Run,
@@ -85,7 +86,7 @@ def _examine(ground: Ground) -> Findings:
     )
     failed = [run.error for run in (weave, *transition) if not run.channels]
     if failed:
-        return Findings({"steering_wheel_deg": angle_deg}, f"no result: {failed[0]}")
+        raise NoResult(failed[0])
     first = round((_BEGIN_S + _DROPPED / WEAVE_Hz) / CURVE_STEP_S)
     last = round((_BEGIN_S + PERIODS / WEAVE_Hz) / CURVE_STEP_S)
     periodic = {name: weave[name][first:last] for name in _CHANNELS}

@@ -88,6 +88,8 @@ def _examine(ground: Ground) -> Findings:
         )
     )
     errors = [run.error for run in (*driven, sweep, *random) if run.error]
+    if errors:
+        summary = f"{len(errors)} of {len(driven) + 1 + len(random)} runs failed, the first: {errors[0]}; {summary}"
     values = {
         "steering_wheel_deg": angle_deg,
         "steps": [{"direction": side, **run.values} for side, run in steps.items()],
@@ -111,7 +113,7 @@ def _examine(ground: Ground) -> Findings:
         Picture("Step", time_panels(steps, _STEP_CHANNELS, _BEGIN_S, "the beginning of steer")),
         *(_bode(name, {kind: responses[name] for kind, responses in found.items() if responses}) for name in _NAMES),
     ]
-    return Findings(values, f"no result: {errors[0]}" if errors else summary, tables, pictures)
+    return Findings(values, summary, tables, pictures)
 
 
 def _sweep_responses(sweep: Run) -> Responses:

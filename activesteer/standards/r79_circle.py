@@ -8,12 +8,14 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from activesteer.errors import SimulationDiverged
 from activesteer.quantities import display_unit
 from activesteer.standards.standard import (
     SIDES,
     Curve,
     Findings,
     Ground,
+    NoResult,
     Panel,
     Picture,
     Run,
@@ -102,7 +104,7 @@ def _examine(ground: Ground) -> Findings:
     faults = [
         {"fault": row["fault"], "direction": CIRCLES[row["situation"]]}
         | {name: row[name] for name in (*FIGURES, "error") if name in row}
-        for row in ground.fault_map(PRESET)
+        for row in _fault_map(ground)
     ]
     values = {
         "rim_radius_m": RIM_RADIUS_M, "efforts": efforts, "faults": faults,
@@ -115,6 +117,13 @@ def _examine(ground: Ground) -> Findings:
         _dots(faults),
     ]
     return Findings(values, summary, [_effort_table(efforts), _fault_table(faults)], pictures)
+
+
+def _fault_map(ground: Ground) -> list[dict[str, Any]]:
+    try:
+        return ground.fault_map(PRESET)
+    except SimulationDiverged as reason:
+        raise NoResult(f"the car in order does not come round the circle: {reason}") from reason
 
 
 def _spirals(ground: Ground, name: str, effort: Effort) -> dict[str, Run]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from activesteer.conventions import CURVE_STEP_S, Array
-from activesteer.errors import RecordingError
+from activesteer.errors import ManeuverError, RecordingError
 from activesteer.quantities import display_unit, metric_label, metric_number
 from activesteer.resources import DEFAULT_DRIVER
 
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 _LEAD_S: Final = 0.2
 SIDES: Final = {"left": 1.0, "right": -1.0}
 """Side to which a car is steered -> sign of the steering wheel angle, ISO 8855."""
+
+
+class NoResult(ManeuverError):  # noqa: N818 - what came out of a test, named as one
+    """A car cannot be tested with a controller: a run failed without which the others make no sense."""
 
 
 @dataclass(frozen=True)
@@ -223,6 +227,16 @@ class Findings:
     tables: Sequence[Table] = field(default_factory=tuple)
     pictures: Sequence[Picture] = field(default_factory=tuple)
 
+    @classmethod
+    def without_result(cls, reason: NoResult) -> Findings:
+        """What is said of a car that cannot be tested."""
+        return cls({"error": str(reason)}, f"no result: {reason}")
+
+    @property
+    def error(self) -> str:
+        """Why nothing can be said; empty where something can."""
+        return self.values.get("error", "")
+
     @property
     def passed(self) -> bool | None:
         """Whether the limits are kept; None for a test method without limits."""
@@ -239,7 +253,8 @@ class Standard:
         edition: Which edition, and from where the text is known.
         implemented: What of it is done here, a sentence each.
         left_out: What is not, or not as it says.
-        examine: Drives the runs of one car with one controller, and evaluates them.
+        examine: Drives the runs of one car with one controller, and evaluates them; a run that fails is a row, and
+            `NoResult` is raised where nothing can be said.
         driver: Who drives where nobody else is asked for.
     """
 

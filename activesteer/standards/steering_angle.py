@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.errors import ManeuverError
-from activesteer.standards.standard import Ground
+from activesteer.errors import RecordingError
+from activesteer.standards.standard import Ground, NoResult
 
 _RATE_DEGPS: Final = 5.0
 """Rate of the ramp [deg/s]: the car lags behind by some 0.1 s, half a degree."""
@@ -27,7 +27,7 @@ def steering_wheel_at(ground: Ground, speed_kmh: float, ay_mps2: float) -> float
         Steering wheel angle, to 0.1 deg [deg].
 
     Raises:
-        ManeuverError: the car does not reach the acceleration.
+        NoResult: the car does not reach the acceleration, or the ramp cannot be driven.
     """
     [run] = ground.drive(
         f"ramp_{speed_kmh:g}kmh",
@@ -36,11 +36,12 @@ def steering_wheel_at(ground: Ground, speed_kmh: float, ay_mps2: float) -> float
         {"steer.rate_degps": _RATE_DEGPS, "duration_s": _LONGEST_S},
         ("steering_wheel_rad", "ay_mps2"),
     )
-    ay = run["ay_mps2"]
+    try:
+        ay = run["ay_mps2"]
+    except RecordingError as reason:
+        raise NoResult(f"the slow ramp at {speed_kmh:g} km/h cannot be driven: {reason}") from reason
     if ay.max() < ay_mps2:
-        raise ManeuverError(
-            f"the car reaches {ay.max():.3g} m/s2 at {speed_kmh:g} km/h; the test needs {ay_mps2:g} m/s2"
-        )
+        raise NoResult(f"the car reaches {ay.max():.3g} m/s2 at {speed_kmh:g} km/h; the test needs {ay_mps2:g} m/s2")
     # Noise apart, the acceleration rises until it is reached.
     end = int(np.argmax(ay >= ay_mps2))
     rising = np.maximum.accumulate(ay[: end + 1])

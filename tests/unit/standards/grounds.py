@@ -9,8 +9,8 @@ from typing import Any
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.standards.standard import Run
 
-Driven = Callable[[str, Mapping[str, Any]], Mapping[str, float]]
-"""Series, case -> metrics."""
+Driven = Callable[[str, Mapping[str, Any]], Mapping[str, float] | str]
+"""Series, case -> metrics, or why there are none."""
 
 
 @dataclass
@@ -36,4 +36,8 @@ class WrittenGround:
         # Every case must be one that can be driven.
         resolve(maneuver, self.vehicle, {**(overrides or {}), **self.changed, **cases[0]})
         self.asked.setdefault(series, []).extend(dict(case) for case in cases)
-        return [Run(case, self.driven(series, case), {}, "") for case in cases]
+        found = [(case, self.driven(series, case)) for case in cases]
+        return [Run(case, *(({}, {}, one) if isinstance(one, str) else (one, {}, ""))) for case, one in found]
+
+    def fault_map(self, preset: str) -> list[dict[str, Any]]:
+        raise NotImplementedError

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import math
 from collections.abc import Mapping
 from itertools import pairwise
@@ -10,9 +12,13 @@ from typing import Any
 import pytest
 
 from activesteer.errors import ManeuverError
+from activesteer.files import json_text
 from activesteer.standards import fmvss126
 from activesteer.standards.examination import examine
 from activesteer.standards.fmvss126 import STANDARD, amplitudes, verdict
+from activesteer.standards.page import page
+from activesteer.standards.proving_ground import ProvingGround
+from activesteer.standards.standard import Findings, Ground
 from tests.unit.standards.grounds import WrittenGround
 
 GOOD = {"factor": 5.0, "yaw_ratio_1s": 0.35, "yaw_ratio_175s": -0.2, "displacement_m": 1.83}
@@ -90,6 +96,34 @@ def test_a_car_that_spins_to_one_side_fails_and_the_first_amplitude_is_named():
     assert found.passed is False
     assert "first at 5.5 A (165 deg), right first: yaw rate 80 %" in found.summary
     assert [row["pass"] for row in found.values["series"]].count(False) == 8
+
+
+def test_a_run_in_which_the_car_tips_over_is_a_row_that_fails():
+    def tips(series: str, case: Mapping[str, Any]) -> Mapping[str, float] | str:
+        over = case.get("steer.steering_wheel_deg", 0.0) > 260.0
+        return "the car tips over" if over else driven(series, case)
+
+    found = STANDARD.examine(WrittenGround(tips))
+    assert found.passed is False
+    assert [row["amplitude_deg"] for row in found.values["series"] if not row["pass"]] == [270.0, 270.0]
+    assert "no result: the car tips over" in found.summary
+    assert found.tables[1].rows[-1][-1] == "fail the car tips over"
+    assert json.loads(json_text(found.values))["series"][-1]["yaw_ratio_1s"] is None
+
+
+def test_a_controller_with_which_the_car_cannot_be_tested_does_not_stop_the_others(monkeypatch):
+    def examined(ground: Ground) -> Findings:
+        good = isinstance(ground, ProvingGround) and ground.controller == "afs"
+        return STANDARD.examine(WrittenGround(driven if good else lambda *_: "it spins"))
+
+    standard = dataclasses.replace(STANDARD, examine=examined)
+    monkeypatch.setattr("activesteer.standards.examination.standard_of", lambda _: standard)
+    result = examine("fmvss126", ["ars", "afs"], jobs=1)
+    assert result.failed == ["ars"]
+    assert "A is not found" in result.findings["ars"].values["error"]
+    assert "it spins" in result.findings["ars"].values["error"]
+    assert result.findings["afs"].passed is True
+    assert ">no result<" in page(result)
 
 
 def test_noisy_sensors_are_drawn_anew_for_each_repetition():
