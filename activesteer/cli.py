@@ -75,6 +75,7 @@ def all_commands() -> Commands:
         envelope,
         fault_map,
         figures,
+        fit,
         identify,
         import_,
         info,
@@ -104,7 +105,7 @@ def all_commands() -> Commands:
         "drive": (listing, run, watch),
         "look": (info, report, compare, replay, video, import_, recover),
         "car": (vehicle, tyre, kc),
-        "study": (study, tune, envelope, fault_map, identify, linearise, driver, margins),
+        "study": (study, tune, fit, envelope, fault_map, identify, linearise, driver, margins),
         "prove": (reproduce, test, figures, validate, bench),
     }.items():
         commands.begin_group(title)

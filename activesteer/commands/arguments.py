@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.config import parse_value
+from activesteer.config import parse_value, read_toml
 from activesteer.errors import MAX_SHOWN, ParameterError
 from activesteer.resources import DEFAULT_DRIVER
 
@@ -76,7 +76,7 @@ def add_vehicle(parser: argparse.ArgumentParser) -> None:
 
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
-    """Adds what `scenario_of` reads: the manoeuvre, `--vehicle`, `--driver`, `--set` and `--fault`."""
+    """Adds what `scenario_of` reads: the manoeuvre, `--vehicle`, `--driver`, `--set`, `--overrides` and `--fault`."""
     parser.add_argument(
         "maneuver", metavar="MANEUVER",
         help="a name from `activesteer list`, a TOML file, or a recording, whose steering, speed and brake are driven",
@@ -92,10 +92,14 @@ def add_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def add_overrides(parser: argparse.ArgumentParser) -> None:
-    """Adds `--set`, which `overrides_of` reads."""
+    """Adds `--set` and `--overrides`, which `overrides_of` reads."""
     parser.add_argument(
         "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
         help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
+    )  # fmt: skip
+    parser.add_argument(
+        "--overrides", action="append", default=[], dest="override_files", type=Path, metavar="FILE.toml",
+        help="replace the parameters of a file, as `activesteer fit` writes it: \"road.mu\" = 0.4 in every line",
     )  # fmt: skip
 
 
@@ -186,17 +190,28 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
     from activesteer.scenario import resolve
 
     faults = {"fault": [fault_table(text) for text in options.faults]} if options.faults else {}
-    overrides = pairs(options.overrides, "--set", "road.mu=0.4", faults)
+    overrides = overrides_of(options, faults)
     return resolve(options.maneuver, options.vehicle, overrides, options.driver)
 
 
-def overrides_of(options: argparse.Namespace) -> dict[str, Any]:
-    """What `--set` gives.
+def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """What `--overrides` and `--set` give.
+
+    Args:
+        options: What the command was called with.
+        given: Keys that have values already.
 
     Raises:
-        ParameterError: it is not written so, or a key is given twice.
+        ParameterError: a file cannot be read, something is not written so, or a key is given twice.
     """
-    return pairs(options.overrides, "--set", "road.mu=0.4")
+    values = dict(given or {})
+    for path in options.override_files:
+        table, source = read_toml(path)
+        for key in table:
+            if key in values:
+                raise source.fail((key,), "is given twice; leave one out")
+        values |= table
+    return pairs(options.overrides, "--set", "road.mu=0.4", values)
 
 
 def pairs(texts: Sequence[str], option: str, example: str, given: Mapping[str, Any] | None = None) -> dict[str, Any]:

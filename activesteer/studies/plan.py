@@ -68,7 +68,9 @@ class Plan:
         )
         _check(study, self.samples, self._values)
         self.settings.expected.update(present_inputs(self.settings))
-        table = {key: value for key, value in study.to_table().items() if key not in (*labelled, "title", "tune")}
+        table = {
+            key: value for key, value in study.to_table().items() if key not in (*labelled, "title", "tune", "fit")
+        }
         table["design"] = [samples.columns for samples in self.samples]
         table |= {key: [label for label, _ in labelled[key]] for key in labelled}
         self.digest = digest({"study": table, "inputs": self.settings.expected})

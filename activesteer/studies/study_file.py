@@ -21,8 +21,13 @@ from activesteer.studies.factors import Factor, read_factor
 
 _KEYS: Final = (
     "title", "maneuvers", "controllers", "vehicles", "driver", "overrides", "factors", "design", "seed", "metrics",
-    "recordings", "curves", "claims", "timestep_s", "tune",
+    "recordings", "curves", "claims", "timestep_s", "tune", "fit",
 )  # fmt: skip
+_SEARCHES: Final = {
+    "tune": "it says what is to be made small",
+    "fit": "it says which channels are compared, and how noisy they are",
+}
+"""Tables of those who choose the factors' values themselves and need no sample; what to say where one is missing."""
 _KEPT: Final = ("none", "failed", "all")
 
 
@@ -46,6 +51,7 @@ class StudyFile:
         claims: Whether the paper's claims are checked for every sample; needs its three systems.
         timestep_s: Step of engine, driver and controller [s].
         tune: The table [tune], as it is; see `tuning`.
+        fit: The table [fit], as it is; see `measured.fit_file`.
         title: One line for the report.
         source: For error messages.
     """
@@ -65,6 +71,7 @@ class StudyFile:
     claims: bool = False
     timestep_s: float = DEFAULT_TIMESTEP_S
     tune: dict[str, Any] | None = None
+    fit: dict[str, Any] | None = None
     title: str = ""
     source: Source = Source("study")
 
@@ -106,8 +113,7 @@ class StudyFile:
         for key, names in (("metrics", self.metrics), ("curves", self.curves)):
             if names:
                 table[key] = list(names)
-        if self.tune is not None:
-            table["tune"] = self.tune
+        table |= {key: found for key in _SEARCHES if (found := getattr(self, key)) is not None}
         return table | {"design": design}
 
     def to_toml(self) -> str:
@@ -124,12 +130,13 @@ class StudyFile:
         return "\n".join(lines) + "\n"
 
 
-def read_study(given: FileOrTable | StudyFile) -> StudyFile:
+def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
     """Reads a study file and checks what can be checked without looking at manoeuvres and vehicles.
 
     Args:
         given: Name of a study that comes with the package, path, or table. Relative paths inside a file start at its
             folder, those of a table at the working directory.
+        search: `tune` or `fit`, where the study must have that table.
 
     Returns:
         The study.
@@ -148,6 +155,8 @@ def read_study(given: FileOrTable | StudyFile) -> StudyFile:
     for key in table:
         if key not in _KEYS:
             raise source.fail((key,), f"there is no such key; {nearest_names(key, _KEYS)}")
+    if search and search not in table:
+        raise source.fail((search,), f"the table is missing: {_SEARCHES[search]}")
     if "maneuvers" not in table:
         raise source.fail((), "the key maneuvers is missing: a list of names or files")
     read = {
@@ -158,7 +167,7 @@ def read_study(given: FileOrTable | StudyFile) -> StudyFile:
         "metrics": lambda value: tuple(_items(value, (str,))),
         "curves": lambda value: tuple(_items(value, (str,))),
         "overrides": lambda value: dict(_typed(value, Mapping, "a table")),
-        "tune": lambda value: dict(_typed(value, Mapping, "a table")),
+        **dict.fromkeys(_SEARCHES, lambda value: dict(_typed(value, Mapping, "a table"))),
         "claims": lambda value: _typed(value, bool, "true or false"),
         "title": lambda value: _typed(value, str, "a text"),
         "seed": _seed,
@@ -192,6 +201,8 @@ def _varied(table: Mapping[str, Any], folder: Path, source: Source) -> dict[str,
         parts.append(dict(part))
     factors = tuple(read_factor(key, value, source) for key, value in parts[0].items())
     case_list = _cases(parts[1].pop("cases", None), folder, source)
+    if any(key in table for key in _SEARCHES) and any(factor.kind != "grid" for factor in factors):
+        parts[1].setdefault("samples", 1)
     design = build(DesignTable, parts[1], source, ("design",))
     return {
         "factors": factors,

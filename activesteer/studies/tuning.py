@@ -143,7 +143,7 @@ def tune(
         ActiveSteerError: an input is wrong, Optuna is not installed, or the folder cannot be written or holds another
             search.
     """
-    study = read_study(study_file)
+    study = read_study(study_file, "tune")
     table = _table(study)
     try:
         import optuna  # noqa: PLC0415 - an extra
@@ -196,11 +196,9 @@ def tune(
 
 
 def _table(study: StudyFile) -> TuneTable:
-    if study.tune is None:
-        raise study.source.fail(("tune",), "the table is missing: it says what is to be made small")
     if study.case_list is not None or not study.factors:
         raise study.source.fail(("factors",), "a search needs factors")
-    table = build(TuneTable, study.tune, study.source, ("tune",))
+    table = build(TuneTable, study.tune or {}, study.source, ("tune",))
     if not table.objectives:
         raise study.source.fail(("tune", "objectives"), "at least one is needed")
     names, controllers = ([label_of(item) for item in items] for items in (study.maneuvers, study.controllers))

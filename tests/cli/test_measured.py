@@ -62,3 +62,29 @@ def test_what_cannot_be_compared_or_imported_is_answered(call, truth, tmp_path):
     told = call("import", "a.csv")
     assert "yawrate has no unit and is taken for rad/s" in told.out
     assert "steering_wheel_rad or rack_m is needed" in call("run", "a.mcap").err
+
+
+def test_what_was_fitted_is_printed_and_drives_the_car(call, truth, tmp_path):
+    rows = slice(None, None, 10)
+    noise = 0.002 * np.random.default_rng(1).standard_normal(len(truth.time_s[rows]))
+    columns = [truth.time_s, truth["steering_wheel_rad"], truth["yaw_rate_radps"], truth["speed_mps"]]
+    table = np.column_stack([values[rows] for values in columns]) + np.outer(noise, [0.0, 0.0, 1.0, 0.0])
+    names = "t [s],steering_wheel_rad,yaw_rate_radps,speed_mps"
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=names, comments="")
+    assert call("import", "a.csv").status == 0
+    (tmp_path / "fit.toml").write_text(
+        'maneuvers = ["a.mcap"]\noverrides = { settle_s = 0.5 }\n'
+        '[factors]\n"factors.tyre_cornering_stiffness" = { uniform = [0.7, 1.3] }\n'
+        "[fit]\nnoise = { yaw_rate_radps = 0.002 }\nfrom_s = 0.4\n"
+        'start = { "factors.tyre_cornering_stiffness" = 0.9 }\n'
+    )
+    told = call("fit", "fit.toml", "-o", "found", "--jobs", "1")
+    assert told.status == 0
+    assert "factors.tyre_cornering_stiffness  " in told.out
+    assert "what is left is" in told.out
+    driven = call("run", "a.mcap", "--overrides", "found/overrides.toml", "--set", "settle_s=0.5", "-o", "b.mcap")
+    assert driven.status == 0
+    found = activesteer.Recording.open(tmp_path / "b.mcap").metadata["overrides"]["factors.tyre_cornering_stiffness"]
+    assert found == pytest.approx(1.0, abs=0.03)
+    twice = call("run", "a.mcap", "--overrides", "found/overrides.toml", "--set", "factors.tyre_cornering_stiffness=1")
+    assert "is given twice; leave one out" in twice.err

@@ -1,0 +1,70 @@
+"""`activesteer fit STUDY.toml`: parameters of a car from recordings."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler
+from activesteer.commands.output import print_entry, print_json
+from activesteer.commands.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from activesteer.measured.fitting import FitProgress
+
+
+def add_to(commands: Any) -> None:
+    """Adds the command to the parser's."""
+    parser = commands.add_parser(
+        "fit",
+        help="parameters of a car from recordings, with their intervals",
+        description="Drives the inputs of recordings again and finds values of a study's factors, by least squares, "
+        "with which the car comes nearest to what was measured.",
+    )
+    parser.add_argument(
+        "study", type=Path, metavar="STUDY.toml", help="a study with recordings for manoeuvres and a table [fit]"
+    )
+    add_output(parser, "DIR", "folder for fit.json, fit.html and overrides.toml; none are written without it")
+    add_jobs(parser)
+    add_scheduler(parser)
+    add_json(parser)
+    parser.set_defaults(action=_fit)
+
+
+def _fit(options: argparse.Namespace) -> int:
+    from activesteer.measured.fit_result import rests_on
+    from activesteer.measured.fitting import fit
+
+    with ProgressBar("fit", quiet=options.json) as bar:
+
+        def progress(here: FitProgress) -> None:
+            so_far = "" if math.isnan(here.misfit) else f", differences {here.misfit:.3g} times the noise"
+            bar(here.done / here.total, f"round {here.round}, {here.done}/{here.total} runs{so_far}")
+
+        found = fit(options.study, jobs=options.jobs, scheduler=options.scheduler, progress=progress)
+    files = []
+    if options.output is not None:
+        from activesteer.measured.fit_page import write_fit
+
+        files = write_fit(found, options.study.stem, options.output)
+    if options.json:
+        print_json(found.to_json())
+        return 0
+    width = max(len(one.key) for one in found.parameters)
+    for one in found.parameters:
+        print(f"{one.key:{width}}  {one.words}")
+    for one, other, value in found.pairs(0.5):
+        print(f"correlation {value:+.2f}  {one}, {other}")
+    for recording, label, noise, before, after, samples, independent in (each.words() for each in found.compared):
+        print(f"  {recording}: {label:24} noise {noise:>12}   rms {before:>12} -> {after:>12}   "
+              f"{independent} of {samples} samples count")  # fmt: skip
+    print(f"{found.rounds} rounds, {found.runs} runs; what is left is {found.misfit:.3g} times the noise")
+    for line in rests_on(found)[:1]:
+        print_entry("", line, hanging=0)
+    for note in found.notes:
+        print_entry("! ", note)
+    for path in files:
+        print(path)
+    return 0

@@ -1,0 +1,310 @@
+"""Parameters of a car from recordings: driven again with their inputs, compared, and moved until little is left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.config import field_in_unit
+from activesteer.conventions import Array
+from activesteer.errors import ActiveSteerError, RecordingError, StudyError, nearest_names
+from activesteer.measured.fit_file import FitTable, read_fit
+from activesteer.measured.fit_result import Compared, Fit, Parameter, notes_of
+from activesteer.measured.intervals import intervals, told_apart, without_effect
+from activesteer.measured.least_squares import AT_END, Answer, Found, search
+from activesteer.recording import Recording
+from activesteer.scenario import FileOrTable, resolve, value_of
+from activesteer.scenario.recorded_inputs import led, open_loop_of
+from activesteer.simulation.runner import run_scenario
+from activesteer.studies.factor_values import FactorValues, label_of
+from activesteer.studies.factors import Factor
+from activesteer.studies.plan import Plan
+from activesteer.studies.run_task import Settings, engine_lock, prepare_worker
+from activesteer.studies.study_file import StudyFile
+from activesteer.studies.workers import TaskQueue, Workers, workers_for
+
+_SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1ps2": 8.0}
+"""Unless the study says otherwise the recorded speed is held to 0.1 %; a driver's gains leave 0.3 %, which would be
+taken for a property of the car."""
+_FEWEST: Final = 20
+"""Samples of a channel in a recording that are needed at least."""
+
+
+class FitProgress(NamedTuple):
+    """How far it is; given to whoever watches.
+
+    Attributes:
+        round: Number of the set of parameters that is tried, with its derivatives.
+        done: Runs of this round that are made.
+        total: Runs of this round.
+        misfit: Rms of all differences relative to their noise, of the best set so far; nan before there is one.
+    """
+
+    round: int
+    done: int
+    total: int
+    misfit: float
+
+
+class _Measured(NamedTuple):
+    """A recording, in the time of the manoeuvre that it became.
+
+    Attributes:
+        name: Of its file.
+        begin_s: Instant of the recording that is zero in the manoeuvre [s].
+        time_s: Instants at which channels are compared [s], shape (n,).
+        channels: What was measured there, SI; not finite where nothing was.
+    """
+
+    name: str
+    begin_s: float
+    time_s: Array
+    channels: dict[str, Array]
+
+
+def fit(
+    study_file: FileOrTable,
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[FitProgress], None] | None = None,
+) -> Fit:
+    """Finds values of a study's factors with which the car, driven by recorded inputs, comes nearest to recordings.
+
+    Args:
+        study_file: Name or path of a study file with a table [fit], or its table.
+        jobs: Number of processes; that of the processors where not given.
+        scheduler: Address of a Dask scheduler, or its scheduler file, instead.
+        progress: Called after every run.
+
+    Returns:
+        Values, intervals, and what is left of the differences.
+
+    Raises:
+        StudyError: the file is wrong, a factor changes nothing that was measured or cannot be told from another one, or
+            the car cannot be driven.
+        ActiveSteerError: a recording, the vehicle, the controller or a key is wrong.
+    """
+    problem = _Problem(*read_fit(study_file))
+    with workers_for(jobs, scheduler=scheduler) as workers:
+        if reason := workers.everywhere(prepare_worker, problem.settings):
+            raise StudyError(reason)
+        found = search(problem.answers_by(workers, progress or (lambda _: None)), problem.start, problem.check)
+    return problem.result(found)
+
+
+class _Problem:
+    """Recordings, the runs that answer them, and how far these are from each other."""
+
+    def __init__(self, study: StudyFile, table: FitTable) -> None:
+        recordings = [Recording.open(Path(str(path))) for path in study.maneuvers]
+        names = [label_of(path) for path in study.maneuvers]
+        held = {} if ":" in str(study.driver) else _SPEED_HOLD
+        known = {key: value for key, value in held.items() if key not in study.keys} | study.overrides
+        first = resolve(open_loop_of(recordings[0], names[0]), study.vehicles[0], known, study.driver)
+        car = first.car.on(first.maneuver.road, study.timestep_s)
+        self._noise = _noise(table, study, [channel.name for channel in car.channels.channels])
+        self._measured = [
+            _measured(recording, name, list(self._noise), table, study)
+            for recording, name in zip(recordings, names, strict=True)
+        ]
+        maneuvers = [
+            led(open_loop_of(recording, measured.name, measured.begin_s), car.steering_lag_s)
+            for recording, measured in zip(recordings, self._measured, strict=True)
+        ]
+        self._study = replace(study, maneuvers=tuple(maneuvers), overrides=known)
+        self._plan = Plan(self._study)
+        self._values = FactorValues(self._study)
+        self._table = table
+        self._factors = study.factors
+        self._low, self._high = (np.array([getattr(each, end) for each in study.factors]) for end in ("low", "high"))
+        self.settings: Settings = self._plan.settings
+        self.start = self._unit([_start(factor, table, first, study) for factor in study.factors])
+        self.runs = 0
+
+    def _unit(self, values: Sequence[float]) -> Array:
+        return (np.array(values) - self._low) / (self._high - self._low)
+
+    def _factor_values(self, place: Array) -> dict[str, Any]:
+        values = self._low + (self._high - self._low) * place
+        return dict(zip(self._study.keys, values.tolist(), strict=True))
+
+    def answers_by(
+        self, workers: Workers, progress: Callable[[FitProgress], None]
+    ) -> Callable[[list[Array]], list[Answer]]:
+        """What drives sets of parameters: every set in every recording, spread over workers."""
+        rounds, best = 0, math.nan
+
+        def answers(places: list[Array]) -> list[Answer]:
+            nonlocal rounds, best
+            rounds += 1
+            queue = TaskQueue(workers)
+            for number, place in enumerate(places):
+                for recording, measured in enumerate(self._measured):
+                    overrides = self._plan.request_with(0, 0, (recording, 0, 0), self._factor_values(place)).overrides
+                    queue.add((number, recording), drive, self.settings, recording, overrides, measured.time_s,
+                              tuple(self._noise))  # fmt: skip
+            driven: dict[tuple[int, int], dict[str, Array] | str] = {}
+            total = len(places) * len(self._measured)
+            for outcome in queue.outcomes():
+                driven[outcome.key] = outcome.result()
+                self.runs += 1
+                progress(FitProgress(rounds, len(driven), total, best))
+            found = [self._answer([driven[number, each] for each in range(len(self._measured))])
+                     for number in range(len(places))]  # fmt: skip
+            if not isinstance(found[0], str):
+                best = np.fmin(best, _misfit(found[0]))
+            return found
+
+        return answers
+
+    def _answer(self, driven: Sequence[dict[str, Array] | str]) -> Answer:
+        series = []
+        for run, measured in zip(driven, self._measured, strict=True):
+            if isinstance(run, str):
+                return f"{measured.name}: {run}"
+            for name, noise in self._noise.items():
+                kept = np.isfinite(measured.channels[name])
+                series.append((run[name][kept] - measured.channels[name][kept]) / noise)
+        return series
+
+    def check(self, slopes: list[Array]) -> None:
+        """Every factor changes something that was measured, and something else than the others do.
+
+        Raises:
+            StudyError: one does not.
+        """
+        source, keys = self._study.source, self._study.keys
+        for place in without_effect(slopes):
+            raise source.fail(
+                ("factors", keys[place]),
+                "changes nothing of these channels in these recordings that their noise would not hide; leave it out",
+            )
+        if together := told_apart(slopes):
+            first, *others = (keys[place] for place in together)
+            raise source.fail(
+                ("factors", first),
+                f"cannot be told from {' and '.join(others)} by these recordings: together they can be changed so that "
+                "nothing of these channels changes; give all but one of them in [overrides]",
+            )
+
+    def result(self, found: Found) -> Fit:
+        """What came out."""
+        free: NDArray[np.bool_] = (found.place > AT_END) & (found.place < 1.0 - AT_END)
+        self.check(found.slopes)
+        known = intervals(found.after, found.slopes, free, stated=self._table.intervals == "noise")
+        values, start = self._factor_values(found.place), self._factor_values(self.start)
+        half_widths = (self._high - self._low) * known.half_widths
+        parameters = tuple(
+            Parameter(factor.key, values[factor.key], float(half), start[factor.key], factor.low, factor.high)
+            for factor, half in zip(self._factors, half_widths, strict=True)
+        )
+        places = [(measured, name) for measured in self._measured for name in self._noise]
+        compared = []
+        for (measured, name), before, after, independent in zip(
+            places, found.before, found.after, known.independent, strict=True
+        ):
+            kept = np.isfinite(measured.channels[name])
+            compared.append(
+                Compared(
+                    measured.name, name, self._noise[name], measured.begin_s + measured.time_s[kept],
+                    measured.channels[name][kept], before, after, independent,
+                )
+            )  # fmt: skip
+        everywhere = {factor.key for factor in self._factors if not factor.maneuvers}
+        overrides = [self._values.overrides(number, 0, values) for number in range(len(self._measured))]
+        made = Fit(
+            parameters, known.correlations, tuple(compared), self._table.intervals, known.freedom, _misfit(found.after),
+            found.rounds, self.runs, found.settled,
+            {key: value for key, value in overrides[0].items() if key in everywhere},
+            {measured.name: own for measured, each in zip(self._measured, overrides, strict=True)
+             if (own := {key: value for key, value in each.items() if key not in everywhere})},
+        )  # fmt: skip
+        return made._replace(notes=notes_of(made))
+
+
+def drive(
+    settings: Settings, recording: int, overrides: dict[str, Any], time_s: Array, channels: tuple[str, ...]
+) -> dict[str, Array] | str:
+    """One run: channels at the instants of a recording, or why there are none.
+
+    Args:
+        settings: What all runs of the study share.
+        recording: Number of its manoeuvre.
+        overrides: Of this run.
+        time_s: Instants [s], shape (n,).
+        channels: Which are wanted.
+    """
+    try:
+        with engine_lock:
+            scenario = resolve(settings.maneuvers[recording][1], settings.vehicles[0][1], overrides, settings.driver)
+            run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.timestep_s)
+    except ActiveSteerError as error:
+        return str(error)
+    return {name: np.interp(time_s, run.time_s, run[name]) for name in channels}
+
+
+def _noise(table: FitTable, study: StudyFile, known: list[str]) -> dict[str, float]:
+    """Channel -> standard deviation, SI."""
+    found: dict[str, float] = {}
+    for key, value in table.noise.items():
+        name, factor = field_in_unit(key, known)
+        if name is None:
+            raise study.source.fail(
+                ("fit", "noise", key), f"there is no such channel; {nearest_names(key, known)}", key
+            )
+        if name in found:
+            raise study.source.fail(("fit", "noise", key), "is given twice, in two units", key)
+        found[name] = value * factor
+    return found
+
+
+def _measured(recording: Recording, name: str, channels: list[str], table: FitTable, study: StudyFile) -> _Measured:
+    for channel in channels:
+        if channel not in recording:
+            have = [each.name for each in recording.channels]
+            raise study.source.fail(
+                ("fit", "noise", channel), f"{name} has no such channel; {nearest_names(channel, have)}", channel, have
+            )
+    if not len(recording):
+        raise RecordingError("has no rows", file=f"{name}.mcap")
+    begin_s = float(recording.time_s[0])
+    time_s = np.asarray(recording.time_s, np.float64)
+    # The last row of a run is one step before its end.
+    inside = time_s <= time_s[-1] - study.timestep_s
+    if table.from_s is not None:
+        inside &= time_s >= table.from_s
+    if table.until_s is not None:
+        inside &= time_s <= table.until_s
+    values = {channel: np.asarray(recording[channel], np.float64)[inside] for channel in channels}
+    for channel, each in values.items():
+        if np.count_nonzero(np.isfinite(each)) < _FEWEST:
+            raise RecordingError(
+                f"{channel} has {np.count_nonzero(np.isfinite(each))} samples to compare, and {_FEWEST} are needed; it "
+                f"is recorded from {time_s[0]:g} to {time_s[-1]:g} s, and compared from fit.from_s to fit.until_s",
+                file=f"{name}.mcap",
+            )
+    return _Measured(name, begin_s, time_s[inside] - begin_s, values)
+
+
+def _start(factor: Factor, table: FitTable, scenario: Any, study: StudyFile) -> float:
+    """Where a factor is looked for first."""
+    if factor.key in table.start:
+        return table.start[factor.key]
+    if factor.nominal:
+        here: Any = 1.0 if factor.nominal == "times" else 0.0
+    else:
+        here = value_of(scenario, factor.key)
+    if isinstance(here, (int, float)) and not isinstance(here, bool) and factor.low <= here <= factor.high:
+        return float(here)
+    return 0.5 * (factor.low + factor.high)
+
+
+def _misfit(series: Sequence[Array]) -> float:
+    return math.sqrt(float(np.mean(np.concatenate(series) ** 2)))

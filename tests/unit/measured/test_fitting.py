@@ -1,0 +1,131 @@
+"""Parameters from recordings: known values come back within their intervals; what is wrong is said before driving."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import activesteer
+from activesteer.config import read_toml
+from activesteer.errors import ActiveSteerError
+from activesteer.measured.fit_page import write_fit
+from activesteer.measured.fitting import fit
+from activesteer.recording import Recording
+
+TRUTH = {"factors.tyre_cornering_stiffness": 0.9, "factors.yaw_inertia": 1.15}
+NOISE = {"yaw_rate_radps": math.radians(0.2), "ay_mps2": 0.1}
+STUDY: dict[str, Any] = {
+    "maneuvers": ["a.mcap"],
+    "overrides": {"settle_s": 0.3},
+    "factors": {key: {"uniform": [0.6, 1.6]} for key in TRUTH},
+    "fit": {"noise": {"yaw_rate_degps": 0.2, "ay_mps2": 0.1}},
+}
+
+
+@pytest.fixture(scope="module")
+def truth() -> Recording:
+    """A step to either side with known parameters."""
+    table = {
+        "kind": "open_loop", "speed_kmh": 80.0, "duration_s": 1.6, "settle_s": 0.3, "hold_last": True,
+        "steering": {"time_s": [0.1, 0.3, 0.7, 1.0], "steering_wheel_deg": [0.0, 40.0, 40.0, -40.0]},
+    }  # fmt: skip
+    return activesteer.simulate(table, overrides=TRUTH)
+
+
+def noisy(truth: Recording, path: Path, seed: int) -> None:
+    """What a data logger makes of it: channels every 10 ms with noise, of inputs a tenth of a degree and of a km/h."""
+    rng = np.random.default_rng(seed)
+    rows = slice(None, None, 10)
+    noise = {"steering_wheel_rad": math.radians(0.1), "speed_mps": 0.1 / 3.6, **NOISE}
+    values = [truth[name][rows] + size * rng.standard_normal(len(truth.time_s[rows])) for name, size in noise.items()]
+    Recording([truth.channels[name] for name in noise], truth.time_s[rows], np.column_stack(values)).save(path)
+
+
+@pytest.fixture
+def folder(truth, tmp_path, monkeypatch) -> Path:
+    noisy(truth, tmp_path / "a.mcap", 4)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_known_values_lie_in_their_intervals_and_are_written(folder):
+    rounds = []
+    found = fit(STUDY, jobs=1, progress=rounds.append)
+    assert found.settled
+    assert found.notes == ()
+    for one in found.parameters:
+        assert abs(one.value - TRUTH[one.key]) < one.half_width
+        assert 0.002 < one.half_width < 0.1
+    assert found.misfit == pytest.approx(1.0, abs=0.1)
+    assert 0.1 < abs(found.correlations[0, 1]) < 0.99
+    for each in found.compared:
+        assert each.to_json()["rms"] == pytest.approx(NOISE[each.channel], rel=0.15)
+        assert np.mean(each.before**2) > 1.3 * np.mean(each.after**2)
+    assert rounds[-1].done == rounds[-1].total == 3
+    assert found.runs == 3 * found.rounds == len(rounds)
+
+    assert [path.name for path in write_fit(found, "fit", folder / "out")] == ["fit.json", "overrides.toml", "fit.html"]
+    assert read_toml(folder / "out" / "overrides.toml")[0] == {one.key: one.value for one in found.parameters}
+    assert "<svg" in (folder / "out" / "fit.html").read_text()
+
+
+def test_a_parameter_at_the_end_of_a_range_that_is_too_narrow_is_said(folder):
+    found = fit({**STUDY, "factors": {"factors.yaw_inertia": {"uniform": [0.9, 1.0]}}}, jobs=1)
+    assert found.parameters[0].at_end
+    assert math.isnan(found.parameters[0].half_width)
+    assert any("factors.yaw_inertia is at an end of its range" in note for note in found.notes)
+    assert found.to_json()["parameters"]["factors.yaw_inertia"]["at_end"] is True
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"fit": {"noise": {}}}, "fit.noise: is empty"),
+        ({"fit": {"noise": {"yaw_rate_dgps": 0.2}}}, "fit.noise.yaw_rate_dgps: there is no such channel; did you mean"),
+        ({"fit": {"noise": {"roll_deg": 0.2}}}, "fit.noise.roll_rad: a has no such channel"),
+        ({"fit": {"noise": {"ay_mps2": 0.0}}}, "fit.noise.ay_mps2: 0.0 is out of range"),
+        ({"fit": {"noise": {"yaw_rate_degps": 1, "yaw_rate_radps": 1}}}, "yaw_rate_radps: is given twice"),
+        ({"fit": {**STUDY["fit"], "from_s": 1.5}}, "has 9 samples to compare, and 20 are needed"),
+        ({"fit": {**STUDY["fit"], "start": {"factors.yaw_inertia": 3.0}}}, "3 is out of its range; that is 0.6 to 1.6"),
+        ({"fit": {**STUDY["fit"], "start": {"mass": 1.0}}}, "fit.start.mass: is no factor; factors are"),
+        ({"factors": {}}, "factors: a fit needs factors"),
+        ({"factors": {"factors.mass": {"grid": [0.9, 1.1]}}}, "a fit needs a range"),
+        ({"factors": {"factors.mas": {"uniform": [0.9, 1.1]}}}, "factors.mas"),
+        ({"factors": {"driver.preview_s": {"uniform": [0.9, 1.1]}}}, "changes nothing in any of the study's runs"),
+        ({"controllers": ["none", "ars"]}, "controllers: a fit has one of them, not 2"),
+        ({"maneuvers": ["step_steer"]}, "'step_steer' is no recording"),
+        ({"maneuvers": ["b.mcap"]}, "b.mcap"),
+    ],
+)
+def test_what_is_wrong_is_said_before_anything_is_driven(folder, change, said):
+    driven = []
+    with pytest.raises(ActiveSteerError) as caught:
+        fit({**STUDY, **change}, jobs=1, progress=driven.append)
+    assert said in str(caught.value)
+    assert driven == []
+
+
+def test_a_study_without_the_table_is_no_fit():
+    with pytest.raises(ActiveSteerError, match="fit: the table is missing"):
+        fit({key: value for key, value in STUDY.items() if key != "fit"}, jobs=1)
+
+
+def test_a_factor_that_no_channel_shows_is_named_after_the_first_round(folder):
+    factors = {**STUDY["factors"], "driver.speed_gain_1ps": {"uniform": [8.0, 8.001]}}
+    with pytest.raises(ActiveSteerError, match=r"factors.driver.speed_gain_1ps: changes nothing of these channels"):
+        fit({**STUDY, "factors": factors}, jobs=1)
+
+
+@pytest.mark.slow
+def test_of_20_intervals_16_at_least_hold_the_truth(truth, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    held = dict.fromkeys(TRUTH, 0)
+    for seed in range(20):
+        noisy(truth, tmp_path / "a.mcap", seed)
+        for one in fit(STUDY, jobs=1).parameters:
+            held[one.key] += abs(one.value - TRUTH[one.key]) < one.half_width
+    assert min(held.values()) >= 16
