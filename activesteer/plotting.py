@@ -6,7 +6,7 @@ import io
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from markupsafe import Markup
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 T = TypeVar("T")
+
+DOTS_PER_INCH: Final = 300
+"""Of pictures that are saved as pixels: what journals ask for."""
 
 
 def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
@@ -54,7 +57,7 @@ def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterEr
     """
     with replacing(path, error) as part:
         try:
-            figure.savefig(part, dpi=150)
+            figure.savefig(part, dpi=DOTS_PER_INCH)
         except ValueError as reason:  # an ending that is no format of matplotlib's
             raise error(f"cannot write {shown_path(path)}: {reason}", value=path) from reason
     return path

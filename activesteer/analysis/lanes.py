@@ -6,11 +6,15 @@ The body is a rectangle of the car's width with a usual overhang beyond the axle
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from contextlib import suppress
 
 import numpy as np
+from numpy.typing import NDArray
 
-from activesteer.analysis.source import RecordingLike
+from activesteer.analysis.source import RecordingLike, read_footprint
 from activesteer.conventions import Array
+from activesteer.errors import RecordingError
 from activesteer.road.course import CONE_RADIUS_M, Course
 from activesteer.road.footprint import Footprint
 
@@ -31,7 +35,7 @@ def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> f
         inside a lane.
     """
     oversteps = [math.nan]
-    for x, y in _corners(recording, car):
+    for x, y in corners(recording, car):
         for lane in course.lanes:
             inside = y[(x >= lane.start_x_m) & (x <= lane.end_x_m)]
             if inside.size:
@@ -47,7 +51,7 @@ def stays_in_lanes(recording: RecordingLike, course: Course, car: Footprint) -> 
 
     A car that turns round before the last lane oversteps nothing there, but it has not kept to the lanes.
     """
-    for x, _ in _corners(recording, car):
+    for x, _ in corners(recording, car):
         for lane in course.lanes:
             if not ((x >= lane.start_x_m) & (x <= lane.end_x_m)).any() or not (x > lane.end_x_m).any():
                 return False
@@ -83,8 +87,20 @@ def _distances(recording: RecordingLike, points_m: Array, car: Footprint) -> Arr
     return distances
 
 
-def _corners(recording: RecordingLike, car: Footprint) -> list[tuple[Array, Array]]:
-    """World x and y of the four corners of the body over time [m]."""
+def struck_cones(recordings: Iterable[RecordingLike], course: Course) -> NDArray[np.bool_]:
+    """Which cones of a course any of some cars hits; shape (number of cones,).
+
+    A run that does not tell where its car was, or how large it is, hits none.
+    """
+    struck = np.zeros(len(course.cones_m), dtype=bool)
+    for recording in recordings:
+        with suppress(RecordingError):
+            struck |= cone_distances(recording, course, read_footprint(recording)) <= 0.0
+    return struck
+
+
+def corners(recording: RecordingLike, car: Footprint) -> list[tuple[Array, Array]]:
+    """World x and y of the four corners of the body over time [m]: front left and right, rear left and right."""
     front_x, front_y, cos, sin = _pose(recording)
     return [
         (front_x + ahead * cos - left * sin, front_y + ahead * sin + left * cos)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
-    parser = commands.add_parser("figures", help="the paper's figures from our own runs, as PNG and SVG")
+    parser = commands.add_parser("figures", help="the paper's figures from our own runs, as PNG, SVG and PDF")
     parser.add_argument("output", type=Path, metavar="DIR", help="folder for the figures")
     parser.add_argument(
         "--recordings", type=Path, metavar="DIR",
@@ -62,7 +62,7 @@ def draw_all(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle:
         vehicle: Name or path of the vehicle, for what the rig measures and for the linear models.
 
     Returns:
-        The files written, PNG and SVG of each.
+        The files written, PNG, SVG and PDF of each.
 
     Raises:
         ActiveSteerError: matplotlib is not installed, a file cannot be written, or the rig fails.

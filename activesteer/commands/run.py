@@ -32,7 +32,7 @@ def add_to(commands: Any) -> None:
     add_controller(run, several=True)
     add_output(run, "FILE_OR_DIR", "a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap", "runs")
     run.add_argument("--replace", action="store_true", help="replace recordings that were made with other settings")
-    run.add_argument("--plot", action="store_true", help="also draw the runs")
+    run.add_argument("--plot", action="store_true", help="also draw the runs: PNG and PDF")
     add_json(run)
     run.set_defaults(action=_run)
 
@@ -150,8 +150,9 @@ def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Pa
     from activesteer.commands.figures import models_beside
 
     name, kind = scenario.maneuver.name, scenario.maneuver.kind
-    figures = [figure_for(kind)(recordings, folder / f"{name}.png")]
+    figures = [figure_for(kind)(recordings, folder / f"{name}{ending}") for ending in (".png", ".pdf")]
     if kind == "step_steer" and "none" in recordings:
         run = recordings["none"]
-        figures.append(figure_2(run, folder / f"{name}-models.png", models_beside(run)))
+        models = models_beside(run)
+        figures += [figure_2(run, folder / f"{name}-models{ending}", models) for ending in (".png", ".pdf")]
     return figures

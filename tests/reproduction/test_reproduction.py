@@ -67,7 +67,9 @@ def test_the_figures_are_drawn_from_the_files(folder: Path, tmp_path: Path, caps
     assert main(["figures", str(tmp_path / "figures"), "--recordings", str(folder)]) == 0
     names = {Path(line).name for line in capsys.readouterr().out.splitlines()}
     for number in (1, 2, 7, 9, *range(11, 25)):
-        assert {".png", ".svg"} == {Path(name).suffix for name in names if name.startswith(f"figure_{number:02}_")}
+        assert {".png", ".svg", ".pdf"} == {
+            Path(name).suffix for name in names if name.startswith(f"figure_{number:02}_")
+        }
     assert all((tmp_path / "figures" / name).stat().st_size > 5000 for name in names)
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Draw = Callable[[Mapping[str, RecordingLike]], "Figure"]
 """Recordings by system -> figure."""
 
-FORMATS: Final = (".png", ".svg")
+FORMATS: Final = (".png", ".svg", ".pdf")
 
 BY_SCENARIO: Final[dict[str, dict[str, Draw]]] = {
     "step_steer": {"figure_11_step_steer": figure_11},
@@ -69,7 +69,7 @@ BY_KIND: Final[dict[str, Draw]] = {
 
 
 def draw_all(recordings: Mapping[str, Mapping[str, RecordingLike]], folder: str | os.PathLike[str]) -> list[Path]:
-    """Draw the paper's figures of all scenarios that there are runs of, as PNG and SVG.
+    """Draw the paper's figures of all scenarios that there are runs of, as PNG, SVG and PDF.
 
     Args:
         recordings: Scenario -> system -> run. Scenarios that the paper does not have are left out.

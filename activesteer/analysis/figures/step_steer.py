@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from activesteer.analysis.figures import style
 from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, Curve
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import RUN_COLOURS, RunLook
+from activesteer.conventions import RUN_COLOURS, RUN_DASHES, RunLook
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure, save
 from activesteer.quantities import quantity_of
@@ -28,7 +28,7 @@ FRONT = quantity_of("front_steer_rad")._replace(short="steering angles")
 def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
     """Response to a step steer.
 
-    From the top: yaw rate (dashed: desired, of the runs with a controller), steering angles (front wheels thin, added
+    From the top: yaw rate (dotted: desired, of the runs with a controller), steering angles (front wheels thin, added
     angles thick: those of the rear wheels, or the superposition at the front ones), lateral acceleration, sideslip and
     roll, over one time axis.
 
@@ -42,21 +42,21 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
     Source: V. Dorsch, Mecatronics-REM 2012, figure 11.
     """
     curves = style.curves(recordings)
-    figure = new_figure(width_in=7.5, height_in=9.5)
+    figure = new_figure(width_in=style.COLUMN_IN, height_in=1.1 + 5 * style.PANEL_IN)
     axes: list[Axes] = list(figure.subplots(5, 1, sharex=True))
     for curve in curves:
         style.draw(axes[0], curve, YAW_RATE, label=curve.look.label)
         if np.any(curve.recording[DESIRED.channel]):
-            style.draw(axes[0], curve, DESIRED, width=1.0, style="--")
+            style.draw(axes[0], curve, DESIRED, width=1.0, style=style.DOTTED)
         style.draw(axes[1], curve, FRONT, width=0.8)
         style.draw_added(axes[1], curve, width=2.2)
     style.plain(axes[0], YAW_RATE.axis_title)
     style.plain(axes[1], FRONT.axis_title)
     style.fill_panels(axes[2:], curves, (LATERAL, SIDESLIP, ROLL))
-    style.explain(axes[0], [("desired", 1.0, "--")])
-    style.explain(axes[1], [("front wheels", 0.8, "-"), ("added: rear wheels (2), superposition (3)", 2.2, "-")])
     figure.align_ylabels(axes)
-    style.name_curves(figure, axes[0])
+    style.name_curves(
+        figure, axes[0], [("desired", 1.0, style.DOTTED), ("front wheels", 0.8, "-"), ("added by a system", 2.2, "-")]
+    )
     return figure
 
 
@@ -100,17 +100,19 @@ def figure_2(
 
     Source: V. Dorsch, Mecatronics-REM 2012, figure 2.
     """
-    figure = new_figure(width_in=7.5, height_in=5.5)
+    figure = new_figure(width_in=style.COLUMN_IN, height_in=3.6)
     axes: list[Axes] = list(figure.subplots(2, 1, sharex=True))
+    car = Curve(recording, RunLook("multibody car", 0, ()))
     for axis, panel in zip(axes, (YAW_RATE, ROLL), strict=True):
-        style.draw(axis, Curve(recording, RunLook("", 0, ())), panel, label="multibody car", width=2.0)
-        for (label, channels), colour in zip((models or {}).items(), RUN_COLOURS[1:], strict=False):
+        style.draw(axis, car, panel, label=car.look.label, width=2.0)
+        for place, (label, channels) in enumerate((models or {}).items(), start=1):
             if panel.channel in channels:
-                values = channels[panel.channel] * panel.factor
-                axis.plot(recording.time_s, values, "--", color=colour, linewidth=1.4, label=label)
+                axis.plot(
+                    recording.time_s, channels[panel.channel] * panel.factor, color=RUN_COLOURS[place], linewidth=1.2,
+                    linestyle=(0.0, RUN_DASHES[place]), label=label,
+                )  # fmt: skip
         style.plain(axis, panel.axis_title)
-        axis.legend(loc="lower right", frameon=False)
-    axes[-1].set_xlabel("time [s]")
-    axes[-1].set_xlim(0.0, float(recording.time_s[-1]))
+    style.finish_time(axes, [car])
     figure.align_ylabels(axes)
+    style.name_curves(figure, axes[0])
     return save(figure, Path(path), RecordingError)

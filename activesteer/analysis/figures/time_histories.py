@@ -20,9 +20,6 @@ Recordings = Mapping[str, RecordingLike]
 def figure_12(recordings: Recordings) -> Figure:
     """Steering wheel angle of the sine with dwell: open loop, so that the curves lie over each other."""
     figure = style.time_figure(recordings, (STEERING_WHEEL,))
-    for index, line in enumerate(reversed(figure.get_axes()[0].get_lines())):
-        # The ones below are wider, to be seen.
-        line.set_linewidth(1.2 + 1.8 * index)
     _mark_instants(figure, recordings)
     return figure
 
@@ -74,11 +71,17 @@ def _mark_instants(figure: Figure, recordings: Recordings) -> None:
         # A run that was cut short can still be looked at.
         return
     axes = figure.get_axes()
-    instants = (("completion of steer", 0.0), *((f"+{s:.2f} s", s) for s in sine_with_dwell.INSTANTS_S))
+    instants = (("end of steer", 0.0), *((f"+{s:.2f} s", s) for s in sine_with_dwell.INSTANTS_S))
+    left, right = axes[0].get_xlim()
+    # Room for the text of the last one.
+    axes[0].set_xlim(left, max(right, completion_s + max(sine_with_dwell.INSTANTS_S) + 0.12 * (right - left)))
     for text, later_s in instants:
         for axis in axes:
             axis.axvline(completion_s + later_s, color="#999999", linewidth=0.9, linestyle=":", zorder=1)
+        # The first stands before its line, so that the texts do not meet.
+        before = later_s == 0.0
         axes[0].annotate(
-            text, (completion_s + later_s, 1.0), (2, -1), xycoords=("data", "axes fraction"),
-            textcoords="offset points", va="top", fontsize="x-small", color="#666666",
+            text, (completion_s + later_s, 1.0), (-2 if before else 2, -1), xycoords=("data", "axes fraction"),
+            textcoords="offset points", va="top", ha="right" if before else "left",
+            fontsize=style.TEXT_PT, color="#555555",
         )  # fmt: skip

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-from activesteer.analysis import track
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.analysis import lanes, track
 from activesteer.analysis.bands import TRACK
 from activesteer.analysis.course_view import CourseView, view_of
 from activesteer.analysis.figures import style
-from activesteer.analysis.source import RecordingLike, read_course
+from activesteer.analysis.figures.style import Curve
+from activesteer.analysis.source import RecordingLike, read_course, read_footprint
+from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure
-from activesteer.road.course import Course
+from activesteer.road.course import CONE_RADIUS_M, Course
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -20,7 +25,10 @@ if TYPE_CHECKING:
 
 LANE_COLOUR: Final = "#f0e6c8"
 CONE_COLOUR: Final = "#e69f00"
-WIDTH_IN: Final = 8.5
+STRUCK_COLOUR: Final = "#b3261e"
+WIDTH_IN: Final = style.PAGE_IN
+CARS: Final = 12
+"""How many outlines of a car stand along the course, at most."""
 COURSE_ASPECT: Final = 0.2
 TRACK_ASPECT: Final = 0.35
 """Height over width of the axes of courses and of tracks, about."""
@@ -37,7 +45,7 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
         axis.annotate(
             f"{text}{lane.end_x_m - lane.start_x_m:.1f} m x {lane.left_y_m - lane.right_y_m:.2f} m",
             (0.5 * (lane.start_x_m + lane.end_x_m), lane.left_y_m), (0, 5), textcoords="offset points",
-            ha="center", va="bottom", fontsize="x-small", color="#555555",
+            ha="center", va="bottom", fontsize=style.TEXT_PT, color="#444444",
         )  # fmt: skip
     return figure
 
@@ -45,7 +53,7 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
 def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
     """Tracks of the front axle centre along the course. It says by how much lateral positions are stretched."""
     course = read_course(style.curves(recordings)[0].recording)
-    figure = new_figure(width_in=WIDTH_IN, height_in=1.3 + _axis_height_in(course, TRACK_ASPECT))
+    figure = new_figure(width_in=WIDTH_IN, height_in=0.95 + _axis_height_in(course, TRACK_ASPECT))
     axis: Axes = figure.subplots()
     _draw_tracks(axis, recordings)
     style.name_curves(figure, axis)
@@ -57,7 +65,7 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
     drawn = style.curves(recordings)
     wanted = (style.STEERING_WHEEL, style.YAW_RATE, style.ADDED, style.LATERAL, style.SIDESLIP)
     panels = style.present(wanted, drawn)
-    figure = new_figure(width_in=WIDTH_IN, height_in=4.6 + 1.5 * len(panels))
+    figure = new_figure(width_in=WIDTH_IN, height_in=3.2 + 1.15 * len(panels))
     grid = figure.add_gridspec(1 + len(panels), 1, height_ratios=[2.6, *(1.0 for _ in panels)])
     above = figure.add_subplot(grid[0])
     _draw_tracks(above, recordings)
@@ -77,13 +85,37 @@ def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
     for curve in drawn:
         style.draw_band(axis, curve, TRACK[1])
         x, y = (style.thinned(values) for values in track.front_axle(curve.recording))
-        axis.plot(x, y, color=curve.look.colour, linewidth=1.4, label=curve.look.label)
-    _draw_course(axis, read_course(drawn[0].recording), TRACK_ASPECT)
+        axis.plot(
+            x, y, color=curve.look.colour, linewidth=style.LINE_PT, linestyle=curve.linestyle, label=curve.look.label
+        )
+    course = read_course(drawn[0].recording)
+    struck = lanes.struck_cones([curve.recording for curve in drawn], course)
+    _draw_course(axis, course, TRACK_ASPECT, struck)
+    for curve in drawn:
+        _draw_cars(axis, curve)
 
 
-def _draw_course(axis: Axes, course: Course, aspect: float) -> None:
+def _draw_cars(axis: Axes, curve: Curve) -> None:
+    """The outline of the car, in its size, at places along the course."""
+    from matplotlib.patches import Polygon  # noqa: PLC0415 - an extra, and slow to import
+
+    try:
+        front_left, front_right, rear_left, rear_right = lanes.corners(curve.recording, read_footprint(curve.recording))
+    except RecordingError:
+        return
+    x, _ = track.front_axle(curve.recording)
+    left, right = axis.get_xlim()
+    for place in np.linspace(left, right, CARS, endpoint=False)[1:]:
+        row = track.first_at(curve.recording, float(place))
+        if row is not None and np.isfinite(x[row]):
+            outline = [(float(xs[row]), float(ys[row])) for xs, ys in (front_left, front_right, rear_right, rear_left)]
+            axis.add_patch(Polygon(outline, closed=True, fill=False, edgecolor=curve.look.colour, linewidth=0.6))
+
+
+def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.bool_] | None = None) -> None:
     """Lanes, path and cones, with a legend of their own, and the limits of the axis."""
-    from matplotlib.patches import Rectangle  # noqa: PLC0415 - an extra, and slow to import
+    from matplotlib.lines import Line2D  # noqa: PLC0415 - an extra, and slow to import
+    from matplotlib.patches import Ellipse, Rectangle  # noqa: PLC0415
 
     shown: list[Artist] = []
     for lane in course.lanes:
@@ -93,11 +125,26 @@ def _draw_course(axis: Axes, course: Course, aspect: float) -> None:
         shown = [patch]
     view = view_of(course)
     shown += axis.plot(view.path_x_m, view.path_y_m, ":", color="#888888", linewidth=1.2, zorder=1)
+    for (x, y), hit in zip(
+        course.cone_centres_m(), struck if struck is not None else [False] * len(course.cones_m), strict=True
+    ):
+        colour = STRUCK_COLOUR if hit else CONE_COLOUR
+        # In its size; the edge keeps it from vanishing.
+        size = 2.0 * CONE_RADIUS_M
+        axis.add_patch(Ellipse((x, y), size, size, facecolor=colour, edgecolor=colour, linewidth=1.6, zorder=3))
+    names = [*(["lane"] if course.lanes else []), "path asked for"]
     if len(course.cones_m):
-        x, y = course.cones_m.T
-        shown += axis.plot(x, y, "^", color=CONE_COLOUR, markersize=4.5, markeredgewidth=0.0, zorder=3)
-    names = [*(["lane"] if course.lanes else []), "path asked for", "cone"]
-    axis.legend(shown, names[: len(shown)], loc="upper right", fontsize="small", frameon=False)
+        shown.append(Line2D([], [], linestyle="", marker="o", markersize=3.0, color=CONE_COLOUR))
+        names.append("cone")
+    if struck is not None and struck.any():
+        axis.plot(
+            *course.cone_centres_m()[struck].T, "x", color=STRUCK_COLOUR, markersize=5.0, zorder=4, label="_struck"
+        )
+        shown.append(axis.get_lines()[-1])
+        names.append("cone hit")
+    axis.legend(
+        shown, names, loc="upper right", fontsize=style.TEXT_PT, frameon=False, handlelength=1.8, labelspacing=0.25
+    )
     style.plain(axis)
     axis.set_xlim(view.x_m)
     axis.set_ylim(view.y_m)

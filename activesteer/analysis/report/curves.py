@@ -11,7 +11,7 @@ import numpy as np
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.course_view import view_of
-from activesteer.analysis.lanes import cone_distances
+from activesteer.analysis.lanes import struck_cones
 from activesteer.analysis.report.groups import Group, Run
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.analysis.track import front_axle, path_distance
@@ -250,11 +250,9 @@ def _courses(group: Group) -> Iterator[Course]:
 
 def _course(course: Course, group: Group) -> dict[str, Any]:
     view = view_of(course)
-    hit = np.zeros(len(course.cones_m), dtype=bool)
+    hit = struck_cones([run.recording for run in group.runs], course)
     low, high = view.y_m
     for run in group.runs:
-        with suppress(RecordingError):
-            hit |= cone_distances(run.recording, course, read_footprint(run.recording)) <= 0.0
         with suppress(RecordingError):
             x, y = front_axle(run.recording)
             seen = y[(x >= view.x_m[0]) & (x <= view.x_m[1]) & np.isfinite(y)]

@@ -8,8 +8,19 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.figures import BY_SCENARIO, draw_all, figure_for, theory, time_histories, tracks
+from activesteer.analysis.figures import (
+    BY_SCENARIO,
+    draw_all,
+    figure_11,
+    figure_for,
+    style,
+    theory,
+    time_histories,
+    tracks,
+)
+from activesteer.conventions import run_looks
 from activesteer.errors import ParameterError, RecordingError
+from activesteer.road.course import CONE_RADIUS_M
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 from activesteer.theory.tolerance import tolerance
 from tests.raising import raises
@@ -25,6 +36,10 @@ from tests.unit.analysis.synthetic import (
 )
 
 pytest.importorskip("matplotlib")
+
+from matplotlib.axes import Axes
+from matplotlib.patches import Ellipse, Polygon, Rectangle
+from matplotlib.text import Text
 
 CONES = tuple((x, y) for _, start, end, right, left in LANES for x in (start, end) for y in (right, left))
 
@@ -53,17 +68,17 @@ def files(tmp_path_factory):
     return draw_all(scenarios, tmp_path_factory.mktemp("figures") / "new")
 
 
-def test_every_figure_of_the_result_part_is_there_as_png_and_svg(files):
+def test_every_figure_of_the_result_part_is_there_in_pixels_and_as_lines(files):
     numbers = [int(path.name.split("_")[1]) for path in files]
-    assert numbers == sorted(2 * [7, 9, *range(11, 25)])
-    assert {path.suffix for path in files} == {".png", ".svg"}
+    assert numbers == sorted(3 * [7, 9, *range(11, 25)])
+    assert {path.suffix for path in files} == {".png", ".svg", ".pdf"}
     assert all(path.stat().st_size > 5000 for path in files)
-    assert len({path.name for path in files}) == len(files) == 2 * (2 + sum(map(len, BY_SCENARIO.values())))
+    assert len({path.name for path in files}) == len(files) == 3 * (2 + sum(map(len, BY_SCENARIO.values())))
 
 
 def test_only_the_figures_that_there_are_runs_for_are_drawn(tmp_path):
     paths = draw_all({"step_steer": {"ars": step_steer()}, "parking": {"none": step_steer()}}, tmp_path)
-    assert [path.name[:9] for path in paths[::2]] == ["figure_07", "figure_09", "figure_11"]
+    assert [path.name[:9] for path in paths[::3]] == ["figure_07", "figure_09", "figure_11"]
 
 
 @pytest.mark.parametrize("recordings", [{}, {"parking": {"none": step_steer()}}, {"slalom": {}}])
@@ -85,10 +100,98 @@ def test_tracks_are_those_of_the_front_axle_with_cones_lanes_and_a_stated_scale(
     for label, system in (("1 no control", "none"), ("3 active front steering", "afs")):
         drawn = np.asarray(lines[label].get_xydata())
         assert drawn[:, 1].max() == pytest.approx(runs[system]["front_axle_y_m"].max())
-    assert len(axis.patches) == len(LANES)
-    cones = [line for line in axis.get_lines() if line.get_marker() == "^"]
-    assert sorted(map(tuple, np.asarray(cones[0].get_xydata()).tolist())) == sorted(CONES)
+    assert sum(isinstance(patch, Rectangle) for patch in axis.patches) == len(LANES)
+    # A lane is measured between its cones: they stand outside it.
+    cones = {patch.center: (patch.width, patch.height) for patch in axis.patches if isinstance(patch, Ellipse)}
+    outside = [
+        (x, y + (CONE_RADIUS_M if y == left else -CONE_RADIUS_M))
+        for _, start, end, right, left in LANES
+        for x in (start, end)
+        for y in (right, left)
+    ]
+    assert sorted(cones) == [pytest.approx(place) for place in sorted(outside)]
+    assert set(cones.values()) == {(2.0 * CONE_RADIUS_M, 2.0 * CONE_RADIUS_M)}
     assert f"stretched {axis.get_aspect():.0f} times" in axis.get_ylabel()
+
+
+def test_cars_stand_on_their_tracks_in_their_size_and_cones_they_hit_are_crossed_out():
+    runs = {"none": along_path(cones=((45.0, 0.5), (45.0, 3.0)))}
+    axis = tracks.track_figure(runs).get_axes()[0]
+    outlines = [patch.get_xy()[:4] for patch in axis.patches if isinstance(patch, Polygon)]
+    assert len(outlines) > 5
+    for corners in outlines:
+        front, rear = 0.5 * (corners[0] + corners[1]), 0.5 * (corners[2] + corners[3])
+        assert np.linalg.norm(front - rear) == pytest.approx(2.6 + 0.85 + 0.75)
+        assert np.linalg.norm(corners[0] - corners[1]) == pytest.approx(1.8)
+    (struck,) = [line for line in axis.get_lines() if line.get_marker() == "x"]
+    assert np.asarray(struck.get_xydata()).tolist() == [[45.0, 0.5]]
+
+
+@pytest.mark.parametrize("draw", [time_histories.figure_13, time_histories.lateral_response, tracks.track_figure])
+def test_curves_are_told_apart_in_grey_by_their_dashes(draw):
+    runs = sines() if draw is time_histories.figure_13 else lane_changes()
+    axis = draw(runs).get_axes()[0]
+    styles = {line.get_label(): str(line._unscaled_dash_pattern) for line in axis.get_lines()}
+    assert len({styles[look.label] for look in run_looks(runs).values()}) == 3
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda: figure_11({"none": step_steer(), "ars": step_steer(rear_rad=-0.01)}),
+        lambda: time_histories.sine_with_dwell_figure(sines()),
+        lambda: tracks.overview(lane_changes()),
+        lambda: tracks.course_figure(lane_changes()),
+        lambda: theory.figure_7(step_steer()),
+        lambda: theory.figure_9(step_steer()),
+    ],
+)
+def test_every_text_is_of_8_points_in_a_figure_as_wide_as_a_column_or_a_page(draw):
+    figure = draw()
+    figure.draw_without_rendering()
+    assert figure.get_figwidth() in (style.COLUMN_IN, style.PAGE_IN)
+    texts = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
+    assert len(texts) > 10
+    assert min(text.get_fontsize() for text in texts) >= 8.0
+    page = figure.bbox
+    for text in texts:
+        box = text.get_window_extent()
+        # Labels of ticks beyond the limits are not drawn, but they exist.
+        if text.get_figure() and box.width and text not in unseen(figure):
+            assert page.x0 - 1 <= box.x0, text
+            assert box.x1 <= page.x1 + 1, text
+
+
+def unseen(figure):
+    """Labels of ticks that lie beyond the limits of their axis."""
+    return {
+        label
+        for axes in figure.findobj(Axes)
+        for axis, (low, high) in ((axes.xaxis, sorted(axes.get_xlim())), (axes.yaxis, sorted(axes.get_ylim())))
+        for tick in axis.get_major_ticks()
+        if not low <= tick.get_loc() <= high
+        for label in (tick.label1, tick.label2)
+    }
+
+
+def test_a_step_fills_the_frame_with_its_transient():
+    axis = figure_11({"none": step_steer(), "ars": step_steer(rear_rad=-0.01)}).get_axes()[0]
+    start, end = axis.get_xlim()
+    assert 0.5 < start < 1.0  # the wheel turns about 1 s
+    assert 1.5 < end < 4.0  # of 7 s
+
+
+def test_a_car_that_spins_is_shown_whole_in_an_inset_and_does_not_set_the_scale():
+    runs = sines() | {"none": sine_with_dwell(sideslip_rad=math.radians(60.0))}
+    (sideslip,) = [axis for axis in time_histories.figure_13(runs).get_axes() if "sideslip" in axis.get_ylabel()]
+    low, high = sideslip.get_ylim()
+    assert math.degrees(0.05) < high - low < 25.0
+    (inset,) = sideslip.child_axes
+    assert max(float(np.max(np.asarray(line.get_ydata()))) for line in inset.get_lines()) == pytest.approx(
+        60.0, rel=0.01
+    )
+    others = {"ars": runs["ars"], "afs": runs["afs"]}
+    assert all(not axis.child_axes for axis in time_histories.figure_13(others).get_axes())
 
 
 def test_panels_over_time_are_in_degrees_with_units_at_the_axes():

@@ -50,12 +50,13 @@ def test_figure_is_a_png_of_readable_size(tmp_path):
 def test_five_panels_share_the_time_axis(saved):
     axes = saved.get_axes()
     assert len(axes) == 5
-    assert {axis.get_xlim() for axis in axes} == {(0.0, 7.0)}
+    assert len({axis.get_xlim() for axis in axes}) == 1
 
 
 def test_curves_are_named_and_ordered_as_in_the_paper(saved):
     legend = [text.get_text() for text in saved.legends[0].get_texts()]
-    assert legend == ["1 no control", "2 active rear steering", "3 active front steering"]
+    assert legend[:3] == ["1 no control", "2 active rear steering", "3 active front steering"]
+    assert legend[3:] == ["desired", "front wheels", "added by a system"]
 
 
 def test_angles_are_in_degrees_and_only_those_that_exist(saved):
@@ -73,7 +74,7 @@ def test_the_same_run_keeps_its_colour_when_others_are_left_out(figures, tmp_pat
 
 def test_a_users_controller_is_drawn_under_its_own_name(figures, tmp_path):
     step_steer_figure({"my_controller.py:Mine": step_steer(rear_rad=-0.02)}, tmp_path / "a.png")
-    assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["my_controller.py:Mine"]
+    assert figures[0].legends[0].get_texts()[0].get_text() == "my_controller.py:Mine"
 
 
 def test_pyplot_is_left_alone(tmp_path):
