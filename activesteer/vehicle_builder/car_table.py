@@ -16,6 +16,7 @@ from activesteer.conventions import CORNERS, Array
 from activesteer.rigs.kc.result import KcResult
 from activesteer.scenario import Car
 from activesteer.vehicle.mass_properties import mass_properties
+from activesteer.vehicle_builder.hardware import hardware_tables
 
 _REMARK = (
     "# {name} as a table for `activesteer vehicle new NAME --kc FOLDER`: written by `activesteer kc --tables FOLDER`.\n"
@@ -67,6 +68,7 @@ def car_table(car: Car, result: KcResult) -> str:
         "brakes": to_table(config.brakes, defaults=False),
         "powertrain": to_table(config.powertrain, defaults=False),
         "aerodynamics": to_table(config.aerodynamics, defaults=False),
+        **hardware_tables(config),
     }
     return _REMARK.format(name=car.name) + toml_text(table)
 

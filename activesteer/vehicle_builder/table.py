@@ -15,7 +15,10 @@ from activesteer.brakes.parameters import Brakes
 from activesteer.config import Range, Source, build, read_toml
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.files import read_csv
+from activesteer.sensors.parameters import Sensors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
+from activesteer.vehicle.rear_actuator import RearActuator
+from activesteer.vehicle.superposition_actuator import SuperpositionActuator
 from activesteer.vehicle_builder.axle_kinds import DEFAULTS, AxleKind, kind_of
 
 Positive = Annotated[float, Range(1e-9)]
@@ -190,6 +193,12 @@ class CarTable:
     brakes: Brakes | None = None
     powertrain: Powertrain | None = None
     aerodynamics: Aerodynamics | None = None
+    rear_actuator: RearActuator | None = None
+    """What steers the rear wheels; the model's hinges where not given."""
+    superposition_actuator: SuperpositionActuator | None = None
+    """What adds to the steering wheel angle; the model's servo where not given."""
+    sensors: Sensors | None = None
+    """What controllers see; the truth where not given."""
 
     def axle(self, name: str) -> AxleTable:
         """The axle of a name, `front` or `rear`."""

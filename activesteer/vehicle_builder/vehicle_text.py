@@ -13,6 +13,7 @@ from activesteer.resources import find_vehicle
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle.mass_properties import mass_properties
 from activesteer.vehicle_builder.design import Car
+from activesteer.vehicle_builder.hardware import hardware_tables, in_degrees
 from activesteer.vehicle_builder.trimmed import Trimmed
 
 _LEFT_OF_STIFFNESS: Final = {"front": 0.6, "rear": 1.05}
@@ -26,6 +27,9 @@ _REMARKS: Final = {
     "curves.rear": "As in front; no rack steers it.",
     "friction": "Dry friction; vibration as in the compact's file (a road of class A at 80 km/h).",
     "brakes": "Torque per wheel at full pedal.",
+    "rear_actuator": "Instead of the hinges of the model.",
+    "superposition_actuator": "Instead of the servo of the model.",
+    "sensors": "What controllers see.",
     "powertrain": "At the wheels: torques in first gear, power, rev limit in top gear.",
     "controllers.desired_yaw_rate": (
         "Controllers of the compact, a start: their gains were found for that car. What a control-free run of this "
@@ -85,6 +89,7 @@ def _table(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> dict[str
         "brakes": to_table(car.brakes, defaults=False),
         "powertrain": to_table(car.powertrain, defaults=False),
         "aerodynamics": to_table(car.aerodynamics, defaults=False),
+        **hardware_tables(car.table),
         "single_track": _single_track(car, model),
         "controllers": compact["controllers"],
     }
@@ -93,14 +98,7 @@ def _table(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> dict[str
 def _curves(car: Car, trimmed: Trimmed) -> dict[str, Any]:
     """Tables [curves.front] and [curves.rear], angles in degrees; none where links guide both axles."""
     guided = {axle.name: curves for axle in car.axles if (curves := trimmed.axle(axle.name).curves) is not None}
-    tables = {}
-    for name, curves in guided.items():
-        tables[name] = {
-            key.removesuffix("_rad") + "_deg" if key.endswith("_rad") else key: [
-                float(f"{math.degrees(value) if key.endswith('_rad') else value:.7g}") for value in values
-            ]
-            for key, values in to_table(curves, defaults=False).items()
-        }
+    tables = {name: in_degrees(to_table(curves, defaults=False)) for name, curves in guided.items()}
     return {"curves": tables} if tables else {}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import tomllib
 from pathlib import Path
 
@@ -10,9 +11,12 @@ import pytest
 
 from activesteer.brakes import Brakes
 from activesteer.config import Source, build, read_toml, to_table, toml_text
+from activesteer.errors import ParameterError
 from activesteer.scenario import load_car
 from activesteer.scenario.car import VehicleConfig
+from activesteer.sensors.parameters import Sensors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
+from activesteer.vehicle.rear_actuator import RearActuator
 from activesteer.vehicle_builder import new_vehicle
 from tests.unit.vehicle_builder.other_values import all_changed
 from tests.unit.vehicle_builder.tables import COMPACT
@@ -45,3 +49,55 @@ def test_a_new_car_has_all_that_its_table_says_as_a_vehicle_file_does(tmp_path: 
     own.write_text(toml_text(table | to_table(given)), encoding="utf-8")
     config = load_car(new_vehicle("own", own, tmp_path / "own").vehicle_file).config
     assert {name: getattr(config, name) for name in given} == given
+
+
+HARDWARE = """
+[rear_actuator]
+preset = "screw_3deg"
+limit_deg = 2.5
+backlash_m = 5e-5
+
+[superposition_actuator]
+preset = "strain_wave"
+
+[sensors]
+preset = "production"
+seed = 7
+
+[sensors.yaw_rate]
+noise_degps = 0.2
+"""
+
+
+def test_actuators_and_sensors_of_a_table_are_those_of_the_new_car(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(COMPACT.read_text(encoding="utf-8") + HARDWARE, encoding="utf-8")
+    made = new_vehicle("own", own, tmp_path / "own").vehicle_file
+    config, asked = load_car(made).config, tomllib.loads(HARDWARE)
+    assert config.rear_actuator == build(RearActuator, asked["rear_actuator"], Source("asked"))
+    assert config.superposition_actuator.is_geared
+    wanted = build(Sensors, asked["sensors"], Source("asked"))
+    assert config.sensors.yaw_rate.noise_radps == pytest.approx(wanted.yaw_rate.noise_radps, rel=1e-6)
+    assert dataclasses.replace(config.sensors, yaw_rate=wanted.yaw_rate) == wanted
+    # What the presets say is left to them.
+    written = tomllib.loads(made.read_text(encoding="utf-8"))
+    assert set(written["rear_actuator"]) == {"preset", "limit_deg", "backlash_m"}
+    assert set(written["sensors"]) == {"preset", "seed", "yaw_rate"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("screw_3deg", "screw_4deg", "rear_actuator.preset"),
+        ("screw_3deg", "hinge", "rear_actuator.limit_rad"),
+        ("seed = 7", "sed = 7", "sensors.sed"),
+    ],
+)
+def test_a_wrong_actuator_or_sensor_is_refused_before_the_car_is_made(
+    tmp_path: Path, old: str, new: str, key: str
+) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(COMPACT.read_text(encoding="utf-8") + HARDWARE.replace(old, new), encoding="utf-8")
+    with pytest.raises(ParameterError, match=re.escape(key)):
+        new_vehicle("own", own, tmp_path / "own")
+    assert not (tmp_path / "own").exists()
