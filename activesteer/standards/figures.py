@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from activesteer.conventions import RUN_COLOURS
 from activesteer.plotting import new_figure
-from activesteer.standards.standard import Panel, Picture
+from activesteer.standards.page_parts import Panel, Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,18 +8,8 @@ from typing import Any, Final
 
 from activesteer.analysis.sine_with_dwell import DISPLACEMENT_TIME_S, INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.slow_ramp import FIT, REFERENCE_MPS2
-from activesteer.standards.standard import (
-    SIDES,
-    Curve,
-    Findings,
-    Ground,
-    NoResult,
-    Panel,
-    Picture,
-    Run,
-    Standard,
-    Table,
-)
+from activesteer.standards.page_parts import Curve, Panel, Picture, Table, cell
+from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
 
 RAMP_DEGPS: Final = 13.5
 """Rate of the slowly increasing steer [deg/s]; S7.6."""
@@ -155,17 +145,13 @@ def _table(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> Tab
     rows = [
         (
             row["direction"], f"{row['factor']:.2f}", f"{row['amplitude_deg']:.1f}",
-            *(_number(100.0 * row[name], 1) for name in RATIOS),
-            _number(row["displacement_m"], 2),
+            *(cell(100.0 * row[name], 1) for name in RATIOS),
+            cell(row["displacement_m"], 2),
             "pass" if row["pass"] else f"fail {run.error}".strip(),
         )
         for row, run in zip(series, runs, strict=True)
     ]  # fmt: skip
     return Table("Sine with dwell", columns, rows, frozenset(i for i, row in enumerate(series) if not row["pass"]))
-
-
-def _number(value: float, digits: int) -> str:
-    return "-" if math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def _pictures(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> list[Picture]:

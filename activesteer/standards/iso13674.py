@@ -12,18 +12,8 @@ from activesteer.analysis.hysteresis import loop, slope_at_zero
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import RecordingError
 from activesteer.quantities import display_unit
-from activesteer.standards.standard import (
-    Curve,
-    Findings,
-    Ground,
-    NoResult,
-    Panel,
-    Picture,
-    Run,
-    Standard,
-    Table,
-    axis_label,
-)
+from activesteer.standards.page_parts import Curve, Panel, Picture, Table, axis_label, cell
+from activesteer.standards.standard import Findings, Ground, NoResult, Run, Standard
 from activesteer.standards.steering_angle import steering_wheel_at
 
 SPEED_KMH: Final = 100.0
@@ -101,12 +91,27 @@ def _examine(ground: Ground) -> Findings:
         Table(
             f"Weave, {WEAVE_Hz:g} Hz, {angle_deg:.1f} deg",
             ("abscissa", "ordinate", "gradient", "ordinate dead band", "abscissa dead band"),
-            [(row["abscissa"], row["ordinate"], *(_number(row[key]) for key in list(row)[2:])) for row in loops],
+            [
+                (
+                    row["abscissa"],
+                    row["ordinate"],
+                    *(cell(row[key], 4) for key in list(row)[2:]),
+                )
+                for row in loops
+            ],
         ),
         Table(
             f"Transition through straight ahead, {TRANSITION_DEGPS:g} deg/s",
             ("abscissa", "ordinate", "slope", "intercept"),
-            [(row["abscissa"], row["ordinate"], _number(row["slope"]), _number(row["intercept"])) for row in lines],
+            [
+                (
+                    row["abscissa"],
+                    row["ordinate"],
+                    cell(row["slope"], 4),
+                    cell(row["intercept"], 4),
+                )
+                for row in lines
+            ],
         ),
     ]
     pictures = [Picture("Weave", _panels(periodic)), Picture("Transition", _panels(through))]
@@ -167,10 +172,6 @@ def transition_lines(signals: Signals) -> list[dict[str, Any]]:
 def _panels(signals: Signals) -> list[Panel]:
     shown = {name: display_unit(name).factor * values for name, values in signals.items()}
     return [Panel(axis_label(x), axis_label(y), [Curve(shown[x], shown[y])]) for x, y in _PLOTS]
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4f}"
 
 
 STANDARD: Final = Standard(

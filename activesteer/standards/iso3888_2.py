@@ -5,18 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from activesteer.standards.standard import (
-    SIDES,
-    Curve,
-    Findings,
-    Ground,
-    Panel,
-    Picture,
-    Run,
-    Standard,
-    Table,
-    time_panels,
-)
+from activesteer.standards.page_parts import Curve, Panel, Picture, Table, cell, time_panels
+from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 
 DRIVER: Final = "expert"
 """The standard asks for a skilled driver."""
@@ -61,6 +51,20 @@ def is_clean(run: Run) -> bool:
     return run.metric("stays_in_lanes") == 1.0 and run.metric("cones_hit") == 0.0
 
 
+def best_run(runs: Sequence[Run], highest_kmh: float | None) -> Run | None:
+    """Of the clean runs at the highest clean speed the one with most room, or of all where there is no such speed.
+
+    Args:
+        runs: The runs to one side.
+        highest_kmh: The highest clean speed; None where there is none.
+
+    Returns:
+        The run; None where none could be evaluated.
+    """
+    good = [run for run in runs if highest_kmh in (None, run.case["speed_kmh"]) and not run.error]
+    return min(good, key=lambda run: run.metric("lane_overstep_m"), default=None)
+
+
 def _examine(ground: Ground) -> Findings:
     speeds: dict[str, float | None] = {}
     driven: dict[str, list[Run]] = {side: [] for side in SIDES}
@@ -98,8 +102,8 @@ def _table(driven: dict[str, list[Run]]) -> Table:
     rows = [
         (
             side, f"{run.case['speed_kmh']:.0f}", f"{run.case['lane.margin_m']:.2f}",
-            _cell(run, "lane_overstep_m", 3), _cell(run, "cones_hit", 0),
-            _cell(run, "speed_end_mps", 1, 3.6), "clean" if is_clean(run) else run.error or "not clean",
+            cell(run.metric("lane_overstep_m"), 3), cell(run.metric("cones_hit"), 0),
+            cell(3.6 * run.metric("speed_end_mps"), 1), "clean" if is_clean(run) else run.error or "not clean",
         )
         for side, runs in driven.items()
         for run in runs
@@ -111,27 +115,13 @@ def _table(driven: dict[str, list[Run]]) -> Table:
     return Table("Entry speeds", columns, rows, frozenset(i for i, row in enumerate(rows) if row[-1] != "clean"))
 
 
-def _cell(run: Run, metric: str, digits: int, factor: float = 1.0) -> str:
-    return "-" if run.error else f"{factor * run.metric(metric):.{digits}f}"
-
-
 def _pictures(ground: Ground, speeds: dict[str, float | None], driven: dict[str, list[Run]]) -> list[Picture]:
-    """The fastest clean run to each side, of several the one with most room: way between the cones, and over time."""
-    best = {
-        side: (
-            speed,
-            min(
-                (run for run in driven[side] if run.case["speed_kmh"] == speed and is_clean(run)),
-                key=lambda run: run.metric("lane_overstep_m"),
-            ),
-        )
-        for side, speed in speeds.items()
-        if speed is not None
-    }
+    """The best run to each side: its way between the cones, and over time."""
+    best = {side: run for side, runs in driven.items() if (run := best_run(runs, speeds[side])) is not None}
     if not best:
         return []
     tracks = []
-    for side, (_, run) in best.items():
+    for side, run in best.items():
         course = ground.scenario("severe_lane_change", {"lane.side": side}).maneuver.course
         assert course is not None
         x, y = run["x_m"], run["y_m"]
@@ -141,10 +131,13 @@ def _pictures(ground: Ground, speeds: dict[str, float | None], driven: dict[str,
             Curve(course.cones_m[:, 0], course.cones_m[:, 1], "cones", marked=True, joined=False),
         ]
         tracks.append(Panel("x [m]", "y [m]", curves, f"{side} first"))
-    labelled = {f"{side}, {speed:.0f} km/h": run for side, (speed, run) in best.items()}
+    words = {
+        side: f"{run.case['speed_kmh']:.0f} km/h{'' if is_clean(run) else ', not clean'}" for side, run in best.items()
+    }
+    labelled = {f"{side}, {words[side]}": run for side, run in best.items()}
     return [
-        Picture("Fastest clean runs", tracks),
-        Picture("Fastest clean runs over time", time_panels(labelled, _SHOWN, 0.0, "the start")),
+        Picture("Fastest clean runs, or where there is none the nearest to it", tracks),
+        Picture("The same over time", time_panels(labelled, _SHOWN, 0.0, "the start")),
     ]
 
 

@@ -11,18 +11,8 @@ from activesteer.analysis.handling import CarGeometry, Handling, evaluate
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.quantities import display_unit
-from activesteer.standards.standard import (
-    SIDES,
-    Curve,
-    Findings,
-    Ground,
-    Panel,
-    Picture,
-    Run,
-    Standard,
-    axis_label,
-    metrics_table,
-)
+from activesteer.standards.page_parts import Curve, Panel, Picture, axis_label, metrics_table
+from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 
 RADIUS_M: Final = 100.0
 """Radius of the first method [m]."""

@@ -13,19 +13,8 @@ from activesteer.analysis.random_response import RandomResponse, random_response
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.quantities import DisplayUnit, display_unit
-from activesteer.standards.standard import (
-    SIDES,
-    Curve,
-    Findings,
-    Ground,
-    Panel,
-    Picture,
-    Run,
-    Standard,
-    Table,
-    metrics_table,
-    time_panels,
-)
+from activesteer.standards.page_parts import Curve, Panel, Picture, Table, metrics_table, time_panels
+from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 from activesteer.standards.steering_angle import steering_wheel_at
 
 SPEED_KMH: Final = 80.0

@@ -6,19 +6,8 @@ import math
 from typing import Final
 
 from activesteer.quantities import display_unit
-from activesteer.standards.standard import (
-    SIDES,
-    Curve,
-    Findings,
-    Ground,
-    Panel,
-    Picture,
-    Run,
-    Standard,
-    axis_label,
-    metrics_table,
-    time_panels,
-)
+from activesteer.standards.page_parts import Curve, Panel, Picture, axis_label, metrics_table, time_panels
+from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 from activesteer.standards.steering_angle import steering_wheel_at
 
 SPEED_KMH: Final = 80.0

@@ -10,19 +10,8 @@ import numpy as np
 
 from activesteer.errors import SimulationDiverged
 from activesteer.quantities import display_unit
-from activesteer.standards.standard import (
-    SIDES,
-    Curve,
-    Findings,
-    Ground,
-    NoResult,
-    Panel,
-    Picture,
-    Run,
-    Standard,
-    Table,
-    time_panels,
-)
+from activesteer.standards.page_parts import Curve, Panel, Picture, Table, cell, time_panels
+from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
 from activesteer.studies.fault_map import FIGURES
 
 
@@ -185,8 +174,8 @@ def _fault_words(faults: list[dict[str, Any]]) -> str:
 def _effort_table(efforts: list[dict[str, Any]]) -> Table:
     rows = [
         (
-            row["steering"].replace("_", " "), row["direction"], f"{row['radius_m']:g}", _number(row["time_s"], 2),
-            _number(row["effort_N"], 1), f"{row['limit_N']:.0f}", "pass" if row["pass"] else "fail",
+            row["steering"].replace("_", " "), row["direction"], f"{row['radius_m']:g}", cell(row["time_s"], 2),
+            cell(row["effort_N"], 1), f"{row['limit_N']:.0f}", "pass" if row["pass"] else "fail",
         )
         for row in efforts
     ]  # fmt: skip
@@ -200,11 +189,11 @@ def _effort_table(efforts: list[dict[str, Any]]) -> Table:
 
 def _fault_table(faults: list[dict[str, Any]]) -> Table:
     def tolerated(row: Mapping[str, Any]) -> str:
-        return "always" if row["fault_tolerant_time_s"] is None else _number(row["fault_tolerant_time_s"], 3)
+        return "always" if row["fault_tolerant_time_s"] is None else cell(row["fault_tolerant_time_s"], 3)
 
     rows = [
         (
-            row["fault"], row["direction"], *(_number(_shown(row, name), 2) for name in FIGURES[:-1]),
+            row["fault"], row["direction"], *(cell(_shown(row, name), 2) for name in FIGURES[:-1]),
             row.get("error") or tolerated(row),
         )
         for row in faults
@@ -220,10 +209,6 @@ def _fault_table(faults: list[dict[str, Any]]) -> Table:
 
 def _shown(row: Mapping[str, Any], name: str) -> float:
     return display_unit(name).factor * row[name]
-
-
-def _number(value: float, digits: int) -> str:
-    return "-" if math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def _dots(faults: list[dict[str, Any]]) -> Picture:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pytest
 
 from activesteer.scenario import resolve
 from activesteer.standards import iso3888_2
 from activesteer.standards.examination import examine
-from activesteer.standards.iso3888_2 import COARSE_KMH, highest_clean
+from activesteer.standards.iso3888_2 import COARSE_KMH, best_run, highest_clean
+from activesteer.standards.standard import Run
+from tests.unit.standards.grounds import WrittenGround
 
 
 @pytest.mark.parametrize(("limit", "found"), [(54.0, 54.0), (54.9, 54.0), (55.0, 55.0), (100.0, 80.0), (20.0, None)])
@@ -26,6 +29,37 @@ def test_search_finds_the_limit_of_a_car_whose_limit_is_known(limit, found):
 
 def test_a_faster_clean_run_counts_although_a_slower_one_is_not_clean():
     assert highest_clean(lambda _, speeds: [speed in (40.0, 50.0, 52.0) for speed in speeds]) == 52.0
+
+
+def test_one_clean_line_is_enough_and_a_car_that_tips_over_is_a_row():
+    """Clean up to 52 km/h, and only with a margin of 0.15 m; at 80 km/h the car tips over."""
+
+    def driven(_: str, case: Mapping[str, Any]) -> Mapping[str, float] | str:
+        if case["speed_kmh"] == 80.0:
+            return "the car tips over"
+        clean = case["speed_kmh"] <= 52.0 and case["lane.margin_m"] == 0.15
+        return {"stays_in_lanes": float(clean), "cones_hit": 0.0 if clean else 1.0, "lane_overstep_m": -0.1 * clean}
+
+    ground = WrittenGround(driven)
+    # Without channels there is nothing to draw.
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(iso3888_2, "_pictures", lambda *_: [])
+        found = iso3888_2.STANDARD.examine(ground)
+    assert found.values["entry_speed_kmh"] == {"left": 52.0, "right": 52.0}
+    assert [case["speed_kmh"] for case in ground.asked["left_fine"][::3]] == [51.0, 52.0, 53.0, 54.0]
+    tipped = [row for row in found.values["runs"] if row["speed_kmh"] == 80.0]
+    assert len(tipped) == 6
+    assert all(row["error"] == "the car tips over" and not row["clean"] for row in tipped)
+
+
+def test_the_run_that_is_shown_is_clean_where_there_is_one():
+    def run(speed_kmh: float, overstep_m: float, error: str = "") -> Run:
+        return Run({"speed_kmh": speed_kmh}, {"lane_overstep_m": overstep_m}, {}, error)
+
+    roomy, narrow, wide = run(50.0, -0.2), run(54.0, -0.01), run(54.0, 0.3)
+    assert best_run([roomy, narrow, wide], 54.0) is narrow
+    assert best_run([wide, run(35.0, 0.1, "it diverged"), narrow], None) is narrow
+    assert best_run([run(35.0, 0.1, "it diverged")], None) is None
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

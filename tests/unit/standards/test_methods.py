@@ -17,7 +17,8 @@ from activesteer.standards.catalogue import STANDARDS, standard_of
 from activesteer.standards.examination import Examination, examine
 from activesteer.standards.iso14512 import after_one_second
 from activesteer.standards.iso21994 import corrected_distance
-from activesteer.standards.standard import Findings, Run, metrics_table
+from activesteer.standards.page_parts import metrics_table
+from activesteer.standards.standard import Findings, Run
 from activesteer.standards.steering_angle import steering_wheel_at
 from tests.unit.standards.signals import run_of, times
 

@@ -8,7 +8,8 @@ import pytest
 
 from activesteer.standards.examination import Examination
 from activesteer.standards.page import page
-from activesteer.standards.standard import Curve, Findings, Panel, Picture, Standard, Table
+from activesteer.standards.page_parts import Curve, Panel, Picture, Table
+from activesteer.standards.standard import Findings, Standard
 
 EVIL = '</td><script>alert(1)</script><img src="http://example.org/x">{{ version }}'
 
