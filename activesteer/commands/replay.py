@@ -35,9 +35,10 @@ def _replay(options: argparse.Namespace) -> int:
     # rerun's own threads write to the terminal, in colours, what we say ourselves.
     os.environ.setdefault("RUST_LOG", "warn,re_log_encoding=off,re_sdk=off")
     try:
-        from activesteer.playback import runs_of, save, serve, show
+        from activesteer.playback import Showing, runs_of, save, serve, show
     except ImportError as error:
         raise PlaybackError("replay needs the viewer rerun: pip install rerun-sdk") from error
+    from activesteer.analysis.verdict import verdict
     from activesteer.recording import Recording
     from activesteer.recording.run_names import run_names
 
@@ -47,14 +48,15 @@ def _replay(options: argparse.Namespace) -> int:
         raise ParameterError(f"a file is named twice: {', '.join(str(file) for file in options.files)}")
     recordings = [Recording.open(file, recover=True) for file in options.files]
     names = run_names(options.files, recordings)
-    runs = runs_of(dict(zip(names, recordings, strict=True)))
+    named = dict(zip(names, recordings, strict=True))
+    runs, how = runs_of(named), Showing(options.compare, options.cutaway, tuple(verdict(named)))
     if options.output is not None:
-        save(runs, options.output, compare=options.compare, cutaway=options.cutaway)
+        save(runs, options.output, how)
         print(f"{options.output}: open it with `rerun {options.output}`", file=sys.stderr)
     if options.web:
-        serve(runs, _announce, compare=options.compare, cutaway=options.cutaway)
+        serve(runs, _announce, how)
     elif options.output is None:
-        show(runs, compare=options.compare, cutaway=options.cutaway)
+        show(runs, how)
     return 0
 
 

@@ -31,8 +31,13 @@ def add_to(commands: Any) -> None:
         "--corner", default=CORNERS[0], choices=CORNERS, help="the wheel that the camera `wheel` looks at (default: fl)"
     )
     parser.add_argument(
-        "--compare", type=Path, metavar="OTHER.mcap", help="also show the car of another recording, transparent"
-    )
+        "--compare", type=Path, action="append", default=[], metavar="OTHER.mcap",
+        help="also show the car of another recording; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--layout", default="overlay", choices=("overlay", "side-by-side"),
+        help="other cars transparent in the same picture, or each car in a picture of its own (default: overlay)",
+    )  # fmt: skip
     parser.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="pixels (default: 1280x720)")
     parser.add_argument("--fps", type=float, help="pictures a second (default: 30, of a GIF 20)")
     add_pace(parser)
@@ -49,20 +54,27 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _video(options: argparse.Namespace) -> int:
+    from activesteer.analysis.verdict import verdict
     from activesteer.recording import Recording
     from activesteer.recording.run_names import run_names
     from activesteer.video import Settings, make_film
 
-    files = [options.file, *([options.compare] if options.compare is not None else [])]
-    if len(files) == 2 and files[0].resolve() == files[1].resolve():
-        raise ParameterError(f"--compare {options.compare}: it is the same file, so there is nothing to compare")
+    files = [options.file, *options.compare]
+    for number, other in enumerate(files):
+        if other.resolve() in [file.resolve() for file in files[:number]]:
+            raise ParameterError(f"--compare {other}: it is the same file, so there is nothing to compare")
+    if options.layout == "side-by-side" and not options.compare:
+        raise ParameterError("--layout side-by-side needs --compare OTHER.mcap: there is one car")
     recordings = [Recording.open(file, recover=True) for file in files]
     output = options.output if options.output is not None else options.file.with_suffix(".mp4")
     rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0
-    settings = Settings(options.camera, options.corner, options.size, rate, options.speed, options.cutaway)
+    settings = Settings(
+        options.camera, options.corner, options.size, rate, options.speed, options.layout, options.cutaway
+    )
+    named = dict(zip(run_names(files, recordings), recordings, strict=True))
     started = time.monotonic()
     with ProgressBar(f"{output}", quiet=False) as progress:
-        made = make_film(dict(zip(run_names(files, recordings), recordings, strict=True)), output, settings, progress)
+        made = make_film(named, output, settings, progress, verdict(named))
     took = time.monotonic() - started
     print(
         f"{output}: {made.pictures} pictures, {made.pictures / made.rate_hz:.1f} s at {made.rate_hz:g} a second, "

@@ -8,16 +8,21 @@ from typing import Any, Final
 import numpy as np
 import rerun as rr
 
-from activesteer.bodywork import SEE_THROUGH, Panel, dressed
-from activesteer.conventions import yaw_of
+from activesteer.conventions import Array, yaw_of
+from activesteer.drawing.bodywork import SEE_THROUGH, Panel, dressed
+from activesteer.drawing.colours import bytes_of
 from activesteer.playback.geometry import about_vertical, xyzw
 from activesteer.playback.runs import CHASSIS, Run
 from activesteer.playback.timeline import times
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.footprint import footprint_of
 
-_GHOST_LINE_M: Final = 0.012
-"""Radius of the lines that draw the car of another run: solids would hide what is in the same place [m]."""
+_GHOST_OPACITY: Final = 0.4
+_HIDDEN_M, _SEEN_M = 0.2, 1.0
+"""A ghost fades from one distance to the other, and nearer to the car it is not seen: two surfaces in one place would
+show through each other in patches [m]."""
+_GHOST_EVERY: Final = 5
+"""Of the poses, every fifth one: the opacity changes slowly."""
 _CUTAWAY_OPACITY: Final = 0.25
 """Opacity of a body through which the suspension is to be seen."""
 
@@ -51,10 +56,8 @@ def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> 
         _send_solids(stream, f"{body_path(run, body)}/solid", solids, [_colour(solid, run.colour) for solid in solids])
     for panel in panels:
         if panel.body in poses.names:
-            _send_panel(stream, run, panel, _CUTAWAY_OPACITY if cutaway and panel.shell else 1.0)
-    bodies = _bodies(run, run.recording.scene)
-    for path, body in zip(ghost_paths(run), ghost_bodies(run), strict=True):
-        _send_solids(stream, path, bodies[body], [(*rgb(run.colour), 255)] * len(bodies[body]), lines=True)
+            opacity = _CUTAWAY_OPACITY if cutaway and panel.shell else 1.0
+            _send_panel(stream, run, panel, opacity, f"{body_path(run, panel.body)}/solid/{panel.name}")
 
 
 def body_path(run: Run, body: str) -> str:
@@ -62,19 +65,41 @@ def body_path(run: Run, body: str) -> str:
     return f"{run.scene}/car/{body}"
 
 
-def ghost_bodies(run: Run) -> list[str]:
-    """Bodies that are drawn of a car that is not the one looked at: chassis and wheels."""
-    return [body for body in _bodies(run, run.recording.scene) if body == CHASSIS or body.endswith("_wheel")]
+def send_ghost(stream: rr.RecordingStream, run: Run, beside: Run) -> None:
+    """Sends the body of a car as it is seen in the view of another: transparent, and the less seen the nearer it is.
+
+    Args:
+        stream: Where to.
+        run: The run whose car it is.
+        beside: The run in whose view it is shown.
+    """
+    poses = run.recording.poses
+    time_s = poses.time_s[run.poses][::_GHOST_EVERY]
+    opacity = _GHOST_OPACITY * np.clip((_apart(run, beside, time_s) - _HIDDEN_M) / (_SEEN_M - _HIDDEN_M), 0.0, 1.0)
+    alpha = np.rint(255.0 * opacity).astype(np.uint32)
+    _, panels = dressed(run.recording.scene, footprint_of(run.recording.metadata))
+    for panel in panels:
+        if panel.shell and panel.body in poses.names:
+            path = f"{ghost_path(run, beside)}/{panel.name}"
+            _send_panel(stream, run, panel, 0.0, path)
+            red, green, blue = _paint(run, panel)
+            painted = (red << 24 | green << 16 | blue << 8) | alpha
+            stream.send_columns(path, times(time_s), rr.Mesh3D.columns(albedo_factor=painted))
 
 
-def ghost_paths(run: Run) -> list[str]:
-    """Entities of the ghost; they are left out where the car itself is shown."""
-    return [f"{body_path(run, body)}/ghost" for body in ghost_bodies(run)]
+def ghost_path(run: Run, beside: Run) -> str:
+    """Entity of the ghost of a car in the view of another run."""
+    return f"{body_path(run, CHASSIS)}/ghost/{beside.name}"
 
 
-def rgb(colour: str) -> tuple[int, int, int]:
-    """The three numbers of `#rrggbb`."""
-    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+def _apart(run: Run, other: Run, time_s: Array) -> Array:
+    """How far the chassis of two runs are apart [m]; a run that has ended stands where it was last."""
+    at = []
+    for each in (run, other):
+        poses = each.recording.poses
+        places = poses.positions_m[each.poses, poses.names.index(CHASSIS)]
+        at.append(np.stack([np.interp(time_s, poses.time_s[each.poses], axis) for axis in places.T], axis=1))
+    return np.linalg.norm(at[0] - at[1], axis=1)
 
 
 def _bodies(run: Run, parts: Sequence[ScenePart]) -> dict[str, list[Primitive]]:
@@ -85,45 +110,44 @@ def _bodies(run: Run, parts: Sequence[ScenePart]) -> dict[str, list[Primitive]]:
     return bodies
 
 
-def _send_panel(stream: rr.RecordingStream, run: Run, panel: Panel, opacity: float) -> None:
-    red, green, blue = rgb(run.colour) if panel.rgb is None else (round(255 * value) for value in panel.rgb)
-    drawn = rr.Mesh3D(
+def _send_panel(stream: rr.RecordingStream, run: Run, panel: Panel, opacity: float, path: str) -> None:
+    drawn = rr.Mesh3D.from_fields(
         vertex_positions=panel.vertices_m.astype(np.float32),
         vertex_normals=panel.normals.astype(np.float32),
         triangle_indices=panel.faces,
-        albedo_factor=(red, green, blue, round(255 * opacity)),
+        albedo_factor=(*_paint(run, panel), round(255 * opacity)) if opacity > 0.0 else None,
     )
-    stream.log(f"{body_path(run, panel.body)}/solid/{panel.name}", drawn, static=True)
+    stream.log(path, drawn, static=True)
+
+
+def _paint(run: Run, panel: Panel) -> tuple[int, int, int]:
+    red, green, blue = bytes_of(run.colour) if panel.rgb is None else (round(255 * value) for value in panel.rgb)
+    return red, green, blue
 
 
 def _colour(solid: Primitive, tint: str) -> tuple[int, int, int, int]:
     r, g, b, a = (round(255 * value) for value in solid.rgba)
-    return (*rgb(tint), a) if solid.rgba[3] < SEE_THROUGH else (r, g, b, a)
+    return (*bytes_of(tint), a) if solid.rgba[3] < SEE_THROUGH else (r, g, b, a)
 
 
 def _send_solids(
-    stream: rr.RecordingStream,
-    path: str,
-    solids: Sequence[Primitive],
-    colours: Sequence[tuple[int, int, int, int]],
-    *,
-    lines: bool = False,
+    stream: rr.RecordingStream, path: str, solids: Sequence[Primitive], colours: Sequence[tuple[int, int, int, int]]
 ) -> None:
-    fill = rr.components.FillMode.MajorWireframe if lines else rr.components.FillMode.Solid
     for kind in ("box", "cylinder", "sphere"):
         members = [index for index, solid in enumerate(solids) if solid.kind == kind]
         if not members:
             continue
         size = np.array([solids[index].size_m for index in members])
-        at = np.array([solids[index].position_m for index in members])
-        turn = xyzw([solids[index].quaternion for index in members])
         style: dict[str, Any] = {
-            "centers": at, "quaternions": turn, "colors": [colours[index] for index in members], "fill_mode": fill
-        }  # fmt: skip
+            "centers": np.array([solids[index].position_m for index in members]),
+            "quaternions": xyzw([solids[index].quaternion for index in members]),
+            "colors": [colours[index] for index in members],
+            "fill_mode": rr.components.FillMode.Solid,
+        }
         if kind == "box":
-            drawn = rr.Boxes3D(half_sizes=size / 2, radii=_GHOST_LINE_M, **style)
+            drawn = rr.Boxes3D(half_sizes=size / 2, **style)
         elif kind == "cylinder":
-            drawn = rr.Cylinders3D(lengths=size[:, 2], radii=size[:, 0] / 2, line_radii=_GHOST_LINE_M, **style)
+            drawn = rr.Cylinders3D(lengths=size[:, 2], radii=size[:, 0] / 2, **style)
         else:
-            drawn = rr.Ellipsoids3D(half_sizes=size / 2, line_radii=_GHOST_LINE_M, **style)
+            drawn = rr.Ellipsoids3D(half_sizes=size / 2, **style)
         stream.log(f"{path}/{kind}", drawn, static=True)

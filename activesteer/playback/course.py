@@ -9,7 +9,7 @@ import numpy as np
 import rerun as rr
 
 from activesteer.conventions import Array, yaw_of
-from activesteer.playback.car import rgb
+from activesteer.drawing.colours import bytes_of
 from activesteer.playback.geometry import rotated
 from activesteer.playback.runs import CHASSIS, Run
 from activesteer.playback.timeline import times
@@ -114,11 +114,17 @@ def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
         )
 
 
-def send_track(stream: rr.RecordingStream, run: Run) -> None:
-    """Sends where a car went, and its outline on the map, wheels with their angles, as it moves."""
+def send_track(stream: rr.RecordingStream, run: Run, number: int) -> None:
+    """Sends where a car went, and its outline on the map, wheels with their angles, as it moves.
+
+    Args:
+        stream: Where to.
+        run: The run.
+        number: Its place among the runs: each line lies a little above the one before.
+    """
     track = _track(run)
-    line = np.column_stack([track, np.full(len(track), 0.03)])
-    colour = rgb(run.colour)
+    line = np.column_stack([track, np.full(len(track), 0.03 + 0.01 * number)])
+    colour = bytes_of(run.colour)
     stream.log(f"{run.scene}/driven", rr.LineStrips3D([line], colors=[colour], radii=[0.035]), static=True)
     stream.log(
         f"{MAP}/{run.name}/driven",

@@ -8,16 +8,17 @@ from typing import Final
 import rerun.blueprint as rrb
 
 from activesteer.playback import events, plots
-from activesteer.playback.car import ghost_paths
+from activesteer.playback.car import body_path, ghost_path
 from activesteer.playback.course import COURSE, MAP, ROAD, map_bounds
-from activesteer.playback.runs import Run
+from activesteer.playback.runs import CHASSIS, Run
 from activesteer.playback.timeline import TIMELINE
+from activesteer.playback.wheel_angles import plan_view, wedges_path
 
 SUMMARY: Final = "summary"
 """Entity of the text."""
 
 _SKY: Final = (176, 196, 214)
-_BEHIND: Final = rrb.EyeControls3D(position=(-7.6, -2.0, 2.2), look_target=(-1.0, 0.0, 0.5), eye_up=(0.0, 0.0, 1.0))
+_BEHIND: Final = rrb.EyeControls3D(position=(-7.6, 0.0, 3.5), look_target=(-0.4, 0.0, 0.2), eye_up=(0.0, 0.0, 1.0))
 # Left is up in the picture, so the car drives to the right.
 _ABOVE: Final = rrb.EyeControls3D(position=(-1.3, 0.0, 6.5), look_target=(-1.3, 0.0, 0.0), eye_up=(0.0, 1.0, 0.0))
 """Eyes in the frame that follows the car, whose origin is on the road below its front axle."""
@@ -53,11 +54,13 @@ def _page(run: Run, runs: Sequence[Run], page: int) -> rrb.Horizontal:
         rrb.Vertical(
             _chase(run, runs),
             _map(runs),
-            rrb.Horizontal(_above(run, runs), _words([run])),
-            row_shares=[5, 2, 4],
+            rrb.Horizontal(_above(run, runs), plan_view([run]), _words([run]), column_shares=[4, 3, 4]),
+            row_shares=[5, 1.5, 4],
         ),
         rrb.Tabs(
             rrb.Vertical(*plots.views(plots.MOTION, [run]), name="Motion"),
+            rrb.Vertical(*plots.views(plots.DRIVING, [run]), name="Driving"),
+            rrb.Vertical(*plots.views(plots.BODY, [run]), name="Body"),
             rrb.Vertical(*plots.views(plots.WHEELS, [run]), name="Wheels"),
             rrb.Vertical(*plots.views(plots.links(run), [run]), name="Links"),
             active_tab=page,
@@ -74,14 +77,20 @@ def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
         rrb.Vertical(
             rrb.Horizontal(*(_chase(run, runs) for run in runs)),
             _map(runs),
-            rrb.Horizontal(_above(runs[0], runs), _words(runs), column_shares=[2, 3]),
-            row_shares=[5, 2, 4],
+            rrb.Horizontal(plan_view(runs), _words(runs), column_shares=[2, 3]),
+            row_shares=[4, 1.3, 4],
         ),
-        rrb.Tabs(
-            rrb.Vertical(*plots.views(plots.MOTION, runs), name="Motion"),
-            rrb.Vertical(*plots.views_by_corner(loads, runs), name="Wheel loads"),
-            rrb.Vertical(*plots.views_by_corner(use, runs), name="Friction utilisation"),
-            active_tab=page,
+        rrb.Vertical(
+            plots.legend(runs),
+            rrb.Tabs(
+                rrb.Vertical(*plots.views(plots.MOTION, runs), name="Motion"),
+                rrb.Vertical(*plots.views(plots.DRIVING, runs), name="Driving"),
+                rrb.Vertical(*plots.views(plots.BODY, runs), name="Body"),
+                rrb.Vertical(*plots.views_by_corner(loads, runs), name="Wheel loads"),
+                rrb.Vertical(*plots.views_by_corner(use, runs), name="Friction utilisation"),
+                active_tab=page,
+            ),
+            row_shares=[1, 20],
         ),
         column_shares=[3, 2],
         name="Comparison",
@@ -89,14 +98,14 @@ def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
 
 
 def _chase(run: Run, runs: Sequence[Run]) -> rrb.Spatial3DView:
-    return _car_view(run, runs, run.label, _BEHIND)
+    return _car_view(run, runs, run.label, _BEHIND, numbers=len(runs) == 1)
 
 
 def _above(run: Run, runs: Sequence[Run]) -> rrb.Spatial3DView:
-    return _car_view(run, runs, f"{run.label}, from above", _ABOVE)
+    return _car_view(run, runs, f"{run.label}, from above", _ABOVE, numbers=False)
 
 
-def _car_view(run: Run, runs: Sequence[Run], name: str, eye: rrb.EyeControls3D) -> rrb.Spatial3DView:
+def _car_view(run: Run, runs: Sequence[Run], name: str, eye: rrb.EyeControls3D, *, numbers: bool) -> rrb.Spatial3DView:
     others = [other for other in runs if other is not run]
     return rrb.Spatial3DView(
         origin=f"/{run.name}/chase",
@@ -104,8 +113,11 @@ def _car_view(run: Run, runs: Sequence[Run], name: str, eye: rrb.EyeControls3D) 
             f"+ /{ROAD}/**",
             f"+ /{COURSE}/**",
             f"+ /{run.scene}/**",
-            *(f"- /{path}/**" for path in ghost_paths(run)),
-            *(f"+ /{path}/**" for other in others for path in ghost_paths(other)),
+            f"+ /{wedges_path(run)}/**",
+            # In a small view the numbers would hide the car; the plan has them too.
+            *([] if numbers else [f"- /{wedges_path(run)}/angle"]),
+            f"- /{body_path(run, CHASSIS)}/ghost/**",
+            *(f"+ /{ghost_path(other, run)}/**" for other in others),
             *(f"+ /{other.scene}/driven" for other in others),
         ],
         name=name,
@@ -124,8 +136,8 @@ def _map(runs: Sequence[Run]) -> rrb.Spatial2DView:
     )
 
 
-def _words(runs: Sequence[Run]) -> rrb.Vertical | rrb.TextDocumentView:
-    """The summary, and below it the warnings where there are any."""
+def _words(runs: Sequence[Run]) -> rrb.Tabs | rrb.TextDocumentView:
+    """The summary, and behind it the warnings where there are any."""
     summary = rrb.TextDocumentView(origin=f"/{SUMMARY}", name="Summary")
     warnings = events.view(runs)
-    return rrb.Vertical(summary, *warnings, row_shares=[3, 2]) if warnings else summary
+    return rrb.Tabs(summary, *warnings, active_tab=0) if warnings else summary

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
@@ -10,11 +11,15 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from activesteer.conventions import CORNERS
-from activesteer.playback.car import rgb
+from activesteer.drawing.colours import bytes_of
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
 from activesteer.quantities import quantity_of
 
+_MOST_NUMBERS: Final = {1: 8.0, 2: 8.0, 3: 8.0, 4: 5.4}
+"""Plots on a page -> multiples of a power of ten that have room beside an axis, in a window of 1280 x 800."""
+LEGEND: Final = "legend"
+"""Entity below which the names of the runs lie."""
 _CORNER_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7")
 _LINK_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00", "#a6a6a6")
 _WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
@@ -56,7 +61,6 @@ def _of_car(channel: str) -> Plot:
 
 
 MOTION: Final = (
-    _of_car("steering_wheel_rad"),
     Plot(
         quantity_of("yaw_rate_radps")._replace(label="yaw rate, desired one thin").title,
         (
@@ -70,10 +74,6 @@ MOTION: Final = (
         (Series("sideslip_rad"), Series("estimated_sideslip_rad", "estimated", "#a6a6a6", 0.8)),
     ),
     Plot(
-        quantity_of("ay_mps2").title,
-        (Series("ay_mps2"), Series("measured_ay_mps2", "measured", "#a6a6a6", 0.8)),
-    ),
-    Plot(
         quantity_of("rear_steer_rad")._replace(label="added steer angles, rear thick, front thin").title,
         (
             Series("rear_steer_rad", "rear wheels", "#d55e00", 2.0),
@@ -82,6 +82,18 @@ MOTION: Final = (
     ),
 )
 """Plots of the car as a whole."""
+DRIVING: Final = (_of_car("steering_wheel_rad"), _of_car("path_distance_m"), _of_car("speed_mps"))
+"""Plots of what the driver does, and how well he keeps to the path."""
+BODY: Final = (
+    Plot(
+        quantity_of("ay_mps2").title,
+        (Series("ay_mps2"), Series("measured_ay_mps2", "measured", "#a6a6a6", 0.8)),
+    ),
+    _of_car("roll_rad"),
+    _of_car("ax_mps2"),
+)
+"""Plots of what is felt in the car."""
+OF_CAR: Final = (*MOTION, *DRIVING, *BODY)
 
 _DEMAND_OF: Final = {
     "yaw_rate_desired_radps": "yaw_rate_desired_radps",
@@ -137,12 +149,12 @@ def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
         alone: Whether it is the only run: the lines of several are distinguished by the colours of the runs.
     """
     when = times(run.recording.time_s)
-    for plot in (*MOTION, *WHEELS, *links(run)):
-        own_colours = alone or plot not in MOTION
+    for plot in (*OF_CAR, *WHEELS, *links(run)):
+        own_colours = alone or plot not in OF_CAR
         for path, lines in _entities(run, plot):
             style = rr.SeriesLines(
                 names=[_legend(run, line, alone=own_colours) for line in lines],
-                colors=[rgb(line.colour if line.colour and own_colours else run.colour) for line in lines],
+                colors=[bytes_of(line.colour if line.colour and own_colours else run.colour) for line in lines],
                 widths=[line.width for line in lines],
             )
             stream.log(path, style, static=True)
@@ -175,17 +187,93 @@ def _is_demanded(run: Run, channel: str) -> bool:
     return demand is None or not run.has(demand) or bool(np.any(run.recording[demand]))
 
 
+def legend(runs: Sequence[Run]) -> rrb.Spatial2DView:
+    """The view that names the colours of the runs, which are the same in all plots, and so hides none of them."""
+    return rrb.Spatial2DView(
+        origin=f"/{LEGEND}",
+        name="Curves",
+        titlebar=False,
+        visual_bounds=rrb.VisualBounds2D(x_range=(-0.5, len(runs) - 0.5), y_range=(-0.05, 0.05)),
+    )
+
+
+def send_legend(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
+    """Sends a line and a name for each run."""
+    for number, run in enumerate(runs):
+        style = {"colors": [bytes_of(run.colour)], "radii": rr.Radius.ui_points(2.5)}
+        line = np.array([(number - 0.45, 0.0), (number - 0.38, 0.0)])
+        stream.log(f"{LEGEND}/{run.name}/line", rr.LineStrips2D([line], **style), static=True)
+        name = rr.Points2D(
+            [(number, -0.03)], labels=[run.label], show_labels=True, colors=[bytes_of(run.colour)], radii=0.0
+        )
+        stream.log(f"{LEGEND}/{run.name}/name", name, static=True)
+
+
 def views(plots: Sequence[Plot], runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
     """A view for each plot that has something to show, with the lines of all these runs."""
     shown = []
-    for plot in plots:
-        entities = [entity for run in runs for entity in _entities(run, plot)]
-        contents = [f"/{path}" for path, _ in entities]
-        if contents:
-            # The colours of several runs are the same in all plots: one legend is enough, and the plots are small.
-            legend = plot is plots[0] if len(runs) > 1 else sum(len(lines) for _, lines in entities) > 1
-            shown.append(_view(plot.title, contents, legend=legend))
+    found = [(plot, [entity for run in runs for entity in _entities(run, plot)]) for plot in plots]
+    filled = [(plot, entities) for plot, entities in found if entities]
+    for plot, entities in filled:
+        # What several runs have in common, `legend` says.
+        several = len(runs) == 1 and sum(len(lines) for _, lines in entities) > 1
+        limits = _range(plot, runs, len(filled))
+        shown.append(_view(plot.title, [f"/{path}" for path, _ in entities], limits, legend=several))
     return shown
+
+
+def _range(plot: Plot, runs: Sequence[Run], beside: int) -> tuple[float, float]:
+    """The range of the axis: one of a few, so that runs of a quantity mostly have the same.
+
+    Args:
+        plot: The plot.
+        runs: The runs.
+        beside: How many plots stand on its page.
+    """
+    values = [
+        run.channel(line.channel) * _factor(line.channel)
+        for run in runs
+        for line in plot.series
+        if run.has(line.channel)
+    ]
+    finite = [found[np.isfinite(found)] for found in values]
+    low = min((float(found.min(initial=0.0)) for found in finite), default=0.0)
+    high = max((float(found.max(initial=0.0)) for found in finite), default=0.0)
+    return axis_range(low, high, _least_span(plot.series[0].channel), _MOST_NUMBERS.get(beside, 4.3))
+
+
+def axis_range(low: float, high: float, least: float, most: float) -> tuple[float, float]:
+    """A range with zero in which the viewer writes at least three numbers.
+
+    It writes them at multiples of one power of ten, if these are 22 points apart or more.
+
+    Args:
+        low: Smallest value, at most 0.
+        high: Largest value, at least 0.
+        least: Smallest height of the range.
+        most: Largest height in which the numbers are so far apart, in that power.
+    """
+    reach = max(1.03 * high, -1.03 * low, 0.5 * least)
+    power = 10.0 ** math.floor(math.log10(reach))
+    # Three numbers: 0 and two above it, or one to each side.
+    below, steps = (0.05, (2.2, 4.0, 5.2, 7.6)) if low >= -0.02 * high else (1.0, (1.1, 2.15, 2.6, 4.0))
+    fitting = [step for step in steps if (1.0 + below) * step <= most]
+    step = next(step for step in (*fitting, 10.0 * steps[0]) if step * power >= reach)
+    return -below * step * power, step * power
+
+
+def _least_span(channel: str) -> float:
+    return 100.0 if channel.endswith("_force_N") else quantity_of(channel).min_span
+
+
+def _range_for(low: float, high: float, least: float) -> tuple[float, float]:
+    reach = max(1.05 * high, -1.05 * low, 0.5 * least)
+    power = 10.0 ** math.floor(math.log10(reach))
+    if low >= -0.02 * high:  # of one sign
+        steps = next(step for step in (2.4, 3.4, 6.4, 24.0) if step * power >= reach)
+        return -0.05 * steps * power, steps * power
+    steps = next(step for step in (1.2, 2.3, 3.2, 12.0) if step * power >= reach)
+    return -steps * power, steps * power
 
 
 def views_by_corner(plot: Plot, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
@@ -194,17 +282,26 @@ def views_by_corner(plot: Plot, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]
     for line in plot.series:
         present = [run for run in runs if run.has(line.channel)]
         styles = {
-            f"/{run.name}/plots/{line.channel}": rr.SeriesLines(names=[run.label], colors=[rgb(run.colour)])
+            f"/{run.name}/plots/{line.channel}": rr.SeriesLines(names=[run.label], colors=[bytes_of(run.colour)])
             for run in present
         }
         if styles:
             head, _, unit = plot.title.rpartition(" [")
-            shown.append(_view(f"{head}, {line.name} [{unit}", list(styles), styles, legend=not shown))
+            shown.append(
+                _view(
+                    f"{head}, {line.name} [{unit}", list(styles), _range(plot, runs, len(CORNERS)), styles, legend=False
+                )
+            )
     return shown
 
 
 def _view(
-    title: str, contents: list[str], styles: dict[Any, rr.SeriesLines] | None = None, *, legend: bool
+    title: str,
+    contents: list[str],
+    limits: tuple[float, float],
+    styles: dict[Any, rr.SeriesLines] | None = None,
+    *,
+    legend: bool,
 ) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",
@@ -212,6 +309,7 @@ def _view(
         name=title,
         overrides=styles,
         # Zooming or moving one plot moves all.
+        axis_y=rrb.ScalarAxis(range=limits),
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
         # At the left: a manoeuvre begins quietly.
         plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),

@@ -9,12 +9,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import RUN_COLOURS, run_looks
+from activesteer.conventions import run_looks
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
-
-COLOURS: Final = ("#a6a6a6", *RUN_COLOURS[1:])
-"""Those of the plots, but for the first: its near-black cannot be seen on the viewer's dark background."""
 
 PLOT_RATE_HZ: Final = 100.0
 """Most samples of a signal that are shown in a second; a screen cannot show more of a run."""
@@ -78,7 +75,7 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
         path = re.sub(r"\W", "_", name, flags=re.ASCII)
         path = f"{number}_{path}" if len(recordings) > 1 else path
         shown = recording.at(_shown(recording.time_s))
-        runs.append(Run(shown, path or "run", name, look.label, COLOURS[look.place], poses))
+        runs.append(Run(shown, path or "run", name, look.label, look.on_dark, poses))
     return runs
 
 

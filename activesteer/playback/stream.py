@@ -8,15 +8,17 @@ from collections.abc import Sequence
 import rerun as rr
 import rerun.blueprint as rrb
 
-from activesteer.playback.car import send_car
+from activesteer.playback.car import send_car, send_ghost
 from activesteer.playback.course import send_course, send_road, send_track
 from activesteer.playback.events import send_events
 from activesteer.playback.layout import SUMMARY
 from activesteer.playback.links import send_links
-from activesteer.playback.plots import send_plots
+from activesteer.playback.plots import send_legend, send_plots
 from activesteer.playback.runs import Run
+from activesteer.playback.showing import Showing
 from activesteer.playback.summary import summary
 from activesteer.playback.tyres import send_tyre_forces
+from activesteer.playback.wheel_angles import send_wheel_angles
 
 
 def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
@@ -33,14 +35,14 @@ def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
     return stream
 
 
-def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint, *, cutaway: bool = False) -> None:
+def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint, how: Showing) -> None:
     """Sends everything.
 
     Args:
         stream: Where to; its target must be chosen before.
         runs: The runs.
         layout: The layout; it takes the place of one that a viewer remembers.
-        cutaway: Whether bodies are to be seen through.
+        how: What is shown of them.
     """
     stream.send_blueprint(layout, make_active=True, make_default=True)
     several = len(runs) > 1
@@ -48,12 +50,17 @@ def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint,
     send_road(stream, runs)
     send_course(stream, runs)
     for run in runs:
-        send_car(stream, run, cutaway=cutaway)
+        send_car(stream, run, cutaway=how.cutaway)
         send_links(stream, run)
-        send_tyre_forces(stream, run)
-        send_track(stream, run)
+        send_tyre_forces(stream, run, runs)
+        send_wheel_angles(stream, run, runs)
+        send_track(stream, run, runs.index(run))
+        for other in runs:
+            if other is not run:
+                send_ghost(stream, run, other)
         send_plots(stream, run, alone=not several)
         send_events(stream, run)
-    text = rr.TextDocument(summary(runs), media_type=rr.MediaType.MARKDOWN)
+    send_legend(stream, runs)
+    text = rr.TextDocument(summary(runs, how.verdict), media_type=rr.MediaType.MARKDOWN)
     stream.log(SUMMARY, text, static=True)
     stream.flush()

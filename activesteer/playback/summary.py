@@ -9,15 +9,27 @@ from activesteer.playback.runs import Run
 from activesteer.quantities import metric_label, metric_number
 
 
-def summary(runs: Sequence[Run]) -> str:
-    """A page in Markdown: scenario, systems, metrics side by side.
+def summary(runs: Sequence[Run], verdict: Sequence[str] = ()) -> str:
+    """A page in Markdown: scenario, what came out, metrics side by side, systems.
 
     Args:
         runs: The runs.
+        verdict: What came out, line by line.
     """
     lines: list[str] = []
     for text in dict.fromkeys(_scenario(run.recording.metadata) for run in runs):
-        lines += [f"## {text}", ""]
+        lines += [f"**{text}**", ""]
+    if verdict:
+        lines += [*(f"- {_emphasised(line)}" for line in verdict), ""]
+    names = list(dict.fromkeys(name for run in runs for name in run.recording.metrics))
+    if names:
+        lines += [f"| metric | unit | {' | '.join(run.short for run in runs)} |", "|---" * (2 + len(runs)) + "|"]
+    for name in names:
+        words, unit, _ = metric_label(name)
+        found = [run.recording.metrics.get(name) for run in runs]
+        values = ("" if value is None else metric_number(name, value) for value in found)
+        lines.append(f"| {words} | {unit} | {' | '.join(values)} |")
+    lines.append("")
     for run in runs:
         metadata = run.recording.metadata
         versions = metadata.get("versions", {})
@@ -28,15 +40,13 @@ def summary(runs: Sequence[Run]) -> str:
         if not metadata.get("complete", True):
             text += f". **Incomplete**: {metadata.get('error', 'the run did not end properly')}"
         lines.append(text)
-    names = list(dict.fromkeys(name for run in runs for name in run.recording.metrics))
-    if names:
-        lines += ["", f"| metric | unit | {' | '.join(run.short for run in runs)} |", "|---" * (2 + len(runs)) + "|"]
-    for name in names:
-        words, unit, _ = metric_label(name)
-        found = [run.recording.metrics.get(name) for run in runs]
-        values = ("" if value is None else metric_number(name, value) for value in found)
-        lines.append(f"| {words} | {unit} | {' | '.join(values)} |")
     return "\n".join(lines) + "\n"
+
+
+def _emphasised(line: str) -> str:
+    """What is judged, in bold type."""
+    about, colon, words = line.partition(":")
+    return f"**{about}{colon}**{words}" if colon else line
 
 
 def _scenario(metadata: Mapping[str, Any]) -> str:

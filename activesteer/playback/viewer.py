@@ -17,24 +17,25 @@ from activesteer.errors import PlaybackError
 from activesteer.files import replacing, shown_path
 from activesteer.playback.layout import blueprint
 from activesteer.playback.runs import Run
+from activesteer.playback.showing import Showing
 from activesteer.playback.stream import fill, new_stream
 
 _ELSEWHERE: Final = "--web shows it in a browser, --save out.rrd writes a file for a viewer elsewhere"
 _HOST: Final = "127.0.0.1"
 """Where a browser's pages are served: to this machine alone."""
+_PLAIN: Final = Showing()
 _FOOTER: Final = b"RRF2FOOT"
 _FOOTER_BYTES: Final = 64
 """What a whole file ends with: this word among its last bytes."""
 
 
-def save(runs: Sequence[Run], path: Path, *, compare: bool = False, cutaway: bool = False) -> None:
+def save(runs: Sequence[Run], path: Path, how: Showing = _PLAIN) -> None:
     """Writes a .rrd file with its layout.
 
     Args:
         runs: The runs.
         path: The file; one that exists is replaced.
-        compare: Whether to leave out the pages of the single runs.
-        cutaway: Whether bodies are to be seen through.
+        how: What is shown of them.
 
     Raises:
         PlaybackError: the name does not end in .rrd, or the file cannot be written.
@@ -43,11 +44,11 @@ def save(runs: Sequence[Run], path: Path, *, compare: bool = False, cutaway: boo
         raise PlaybackError(f"{shown_path(path)}: the name of a file for the viewer must end in .rrd", value=path)
     with replacing(path, PlaybackError) as part:
         part.touch()
-        stream = new_stream(runs, compare=compare)
+        stream = new_stream(runs, compare=how.compare)
         # It writes in a thread of its own, which only logs what goes wrong.
         stream.save(part)
         try:
-            fill(stream, runs, blueprint(runs, compare=compare), cutaway=cutaway)
+            fill(stream, runs, blueprint(runs, compare=how.compare), how)
             stream.disconnect()
             with part.open("rb") as file:
                 file.seek(-min(_FOOTER_BYTES, part.stat().st_size), os.SEEK_END)
@@ -58,34 +59,30 @@ def save(runs: Sequence[Run], path: Path, *, compare: bool = False, cutaway: boo
             raise PlaybackError(f"cannot write {shown_path(path)}: not all of it could be written; is the disk full?")
 
 
-def show(runs: Sequence[Run], *, compare: bool = False, cutaway: bool = False) -> None:
+def show(runs: Sequence[Run], how: Showing = _PLAIN) -> None:
     """Opens the viewer's window, and returns when it is closed.
 
     Args:
         runs: The runs.
-        compare: Whether to leave out the pages of the single runs.
-        cutaway: Whether bodies are to be seen through.
+        how: What is shown of them.
 
     Raises:
         PlaybackError: there is no viewer, or it ended with an error, as it does without a display.
     """
-    _run_viewer(["--port", "auto"], runs, compare=compare, cutaway=cutaway)
+    _run_viewer(["--port", "auto"], runs, how)
 
 
 def serve(
     runs: Sequence[Run],
     announce: Callable[[str], object],
-    *,
-    compare: bool = False,
-    cutaway: bool = False,
+    how: Showing = _PLAIN,
 ) -> None:
     """Serves the viewer to browsers of this machine, until it is interrupted.
 
     Args:
         runs: The runs.
         announce: Called with the address to open as soon as it is served.
-        compare: Whether to leave out the pages of the single runs.
-        cutaway: Whether bodies are to be seen through.
+        how: What is shown of them.
 
     Raises:
         PlaybackError: there is no viewer, or it ended with an error.
@@ -94,15 +91,14 @@ def serve(
     proxy = urllib.parse.quote(f"rerun+http://{_HOST}:{data}/proxy", safe="")
     arguments = ["--serve-web", "--bind", _HOST, "--port", str(data), "--web-viewer-port", str(page)]
     url = f"http://{_HOST}:{page}/?url={proxy}"
-    _run_viewer(arguments, runs, compare=compare, cutaway=cutaway, ready=lambda: announce(url), port=page)
+    _run_viewer(arguments, runs, how, ready=lambda: announce(url), port=page)
 
 
 def _run_viewer(
     arguments: Sequence[str],
     runs: Sequence[Run],
+    how: Showing,
     *,
-    compare: bool,
-    cutaway: bool,
     ready: Callable[[], object] | None = None,
     port: int | None = None,
 ) -> None:
@@ -110,7 +106,7 @@ def _run_viewer(
     binary = viewer_binary()
     with tempfile.TemporaryDirectory(prefix="activesteer-") as folder:
         file, log = Path(folder) / "runs.rrd", Path(folder) / "viewer.log"
-        save(runs, file, compare=compare, cutaway=cutaway)
+        save(runs, file, how)
         try:
             with log.open("w") as output:
                 process = subprocess.Popen([str(binary), *arguments, str(file)], stdout=output, stderr=output)

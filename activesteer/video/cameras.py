@@ -18,6 +18,9 @@ CAMERAS: Final = ("chase", "top", "wheel")
 CUTAWAY: Final = 0.12
 """Opacity of a body through which the suspension is to be seen."""
 
+_WHEELS_SEEN: Final = 0.45
+"""Opacity of a body through which the wheels are to be seen from above."""
+
 
 class View(NamedTuple):
     """A way to look at a car.
@@ -25,10 +28,12 @@ class View(NamedTuple):
     Attributes:
         aim: Sets a camera for an instant [s].
         shell_opacity: How opaque the shell of the car is to be: little, where the suspension is what is looked at.
+        marked: Whether wedges and arrows beside the car are seen from there.
     """
 
     aim: Callable[[mujoco.MjvCamera, float], None]
     shell_opacity: float
+    marked: bool = True
 
 
 def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
@@ -46,9 +51,9 @@ def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
     if name == "chase":
         return View(_chase(track), 1.0)
     if name == "top":
-        return View(_top(track), 1.0)
+        return View(_top(track), _WHEELS_SEEN)
     if name == "wheel":
-        return View(_wheel(track, corner), CUTAWAY)
+        return View(_wheel(track, corner), CUTAWAY, marked=False)
     raise ParameterError(f"there is no camera {name!r}; {nearest_names(name, CAMERAS)}", value=name)
 
 
@@ -58,8 +63,8 @@ def _chase(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
     def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
         heading = track.heading(time_s, steady=True)
         ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
-        camera.lookat = track.middle(time_s) + 1.0 * ahead - np.array([0.0, 0.0, 0.1])
-        camera.distance, camera.elevation, camera.azimuth = 9.3, -17.0, math.degrees(heading)
+        camera.lookat = track.middle(time_s) + 0.9 * ahead + np.array([0.0, 0.0, 0.15])
+        camera.distance, camera.elevation, camera.azimuth = 8.3, -20.0, math.degrees(heading)
 
     return aim
 
@@ -69,7 +74,7 @@ def _top(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
 
     def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
         camera.lookat = track.middle(time_s)
-        camera.distance, camera.elevation, camera.azimuth = 28.0, -90.0, 90.0
+        camera.distance, camera.elevation, camera.azimuth = 15.0, -90.0, 90.0
 
     return aim
 

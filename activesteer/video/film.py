@@ -11,21 +11,27 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, RUN_COLOURS, run_looks
-from activesteer.errors import ParameterError
+from activesteer.conventions import CORNERS, run_looks
+from activesteer.drawing import tyre_forces
+from activesteer.errors import ParameterError, nearest_names
 from activesteer.recording import Recording
 from activesteer.road.course import course_of
-from activesteer.road.footprint import footprint_of
+from activesteer.road.footprint import Footprint, footprint_of
 from activesteer.road.road import road_of
 from activesteer.video.cameras import CUTAWAY, view
 from activesteer.video.encoder import check, encoder, frame_rate
+from activesteer.video.end_card import end_card
 from activesteer.video.gauges import Dials, Gauges
+from activesteer.video.labels import Labels
+from activesteer.video.markings import Markings
 from activesteer.video.offscreen import Offscreen
 from activesteer.video.render_scene import Car, RenderScene
 from activesteer.video.track import Track
 
-COLOURS: Final = ("#c9ccd1", *RUN_COLOURS[1:])
-"""Those of the plots, but for the first: a near-black car could hardly be distinguished from its tyres and the road."""
+LAYOUTS: Final = ("overlay", "side-by-side")
+"""How several cars are shown: in one picture, the others transparent, or each in a part of the picture of its own."""
+END_S: Final = 3.0
+"""How long the last picture is shown, with what came out [s]."""
 _SAMPLES: Final = 6
 
 
@@ -43,6 +49,8 @@ class Settings:
     """Pictures a second [1/s]."""
     speed: float = 1.0
     """Simulated seconds that a second of film shows."""
+    layout: str = "overlay"
+    """`overlay` or `side-by-side`."""
     cutaway: bool = False
     """Whether the bodies of the cars are to be seen through; for the camera `wheel` they always are."""
 
@@ -52,6 +60,10 @@ class Settings:
         Raises:
             ParameterError: one is out of its range.
         """
+        if self.layout not in LAYOUTS:
+            raise ParameterError(
+                f"there is no layout {self.layout!r}; {nearest_names(self.layout, LAYOUTS)}", value=self.layout
+            )
         for name, value, low, high in (
             ("pictures a second", self.rate_hz, 1.0, 240.0),
             ("speed", self.speed, 0.01, 100.0),
@@ -61,15 +73,16 @@ class Settings:
 
 
 class Film:
-    """The scene with the cars of some recordings, and a camera; to be used in a `with` block."""
+    """The scenes with the cars of some recordings, and cameras; to be used in a `with` block."""
 
-    def __init__(self, recordings: Mapping[str, Recording], settings: Settings) -> None:
-        """Builds the scene.
+    def __init__(self, recordings: Mapping[str, Recording], settings: Settings, verdict: Sequence[str] = ()) -> None:
+        """Builds the scenes.
 
         Args:
-            recordings: By what they are called. The camera follows the car of the first; those of the others are
-                transparent.
+            recordings: By what they are called. In an overlay the camera follows the car of the first; those of the
+                others are transparent.
             settings: Camera, size, speed.
+            verdict: What is said in the end, a line for each; in the colours of the runs as far as there are runs.
 
         Raises:
             ParameterError: there is no recording, or no such camera or wheel.
@@ -78,47 +91,40 @@ class Film:
         if not recordings:
             raise ParameterError("there is no recording to make a film of, at least one is needed")
         self.settings = settings
-        self._tracks = [Track(recording, name) for name, recording in recordings.items()]
-        self._view = view(settings.camera, self._tracks[0], settings.corner)
+        every = tuple(recordings.values())
         looks = run_looks(recordings)
-        colours = [COLOURS[looks[name].place] for name in recordings]
-        opacity = CUTAWAY if settings.cutaway else self._view.shell_opacity
-        cars = [
-            Car(
-                recording.scene, track.bodies, colour, opacity,
-                ghost=number > 0, size=footprint_of(recording.metadata),
-            )
-            for number, (recording, track, colour) in enumerate(
-                zip(recordings.values(), self._tracks, colours, strict=True)
-            )
-        ]  # fmt: skip
-        first = next(iter(recordings.values()))
-        maneuver = first.metadata.get("maneuver", {})
-        self._scene = RenderScene(cars, course_of(first.metadata), road_of(first.metadata), settings.size)
-        dials = [
-            Dials(recording, looks[name].label, colour)
-            for (name, recording), colour in zip(recordings.items(), colours, strict=True)
+        actors = [
+            _Actor(recording, Track(recording, name), looks[name].label, looks[name].on_dark)
+            for name, recording in recordings.items()
         ]
-        self._gauges = Gauges(dials, str(maneuver.get("title") or maneuver.get("name") or ""), settings.size)
-        self._camera = mujoco.MjvCamera()
-        self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-        self._note = f"x {settings.speed:g}" if settings.speed != 1.0 else ""
-        self._canvas: Offscreen | None = None
+        self._tracks = [actor.track for actor in actors]
+        maneuver = every[0].metadata.get("maneuver", {})
+        title = str(maneuver.get("title") or maneuver.get("name") or "")
+        notes = [f"speed x {settings.speed:g}"] if settings.speed != 1.0 else []
+        if any(name in run for run in every for name in tyre_forces.CHANNELS):
+            notes.append(f"force arrows: 1 m = {tyre_forces.force_scale(every) / 1000.0:.2g} kN")
+        groups = [[actor] for actor in actors] if settings.layout == "side-by-side" else [actors]
+        edges = np.linspace(0, settings.size[0], len(groups) + 1).astype(int)
+        self._panes = [
+            _Pane(group, every, settings, (int(width), settings.size[1]), title if first else "", ", ".join(notes))
+            for group, width, first in zip(groups, np.diff(edges), [True] + [False] * len(groups), strict=False)
+        ]
+        self._end = end_card(title, verdict, [actor.colour for actor in actors], settings.size)
 
     def __enter__(self) -> Self:
-        """Opens the canvas.
+        """Opens the canvases.
 
         Raises:
             PlaybackError: nothing can be drawn here.
         """
-        self._canvas = Offscreen(self._scene.model, self.settings.size)
+        for pane in self._panes:
+            pane.open()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Closes the canvas."""
-        if self._canvas is not None:
-            self._canvas.close()
-            self._canvas = None
+        """Closes the canvases."""
+        for pane in self._panes:
+            pane.close()
 
     def times(self, rate_hz: float) -> NDArray[np.float64]:
         """Instants of the pictures [s]: from the first pose of any car to the last.
@@ -138,18 +144,89 @@ class Film:
         Args:
             time_s: The instant [s]; a car whose recording has ended stands where it was last.
         """
+        drawn = [pane.picture(time_s) for pane in self._panes]
+        return drawn[0] if len(drawn) == 1 else np.hstack(drawn)
+
+    def ending(self, time_s: float) -> NDArray[np.uint8]:
+        """The picture of an instant, and over it title and verdict.
+
+        Args:
+            time_s: The instant [s].
+        """
+        return self._end(self.picture(time_s))
+
+    def pictures(self, times_s: Sequence[float] | NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
+        """Pictures of several instants."""
+        for time_s in times_s:
+            yield self.picture(float(time_s))
+
+
+class _Actor(NamedTuple):
+    """A run that is shown."""
+
+    recording: Recording
+    track: Track
+    label: str
+    colour: str
+
+    @property
+    def size(self) -> Footprint | None:
+        return footprint_of(self.recording.metadata)
+
+
+class _Pane:
+    """A part of the picture with a scene and a camera of its own."""
+
+    def __init__(
+        self,
+        actors: Sequence[_Actor],
+        every: Sequence[Recording],
+        settings: Settings,
+        size: tuple[int, int],
+        title: str,
+        note: str,
+    ) -> None:
+        first = actors[0]
+        self._tracks = [actor.track for actor in actors]
+        self._view = view(settings.camera, first.track, settings.corner)
+        opacity = CUTAWAY if settings.cutaway else self._view.shell_opacity
+        cars = [
+            Car(actor.recording.scene, actor.track.bodies, actor.colour, opacity, ghost=number > 0, size=actor.size)
+            for number, actor in enumerate(actors)
+        ]
+        metadata = first.recording.metadata
+        self._size = size
+        self._scene = RenderScene(cars, course_of(metadata), road_of(metadata), size)
+        dials = [Dials(actor.recording, actor.label, actor.colour) for actor in actors]
+        self._gauges = Gauges(dials, title, size, note, every)
+        self._labels = Labels(size)
+        self._markings = None
+        if self._view.marked:
+            footprint = first.size or Footprint()
+            self._markings = Markings(first.recording, first.track, footprint, first.colour, every)
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+        self._canvas: Offscreen | None = None
+
+    def open(self) -> None:
+        self._canvas = Offscreen(self._scene.model, self._size)
+
+    def close(self) -> None:
+        if self._canvas is not None:
+            self._canvas.close()
+            self._canvas = None
+
+    def picture(self, time_s: float) -> NDArray[np.uint8]:
         if self._canvas is None:
             raise RuntimeError("a film is drawn in a `with` block")
         for number, track in enumerate(self._tracks):
             self._scene.place(number, *track.poses(time_s))
         self._scene.update()
         self._view.aim(self._camera, time_s)
-        return self._gauges.draw(self._canvas.draw(self._scene.data, self._camera), time_s, self._note)
-
-    def pictures(self, times_s: Sequence[float] | NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
-        """Pictures of several instants."""
-        for time_s in times_s:
-            yield self.picture(float(time_s))
+        scene = self._canvas.prepare(self._scene.data, self._camera)
+        labels = self._markings.add(scene, time_s) if self._markings is not None else []
+        pixels = self._labels.draw(self._canvas.draw(), scene, labels)
+        return self._gauges.draw(pixels, time_s)
 
 
 class FilmInfo(NamedTuple):
@@ -164,6 +241,7 @@ def make_film(
     path: Path,
     settings: Settings | None = None,
     progress: Callable[[float], Any] | None = None,
+    verdict: Sequence[str] = (),
 ) -> FilmInfo:
     """Draws a film of recordings and writes it to a file.
 
@@ -172,6 +250,7 @@ def make_film(
         path: The file, ending in .mp4 or .gif; one that exists is replaced when the new one is whole.
         settings: Camera, size, speed.
         progress: Called after each picture with the fraction that is done, 0 to 1.
+        verdict: See `Film`; the last picture is shown for `END_S` with title and verdict.
 
     Raises:
         ParameterError: a setting or the file's ending is wrong.
@@ -181,7 +260,7 @@ def make_film(
     settings = settings or Settings()
     check(path, settings.size)
     rate = frame_rate(path, settings.rate_hz)
-    with Film(recordings, settings) as film:
+    with Film(recordings, settings, verdict) as film:
         times = film.times(rate)
         samples = [film.picture(float(time)) for time in times[:: max(1, len(times) // _SAMPLES)]]
         with encoder(path, settings.size, rate, samples) as file:
@@ -189,4 +268,8 @@ def make_film(
                 file.write(pixels)
                 if progress is not None:
                     progress(number / len(times))
-    return FilmInfo(len(times), rate)
+            last = film.ending(float(times[-1]))
+            held = round(END_S * rate)
+            for _ in range(held):
+                file.write(last)
+    return FilmInfo(len(times) + held, rate)

@@ -1,32 +1,52 @@
-"""What is written over the picture: run, time, and of each car speed, steering wheel, sideslip and added angles."""
+"""What is written over the picture: run, time, and of each car its numbers and a plan with the angles of its wheels."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from activesteer.drawing import wheel_angles
+from activesteer.drawing.colours import bytes_of
 from activesteer.quantities import quantity_of
 from activesteer.recording import Recording
+from activesteer.road.footprint import Footprint, footprint_of
+
+Colour = tuple[int, int, int, int]
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 
 _HEIGHT: Final = 480.0
 """Sizes below are pixels of a picture of this height; others are scaled with it."""
-_PANEL: Final = (16, 18, 22, 165)
-_WHITE: Final = (245, 246, 248, 255)
-_GREY: Final = (176, 181, 189, 255)
+PANEL: Final = (16, 18, 22, 190)
+WHITE: Final = (245, 246, 248, 255)
+GREY: Final = (176, 181, 189, 255)
 _YELLOW: Final = (255, 205, 70, 255)
-_ROW: Final = 62.0
+_BODY: Final = (70, 76, 86, 255)
+_TITLE_ROW: Final = 19.0
+_ROW: Final = 17.0
+_TEXT: Final = 11.5
+_SMALL: Final = 9.5
+_GAP: Final = 7.0
+_TALLEST_PLAN: Final = 0.24
+"""Height of a plan, of that of the picture, where there is room for it."""
+LARGEST_SHARE: Final = 0.1
+"""Most of the picture that gauges may cover."""
+_ROWS_SHARE: Final = 0.07
+"""Most of it that title and rows may cover, so that there is room for the plans."""
+_SMALLEST: Final = 0.4
+_PLAN_ASPECT: Final = 0.8
+"""Width of a plan by its height."""
 _MIN_ANGLE_RAD: Final = math.radians(0.005)
 """An added angle that never reaches it is not shown: the car has no such steering [rad]."""
 MIN_SPEED_MPS: Final = 1.0
 """Below it the direction of motion says nothing, and so neither does the sideslip [m/s]."""
 _SIDE: Final = 3
-"""Pictures in the gauges are drawn this much larger and then shrunk: Pillow's lines have hard edges."""
-
+"""Plans are drawn this much larger and then shrunk: Pillow's lines have hard edges."""
 
 READINGS: Final = tuple(
     quantity_of(channel)
@@ -34,6 +54,7 @@ READINGS: Final = tuple(
 )
 """What is written out."""
 _ADDED: Final = ("rear_steer_rad", "superposition_rad")
+_WIDEST: Final = {"speed_mps": "188.8", "steering_wheel_rad": "-188", "sideslip_rad": "-18.8"}
 
 
 class Dials(NamedTuple):
@@ -59,95 +80,160 @@ class Dials(NamedTuple):
 class Gauges:
     """Draws them over pictures of one size."""
 
-    def __init__(self, dials: Sequence[Dials], title: str, size: tuple[int, int]) -> None:
+    def __init__(
+        self,
+        dials: Sequence[Dials],
+        title: str,
+        size: tuple[int, int],
+        note: str = "",
+        shown_with: Sequence[Recording] = (),
+    ) -> None:
         """Chooses fonts and what is to be shown.
 
         Args:
             dials: The runs, from top to bottom.
-            title: What stands above the picture.
+            title: What stands above the picture; without one, neither does the time.
             size: Width and height of the pictures [pixels].
+            note: What stands behind the title, such as a slower speed.
+            shown_with: All runs of the film, where they are more: their plans have one scale.
         """
         self._dials = list(dials)
-        self._title = title
+        self._title, self._note = title, note
         self._size = size
-        # Rows are as wide as 640 x 480 pixels let them be; a narrow or flat picture gets smaller ones.
-        self._scale = min(size[1] / _HEIGHT, size[0] / 640.0)
-        self._fonts = {points: _font(points * self._scale) for points in (12, 14, 24)}
+        recordings = list(shown_with) or [dial.recording for dial in dials]
+        self._factors = wheel_angles.factors(recordings)
         self._readings = [
             reading
             for reading in READINGS
-            if reading.channel not in _ADDED or any(_used(dial.recording, reading.channel) for dial in self._dials)
+            if reading.channel not in _ADDED or any(_used(recording, reading.channel) for recording in recordings)
         ]
+        # Rows are as wide as 640 x 480 pixels let them be; a narrow or flat picture gets smaller ones.
+        area, scale = size[0] * size[1], min(size[1] / _HEIGHT, size[0] / 640.0)
+        while self._fit(scale) > _ROWS_SHARE * area and scale > _SMALLEST:
+            scale *= 0.95
+        left = LARGEST_SHARE * area - self._fit(scale)
+        height = min(_TALLEST_PLAN * size[1], math.sqrt(max(left, 0.0) / max(1, len(dials)) / _PLAN_ASPECT))
+        self._plan = int(_PLAN_ASPECT * height), int(height)
 
-    def draw(self, pixels: NDArray[np.uint8], time_s: float, note: str = "") -> NDArray[np.uint8]:
+    def _fit(self, scale: float) -> float:
+        """Takes sizes for a scale; returns what title and rows cover with it [pixels]."""
+        self._scale = scale
+        self._row, self._title_row = max(1, round(_ROW * scale)), max(1, round(_TITLE_ROW * scale))
+        self._text, self._small = font(_TEXT * scale), font(_SMALL * scale)
+        self._columns = self._places()
+        return self._columns[-1] * self._row * len(self._dials) + self._title_area()
+
+    def draw(self, pixels: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
         """Draws them over a picture.
 
         Args:
             pixels: The picture, shape (height, width, 3); it stays as it is.
             time_s: The instant [s].
-            note: What stands beside the time, such as a slower speed.
 
         Returns:
             The picture with gauges, of the same shape.
         """
         picture = Image.fromarray(np.ascontiguousarray(pixels))
-        row = round(_ROW * self._scale)
-        heights = round(26 * self._scale), row * len(self._dials)
-        self._paste(picture, self._headline(time_s, note, heights[0]), 0)
-        panel = Image.new("RGBA", (self._size[0], heights[1]), _PANEL)
+        if self._title:
+            self._headline(picture, f"{time_s:.2f} s")
+        panel = Image.new("RGBA", (self._columns[-1], self._row * len(self._dials)), PANEL)
         for number, dial in enumerate(self._dials):
-            self._row(panel, dial, time_s, number * row)
-        self._paste(picture, panel, self._size[1] - heights[1])
+            self._readings_of(panel, dial, time_s, number * self._row)
+        picture.paste(panel, (0, self._size[1] - panel.height), panel)
+        width, height = self._plan
+        if width > 30:
+            first = self._size[0] - len(self._dials) * width
+            top = self._size[1] - height - (panel.height if first < panel.width else 0)
+            for number, dial in enumerate(self._dials):
+                plan = self._plan_of(dial, time_s)
+                picture.paste(plan, (first + number * width, top), plan)
         return np.asarray(picture)
 
-    @staticmethod
-    def _paste(picture: Image.Image, layer: Image.Image, top: int) -> None:
-        picture.paste(layer, (0, top), layer)
+    def _places(self) -> list[int]:
+        """Where columns of a row begin, and where the last one ends [pixels]."""
+        gap = _GAP * self._scale
+        places = [max((self._text.getlength(dial.label) for dial in self._dials), default=0.0) + 2.5 * gap]
+        for reading in self._readings:
+            value = self._text.getlength(_WIDEST.get(reading.channel, "-8.88"))
+            name = self._small.getlength(f"{reading.short} {reading.unit.name}")
+            places.append(places[-1] + name + value + 2.8 * gap)
+        return [min(round(place), self._size[0]) for place in places]
 
-    def _headline(self, time_s: float, note: str, height: int) -> Image.Image:
-        layer = Image.new("RGBA", (self._size[0], height), _PANEL)
-        pen, font, margin = ImageDraw.Draw(layer), self._fonts[14], round(10 * self._scale)
-        right = f"{note}  {time_s:.2f} s" if note else f"{time_s:.2f} s"
-        room = self._size[0] - 3 * margin - font.getlength(right)
-        title = self._title
-        while title and font.getlength(title) > room:
-            title = title[:-2].rstrip(" .,…") + "…" if len(title) > 2 else ""
-        pen.text((margin, height / 2), title, _WHITE, font, anchor="lm")
-        pen.text((self._size[0] - margin, height / 2), right, _WHITE, font, anchor="rm")
-        return layer
+    def _title_area(self) -> float:
+        words = f"{self._title}  {self._note}  88.88 s"
+        return self._title_row * min(self._text.getlength(words) + 4 * _GAP * self._scale, self._size[0])
 
-    def _row(self, panel: Image.Image, dial: Dials, time_s: float, top: int) -> None:
-        """One run: its name above its numbers, beside them wheel and car as they stand."""
-        scale, pen = self._scale, ImageDraw.Draw(panel)
-        margin, row = 10 * scale, _ROW * scale
-        pen.rectangle((0, top, 4 * scale, top + row - 1), dial.colour)
-        pen.text(
-            (margin, top + 4 * scale), dial.label, _YELLOW if len(self._dials) == 1 else dial.colour, self._fonts[12]
-        )
-        icon = round(44 * scale)
-        steering_wheel = dial.value("steering_wheel_rad", time_s)
-        sideslip = dial.value("sideslip_rad", time_s)
+    def _headline(self, picture: Image.Image, time: str) -> None:
+        gap = round(_GAP * self._scale)
+        right = f"{self._note}   {time}" if self._note else time
+        room = self._size[0] - 4 * gap - self._text.getlength(right)
+        title, whole = self._title, len(self._title)
+        while whole and self._text.getlength(title) > room:
+            whole -= 1
+            title = self._title[:whole].rstrip(" .,-") + "..." if whole > 2 else ""
+        # As wide as at any other time: figures of this font have all the same width.
+        ends = gap + self._text.getlength(title) + (2 * gap if title else 0)
+        width = min(round(ends + self._text.getlength(right) + gap), self._size[0])
+        layer = Image.new("RGBA", (width, self._title_row), PANEL)
+        write(layer, (gap, self._title_row / 2), title, WHITE, self._text)
+        write(layer, (ends, self._title_row / 2), right, GREY, self._text)
+        picture.paste(layer, (0, 0), layer)
+
+    def _readings_of(self, panel: Image.Image, dial: Dials, time_s: float, top: int) -> None:
+        """One run in a row: its name, then its numbers."""
+        gap, middle = _GAP * self._scale, top + self._row / 2
+        bar = (*bytes_of(dial.colour), 255)
+        ImageDraw.Draw(panel).rectangle((0, top, 0.6 * gap, top + self._row - 1), bar)
+        write(panel, (1.4 * gap, middle), dial.label, bar, self._text)
         moving = dial.value("speed_mps", time_s) > MIN_SPEED_MPS
-        wheel = _steering_wheel(steering_wheel if math.isfinite(steering_wheel) else 0.0, icon)
-        car = _drifting_car(
-            sideslip if math.isfinite(sideslip) and moving else None,
-            [dial.value(channel, time_s) for channel in ("front_steer_rad", "rear_steer_rad")],
-            icon,
-        )
-        left = panel.width - 2 * icon - 2 * round(8 * scale)
-        panel.alpha_composite(wheel, (left, top + round(9 * scale)))
-        panel.alpha_composite(car, (left + icon + round(8 * scale), top + round(9 * scale)))
-        column = (left - margin) / len(self._readings)
-        for number, reading in enumerate(self._readings):
-            x = margin + number * column
+        for x, end, reading in zip(self._columns[:-1], self._columns[1:], self._readings, strict=True):
             value = dial.value(reading.channel, time_s)
             if reading.channel == "sideslip_rad" and not moving:
                 value = math.nan
-            text = reading.value_text(value)
-            pen.text((x, top + row - 18 * scale), text, _WHITE, self._fonts[24], anchor="ls")
-            after = x + self._fonts[24].getlength(text) + 2 * scale
-            pen.text((after, top + row - 18 * scale), reading.unit.name, _GREY, self._fonts[14], anchor="ls")
-            pen.text((x, top + row - 4 * scale), reading.short, _GREY, self._fonts[12], anchor="ls")
+            write(panel, (x, middle), reading.short, GREY, self._small)
+            unit_at = end - 2.0 * gap - self._small.getlength(reading.unit.name)
+            write(panel, (unit_at - 0.3 * gap, middle), reading.value_text(value), WHITE, self._text, anchor="rm")
+            write(panel, (unit_at, middle), reading.unit.name, GREY, self._small)
+
+    def _plan_of(self, dial: Dials, time_s: float) -> Image.Image:
+        """The car from above, nose up: wheels turned by enlarged angles, and an arrow that shows where it goes."""
+        width, height = self._plan
+        large = Image.new("RGBA", (width * _SIDE, height * _SIDE), PANEL)
+        size = footprint_of(dial.recording.metadata) or Footprint()
+        angles = np.array([dial.value(channel, time_s) for channel in wheel_angles.CHANNELS])
+        plan = wheel_angles.plan(size, angles, self._factors)
+        pen, colour = ImageDraw.Draw(large), (*bytes_of(dial.colour), 255)
+        # All of the car, and of the wedges before its front wheels.
+        per_m = large.height / (size.front_m - size.rear_m + 2.0)
+        middle_m = 0.5 * (size.front_m + size.rear_m) + 0.1
+
+        def at(points_m: NDArray[np.float64]) -> list[tuple[float, float]]:
+            return [(large.width / 2 - y * per_m, large.height / 2 - (x - middle_m) * per_m) for x, y in points_m]
+
+        line = max(1, round(0.05 * per_m))
+        pen.polygon(at(plan.body), fill=_BODY, outline=colour, width=line)
+        for wheel, wedge in zip(plan.wheels, plan.wedges, strict=True):
+            pen.polygon(at(wheel), fill=(12, 12, 14, 255), outline=WHITE, width=max(1, line // 2))
+            pen.polygon(at(wedge), fill=colour)
+            pen.line(at(wedge[:2]), WHITE, line)
+        sideslip = dial.value("sideslip_rad", time_s)
+        if math.isfinite(sideslip) and dial.value("speed_mps", time_s) > MIN_SPEED_MPS:
+            _arrow(pen, at, (0.5 * -size.wheelbase_m, 0.0), sideslip, line)
+        shrunk = large.resize((width, height), Image.Resampling.BOX)
+        for row, wheel, x in ((0.02, 0, 0.0), (0.97, 2, -size.wheelbase_m)):
+            mean = wheel_angles.words(float(np.mean(angles[wheel : wheel + 2])))
+            write(shrunk, (width / 2, row * height), mean, WHITE, self._small, "mt" if row < 0.5 else "mb")
+            beside = width - 0.2 * _GAP * self._scale, at(np.array([(x, 0.0)]))[0][1] / _SIDE
+            write(shrunk, beside, f"x{self._factors[wheel]}" if mean else "", GREY, self._small, "rm")
+        return shrunk
+
+
+def _arrow(pen: ImageDraw.ImageDraw, at: object, start: tuple[float, float], angle_rad: float, line: int) -> None:
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    shape = np.array([(0.0, 0.0), (1.5, 0.0), (1.9, 0.0), (1.45, 0.2), (1.45, -0.2)])
+    points = at(np.array(start) + shape @ np.array([(cos, sin), (-sin, cos)]))  # type: ignore[operator]
+    pen.line(points[:2], _YELLOW, line)
+    pen.polygon(points[2:], _YELLOW)
 
 
 def _used(recording: Recording, channel: str) -> bool:
@@ -157,51 +243,34 @@ def _used(recording: Recording, channel: str) -> bool:
     return bool(np.max(values[np.isfinite(values)], initial=0.0) >= _MIN_ANGLE_RAD)
 
 
-def _steering_wheel(angle_rad: float, side: int) -> Image.Image:
-    """The steering wheel as the driver sees it, a mark at its top."""
-    n = side * _SIDE
-    picture = Image.new("RGBA", (n, n))
-    pen, centre, radius = ImageDraw.Draw(picture), n / 2, 0.45 * n
+def write(
+    layer: Image.Image, place: tuple[float, float], text: str, colour: Colour, face: Font, anchor: str = "lm"
+) -> None:
+    """Writes a text; most are written again in the next picture, so they are kept.
 
-    def rim(angle: float, fraction: float) -> tuple[float, float]:
-        """A point at an angle from the top, left positive."""
-        return centre - fraction * radius * math.sin(angle), centre - fraction * radius * math.cos(angle)
-
-    for spoke in (-math.pi / 2, math.pi / 2, math.pi):
-        pen.line((centre, centre, *rim(angle_rad + spoke, 0.95)), _GREY, round(0.07 * n))
-    box = (centre - radius, centre - radius, centre + radius, centre + radius)
-    pen.ellipse(box, outline=_WHITE, width=round(0.08 * n))
-    hub = 0.1 * n
-    pen.ellipse((centre - hub, centre - hub, centre + hub, centre + hub), _GREY)
-    pen.line((*rim(angle_rad, 0.78), *rim(angle_rad, 1.06)), _YELLOW, round(0.1 * n))
-    return picture.resize((side, side), Image.Resampling.BOX)
-
-
-def _drifting_car(sideslip_rad: float | None, steer_rad: Sequence[float], side: int) -> Image.Image:
-    """The car from above with its wheels as they are turned, and an arrow: where it goes; upwards is straight ahead."""
-    n = side * _SIDE
-    picture = Image.new("RGBA", (n, n))
-    pen, centre = ImageDraw.Draw(picture), n / 2
-
-    def at(x: float, y: float) -> tuple[float, float]:
-        """Picture of a point of the car, x forward, y left, in fractions of the side."""
-        return centre - y * n, centre - x * n
-
-    pen.polygon([at(0.3, 0.13), at(0.3, -0.13), at(-0.3, -0.13), at(-0.3, 0.13)], (90, 120, 160, 255))
-    for x, angle in zip((0.19, -0.19), steer_rad, strict=True):
-        turned = angle if math.isfinite(angle) else 0.0
-        along = 0.085 * math.cos(turned), 0.085 * math.sin(turned)
-        for y in (0.16, -0.16):
-            ends = at(x + along[0], y + along[1]), at(x - along[0], y - along[1])
-            pen.line((*ends[0], *ends[1]), _WHITE, round(0.055 * n))
-    if sideslip_rad is not None:
-        cos, sin = math.cos(sideslip_rad), math.sin(sideslip_rad)
-        tip, neck = 0.48, 0.34
-        pen.line((centre, centre, *at(neck * cos, neck * sin)), _YELLOW, round(0.05 * n))
-        head = [(tip, 0.0), (neck, 0.07), (neck, -0.07)]
-        pen.polygon([at(x * cos - y * sin, x * sin + y * cos) for x, y in head], _YELLOW)
-    return picture.resize((side, side), Image.Resampling.BOX)
+    Args:
+        layer: Where to.
+        place: Where its anchor is [pixels].
+        text: The text.
+        colour: Its colour.
+        face: The font.
+        anchor: As in Pillow.
+    """
+    if text:
+        drawn, (left, top) = _drawn(text, colour, face, anchor)
+        at = round(place[0] + left), round(place[1] + top)
+        layer.paste(drawn, at, drawn)
 
 
-def _font(points: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+@lru_cache(maxsize=2000)
+def _drawn(text: str, colour: Colour, face: Font, anchor: str) -> tuple[Image.Image, tuple[float, float]]:
+    left, top, right, bottom = ImageDraw.Draw(Image.new("L", (1, 1))).textbbox((0, 0), text, face, anchor)
+    drawn = Image.new("RGBA", (math.ceil(right - left) + 2, math.ceil(bottom - top) + 2), (*colour[:3], 0))
+    ImageDraw.Draw(drawn).text((-left, -top), text, colour, face, anchor)
+    return drawn, (left, top)
+
+
+@lru_cache(maxsize=100)
+def font(points: float) -> Font:
+    """The font of everything that is written over pictures, in a size [pixels]."""
     return ImageFont.load_default(max(6.0, points))

@@ -129,18 +129,23 @@ class Offscreen:
             raise PlaybackError(f"pictures of {size[0]} x {size[1]} are larger than what can be drawn here: {maximum}")
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
 
-    def draw(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> NDArray[np.uint8]:
-        """One picture.
+    def prepare(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> mujoco.MjvScene:
+        """What the next picture will show; more can be added to it.
 
         Args:
             data: The state of the model.
             camera: From where.
+        """
+        every = int(mujoco.mjtCatBit.mjCAT_ALL)
+        mujoco.mjv_updateScene(self._model, data, self._look, None, camera, every, self._scene)
+        return self._scene
+
+    def draw(self) -> NDArray[np.uint8]:
+        """The picture of what was prepared.
 
         Returns:
             Red, green and blue of each pixel, top row first, shape (height, width, 3); overwritten by the next picture.
         """
-        every = int(mujoco.mjtCatBit.mjCAT_ALL)
-        mujoco.mjv_updateScene(self._model, data, self._look, None, camera, every, self._scene)
         self._context.make_current()
         mujoco.mjr_render(self._rect, self._scene, self._drawer)
         mujoco.mjr_readPixels(self._pixels, None, self._rect, self._drawer)

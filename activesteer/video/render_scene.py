@@ -12,8 +12,9 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from activesteer.bodywork import SEE_THROUGH, Panel, dressed
 from activesteer.conventions import Array, yaw_of
+from activesteer.drawing.bodywork import SEE_THROUGH, Panel, dressed
+from activesteer.drawing.colours import shares_of
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.course import Course
@@ -34,10 +35,11 @@ _SEEN_M: Final = 1.0
 surfaces in one place would show through each other in patches."""
 _GLASS: Final = (0.1, 0.13, 0.17)
 _GLASS_OPACITY: Final = 0.85
-_SHADOW: Final = (0.02, 0.02, 0.025, 0.25)
-_SHADOW_M: Final = (0.12, 0.04, -0.04)
-"""How far the three layers of the shadow reach beyond the car [m]: the edge fades. Real shadows would cost three times
-the picture."""
+_SHADOW_OPACITY: Final = 0.62
+_SHADOW_FADE_M: Final = 0.3
+"""How far the edge of the shadow fades to both sides of the outline [m]. A shadow that the light casts would cost three
+times the picture, and have a hard edge."""
+_SHADOW_PIXELS: Final = 64
 
 _BASE: Final = """
 <mujoco>
@@ -209,7 +211,7 @@ def _add_panel(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: Panel, car: Car
     mesh.uservert, mesh.userface = panel.vertices_m.ravel(), panel.faces.ravel()
     mesh.usernormal = panel.normals.ravel()
     mesh.userfacenormal = panel.faces.ravel()
-    rgb = panel.rgb or (_rgb(car.colour) if car.colour else _PAINT)
+    rgb = panel.rgb or (shares_of(car.colour) if car.colour else _PAINT)
     opacity = (car.shell_opacity if panel.shell else 1.0) * (_GHOST_OPACITY if car.ghost else 1.0)
     body.add_geom(
         name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=(*rgb, opacity), contype=0, conaffinity=0
@@ -221,14 +223,9 @@ def _colour_of(
 ) -> tuple[float, float, float, float]:
     r, g, b, a = rgba
     if shell:
-        r, g, b = _GLASS if glass else _rgb(car.colour) if car.colour else (r, g, b)
+        r, g, b = _GLASS if glass else shares_of(car.colour) if car.colour else (r, g, b)
         a = car.shell_opacity * (_GLASS_OPACITY if glass else 1.0)
     return (r, g, b, a * _GHOST_OPACITY if car.ghost else a)
-
-
-def _rgb(colour: str) -> tuple[float, float, float]:
-    """The three numbers of `#rrggbb`, 0 to 1."""
-    return int(colour[1:3], 16) / 255.0, int(colour[3:5], 16) / 255.0, int(colour[5:7], 16) / 255.0
 
 
 def _add_shadow(spec: mujoco.MjSpec, prefix: str, solids: Sequence[Primitive], opacity: float) -> None:
@@ -239,12 +236,32 @@ def _add_shadow(spec: mujoco.MjSpec, prefix: str, solids: Sequence[Primitive], o
         return
     low = np.min([np.subtract(solid.position_m, np.multiply(solid.size_m, 0.5)) for solid in hull], axis=0)
     high = np.max([np.add(solid.position_m, np.multiply(solid.size_m, 0.5)) for solid in hull], axis=0)
-    for number, beyond in enumerate(_SHADOW_M):
-        body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.0),
-            size=(0.5 * (high[0] - low[0]) + beyond, 0.5 * (high[1] - low[1]) + beyond, 0.02 + 0.003 * number),
-            rgba=(*_SHADOW[:3], _SHADOW[3] * opacity),
-            contype=0,
-            conaffinity=0,
-        )
+    half_m = 0.5 * (high - low)[:2]
+    name = f"{prefix}shadow"
+    texture = spec.add_texture(
+        name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=_SHADOW_PIXELS, height=_SHADOW_PIXELS, nchannel=4
+    )
+    # It only darkens: opaque in the middle, and the less the nearer to the edge.
+    pixels = np.zeros((_SHADOW_PIXELS, _SHADOW_PIXELS, 4), np.uint8)
+    along, across = (_faded(float(half)) for half in half_m)
+    pixels[..., 3] = np.outer(across, along) * _SHADOW_OPACITY * opacity * 255.0
+    texture.data = pixels.tobytes()
+    material = spec.add_material(name=name, specular=0.0)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+    # MuJoCo mixes colours only of what is not quite opaque itself.
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        pos=(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.03),
+        size=(half_m[0] + _SHADOW_FADE_M, half_m[1] + _SHADOW_FADE_M, 1.0),
+        material=name,
+        rgba=(1.0, 1.0, 1.0, 0.99),
+        contype=0,
+        conaffinity=0,
+    )
+
+
+def _faded(half_m: float) -> Array:
+    """How dark the shadow is along one side, from the outer end of one fading edge to that of the other, 0 to 1."""
+    away = np.linspace(-half_m - _SHADOW_FADE_M, half_m + _SHADOW_FADE_M, _SHADOW_PIXELS)
+    inside = np.clip((half_m + _SHADOW_FADE_M - np.abs(away)) / (2.0 * _SHADOW_FADE_M), 0.0, 1.0)
+    return inside**2 * (3.0 - 2.0 * inside)

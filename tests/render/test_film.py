@@ -12,6 +12,7 @@ from PIL import Image
 from activesteer.errors import PlaybackError
 from activesteer.recording import Recording
 from activesteer.video import Film, Settings, make_film
+from activesteer.video.film import END_S
 from activesteer.video.offscreen import backend
 from tests.unit.video.films import decode, need_ffmpeg
 
@@ -116,7 +117,7 @@ def test_motion_is_seen(picture):
 
 def test_other_car_is_a_ghost_where_it_is(drives, folder):
     run = drives["afs"]
-    left = run.poses._replace(positions_m=run.poses.positions_m + np.array([0.0, 4.0, 0.0]))
+    left = run.poses._replace(positions_m=run.poses.positions_m + np.array([0.0, 3.0, 0.0]))
     other = Recording(run.channels, run.time_s, run.values, poses=left, scene=run.scene)
     shown = []
     for name, runs in (("alone", {"afs": run}), ("both", {"afs": run, "beside": other})):
@@ -125,12 +126,65 @@ def test_other_car_is_a_ghost_where_it_is(drives, folder):
         Image.fromarray(shown[-1].astype(np.uint8)).save(folder / f"film-ghost-{name}.png")
     alone, both = shown
     assert 0.004 < share(alone, blue) == pytest.approx(share(both, blue), rel=0.2)  # the colour of its system in both
-    # 240 pixels are 23 m, and left is up.
-    ghost = np.s_[100 - 48 : 100 - 34, 140:180]
+    # 240 pixels are 12.4 m, and left is up.
+    ghost = np.s_[100 - 68 : 100 - 48, 150:190]
     assert np.abs(alone[ghost] - both[ghost]).mean() > 10
     assert (both[ghost].max(axis=2) - both[ghost].min(axis=2)).mean() > 10  # tinted, the road is grey
-    elsewhere = np.s_[:40]
+    elsewhere = np.s_[130:155, :200]
     assert np.abs(alone[elsewhere] - both[elsewhere]).max() < 4
+
+
+def steered(run: Recording, rear_deg: float) -> Recording:
+    """The same run with other angles of the rear wheels."""
+    values = run.values.copy()
+    for number, channel in enumerate(run.channels):
+        if channel.name in {"rl_steer_rad", "rr_steer_rad"}:
+            values[:, number] = np.radians(rear_deg)
+    return Recording(run.channels, run.time_s, values, poses=run.poses, scene=run.scene, metadata=run.metadata)
+
+
+def test_rear_steering_of_2_deg_is_seen_beside_the_car_and_so_is_its_side(drives, folder):
+    shown = []
+    for angle_deg in (1.7, -1.7):
+        with Film({"ars": steered(drives["ars"], angle_deg)}, Settings(size=(640, 480), camera="top")) as film:
+            shown.append(film.picture(0.2)[:360].astype(int))  # straight ahead, to the right in the picture
+        Image.fromarray(shown[-1].astype(np.uint8)).save(folder / f"film-rear-{angle_deg}.png")
+    left, right = (np.argwhere(orange(*np.moveaxis(pixels, 2, 0))) for pixels in shown)
+    seen = [{tuple(pixel) for pixel in pixels} for pixels in (left, right)]
+    only_left, only_right = (np.array(sorted(own - other)) for own, other in (seen, seen[::-1]))
+    # Two wedges of 17 deg and 1.2 m, 38.6 pixels to a metre.
+    area = 2 * 0.5 * 1.2**2 * np.radians(17.0) * 38.6**2
+    assert area * 0.6 < len(only_left) < area * 1.4
+    assert area * 0.6 < len(only_right) < area * 1.4
+    assert only_left[:, 0].mean() < only_right[:, 0].mean() - 5.0  # left is up
+    assert only_left[:, 1].max() < 320  # the rear end
+    assert set(np.unique(np.sign(only_left[:, 0] - 240))) == {-1, 1}  # a wedge on each side of the car
+
+
+def test_arrows_of_tyre_forces_are_seen_on_the_slippery_road(picture):
+    def magenta(r, g, b):
+        return (r > 150) & (g < 80) & (b > 60) & (b < r)
+
+    assert share(picture(3.4, "ars", camera="top"), magenta) > 0.001
+
+
+def test_side_by_side_every_car_has_a_picture_of_its_own(drives, folder):
+    runs = {name: drives[name] for name in ("ars", "afs")}
+    with Film(runs, Settings(size=(640, 240), layout="side-by-side")) as film:
+        pixels = film.picture(2.0)
+    Image.fromarray(pixels).save(folder / "film-side-by-side.png")
+    left, right = (part[20:180].astype(int) for part in np.split(pixels, 2, axis=1))
+    assert share(left, orange) > 0.02 > share(right, orange)
+    assert share(right, blue) > 0.02 > share(left, blue)
+
+
+def test_shadow_is_dark_at_the_car_and_has_no_edge(drives):
+    with Film({"none": drives["none"]}, Settings(size=(640, 480), camera="top")) as film:
+        pixels = film.picture(0.2).astype(int)
+    # From the road behind the car, which begins 80 pixels behind the middle, to its end, beside the path.
+    grey = pixels[215:230, 205:235].mean(axis=(0, 2))
+    assert grey[0] - grey.min() > 15.0
+    assert np.abs(np.diff(grey)).max() < 12.0
 
 
 def test_film_of_a_recording_read_from_a_file_is_the_same(drives, tmp_path):
@@ -149,13 +203,17 @@ def test_file_is_as_long_as_the_drive(drives, folder, name):
         need_ffmpeg()
     shares: list[float] = []
     made = make_film({"ars": drives["ars"]}, folder / name, Settings(size=SIZE, rate_hz=10, speed=2.0), shares.append)
-    duration_s = drives["ars"].poses.time_s[-1] / 2.0
+    duration_s = drives["ars"].poses.time_s[-1] / 2.0 + END_S
     assert made.pictures / made.rate_hz == pytest.approx(duration_s, abs=0.15)
     assert shares[-1] == 1.0
-    assert len(shares) == made.pictures
+    assert len(shares) == made.pictures - round(END_S * made.rate_hz)
     if name.endswith(".gif"):
         with Image.open(folder / name) as gif:
-            assert gif.n_frames == made.pictures  # type: ignore[attr-defined]
+            shown_ms = 0
+            for number in range(gif.n_frames):  # type: ignore[attr-defined]
+                gif.seek(number)
+                shown_ms += gif.info["duration"]
+        assert shown_ms == made.pictures * 100  # the last picture is one, shown for long
         return
     film = decode(folder / name)
     assert "10 fps" in film.about

@@ -9,12 +9,12 @@ import pytest
 import rerun as rr
 from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS
-from activesteer.playback import runs_of, save
+from activesteer.conventions import CORNERS, RUN_COLOURS_ON_DARK
+from activesteer.playback import Showing, runs_of, save
 from activesteer.playback.layout import blueprint
 from activesteer.playback.plots import WHEELS, links
-from activesteer.playback.runs import COLOURS
 from activesteer.playback.stream import fill
+from activesteer.playback.wheel_angles import plan_view
 from activesteer.recording import Recording
 from tests.render.headless import Headless, Picture, save_pictures
 
@@ -24,16 +24,14 @@ Pictures = dict[str, Picture]
 Drives = dict[str, Recording]
 
 SKY, ASPHALT, CONE, LANE = (176, 196, 214), (58, 60, 64), (255, 120, 20), (0, 158, 115)
-NONE, ARS, AFS = COLOURS[:3]
+NONE, ARS, AFS = RUN_COLOURS_ON_DARK[:3]
 AT_S = 3.8
 """Between the gates."""
 
 CARS = ("1 no control", "2 active rear steering", "3 active front steering")
 PLOTS = (
-    "Steering wheel angle [deg]",
     "Yaw rate, desired one thin [deg/s]",
     "Sideslip angle [deg]",
-    "Lateral acceleration [m/s²]",
     "Added steer angles, rear thick, front thin [deg]",
 )
 BESIDE = ("Course [m]", "Summary", *PLOTS)
@@ -44,14 +42,24 @@ BESIDE = ("Course [m]", "Summary", *PLOTS)
 def alone(viewer: Headless, drives: Drives, folder: Path) -> dict[float, Pictures]:
     """The page of a single run, at two instants."""
     save(runs_of({"ars": drives["ars"]}), folder / "alone.rrd")
-    return _looked_at(viewer, folder / "alone.rrd", (CARS[1], f"{CARS[1]}, from above", *BESIDE), (0.5, AT_S))
+    return _looked_at(
+        viewer,
+        folder / "alone.rrd",
+        (CARS[1], f"{CARS[1]}, from above", _plan({"ars": drives["ars"]}), *BESIDE),
+        (0.5, AT_S),
+    )
 
 
 @pytest.fixture(scope="module")
 def together(viewer: Headless, drives: Drives, folder: Path) -> Pictures:
     """The page that compares."""
-    save(runs_of(drives), folder / "together.rrd", compare=True)
-    return _looked_at(viewer, folder / "together.rrd", (*CARS, f"{CARS[0]}, from above", *BESIDE), (AT_S,))[AT_S]
+    save(runs_of(drives), folder / "together.rrd", Showing(compare=True))
+    return _looked_at(viewer, folder / "together.rrd", (*CARS, _plan(drives), "Curves", *BESIDE), (AT_S,))[AT_S]
+
+
+def _plan(drives: Drives) -> str:
+    """Name of the view of the wheel angles, which says how much they are enlarged."""
+    return str(plan_view(runs_of(drives)).name)
 
 
 def _looked_at(
@@ -99,7 +107,7 @@ def test_no_view_reports_anything(alone: dict[float, Pictures], together: Pictur
 def test_the_car_is_seen_from_behind_on_its_road(alone: dict[float, Pictures]) -> None:
     pixels = alone[AT_S][CARS[1]].pixels
     height, width = pixels.shape[:2]
-    assert like(pixels[: height // 5], SKY, 6).mean() > 0.95
+    assert like(pixels[: height // 40], SKY, 6).mean() > 0.95
     assert like(pixels[-height // 5 :], ASPHALT, 12).mean() > 0.5
     middle = pixels[height // 4 :, width // 4 : -width // 4]
     assert like(middle, (0, 0, 0), 25).mean() > 0.002  # tyres
@@ -165,26 +173,33 @@ def test_the_summary_is_there(alone: dict[float, Pictures]) -> None:
 def test_each_car_is_compared_with_the_ghosts_of_the_others(together: Pictures) -> None:
     for own, others in zip(CARS, ((ARS, AFS), (NONE, AFS), (NONE, ARS)), strict=True):
         pixels = together[own].pixels
-        assert like(pixels[: len(pixels) // 5], SKY, 6).mean() > 0.9
+        assert like(pixels[: len(pixels) // 40], SKY, 6).mean() > 0.9
         for colour in others:
             assert like(pixels, colour, 45).mean() > 0.001, (own, colour)
 
 
 def test_the_plots_hold_all_runs_in_their_colours(together: Pictures) -> None:
-    for start in ("Yaw rate", "Sideslip", "Lateral"):
+    for start in ("Yaw rate", "Sideslip"):
         pixels = view(together, start)
         seen = [spread(like(pixels, colour, 35)) for colour in (NONE, ARS, AFS)]
         assert min(seen) > 0.1, (start, seen)
 
 
+def test_plan_and_names_of_the_curves_show_every_run_in_its_colour_from_left_to_right(together: Pictures) -> None:
+    for start in ("Wheels", "Curves"):
+        middles = [np.argwhere(like(view(together, start), colour, 30))[:, 1].mean() for colour in (NONE, ARS, AFS)]
+        assert middles == sorted(middles), start
+        assert np.diff(middles).min() > 0.1 * view(together, start).shape[1], start
+
+
 def test_the_plots_of_wheels_and_links_are_drawn(viewer: Headless, drives: Drives, folder: Path) -> None:
     """They stand on pages behind the first one."""
     runs = runs_of({"ars": drives["ars"]})
-    for page, plots in ((1, WHEELS), (2, links(runs[0]))):
+    for page, plots in ((3, WHEELS), (4, links(runs[0]))):
         file = folder / f"page {page}.rrd"
         stream = rr.RecordingStream(f"page {page}")
         stream.save(file)
-        fill(stream, runs, blueprint(runs, compare=False, page=page))
+        fill(stream, runs, blueprint(runs, compare=False, page=page), Showing())
         stream.disconnect()
         # Nobody brakes in these drives, and what is zero throughout has no plot.
         titles = tuple(plot.title for plot in plots if not plot.title.startswith("Brake pressure"))

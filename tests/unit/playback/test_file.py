@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from activesteer.drawing.wheel_angles import SLICES, factors, tips_beside
 from activesteer.errors import PlaybackError
 from activesteer.playback import runs_of, save
 from activesteer.playback.course import extent, map_bounds
-from activesteer.playback.plots import MOTION, views
-from activesteer.playback.tyres import FORCE_SCALE_NPM, force_arrows, use_colours
+from activesteer.playback.plots import MOTION, axis_range, views
+from activesteer.playback.tyres import use_colours
 from activesteer.recording import Recording
+from activesteer.road.footprint import Footprint
 from activesteer.signals import Channel
 from tests.raising import raises
 from tests.unit.playback import synthetic
@@ -86,16 +88,31 @@ def test_links_reach_from_body_to_body_and_springs_are_as_long_as_their_ends_are
         assert (scale[:, :2] == 1.0).all()
 
 
-def test_force_arrows_stand_at_the_contact_points_and_turn_with_the_wheels() -> None:
+def test_wedges_stand_beside_the_car_and_are_ten_times_as_wide_as_the_angles(tmp_path: Path) -> None:
     recording = circle()
-    (run,) = runs_of({"ars": recording})
-    origins, vectors = force_arrows(run)
-    assert np.allclose(origins[:, 1, 0], run.recording["fr_contact_x_m"], atol=1e-5)
-    assert np.allclose(np.linalg.norm(vectors, axis=-1), synthetic.FY_N / FORCE_SCALE_NPM, rtol=1e-5)
-    # A side force points a quarter turn to the left of where the wheel points.
-    for wheel, steer in ((0, synthetic.STEER_RAD), (3, 0.0)):
-        angle = np.unwrap(np.arctan2(vectors[:, wheel, 1], vectors[:, wheel, 0]))
-        assert np.allclose(angle, run.recording["yaw_rad"] + steer + 0.5 * math.pi, atol=1e-5)
+    rrd = saved(tmp_path, {"ars": recording})
+    factor = factors([recording])
+    assert factor == (10, 10, 10, 10)
+    points = rrd.numbers("/ars/chase/wheel_angles/wedge", "Mesh3D:vertex_positions").reshape(-1, 4, SLICES + 2, 3)
+    assert len(points) == pytest.approx(0.5 * len(recording.poses.time_s), abs=1)
+    tips = points[:, :, 0, :2]
+    assert np.allclose(tips, tips_beside(Footprint()), atol=1e-5)  # of a recording that does not give the car's size
+    turned = points[:, :, -1, :2] - tips
+    angle = np.arctan2(turned[..., 1], turned[..., 0])
+    assert np.allclose(angle, [10.0 * synthetic.STEER_RAD] * 2 + [0.0] * 2, atol=1e-5)
+    labels = rrd.column("/ars/chase/wheel_angles/angle", "Points3D:labels")[-1]
+    assert labels == ["5.7 deg left, x10", "5.7 deg left, x10", "0.0 deg, x10", "0.0 deg, x10"]
+
+
+def test_the_plan_shows_every_car_nose_up_with_its_wheels_turned(tmp_path: Path) -> None:
+    rrd = saved(tmp_path, {"none": circle(0.2), "ars": circle(0.2)})
+    left = rrd.numbers("/plan/1_none/body", "LineStrips2D:strips")[0, 0]
+    right = rrd.numbers("/plan/2_ars/body", "LineStrips2D:strips")[0, 0]
+    assert left[:, 0].max() < right[:, 0].min()  # beside each other
+    assert left[:, 1].min() == pytest.approx(-Footprint().front_m)  # the second axis points down
+    rays = rrd.numbers("/plan/2_ars/wedges", "LineStrips2D:strips")[-1].reshape(4, -1, 2, 2)
+    along = rays[:, -1, 1] - rays[:, -1, 0]
+    assert np.allclose(np.arctan2(-along[:, 0], -along[:, 1]), [10.0 * synthetic.STEER_RAD] * 2 + [0.0] * 2, atol=1e-5)
 
 
 def test_friction_use_goes_from_green_to_red() -> None:
@@ -143,10 +160,45 @@ def test_an_angle_that_nobody_asked_for_is_not_plotted(tmp_path: Path) -> None:
 def test_several_runs_share_a_file_each_with_a_ghost(tmp_path: Path) -> None:
     rrd = saved(tmp_path, {"none": circle(0.5), "ars": circle(0.7)})
     for name in ("1_none", "2_ars"):
-        assert f"/{name}/scene/car/chassis/ghost/box" in rrd.entities
         assert f"/{name}/plots/yaw_rate_radps" in rrd.entities
         assert f"/map/{name}/car" in rrd.entities
     assert len(rrd.blueprints) == 1
+
+
+def test_a_ghost_is_the_same_body_and_fades_where_a_car_is(tmp_path: Path) -> None:
+    car = {"car": {"width_m": 1.8, "wheelbase_m": 2.6, "tyre_width_m": [0.2, 0.2]}}
+    here = circle(0.5, car)
+    drifted = here.poses.positions_m.copy()
+    drifted[:, :, 1] += np.linspace(0.0, 2.0, len(drifted))[:, None]
+    there = Recording(
+        here.channels, here.time_s, here.values, poses=here.poses._replace(positions_m=drifted),
+        metadata=here.metadata, scene=here.scene,
+    )  # fmt: skip
+    rrd = saved(tmp_path, {"none": here, "ars": there})
+    body, ghost = (f"/2_ars/scene/car/chassis/{part}/paint" for part in ("solid", "ghost/1_none"))
+    assert rrd.column(ghost, "Mesh3D:vertex_positions") == rrd.column(body, "Mesh3D:vertex_positions")
+    alpha = rrd.numbers(ghost, "Mesh3D:albedo_factor")[:, 0].astype(int) & 255
+    apart = np.interp(rrd.time_s(ghost), here.poses.time_s, np.linspace(0.0, 2.0, len(drifted)))
+    assert (alpha[apart < 0.2] == 0).all()
+    assert (np.diff(alpha) >= 0).all()
+    assert 0 < alpha[apart > 1.0].min() < 128
+    assert "/1_none/scene/car/chassis/ghost/1_none/paint" not in rrd.entities
+
+
+@pytest.mark.parametrize("most", [4.3, 5.4, 8.0])
+def test_every_axis_has_room_for_three_numbers(most: float) -> None:
+    for reach in np.geomspace(0.02, 5000.0, 200):
+        for low in (0.0, -0.3 * reach, -reach):
+            below, above = axis_range(low, reach, 1e-3, most)
+            assert below <= low <= reach <= above
+            power = 10.0 ** math.floor(math.log10(above))
+            assert math.floor(above / power) + math.floor(-below / power) + 1 >= 3
+            assert (above - below) / power <= most
+
+
+def test_axes_are_the_same_for_runs_that_are_alike_and_no_signal_is_enlarged_without_end() -> None:
+    assert axis_range(-2.2, 2.1, 0.1, 8.0) == axis_range(-2.5, 2.3, 0.1, 8.0)
+    assert axis_range(-1e-9, 1e-9, 0.1, 8.0)[1] >= 0.05
 
 
 def test_course_and_patches_of_other_friction_are_drawn(tmp_path: Path) -> None:

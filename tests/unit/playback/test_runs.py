@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.conventions import RUN_COLOURS
+from activesteer.conventions import RUN_COLOURS_ON_DARK
 from activesteer.errors import RecordingError
 from activesteer.playback import runs_of
-from activesteer.playback.runs import COLOURS
 from activesteer.recording import Poses, Recording
 from tests.raising import raises
 from tests.unit.playback.synthetic import circle
@@ -20,17 +19,11 @@ def test_the_three_systems_have_their_order_numbers_and_colours_whatever_the_ord
     assert [r.short for r in runs] == ["none", "ars", "afs", "mine", "other"]
     assert [r.label for r in runs[:3]] == ["1 no control", "2 active rear steering", "3 active front steering"]
     assert [r.name for r in runs] == ["1_none", "2_ars", "3_afs", "4_mine", "5_other"]
-    assert [r.colour for r in runs] == list(COLOURS[:5])
+    assert [r.colour for r in runs] == list(RUN_COLOURS_ON_DARK[:5])
 
 
 def test_a_system_keeps_its_colour_without_the_others() -> None:
-    assert [r.colour for r in runs_of({"afs": circle(0.1)})] == [COLOURS[2]]
-
-
-def test_the_colours_are_those_of_the_plots_but_for_the_black_one() -> None:
-    assert COLOURS[1:] == RUN_COLOURS[1:]
-    assert int(COLOURS[0][1:3], 16) > 128
-    assert COLOURS[0][1:3] == COLOURS[0][3:5] == COLOURS[0][5:]
+    assert [r.colour for r in runs_of({"afs": circle(0.1)})] == [RUN_COLOURS_ON_DARK[2]]
 
 
 def test_names_are_fit_for_paths_and_differ() -> None:

@@ -13,8 +13,8 @@ def test_scenario_systems_and_metrics_side_by_side() -> None:
     other.metrics["only_here_s"] = 1.5
     text = summary(runs_of({"ars": other, "none": one}))
     lines = text.splitlines()
-    assert lines[0] == "## A circle"
-    assert sum(line.startswith("## ") for line in lines) == 1
+    assert lines[0] == "**A circle**"
+    assert text.count("A circle") == 1
     assert "- **1 no control**: controller none, vehicle compact, activesteer ?, road.mu = 0.4" in lines
     assert "| metric | unit | none | ars |" in lines
     assert "| yaw rate peak | deg/s | 11.459 | 11.459 |" in lines
@@ -30,5 +30,12 @@ def test_an_incomplete_run_says_so() -> None:
 def test_runs_of_different_manoeuvres_are_all_named() -> None:
     other = circle(0.1, {"maneuver": {"title": "Another"}})
     text = summary(runs_of({"ars": circle(0.1), "none": other}))
-    assert "## A circle" in text
-    assert "## Another" in text
+    assert "**A circle**" in text
+    assert "**Another**" in text
+
+
+def test_what_came_out_stands_above_the_numbers() -> None:
+    text = summary(runs_of({"ars": circle(0.1)}), ["ars: keeps to its lanes", "S1 passed: something"])
+    lines = text.splitlines()
+    assert lines[2:4] == ["- **ars:** keeps to its lanes", "- **S1 passed:** something"]
+    assert text.index("keeps to its lanes") < text.index("| metric |")

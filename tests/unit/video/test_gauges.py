@@ -5,12 +5,14 @@ import math
 import numpy as np
 import pytest
 
+from activesteer.drawing.wheel_angles import CHANNELS
 from activesteer.recording import Recording
 from activesteer.signals import Channel
-from activesteer.video.gauges import Dials, Gauges
+from activesteer.video.gauges import LARGEST_SHARE, Dials, Gauges
 
-SIZE = (640, 480)
-NAMES = ("speed_mps", "steering_wheel_rad", "sideslip_rad", "rear_steer_rad", "superposition_rad", "front_steer_rad")
+SIZE = (1280, 720)
+NAMES = ("speed_mps", "steering_wheel_rad", "sideslip_rad", "rear_steer_rad", "superposition_rad", *CHANNELS)
+ORANGE = "#f0843c"
 
 
 def recording(**values: float) -> Recording:
@@ -19,25 +21,31 @@ def recording(**values: float) -> Recording:
     return Recording(table, [0.0, 1.0], [list(everything.values())] * 2)
 
 
-def drawn(*runs: Recording, title: str = "", size: tuple[int, int] = SIZE, note: str = "") -> np.ndarray:
-    gauges = Gauges([Dials(run, "2 active rear steering", "#d55e00") for run in runs], title, size)
-    return gauges.draw(np.full((size[1], size[0], 3), 100, np.uint8), 0.5, note).astype(int)
+def drawn(
+    *runs: Recording, title: str = "", size: tuple[int, int] = SIZE, note: str = "", colour: str = ORANGE
+) -> np.ndarray:
+    gauges = Gauges([Dials(run, "2 active rear steering", colour) for run in runs], title, size, note)
+    return gauges.draw(np.full((size[1], size[0], 3), 100, np.uint8), 0.5).astype(int)
 
 
 def changed(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Columns and rows where two pictures differ."""
+    """Rows and columns where two pictures differ."""
     return np.argwhere((one != other).any(axis=2))
 
 
-def test_middle_of_the_picture_is_left_alone():
-    picture = drawn(recording())
-    assert (picture[40:400] == 100).all()
-    assert (picture[-60:] != 100).all(axis=2).mean() > 0.9
+@pytest.mark.parametrize("runs", [1, 2, 3])
+@pytest.mark.parametrize("size", [(1280, 720), (640, 480), (640, 720), (1920, 1080)])
+def test_gauges_cover_at_most_a_tenth_of_the_picture(runs, size):
+    full = recording(**dict.fromkeys(NAMES, 0.05))
+    picture = drawn(*[full] * runs, title="Double lane change ISO 3888-1, 80 km/h", note="speed x 0.25", size=size)
+    assert (picture != 100).any(axis=2).mean() <= LARGEST_SHARE
+    assert (picture[size[1] // 4 : size[1] // 2] == 100).all()
 
 
-def test_two_runs_have_two_rows():
-    assert (drawn(recording(), recording())[350:] == 100).all(axis=2).mean() < 0.2
-    assert (drawn(recording())[350:410] == 100).all()
+def test_each_run_has_a_row_and_a_plan():
+    one, two = drawn(recording()), drawn(recording(), recording())
+    assert len(changed(one, two)) > 3000
+    assert np.ptp(changed(np.full_like(two, 100), two)[:, 1]) > 1200  # from the left edge to the right one
 
 
 @pytest.mark.parametrize(
@@ -47,28 +55,44 @@ def test_each_value_is_seen(change):
     values = {"steering_wheel_rad": 0.0, "sideslip_rad": 0.0, "rear_steer_rad": 0.01}
     where = changed(drawn(recording(**values)), drawn(recording(**(values | change))))
     assert len(where) > 20
-    assert where[:, 0].min() > 410
+    assert where[:, 0].min() > 500
 
 
-def test_wheel_and_arrow_turn_to_the_side_of_their_sign():
-    def middle_of_change(**change: float) -> float:
-        """Which side of its upright mark the mark of a gauge went to, in pixels; left is negative."""
-        still = {"steering_wheel_rad": 0.0, "sideslip_rad": 0.0}
-        before, after = drawn(recording(**still)), drawn(recording(**(still | change)))
-        icons = changed(before, after)
-        icons = icons[icons[:, 1] > 530]  # right of the numbers
-        yellow = [pixel[1] for pixel in icons if _yellow(after[tuple(pixel)]) and not _yellow(before[tuple(pixel)])]
-        gone = [pixel[1] for pixel in icons if _yellow(before[tuple(pixel)]) and not _yellow(after[tuple(pixel)])]
-        return float(np.mean(yellow) - np.mean(gone))
-
-    assert middle_of_change(steering_wheel_rad=math.radians(60)) < -5.0
-    assert middle_of_change(steering_wheel_rad=math.radians(-60)) > 5.0
-    assert middle_of_change(sideslip_rad=math.radians(30)) < -2.0
-    assert middle_of_change(sideslip_rad=math.radians(-30)) > 2.0
+def wedges(rear_deg: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the wedges at the rear wheels of the plan."""
+    steer = dict.fromkeys(CHANNELS, 0.0)
+    straight = drawn(recording(**steer))
+    turned = drawn(recording(**(steer | dict.fromkeys(CHANNELS[2:], math.radians(rear_deg)))))
+    red, green, blue = np.moveaxis(turned, 2, 0)
+    rows, columns = np.nonzero(
+        (red > 200) & (abs(green - 132) < 45) & (blue < 110) & (np.abs(turned - straight).max(axis=2) > 60)
+    )
+    return rows, columns
 
 
-def _yellow(pixel: np.ndarray) -> bool:
-    return bool(pixel[0] > 180 and pixel[1] > 140 and pixel[2] < 110)
+@pytest.mark.parametrize("angle_deg", [1.7, -1.7])
+def test_the_plan_shows_side_and_size_of_rear_steering(angle_deg):
+    rows, columns = wedges(angle_deg)
+    assert len(rows) > 40
+    assert rows.min() > 600  # the rear end of a plan whose nose is up
+    # Wedges have their tips below and open to the side of their sign: left is positive, and left in the picture.
+    top, bottom = columns[rows < np.median(rows)], columns[rows > np.median(rows)]
+    assert np.sign(top.mean() - bottom.mean()) == -np.sign(angle_deg)
+    # Twice the angle, twice the area.
+    assert len(wedges(2.0 * angle_deg)[0]) / len(rows) == pytest.approx(2.0, abs=0.5)
+
+
+def test_arrow_shows_where_the_car_goes():
+    still = {"sideslip_rad": 0.0}
+    before, after = drawn(recording(**still)), drawn(recording(sideslip_rad=math.radians(30)))
+    where = [pixel[1] for pixel in changed(before, after) if pixel[1] > 1000]
+    yellow = [column for row, column in changed(before, after) if column > 1000 and _yellow(after[row, column])]
+    assert np.mean(yellow) < np.mean(where) + 2.0
+    assert np.mean(yellow) < np.mean([c for r, c in np.argwhere(_yellow(before)) if c > 1000]) - 3.0  # to the left
+
+
+def _yellow(pixels: np.ndarray) -> np.ndarray:
+    return (pixels[..., 0] > 180) & (pixels[..., 1] > 140) & (pixels[..., 2] < 110)
 
 
 def test_added_angle_that_is_never_used_takes_no_place():
@@ -84,14 +108,15 @@ def test_car_that_stands_has_no_sideslip():
 
 def test_channels_that_are_missing_or_not_finite_are_no_error():
     bare = Recording([Channel("x_m", "m", "", "vehicle")], [0.0], [[0.0]])
-    assert drawn(bare).shape == (480, 640, 3)
-    assert drawn(recording(**dict.fromkeys(NAMES, math.nan))).shape == (480, 640, 3)
+    assert drawn(bare).shape == (720, 1280, 3)
+    assert drawn(recording(**dict.fromkeys(NAMES, math.nan))).shape == (720, 1280, 3)
 
 
 def test_long_title_leaves_room_for_the_time():
-    short, long = drawn(recording(), title="A"), drawn(recording(), title="A manoeuvre " * 30)
-    assert (short[:26, 590:] == long[:26, 590:]).all()
-    assert len(changed(short[:26], long[:26])) > 500
+    long = drawn(recording(), title="A manoeuvre " * 30)
+    times = [drawn(recording(), title="A manoeuvre " * 30, note=note) for note in ("", "speed x 0.25")]
+    assert len(changed(*times)) > 100
+    assert (long[:20, 1275:] != 100).any()
 
 
 @pytest.mark.parametrize("size", [(16, 16), (64, 480), (480, 64), (1920, 1080)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.bodywork import Panel, dressed
+from activesteer.drawing.bodywork import Panel, dressed
 from activesteer.recording import Link, Primitive
 from activesteer.resources import models_dir
 from activesteer.road.footprint import Footprint

@@ -1,0 +1,54 @@
+"""What came out of runs in a few words, for where there is no room for a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from activesteer.analysis.loss import CONES_MISSED, IN_LANES, SIDESLIP_PEAKS, has_spun
+from activesteer.analysis.report.groups import groups_of
+from activesteer.analysis.report.judgement import judge
+from activesteer.quantities import metric_label, metric_number
+from activesteer.recording import Recording
+
+_ALSO: Final = ("yaw_rate_steady_state_radps", "stopping_distance_m", "steering_wheel_rms_rad")
+"""Metrics that are named where a manoeuvre has them."""
+
+
+def outcome(recording: Recording) -> str:
+    """Whether a car was held, kept to its course and hit cones, and its key figures.
+
+    Args:
+        recording: The run.
+    """
+    metadata, metrics = recording.metadata, recording.metrics
+    if not metadata.get("complete", True):
+        return f"the run did not end properly: {metadata.get('error', 'no reason is recorded')}"
+    said = []
+    peaks = [name for name in SIDESLIP_PEAKS if name in metrics]
+    if peaks and has_spun(metrics):
+        said.append("the car is lost")
+    if IN_LANES in metrics:
+        over_m = max(metrics.get("lane_overstep_m", 0.0), 0.0)
+        said.append("keeps to its lanes" if metrics[IN_LANES] == 1.0 else f"leaves its lanes by {over_m:.2f} m")
+    for name, did in (("cones_hit", "hits"), (CONES_MISSED, "misses")):
+        if name in metrics:
+            count = round(metrics[name])
+            said.append(f"{did} {count or 'no'} cone{'s' if count != 1 else ''}")
+    for name in (*peaks[:1], *_ALSO):
+        if name in metrics:
+            words, unit, _ = metric_label(name)
+            said.append(f"{words.removesuffix(' abs')} {metric_number(name, metrics[name])} {unit}")
+    return ", ".join(said)
+
+
+def verdict(recordings: Mapping[str, Recording]) -> list[str]:
+    """A line for each run, then one for each claim of the paper about them.
+
+    Args:
+        recordings: By name of the run.
+    """
+    lines = [f"{name}: {outcome(recording)}" for name, recording in recordings.items()]
+    groups = groups_of({f"{name}.mcap": recording for name, recording in recordings.items()})
+    judged = judge(groups[0]).scorecard.judged if len(groups) == 1 else ()
+    return lines + [f"{item.claim.id} {item.verdict.value}: {item.claim.text}" for item in judged]

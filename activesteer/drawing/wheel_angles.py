@@ -1,0 +1,129 @@
+"""Angles of the wheels as wedges, drawn so much larger that 2 deg of rear steering are seen.
+
+Points are in the axes of the car: x forward and y left, the origin on the road below the middle of its front axle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from activesteer.conventions import CORNERS, Array
+from activesteer.quantities import quantity_of
+from activesteer.recording import Recording
+from activesteer.road.footprint import Footprint
+
+CHANNELS: Final = tuple(f"{corner}_steer_rad" for corner in CORNERS)
+RADIUS_M: Final = 1.2
+"""From the tip of a wedge to its arc [m]."""
+SLICES: Final = 12
+"""Triangles of a wedge."""
+_FACTORS: Final = (10, 5, 2, 1)
+_WIDEST_RAD: Final = math.radians(90.0)
+"""No wedge becomes wider: an axle that steers further is drawn with a smaller factor [rad]."""
+_BESIDE_M: Final = 0.4
+"""From the side of the body to the tips of the wedges, which it would hide [m]."""
+_WHEEL_M: Final = 0.36, 0.13
+"""Half length and half width of a wheel in a plan [m]."""
+_NOTHING_RAD: Final = math.radians(0.05)
+"""An angle that is written as zero has no side."""
+
+
+def factors(recordings: Sequence[Recording]) -> tuple[int, ...]:
+    """How many times larger the angles of each wheel are drawn, the same for all runs that are shown together.
+
+    Ten, and less for an axle that steers by more than 9 deg.
+
+    Args:
+        recordings: The runs.
+
+    Returns:
+        One for each wheel, the same at both wheels of an axle.
+    """
+    found: list[int] = []
+    for axle in (CHANNELS[:2], CHANNELS[2:]):
+        angles = [np.abs(run[name]) for run in recordings for name in axle if name in run]
+        largest = max((float(np.max(values[np.isfinite(values)], initial=0.0)) for values in angles), default=0.0)
+        found += [next((factor for factor in _FACTORS if factor * largest <= _WIDEST_RAD), 1)] * 2
+    return tuple(found)
+
+
+def wedges(angle_rad: Array, factor: Sequence[int]) -> Array:
+    """Wedges from straight ahead to where the wheels point, their tips at the origin.
+
+    Args:
+        angle_rad: Steer angles [rad], left positive, shape (..., 4).
+        factor: See `factors`.
+
+    Returns:
+        Points [m], shape (..., 4, SLICES + 2, 2): the tip, then the arc from straight ahead on.
+    """
+    shown = np.nan_to_num(np.asarray(angle_rad, np.float64) * factor)
+    along = shown[..., None] * np.linspace(0.0, 1.0, SLICES + 1)
+    arc = RADIUS_M * np.stack([np.cos(along), np.sin(along)], axis=-1)
+    return np.concatenate([np.zeros((*shown.shape, 1, 2)), arc], axis=-2)
+
+
+def wheel_centres(size: Footprint) -> Array:
+    """Where the wheels are [m], shape (4, 2)."""
+    half = 0.5 * size.width_m - _WHEEL_M[1]
+    return np.array([(x, side * half) for x in (0.0, -size.wheelbase_m) for side in (1.0, -1.0)])
+
+
+def tips_beside(size: Footprint) -> Array:
+    """Where wedges beside the car have their tips [m], shape (4, 2)."""
+    beside = 0.5 * size.width_m + _BESIDE_M
+    return np.array([(x, side * beside) for x in (0.0, -size.wheelbase_m) for side in (1.0, -1.0)])
+
+
+class Plan(NamedTuple):
+    """A car from above; every part is a closed line in the axes of the car.
+
+    Attributes:
+        body: Outline of the body [m], shape (points, 2).
+        wheels: Outlines of the wheels [m], turned by the enlarged angles, shape (..., 4, 4, 2).
+        wedges: The enlarged angles, their tips at the wheels [m], shape (..., 4, SLICES + 2, 2).
+    """
+
+    body: Array
+    wheels: Array
+    wedges: Array
+
+
+def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:
+    """The car from above with enlarged angles of its wheels.
+
+    Args:
+        size: Its size.
+        angle_rad: Steer angles [rad], left positive, shape (..., 4).
+        factor: See `factors`.
+    """
+    front, rear, half = size.front_m, size.rear_m, 0.5 * size.width_m
+    body = np.array(
+        [
+            *((front, 0.5 * half), (front - 0.35, half), (rear + 0.2, half), (rear, 0.75 * half)),
+            *((rear, -0.75 * half), (rear + 0.2, -half), (front - 0.35, -half), (front, -0.5 * half)),
+        ]
+    )
+    at = wheel_centres(size)[:, None]
+    shown = np.nan_to_num(np.asarray(angle_rad, np.float64) * factor)[..., None]
+    x, y = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]).T * np.array(_WHEEL_M)[:, None]
+    cos, sin = np.cos(shown), np.sin(shown)
+    wheels = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+    return Plan(body, at + wheels, at + wedges(angle_rad, factor))
+
+
+def words(angle_rad: float) -> str:
+    """The true angle that a wedge shows, and its side; nothing where it is not known.
+
+    Args:
+        angle_rad: Steer angle [rad], left positive.
+    """
+    if not math.isfinite(angle_rad):
+        return ""
+    side = "" if abs(angle_rad) < _NOTHING_RAD else " left" if angle_rad > 0.0 else " right"
+    unit = quantity_of(CHANNELS[0]).unit
+    return f"{abs(angle_rad) * unit.factor:.1f} {unit.name}{side}"

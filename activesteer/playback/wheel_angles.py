@@ -1,0 +1,146 @@
+"""Angles of the wheels, enlarged: wedges beside the car in the world, and all cars from above in a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import cycle
+from typing import Any, Final
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from activesteer.conventions import CORNERS, Array
+from activesteer.drawing.colours import bytes_of
+from activesteer.drawing.wheel_angles import (
+    CHANNELS,
+    SLICES,
+    factors,
+    plan,
+    tips_beside,
+    wedges,
+    wheel_centres,
+    words,
+)  # fmt: skip
+from activesteer.playback.runs import Run
+from activesteer.playback.timeline import times
+from activesteer.road.footprint import Footprint, footprint_of
+
+PLAN: Final = "plan"
+"""Entity below which all of the plan lies."""
+_EVERY: Final = 2
+"""Of the poses, every second one: 50 a second."""
+_ABOVE_ROAD_M: Final = 0.05
+_AHEAD: Final = (245, 245, 245)
+_APART_M: Final = 5.5
+"""From the middle of a car in the plan to that of the next [m]."""
+_RAYS: Final = range(1, SLICES + 2, 2)
+"""Points of the arc to which the plan has a line from the tip: it can fill no area."""
+
+
+def send_wheel_angles(stream: rr.RecordingStream, run: Run, runs: Sequence[Run]) -> None:
+    """Sends wedges and plan of a run; nothing where the recording has no angles of the wheels.
+
+    Args:
+        stream: Where to.
+        run: The run.
+        runs: All runs that are shown together: their scales are the same.
+    """
+    if not run.has(*CHANNELS):
+        return
+    recording, size = run.recording, footprint_of(run.recording.metadata) or Footprint()
+    time_s = recording.poses.time_s[run.poses][::_EVERY]
+    angles = np.stack([np.interp(time_s, recording.time_s, recording[name]) for name in CHANNELS], axis=1)
+    factor = factors([other.recording for other in runs])
+    texts = [words(float(angle)) for row in angles for angle in row]
+    when = times(time_s)
+    enlarged = [f"{text}, x{larger}" if text else "" for text, larger in zip(texts, cycle(factor), strict=False)]
+    _send_wedges(stream, run, when, wedges(angles, factor), enlarged, size)
+    _send_plan(stream, run, runs.index(run), when, (angles, factor), texts, size)
+
+
+def wedges_path(run: Run) -> str:
+    """Entity of the wedges beside the car of a run."""
+    return f"{run.name}/chase/wheel_angles"
+
+
+def plan_view(runs: Sequence[Run]) -> rrb.Spatial2DView:
+    """The view of the plans of these runs.
+
+    Args:
+        runs: The runs, from left to right.
+    """
+    found = [footprint_of(run.recording.metadata) or Footprint() for run in runs]
+    front = max(size.front_m for size in found) + 1.5
+    rear = min(size.rear_m for size in found) - 1.2
+    at_front, _, at_rear, _ = factors([run.recording for run in runs])
+    scale = f"x{at_front}" if at_front == at_rear else f"front x{at_front}, rear x{at_rear}"
+    return rrb.Spatial2DView(
+        origin=f"/{PLAN}",
+        contents=[f"+ /{PLAN}/{run.name}/**" for run in runs],
+        name=f"Wheels, {scale}",
+        visual_bounds=rrb.VisualBounds2D(
+            x_range=(-0.5 * _APART_M, (len(runs) - 0.5) * _APART_M), y_range=(-front, -rear)
+        ),
+    )
+
+
+def _send_wedges(
+    stream: rr.RecordingStream, run: Run, when: list[rr.TimeColumn], shapes: Array, texts: list[str], size: Footprint
+) -> None:
+    tips, rows, corners = tips_beside(size), len(shapes), len(CORNERS)
+    placed = np.full((*shapes.shape[:-1], 3), _ABOVE_ROAD_M, np.float32)
+    placed[..., :2] = shapes + tips[:, None]
+    path, colour = wedges_path(run), bytes_of(run.colour)
+    per_wedge = shapes.shape[2]
+    fan = np.array([(0, slice_ + 1, slice_ + 2) for slice_ in range(SLICES)])
+    faces = (np.arange(corners)[:, None, None] * per_wedge + fan).reshape(-1, 3)
+    stream.log(f"{path}/wedge", rr.Mesh3D.from_fields(triangle_indices=faces, albedo_factor=colour), static=True)
+    columns = rr.Mesh3D.columns(vertex_positions=placed.reshape(-1, 3))
+    stream.send_columns(f"{path}/wedge", when, columns.partition(lengths=[corners * per_wedge] * rows))
+    stream.log(f"{path}/wheel", rr.LineStrips3D.from_fields(colors=[colour], radii=[0.02]), static=True)
+    lines = rr.LineStrips3D.columns(strips=placed[:, :, [0, -1]].reshape(-1, 2, 3))
+    stream.send_columns(f"{path}/wheel", when, lines.partition(lengths=[corners] * rows))
+    ahead = rr.LineStrips3D(placed[0][:, [0, 1]], colors=[_AHEAD], radii=[0.015])
+    stream.log(f"{path}/ahead", ahead, static=True)
+    beside = np.column_stack([tips * (1.0, 2.1), np.full(corners, _ABOVE_ROAD_M)])
+    style: dict[str, Any] = {"colors": [colour], "radii": [0.02], "show_labels": True}
+    stream.log(f"{path}/angle", rr.Points3D.from_fields(positions=beside, **style), static=True)
+    stream.send_columns(f"{path}/angle", when, rr.Points3D.columns(labels=texts).partition(lengths=[corners] * rows))
+
+
+def _send_plan(
+    stream: rr.RecordingStream,
+    run: Run,
+    number: int,
+    when: list[rr.TimeColumn],
+    angles: tuple[Array, Sequence[int]],
+    texts: list[str],
+    size: Footprint,
+) -> None:
+    def placed(points_m: Array) -> Any:
+        """Nose up: the second axis of the view points down."""
+        flat = np.stack([number * _APART_M - points_m[..., 1], -points_m[..., 0]], axis=-1)
+        return flat.astype(np.float32)
+
+    drawn, path, colour = plan(size, *angles), f"{PLAN}/{run.name}", bytes_of(run.colour)
+    rows = len(drawn.wedges)
+    body = placed(np.vstack([drawn.body, drawn.body[:1]]))
+    name = rr.Points2D([placed(np.array([0.5 * size.rear_m, 0.0]))], labels=[run.short], colors=[colour], radii=[0.01])
+    stream.log(f"{path}/body", rr.LineStrips2D([body], colors=[colour], radii=[0.05]), static=True)
+    stream.log(f"{path}/name", name, static=True)
+    outline = np.concatenate([drawn.wheels, drawn.wheels[..., :1, :]], axis=-2)
+    sides = np.stack([outline[..., :-1, :], outline[..., 1:, :]], axis=-2)
+    tips = np.broadcast_to(drawn.wedges[..., :1, :], drawn.wedges[..., _RAYS, :].shape)
+    rays = np.stack([tips, drawn.wedges[..., _RAYS, :]], axis=-2)
+    for part, strokes, paint in (("wheels", sides, _AHEAD), ("wedges", rays, colour)):
+        flat = placed(strokes).reshape(rows, -1, 2, 2)
+        stream.log(f"{path}/{part}", rr.LineStrips2D.from_fields(colors=[paint], radii=[0.04]), static=True)
+        columns = rr.LineStrips2D.columns(strips=flat.reshape(-1, 2, 2))
+        stream.send_columns(f"{path}/{part}", when, columns.partition(lengths=[flat.shape[1]] * rows))
+    # One number for each axle has room: that of the left wheel.
+    at = placed(wheel_centres(size)[[0, 2]] * (1.0, 0.0) + [(1.75, 0.0), (-1.2, 0.0)])
+    label = rr.Points2D.from_fields(positions=at, colors=[colour], radii=[0.01], show_labels=True)
+    stream.log(f"{path}/angle", label, static=True)
+    shown = [text for row in range(rows) for text in (texts[4 * row], texts[4 * row + 2])]
+    stream.send_columns(f"{path}/angle", when, rr.Points2D.columns(labels=shown).partition(lengths=[2] * rows))

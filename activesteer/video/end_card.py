@@ -1,0 +1,69 @@
+"""What is said at the end of a film, over its last picture: what was driven, and what came out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from activesteer.drawing.colours import bytes_of
+from activesteer.video.gauges import PANEL, WHITE, font, write
+
+_HEIGHT: Final = 480.0
+_TITLE, _TEXT, _LINE, _MARGIN, _BAR = 17.0, 12.0, 20.0, 16.0, 5.0
+_SHADE: Final = (*PANEL[:3], 225)
+
+
+def end_card(
+    title: str, lines: Sequence[str], colours: Sequence[str], size: tuple[int, int]
+) -> Callable[[NDArray[np.uint8]], NDArray[np.uint8]]:
+    """Draws it once.
+
+    Args:
+        title: What was driven.
+        lines: What came out, a line for each run, then others.
+        colours: Of the runs, `#rrggbb`.
+        size: Width and height of the pictures [pixels].
+
+    Returns:
+        What lays it over a picture.
+    """
+    scale = min(size[1] / _HEIGHT, size[0] / 640.0)
+    margin, line, bar = (value * scale for value in (_MARGIN, _LINE, _BAR))
+    large, text = font(_TITLE * scale), font(_TEXT * scale)
+    room = size[0] - 4.0 * margin - 2.0 * bar
+    rows = [
+        (part, colour if number == 0 else "")
+        for words, colour in zip(lines, [*colours, *[""] * len(lines)], strict=False)
+        for number, part in enumerate(_wrapped(words, lambda part: text.getlength(part) <= room))
+    ]
+    height = min(round(2.0 * margin + 1.6 * line + line * len(rows)), size[1])
+    card = Image.new("RGBA", (round(size[0] - 2.0 * margin), height), _SHADE)
+    write(card, (margin, margin + 0.5 * line), title, WHITE, large)
+    pen = ImageDraw.Draw(card)
+    for number, (words, colour) in enumerate(rows):
+        top = margin + 1.6 * line + number * line
+        if colour:
+            pen.rectangle((margin, top + 0.1 * line, margin + bar, top + 0.9 * line), (*bytes_of(colour), 255))
+        write(card, (margin + 2.0 * bar, top + 0.5 * line), words, WHITE, text)
+    at = (size[0] - card.width) // 2, (size[1] - card.height) // 2
+
+    def lay_over(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        picture = Image.fromarray(np.ascontiguousarray(pixels))
+        picture.paste(card, at, card)
+        return np.asarray(picture)
+
+    return lay_over
+
+
+def _wrapped(words: str, fits: Callable[[str], bool]) -> list[str]:
+    rows: list[str] = []
+    for word in words.split():
+        if rows and fits(f"{rows[-1]} {word}"):
+            rows[-1] += f" {word}"
+        else:
+            rows.append(word)
+    return rows

@@ -1,0 +1,87 @@
+"""Texts that stand at places of the world: found in the picture, and written over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from activesteer.conventions import Array
+from activesteer.video.gauges import PANEL, WHITE, font, write
+from activesteer.video.markings import Label
+
+_TEXT: Final = 10.5
+_HEIGHT: Final = 480.0
+
+
+class Labels:
+    """Writes them over pictures of one size."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        """Chooses the font.
+
+        Args:
+            size: Width and height of the pictures [pixels].
+        """
+        self._size = size
+        self._scale = min(size[1] / _HEIGHT, size[0] / 640.0)
+        self._font = font(_TEXT * self._scale)
+
+    def draw(self, pixels: NDArray[np.uint8], scene: mujoco.MjvScene, labels: Sequence[Label]) -> NDArray[np.uint8]:
+        """Writes labels over a picture.
+
+        Args:
+            pixels: The picture, shape (height, width, 3); it stays as it is.
+            scene: What it shows, with the camera.
+            labels: The labels; one behind the camera is left out.
+        """
+        if not labels:
+            return pixels
+        picture = Image.fromarray(np.ascontiguousarray(pixels))
+        for label in labels:
+            at, outside = (pixel_of(scene, place, self._size) for place in (label.place_m, label.outside_m))
+            if not label.text or at is None or outside is None:
+                continue
+            right, down = outside[0] - at[0], outside[1] - at[1]
+            sideways = abs(right) >= abs(down)
+            anchor = ("l" if right > 0 else "r") + "m" if sideways else "m" + ("t" if down > 0 else "b")
+            self._write(picture, at, label.text, anchor)
+        return np.asarray(picture)
+
+    def _write(self, picture: Image.Image, at: tuple[float, float], text: str, anchor: str) -> None:
+        pad = 3.0 * self._scale
+        width = round(self._font.getlength(text) + 2 * pad)
+        height = round(1.35 * _TEXT * self._scale)
+        panel = Image.new("RGBA", (max(width, 1), max(height, 1)), PANEL)
+        write(panel, (pad, height / 2), text, WHITE, self._font)
+        left = at[0] - {"l": 0.0, "m": 0.5, "r": 1.0}[anchor[0]] * width
+        top = at[1] - {"t": 0.0, "m": 0.5, "b": 1.0}[anchor[1]] * height
+        picture.paste(panel, (round(left), round(top)), panel)
+
+
+def pixel_of(scene: mujoco.MjvScene, place_m: Array, size: tuple[int, int]) -> tuple[float, float] | None:
+    """Where a place of the world is in the picture.
+
+    Args:
+        scene: The scene, with its camera.
+        place_m: The place [m], shape (3,).
+        size: Width and height of the picture [pixels].
+
+    Returns:
+        Columns from the left and rows from the top; None where it is behind the camera.
+    """
+    # A scene holds a camera for each eye; they differ by the width of a nose.
+    left, right = scene.camera[0], scene.camera[1]
+    eye = 0.5 * (left.pos.astype(np.float64) + right.pos)
+    forward, up = left.forward.astype(np.float64), left.up.astype(np.float64)
+    away = np.asarray(place_m, np.float64) - eye
+    depth = float(away @ forward)
+    if depth <= left.frustum_near:
+        return None
+    per_unit = size[1] / (left.frustum_top - left.frustum_bottom) * left.frustum_near / depth
+    x, y = float(away @ np.cross(forward, up)), float(away @ up)
+    return 0.5 * size[0] + x * per_unit, 0.5 * size[1] - y * per_unit

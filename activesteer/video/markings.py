@@ -1,0 +1,136 @@
+"""What is drawn at a car beside what is there: the angles of its wheels, enlarged, and the forces of its tyres."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import Array
+from activesteer.drawing import tyre_forces, wheel_angles
+from activesteer.drawing.colours import shares_of
+from activesteer.recording import Recording
+from activesteer.road.footprint import Footprint
+from activesteer.video.track import Track
+
+_ABOVE_ROAD_M: Final = 0.05
+_EDGE_M: Final = 0.022
+_AHEAD_RGBA: Final = (0.97, 0.97, 0.97, 1.0)
+_WEDGE_OPACITY: Final = 0.75
+_ARROW_RGBA: Final = (0.83, 0.05, 0.45, 1.0)
+_ARROW_M: Final = 0.05
+_LABEL_M: Final = 0.35, 0.4
+"""Of a label from the tip of its wedge, ahead and to the outside [m]."""
+
+
+class Label(NamedTuple):
+    """A text at a place in the world.
+
+    Attributes:
+        text: The text.
+        place_m: Where it begins, shape (3,).
+        outside_m: A point from which it goes away from the car, shape (3,).
+    """
+
+    text: str
+    place_m: Array
+    outside_m: Array
+
+
+class Markings:
+    """Those of one car."""
+
+    def __init__(
+        self, recording: Recording, track: Track, size: Footprint, colour: str, shown_with: Sequence[Recording]
+    ) -> None:
+        """Takes what is to be shown.
+
+        Args:
+            recording: The run.
+            track: Where its car is.
+            size: The size of the car.
+            colour: The colour of its system, `#rrggbb`.
+            shown_with: All runs of the picture: they have their scales in common.
+        """
+        self._track, self._rgb = track, shares_of(colour)
+        self._tips = wheel_angles.tips_beside(size)
+        self._factors = wheel_angles.factors(shown_with)
+        self._time_s = recording.time_s
+        self._angles = None
+        if all(name in recording for name in wheel_angles.CHANNELS):
+            self._angles = np.stack([recording[name] for name in wheel_angles.CHANNELS])
+        self._arrows = None
+        if all(name in recording for name in tyre_forces.CHANNELS):
+            self._arrows = tyre_forces.force_arrows(recording, tyre_forces.force_scale(shown_with))
+
+    def angles(self, time_s: float) -> Array | None:
+        """Steer angles of the wheels at an instant [rad], shape (4,); None where they were not recorded."""
+        if self._angles is None:
+            return None
+        return np.array([np.interp(time_s, self._time_s, row) for row in self._angles])
+
+    def add(self, scene: mujoco.MjvScene, time_s: float) -> list[Label]:
+        """Adds them to what is going to be drawn.
+
+        Args:
+            scene: The scene.
+            time_s: The instant [s].
+
+        Returns:
+            What is to be written over the picture.
+        """
+        labels = []
+        angles = self.angles(time_s)
+        if angles is not None:
+            origin, heading = self._track.chassis(time_s), self._track.heading(time_s)
+            cos, sin = np.cos(heading), np.sin(heading)
+            turn = np.array([(cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)])
+            for angle, factor, tip in zip(angles, self._factors, self._tips, strict=True):
+                at = origin + turn @ (*tip, _ABOVE_ROAD_M)
+                self._add_wedge(scene, at, turn, float(angle), factor)
+                outside = np.sign(tip[1])
+                place = at + turn @ (_LABEL_M[0], outside * _LABEL_M[1], 0.0)
+                words = wheel_angles.words(float(angle))
+                labels.append(Label(f"{words}, x{factor}" if words else "", place, place + turn @ (0.0, outside, 0.0)))
+        if self._arrows is not None:
+            row = int(np.clip(np.searchsorted(self._time_s, time_s), 0, len(self._time_s) - 1))
+            for origin, vector in zip(self._arrows[0][row], self._arrows[1][row], strict=True):
+                if np.isfinite([origin, vector]).all() and np.linalg.norm(vector) > 2.0 * _ARROW_M:
+                    _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, _ARROW_M, origin, origin + vector, _ARROW_RGBA)
+        return labels
+
+    def _add_wedge(self, scene: mujoco.MjvScene, at: Array, turn: Array, angle_rad: float, factor: int) -> None:
+        points = wheel_angles.wedges(np.array([angle_rad]), (factor,))[0]
+        world = at + np.column_stack([points, np.zeros(len(points))]) @ turn.T
+        tip, arc = world[0], world[1:]
+        for first, second in pairwise(arc):
+            # The triangle has its sides along the axes of its frame, which need not be at right angles.
+            frame = np.column_stack([first - tip, second - tip, (0.0, 0.0, 1.0)])
+            _add(scene, mujoco.mjtGeom.mjGEOM_TRIANGLE, np.ones(3), tip, frame, (*self._rgb, _WEDGE_OPACITY))
+        for end, rgba in ((arc[0], _AHEAD_RGBA), (arc[-1], (*self._rgb, 1.0))):
+            _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, _EDGE_M, tip, end, rgba)
+
+
+def _add(
+    scene: mujoco.MjvScene,
+    kind: mujoco.mjtGeom,
+    size: NDArray[np.float64],
+    at: Array,
+    frame: Array,
+    rgba: tuple[float, ...],
+) -> mujoco.MjvGeom:
+    geom = scene.geoms[scene.ngeom]
+    mujoco.mjv_initGeom(geom, kind, size, at, frame.ravel(), np.array(rgba, np.float32))
+    scene.ngeom += 1
+    return geom
+
+
+def _connect(
+    scene: mujoco.MjvScene, kind: mujoco.mjtGeom, width: float, start: Array, end: Array, rgba: tuple[float, ...]
+) -> None:
+    geom = _add(scene, kind, np.ones(3), start, np.eye(3), rgba)
+    mujoco.mjv_connector(geom, kind, width, np.asarray(start, np.float64), np.asarray(end, np.float64))

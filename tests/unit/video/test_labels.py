@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer.video.labels import pixel_of
+
+SIZE = (640, 480)
+
+
+@pytest.fixture
+def scene() -> mujoco.MjvScene:
+    """Seen from 10 m above the origin, x to the right and y up."""
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = mujoco.MjvCamera()
+    camera.lookat, camera.distance, camera.elevation, camera.azimuth = (0.0, 0.0, 0.0), 10.0, -90.0, 90.0
+    made = mujoco.MjvScene(model, 10)
+    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, camera, int(mujoco.mjtCatBit.mjCAT_ALL), made)
+    return made
+
+
+def test_places_are_found_in_the_picture(scene):
+    assert pixel_of(scene, np.zeros(3), SIZE) == pytest.approx((320.0, 240.0), abs=0.5)
+    right, up = (pixel_of(scene, np.array(place), SIZE) for place in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    assert right is not None
+    assert up is not None
+    # Half the height is seen under 22.5 deg.
+    per_m = 240.0 / (10.0 * np.tan(np.radians(22.5)))
+    assert right == pytest.approx((320.0 + per_m, 240.0), abs=1.0)
+    assert up == pytest.approx((320.0, 240.0 - per_m), abs=1.0)
+
+
+def test_what_is_behind_the_camera_is_nowhere(scene):
+    assert pixel_of(scene, np.array([0.0, 0.0, 11.0]), SIZE) is None
