@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,10 @@ from typing import Any
 import pytest
 
 from activesteer import Recording
+from tests.docs.blocks import same_output
 
 ROOT = Path(__file__).resolve().parents[2]
-NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
+FIRST_RUNS, LQR_DESIGN = (ROOT / "examples" / f"{name}.ipynb" for name in ("first_runs", "lqr_design"))
 
 
 @pytest.fixture
@@ -33,15 +35,29 @@ def outputs(notebook: Any) -> list[dict[str, Any]]:
     return [output["data"] for cell in cells for output in cell.outputs if "data" in output]
 
 
-def test_there_is_a_notebook() -> None:
-    assert [path.name for path in NOTEBOOKS] == ["first_runs.ipynb"]
+def run(path: Path, folder: Path) -> Any:
+    """The notebook as it is after a run."""
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    notebook = nbformat.read(path, as_version=4)
+    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(folder)}}).execute()
+    return notebook
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook_is_kept_without_outputs(path: Path) -> None:
+def printed(notebook: Any) -> list[str]:
+    """What the cells print."""
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    return ["".join(output.text for output in cell.outputs if output.output_type == "stream") for cell in cells]
+
+
+def test_every_notebook_is_tested() -> None:
+    assert sorted((ROOT / "examples").glob("*.ipynb")) == [FIRST_RUNS, LQR_DESIGN]
+
+
+def test_first_runs_are_kept_without_outputs() -> None:
     """They would be out of date with the next change of the car."""
     nbformat = pytest.importorskip("nbformat")
-    notebook = nbformat.read(path, as_version=4)
+    notebook = nbformat.read(FIRST_RUNS, as_version=4)
     nbformat.validate(notebook)
     for cell in notebook.cells:
         if cell.cell_type == "code":
@@ -50,11 +66,7 @@ def test_notebook_is_kept_without_outputs(path: Path) -> None:
 
 
 def test_first_runs_run(kernel_home: Path) -> None:
-    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
-    pytest.importorskip("ipykernel")
-    notebook = nbformat.read(ROOT / "examples" / "first_runs.ipynb", as_version=4)
-    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(kernel_home)}}).execute()
-    shown = outputs(notebook)
+    shown = outputs(run(FIRST_RUNS, kernel_home))
     assert sum("image/png" in data for data in shown) == 1
     assert sum("text/html" in data for data in shown) == 3  # tables
     share = float(shown[-2]["text/plain"].removeprefix("np.float64(").removesuffix(")"))
@@ -65,3 +77,22 @@ def test_first_runs_run(kernel_home: Path) -> None:
     }  # fmt: skip
     assert Recording.open(kernel_home / "step_steer-ars.mcap").metadata["controller"] == "ars"
     shutil.rmtree(kernel_home)
+
+
+def test_lqr_design_shows_what_it_gives_and_keeps_the_car(kernel_home: Path) -> None:
+    nbformat = pytest.importorskip("nbformat")
+    stored = nbformat.read(LQR_DESIGN, as_version=4)
+    nbformat.validate(stored)
+    again = run(LQR_DESIGN, kernel_home)
+    assert all(
+        same_output(ours.splitlines(), theirs) for ours, theirs in zip(printed(stored), printed(again), strict=True)
+    )
+    assert (
+        sum("image/png" in data for data in outputs(stored)) == sum("image/png" in data for data in outputs(again)) == 2
+    )
+    text = "".join(printed(again))
+    assert "none: spins" in text
+    assert "gentle: sideslip up to" in text
+    grows = [float(value) for value in re.findall(r"sharp: .* real part ([-\d.]+)", text)]
+    holds = [float(value) for value in re.findall(r"gentle: .* real part ([-\d.]+)", text)]
+    assert min(grows) > 0.0 > max(holds)
