@@ -84,12 +84,10 @@ def test_lqr_design_shows_what_it_gives_and_keeps_the_car(kernel_home: Path) -> 
     stored = nbformat.read(LQR_DESIGN, as_version=4)
     nbformat.validate(stored)
     again = run(LQR_DESIGN, kernel_home)
-    assert all(
-        same_output(ours.splitlines(), theirs) for ours, theirs in zip(printed(stored), printed(again), strict=True)
-    )
-    assert (
-        sum("image/png" in data for data in outputs(stored)) == sum("image/png" in data for data in outputs(again)) == 2
-    )
+    for shown, now in zip(printed(stored), printed(again), strict=True):
+        assert same_output(tuple(shown.splitlines()), now)
+    for notebook in (stored, again):
+        assert sum("image/png" in data for data in outputs(notebook)) == 2
     text = "".join(printed(again))
     assert "none: spins" in text
     assert "gentle: sideslip up to" in text
