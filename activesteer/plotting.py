@@ -42,9 +42,9 @@ def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
 
 
 def as_svg(figure: Figure) -> Markup:
-    """The picture as an SVG element, to stand in a page; matplotlib escapes its texts."""
+    """The picture as an SVG element, to stand on a page of any colour; matplotlib escapes its texts."""
     text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})
+    figure.savefig(text, format="svg", metadata={"Date": None}, transparent=True)
     svg = text.getvalue()
     return Markup(svg[svg.index("<svg") :])
 

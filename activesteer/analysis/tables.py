@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from activesteer.quantities import metric_label, metric_number
 
+Paint = Callable[[str, float, float, str], str]
+"""Of a metric: its name, its value in a run, that in the first run, its text -> the text as it is shown."""
 
-def comparison(runs: Mapping[str, Mapping[str, float]]) -> str:
+
+def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = None) -> str:
     """A table with a row per metric and a column per run.
 
     Args:
         runs: Metrics by label of the run; metrics that only some runs have leave a blank in the others.
+        paint: Gives the values of all runs but the first their colours; without it they have none.
 
     Returns:
         Lines of equal form, without a newline at the end: name, unit, then the values. A value that the run does not
@@ -24,10 +28,15 @@ def comparison(runs: Mapping[str, Mapping[str, float]]) -> str:
         numbers = [metric_number(name, metrics[name]) if name in metrics else "" for metrics in runs.values()]
         rows.append([words, unit, *numbers])
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return "\n".join(_line(row, widths) for row in rows)
+    cells = [_cells(row, widths) for row in rows]
+    first = next(iter(runs.values()), {})
+    for row, name in zip(cells[1:], names, strict=True):
+        for place, metrics in enumerate(list(runs.values())[1:], start=3):
+            if paint is not None and name in metrics and name in first:
+                row[place] = paint(name, metrics[name], first[name], row[place])
+    return "\n".join("  ".join(row).rstrip() for row in cells)
 
 
-def _line(row: list[str], widths: list[int]) -> str:
+def _cells(row: list[str], widths: list[int]) -> list[str]:
     texts = [cell.ljust(width) for cell, width in zip(row[:2], widths[:2], strict=True)]
-    numbers = [cell.rjust(max(width, 8)) for cell, width in zip(row[2:], widths[2:], strict=True)]
-    return "  ".join(texts + numbers).rstrip()
+    return texts + [cell.rjust(max(width, 8)) for cell, width in zip(row[2:], widths[2:], strict=True)]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.commands.arguments import add_json, add_output
-from activesteer.commands.output import print_json
+from activesteer.commands.output import BAD, GOOD, painted, print_json
 from activesteer.errors import ParameterError
 
 
@@ -54,9 +54,13 @@ def _compare(options: argparse.Namespace) -> int:
         later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{1e3 * shift_s:+.1f} ms"
         print(f"time shift of {file}: {later}")
     for each in found.quantities:
-        label, residual, tolerance, share, verdict = words(each)
-        print(f"  {label:24} rms {residual:>14}   {tolerance:>18}   {share:>7} {verdict}")
-    print("inside" if found.inside else "outside")
+        label, residual, tolerance, share, _ = words(each)
+        print(f"  {label:24} rms {residual:>14}   {tolerance:>18}   {share:>7} {_verdict(each.inside)}")
+    print(_verdict(found.inside))
     if options.output is not None:
         print(f"page: {options.output}")
     return 0 if found.inside else 1
+
+
+def _verdict(inside: bool) -> str:
+    return painted("inside", GOOD) if inside else painted("outside", BAD)

@@ -19,6 +19,7 @@ def add_to(commands: Any) -> None:
 
 
 def _info(options: argparse.Namespace) -> int:
+    from activesteer.analysis.report.results import kept, losses
     from activesteer.analysis.tables import comparison
     from activesteer.recording import Recording
 
@@ -26,7 +27,7 @@ def _info(options: argparse.Namespace) -> int:
     metadata = recording.metadata
     time_s = recording.time_s
     span = f"{time_s[0]:.3f} to {time_s[-1]:.3f} s, {len(time_s)} steps" if len(time_s) else "no steps"
-    print(f"{shown_path(options.file)}: {span}")
+    print_entry(f"{shown_path(options.file)}: ", span)
     for key in ("maneuver", "vehicle"):
         table = metadata.get(key, {})
         print_entry(f"{key}: ", f"{table.get('name', '?')} {table.get('title', '')}")
@@ -41,6 +42,8 @@ def _info(options: argparse.Namespace) -> int:
             print_entry(f"{key}: ", ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
     if not metadata.get("complete", True):
         print_entry("INCOMPLETE: ", str(metadata.get("error", "the run did not end properly")))
+    if result := [*losses(recording.metrics), *kept(recording.metrics)]:
+        print_entry("result: ", ", ".join(result))
     if recording.metrics:
         print(comparison({"metrics": recording.metrics}))
     print("channels:")
@@ -57,5 +60,10 @@ def _driver(recorded: Any) -> str:
     if not isinstance(recorded, dict):
         return str(recorded)
     numbers = recorded.get("parameters", recorded)
-    said = ", ".join(f"{key} {shown(value)}" for key, value in numbers.items() if key not in ("name", "title"))
+    words = (
+        f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {shown(value)}"
+        for key, value in numbers.items()
+        if key not in ("name", "title")
+    )
+    said = ", ".join(words)
     return f"{recorded.get('name', '?')} {recorded.get('title', '')}".rstrip() + (f" ({said})" if said else "")

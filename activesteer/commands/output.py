@@ -13,8 +13,12 @@ from typing import Any, Final
 
 from activesteer.files import json_text
 
-_COLOURS: Final = {"passed": 32, "FAILED": 31, "not reproduced": 33}
-"""Verdict -> what makes a terminal write green, red or yellow."""
+GOOD: Final = 32
+BAD: Final = 31
+_KNOWN: Final = 33
+"""What makes a terminal write green, red and yellow."""
+_COLOURS: Final = {"passed": GOOD, "FAILED": BAD, "not reproduced": _KNOWN}
+"""By verdict."""
 _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
 _COLUMNS: Final = 80
@@ -25,11 +29,25 @@ def print_json(value: Any) -> None:
     print(json_text(value))
 
 
+def in_colour() -> bool:
+    """Whether standard output may be coloured: a terminal that NO_COLOR does not forbid, or FORCE_COLOR asks for it.
+
+    Source: no-color.org, force-color.org.
+    """
+    if os.environ.get("NO_COLOR"):
+        return False
+    forced = os.environ.get("FORCE_COLOR", "")
+    return forced not in ("", "0") or (sys.stdout.isatty() and os.environ.get("TERM") != "dumb")
+
+
+def painted(text: str, colour: int) -> str:
+    """The text in a colour, where there may be one."""
+    return f"\x1b[{colour}m{text}\x1b[0m" if in_colour() and text.strip() else text
+
+
 def coloured(text: str) -> str:
-    """The text with its verdicts in colour where a terminal shows it and NO_COLOR does not forbid it (no-color.org)."""
-    if not sys.stdout.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
-        return text
-    return _VERDICT.sub(lambda found: f"{found[1]}\x1b[{_COLOURS[found[2]]}m{found[2]}\x1b[0m", text)
+    """The text with its verdicts in colour, where there may be one."""
+    return _VERDICT.sub(lambda found: f"{found[1]}{painted(found[2], _COLOURS[found[2]])}", text)
 
 
 def print_entry(head: str, text: str, hanging: int = 2) -> None:

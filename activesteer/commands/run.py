@@ -15,7 +15,7 @@ from activesteer.commands.arguments import (
     add_scenario,
     scenario_of,
 )
-from activesteer.commands.output import coloured, print_json
+from activesteer.commands.output import BAD, GOOD, coloured, painted, print_json
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError, shown
 from activesteer.files import make_folder
@@ -73,7 +73,9 @@ def _run(options: argparse.Namespace) -> int:
         table = {"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs}
         print_json({**table, "claims": claims.to_json()["claims"] if claims else []})
     elif any(recording.metrics for recording in recordings.values()):
-        print(comparison({label: recording.metrics for label, recording in recordings.items()}))
+        metrics = {label: recording.metrics for label, recording in recordings.items()}
+        print(comparison(metrics, _paint))
+        _print_outcomes(metrics)
         for judged in claims.judged if claims else ():
             verdict = "FAILED" if judged.verdict == "failed" else judged.verdict
             print(coloured(f"{judged.claim.id} {verdict}: {judged.claim.text}"))
@@ -82,6 +84,24 @@ def _run(options: argparse.Namespace) -> int:
             if not options.json:
                 print(f"figure: {figure}")
     return 0
+
+
+def _paint(name: str, value: float, first: float, text: str) -> str:
+    """What is better than in the first run in green, what is worse in red."""
+    from activesteer.analysis.report.results import Change, worth
+
+    colour = {Change.BETTER: GOOD, Change.WORSE: BAD}.get(worth(name, value, first))
+    return text if colour is None else painted(text, colour)
+
+
+def _print_outcomes(metrics: Mapping[str, Mapping[str, float]]) -> None:
+    """What each run lost or kept, below its numbers."""
+    from activesteer.analysis.report.results import kept, losses
+
+    for label, found in metrics.items():
+        for words, colour in ((losses(found), BAD), (kept(found), GOOD)):
+            if text := ", ".join(words):
+                print(f"{label}: {painted(text, colour)}")
 
 
 def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) -> list[Path]:

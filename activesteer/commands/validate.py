@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler
-from activesteer.commands.output import print_json
+from activesteer.commands.output import BAD, painted, print_json
 from activesteer.commands.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -78,7 +78,8 @@ def _validate(options: argparse.Namespace) -> int:
     for comparison in result.comparisons:
         mark = {True: " ", False: "!", None: "~"}[comparison.inside]
         run, quantity, ours, theirs, error, tolerance = comparison.words()
-        print(f"{mark} {run:13} {quantity:42} {ours:>15} {theirs:>15} {error:>14} {tolerance:>9}")
+        line = f"{mark} {run:13} {quantity:42} {ours:>15} {theirs:>15} {error:>14} {tolerance:>9}"
+        print(painted(line, BAD) if comparison.inside is False else line)
     kept = result.judged - len(result.outside)
     print(f"{kept} of {result.judged} comparisons keep their tolerance (! does not, ~ has none)")
     if options.output is not None:

@@ -77,7 +77,7 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
     shown = _shown_rows(table)
     return {
         "controllers": who["controller"][0],
-        "colours": [run_looks(who["controller"][0])[name].colour for name in who["controller"][0]],
+        "places": [run_looks(who["controller"][0])[name].place for name in who["controller"][0]],
         "groups": [f"{who['maneuver'][0][m]}, {who['vehicle'][0][v]}" for m, v in groups],
         "metrics": [{"name": name, "label": metric_label(name)[0], "unit": metric_label(name)[1]} for name in values],
         "factors": [_factor(key, table[key]) for key in study.keys],

@@ -13,7 +13,9 @@ import pytest
 
 import activesteer
 from activesteer import Recording
-from activesteer.commands.output import coloured
+from activesteer.analysis.tables import comparison
+from activesteer.commands import run as run_command
+from activesteer.commands.output import BAD, coloured, painted
 from activesteer.resources import find_vehicle
 from activesteer.version import __version__
 
@@ -216,7 +218,7 @@ def test_plot_is_drawn_beside_the_files(call, tmp_path):
 
 @pytest.mark.parametrize(("environment", "green"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)])
 def test_verdicts_are_coloured_on_a_terminal_alone(monkeypatch, environment, green):
-    for name in ("NO_COLOR", "TERM"):
+    for name in ("NO_COLOR", "FORCE_COLOR", "TERM"):
         monkeypatch.delenv(name, raising=False)
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
@@ -226,3 +228,37 @@ def test_verdicts_are_coloured_on_a_terminal_alone(monkeypatch, environment, gre
     shown = text.replace("passed:", "\x1b[32mpassed\x1b[0m:").replace("FAILED", "\x1b[31mFAILED\x1b[0m")
     shown = shown.replace("not reproduced", "\x1b[33mnot reproduced\x1b[0m")
     assert coloured(text) == (shown if green else text)
+
+
+@pytest.mark.parametrize(
+    ("environment", "colours"),
+    [
+        ({}, False),
+        ({"FORCE_COLOR": "1"}, True),
+        ({"FORCE_COLOR": "0"}, False),
+        ({"FORCE_COLOR": "1", "NO_COLOR": "1"}, False),
+    ],
+)
+def test_a_pipe_has_colours_only_where_they_are_forced(monkeypatch, environment, colours):
+    for name in ("NO_COLOR", "FORCE_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    assert ("\x1b[" in painted("lost", BAD)) is colours
+
+
+def test_metrics_that_are_better_than_in_the_first_run_are_green_and_worse_ones_red(monkeypatch, capsys):
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    none = {"sideslip_peak_abs_rad": 0.8, "cones_hit": 0.0, "yaw_rate_peak_abs_radps": 0.5}
+    ars = {"sideslip_peak_abs_rad": 0.1, "cones_hit": 2.0, "yaw_rate_peak_abs_radps": 0.6}
+    table = comparison({"none": none, "ars": ars}, run_command._paint)
+    assert "\x1b[32m   5.730\x1b[0m" in table
+    assert "\x1b[31m       2\x1b[0m" in table
+    assert table.count("\x1b[0m") == 2
+    run_command._print_outcomes({"none": none, "ars": ars})
+    told = capsys.readouterr().out
+    assert "none: \x1b[31mlost at 46 deg of sideslip\x1b[0m" in told
+    assert "ars: \x1b[31mhits 2 cones\x1b[0m" in told
+    monkeypatch.delenv("FORCE_COLOR")
+    assert comparison({"none": none, "ars": ars}, run_command._paint) == comparison({"none": none, "ars": ars})

@@ -40,8 +40,9 @@ DOTTED: Final[LineStyle] = (0.0, (1.0, 1.6))
 _INSET_FROM: Final = 2.0
 """By how much a lost car must exceed the others for an inset."""
 _INSET_WIDTH: Final = 0.34
-_INSET_HEIGHT: Final = 0.5
-"""Part of the axis."""
+_INSET_HEIGHT: Final = 0.48
+_INSET_CAPTION: Final = 0.16
+"""Parts of the axis."""
 _SETTLED: Final = 0.05
 """A signal has settled when it stays this near to its end, of its range."""
 _BEFORE: Final = 0.08
@@ -259,8 +260,8 @@ def show_lost_beside(axis: Axes, drawn: Sequence[Curve], panel: Quantity) -> Non
     margin = 0.08 * max(high - low, panel.min_span)
     low, high = low - margin, high + margin
     # Above or below, where it takes less to keep the inset clear of the others.
-    top = max(high, low + (corner_high + margin - low) / (1.0 - _INSET_HEIGHT))
-    bottom = min(low, high - (high - corner_low + margin) / (1.0 - _INSET_HEIGHT))
+    top = max(high, low + (corner_high + margin - low) / (1.0 - _INSET_HEIGHT - _INSET_CAPTION))
+    bottom = min(low, high - (high - corner_low + margin) / (1.0 - _INSET_HEIGHT - _INSET_CAPTION))
     above = top - low <= high - bottom
     axis.set_ylim(*((low, top) if above else (bottom, high)))
     place = (1.0 - _INSET_WIDTH, 1.02 - _INSET_HEIGHT if above else 0.02, _INSET_WIDTH, _INSET_HEIGHT - 0.04)

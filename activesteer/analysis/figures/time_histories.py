@@ -78,8 +78,8 @@ def _mark_instants(figure: Figure, recordings: Recordings) -> None:
     for text, later_s in instants:
         for axis in axes:
             axis.axvline(completion_s + later_s, color="#999999", linewidth=0.9, linestyle=":", zorder=1)
-        # The first stands before its line, so that the texts do not meet.
-        before = later_s == 0.0
+        # Only the last stands behind its line, so that the texts do not meet.
+        before = later_s < max(sine_with_dwell.INSTANTS_S)
         axes[0].annotate(
             text, (completion_s + later_s, 1.0), (-2 if before else 2, -1), xycoords=("data", "axes fraction"),
             textcoords="offset points", va="top", ha="right" if before else "left",

@@ -107,13 +107,13 @@ def results(group: Group) -> list[Result]:
     """What came out of each run of a group, beside the first of them."""
     chosen = list(_chosen(group))
     first = group.runs[0].recording.metrics
-    losses = [tuple(_losses(run)) for run in group.runs]
+    lost = [(*(["incomplete"] if run.problem else []), *losses(run.recording.metrics)) for run in group.runs]
     found = []
     for place, run in enumerate(group.runs):
         metrics = run.recording.metrics
-        kept = tuple(_kept(metrics)) or (("keeps the car",) if any(losses) and not losses[place] else ())
+        well = tuple(kept(metrics)) or (("keeps the car",) if any(lost) and not lost[place] else ())
         figures = [_figure(figure, name, metrics, first if place else None) for figure, name in chosen]
-        found.append(Result(run, losses[place], kept, tuple(figures)))
+        found.append(Result(run, lost[place], well, tuple(figures)))
     return found
 
 
@@ -130,10 +130,25 @@ def _chosen(group: Group) -> Iterator[tuple[KeyFigure, str]]:
     yield from list(having)[:MAX_FIGURES]
 
 
-def _losses(run: Run) -> Iterator[str]:
-    metrics = run.recording.metrics
-    if run.problem:
-        yield "incomplete"
+def worth(metric: str, value: float, first: float) -> Change:
+    """What the difference of a metric to that of the first run is worth; OTHER where it is no key figure.
+
+    Args:
+        metric: Its name.
+        value: Its value [SI].
+        first: That of the first run [SI].
+    """
+    figure = next((figure for figure in KEY_FIGURES if metric in figure.metrics), None)
+    if figure is None or figure.size is None or not math.isfinite(value - first):
+        return Change.OTHER
+    size, before = figure.size(value), figure.size(first)
+    if _near(metric, size, before):
+        return Change.SAME
+    return Change.BETTER if size < before else Change.WORSE
+
+
+def losses(metrics: Mapping[str, float]) -> Iterator[str]:
+    """What went wrong in a run with these metrics, in words."""
     peak = next((abs(metrics[name]) for name in SIDESLIP_PEAKS if name in metrics), None)
     if peak is not None and has_spun(metrics):
         yield f"lost at {math.degrees(peak):.0f} deg of sideslip" if math.isfinite(peak) else "lost"
@@ -146,7 +161,8 @@ def _losses(run: Run) -> Iterator[str]:
         yield f"hits {_cones(hit)}"
 
 
-def _kept(metrics: Mapping[str, float]) -> Iterator[str]:
+def kept(metrics: Mapping[str, float]) -> Iterator[str]:
+    """What a run with these metrics kept to, in words; nothing where there is nothing to keep to."""
     if metrics.get(IN_LANES) == 1.0:
         yield "stays in the lanes"
     if metrics.get(CONES_MISSED) == 0.0:
@@ -167,9 +183,11 @@ def _figure(figure: KeyFigure, name: str, metrics: Mapping[str, float], first: M
     if not math.isfinite(value - before):
         return Figure(text)
     difference = difference_text(name, value, before)
-    if abs(value - before) <= noticeable(name) or difference.text == "0":
+    if _near(name, value, before):
         return Figure(text, difference.text, Change.SAME)
-    shown = difference.percent or difference.text
-    if figure.size is None:
-        return Figure(text, shown)
-    return Figure(text, shown, Change.BETTER if figure.size(value) < figure.size(before) else Change.WORSE)
+    return Figure(text, difference.percent or difference.text, worth(name, value, before))
+
+
+def _near(metric: str, value: float, first: float) -> bool:
+    """Whether neither a driver nor a sensor could tell two values [SI] apart."""
+    return abs(value - first) <= noticeable(metric) or difference_text(metric, value, first).text == "0"

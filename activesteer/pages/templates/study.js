@@ -1,6 +1,7 @@
 "use strict";
 // Draws a study from the JSON in #data. Every picture is an SVG with axes and units; nothing is fetched.
 const data = JSON.parse(document.getElementById("data").textContent);
+const colourOf = data.places.map((place) => `var(--run-${place})`);
 const at = (id) => document.getElementById(id);
 const NS = "http://www.w3.org/2000/svg";
 
@@ -27,7 +28,7 @@ function ticks(low, high, count) {
   return found;
 }
 
-const short = (value) => String(Number(value.toPrecision(4)));
+const short = (value) => String(Number(value.toPrecision(4))).replace("-", "−");
 const withUnit = (label, unit) => (unit && unit !== "-" ? `${label} [${unit}]` : label);
 
 function range(values) {
@@ -72,7 +73,7 @@ function histogram(parent, metric, found, width, height) {
   shares.forEach((part, c) => {
     let path = `M${f.sx(edges[0])} ${f.sy(0)}`;
     part.forEach((share, i) => { path += `V${f.sy(share)}H${f.sx(edges[i + 1])}`; });
-    element(f.svg, "path", { d: `${path}V${f.sy(0)}`, fill: data.colours[c], "fill-opacity": 0.15, stroke: data.colours[c], "stroke-width": 1.5 });
+    element(f.svg, "path", { d: `${path}V${f.sy(0)}`, fill: colourOf[c], "fill-opacity": 0.15, stroke: colourOf[c], "stroke-width": 1.5 });
   });
 }
 
@@ -93,7 +94,7 @@ function scatter(parent, factor, points, label) {
   const f = frame(parent, 380, 260, axis, { label, range: range(points.map((p) => p.y)) });
   for (const p of points) {
     if (p.y === null || p.x === null || p.x === undefined) continue;
-    const dot = element(f.svg, "circle", { cx: f.sx(value(p.x)), cy: f.sy(p.y), r: 2.2, fill: data.colours[p.c], "fill-opacity": 0.6 });
+    const dot = element(f.svg, "circle", { cx: f.sx(value(p.x)), cy: f.sy(p.y), r: 2.2, fill: colourOf[p.c], "fill-opacity": 0.6 });
     element(dot, "title", {}, `run ${p.run}: ${short(p.y)}`);
   }
 }
@@ -109,7 +110,7 @@ function heat(parent, metric, found, keyed) {
       if (v === null) return;
       const depth = high > low ? (v - low) / (high - low) : 0.5;
       element(f.svg, "rect", { x: f.sx(i - 0.5), y: f.sy(j + 0.5), width: f.sx(0.5) - f.sx(-0.5), height: f.sy(-0.5) - f.sy(0.5), fill: `hsl(210 60% ${97 - 37 * depth}%)`, "shape-rendering": "crispEdges" });
-      if (map.length <= 12) element(f.svg, "text", { x: f.sx(i), y: f.sy(j) + 4, "text-anchor": "middle" }, short(v));
+      if (map.length <= 12) element(f.svg, "text", { x: f.sx(i), y: f.sy(j) + 4, "text-anchor": "middle", class: "on-shade" }, short(v));
     }));
   });
 }
@@ -123,10 +124,10 @@ function bars(parent, controller, found, metric, [bottom, top]) {
   element(f.svg, "line", { x1: f.sx(-0.5), x2: f.sx(factors.length - 0.5), y1: f.sy(0), y2: f.sy(0), stroke: "#888" });
   for (const [factor, name, value, confidence, spread] of found) {
     const n = names.indexOf(name), width = 0.6 / names.length, x = factors.indexOf(factor) - 0.3 + n * width;
-    const bar = element(f.svg, "rect", { x: f.sx(x), width: f.sx(width) - f.sx(0), y: f.sy(Math.max(value, 0)), height: Math.abs(f.sy(value) - f.sy(0)), fill: data.colours[controller], "fill-opacity": n === 0 && names.length > 1 ? 0.45 : 0.85 });
+    const bar = element(f.svg, "rect", { x: f.sx(x), width: f.sx(width) - f.sx(0), y: f.sy(Math.max(value, 0)), height: Math.abs(f.sy(value) - f.sy(0)), fill: colourOf[controller], "fill-opacity": n === 0 && names.length > 1 ? 0.45 : 0.85 });
     element(bar, "title", {}, `${name} ${short(value)} ± ${short(confidence)}${spread === null ? "" : `, spread ${short(spread)}`}`);
     const middle = f.sx(x + width / 2);
-    element(f.svg, "line", { x1: middle, x2: middle, y1: f.sy(value - confidence), y2: f.sy(value + confidence), stroke: "#000", "stroke-width": 1.5 });
+    element(f.svg, "line", { x1: middle, x2: middle, y1: f.sy(value - confidence), y2: f.sy(value + confidence), stroke: "currentColor", "stroke-width": 1.5 });
   }
 }
 
@@ -141,10 +142,10 @@ function parallel(parent, metric, rows) {
   for (const i of rows.slice(0, 600)) {
     const points = axes.map((axis, n) => [x(n), axis.of(i)]);
     if (points.some(([, v]) => v === null || v === undefined)) continue;
-    element(svg, "polyline", { points: points.map(([px, v], n) => `${px},${y(axes[n], v)}`).join(" "), fill: "none", stroke: data.colours[data.rows.controller[i]], "stroke-opacity": 0.35 });
+    element(svg, "polyline", { points: points.map(([px, v], n) => `${px},${y(axes[n], v)}`).join(" "), fill: "none", stroke: colourOf[data.rows.controller[i]], "stroke-opacity": 0.35 });
   }
   axes.forEach((axis, n) => {
-    element(svg, "line", { x1: x(n), x2: x(n), y1: top, y2: height - bottom, stroke: "#444" });
+    element(svg, "line", { x1: x(n), x2: x(n), y1: top, y2: height - bottom, stroke: "currentColor" });
     element(svg, "text", { x: x(n), y: 16, "text-anchor": "middle" }, axis.label);
     const marks = axis.levels ? axis.levels.map((level, i) => [i, String(level)]) : ticks(...axis.range, 5).map((v) => [v, short(v)]);
     for (const [v, text] of marks) element(svg, "text", { x: x(n) - 5, y: y(axis, v) + 4, "text-anchor": "end", class: "over" }, text);
@@ -217,13 +218,22 @@ for (const metric of data.metrics) html(at("metric"), "option", metric.label).va
 data.controllers.forEach((name, c) => {
   const colour = html(at("legend"), "span");
   colour.className = "colour";
-  colour.style.background = data.colours[c];
+  colour.style.background = colourOf[c];
   at("legend").append(name);
 });
-const preferred = data.metrics.find((metric) => metric.name === "sideslip_peak_abs_rad" || metric.name === "yaw_rate_peak_radps");
-if (preferred) at("metric").value = preferred.name;
+// A metric that the manoeuvre has: the one that is shown, where it has that, or the one that is mostly asked for.
+function choose() {
+  const has = data.by_group[Number(at("group").value)];
+  if (has[at("metric").value]) return;
+  const names = data.metrics.map((metric) => metric.name).filter((name) => has[name]);
+  const asked = names.find((name) => ["sideslip_peak_abs_rad", "sideslip_peak_rad", "yaw_rate_peak_radps"].includes(name));
+  if (names.length) at("metric").value = asked || names[0];
+}
+
 if (data.metrics.length) {
-  at("group").addEventListener("change", draw);
+  at("group").addEventListener("change", () => { choose(); draw(); });
   at("metric").addEventListener("change", draw);
+  at("metric").value = "sideslip_peak_abs_rad";
+  choose();
   draw();
 }
