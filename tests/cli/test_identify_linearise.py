@@ -45,6 +45,11 @@ def test_linearise_tells_the_modes_and_draws(tmp_path, capsys):
     assert (tmp_path / "root_locus.png").stat().st_size > 10_000
 
 
+def test_linearise_takes_other_values_of_the_car(capsys):
+    assert main(["linearise", "--set", "rear_actuator.preset=screw_3deg"]) == 0
+    assert "act_rl_screw" in capsys.readouterr().out
+
+
 def test_linearise_needs_a_speed(capsys):
     assert main(["linearise", "--speed-kmh", "0"]) == 1
     assert "speed_mps" in capsys.readouterr().err
