@@ -31,15 +31,15 @@ class SideslipRearSteerParameters:
 class LqrParameters:
     """Both axles by a linear-quadratic regulator (`lqr`)."""
 
-    yaw_rate_scale_radps: _Scale = math.radians(0.8)
+    yaw_rate_scale_radps: _Scale = math.radians(1.5)
     """Error of the yaw rate that weighs as much as a sideslip or an angle of their scales [rad/s]."""
     sideslip_scale_rad: _Scale = math.radians(0.5)
     """Sideslip angle, likewise [rad]."""
     rear_scale_rad: _Scale = math.radians(2.0)
     """Rear angle, likewise [rad]."""
-    superposition_scale_rad: _Scale = math.radians(4.0)
+    superposition_scale_rad: _Scale = math.radians(2.5)
     """Angle added at the front, likewise [rad]."""
-    reference_length_m: _Length = 0.87
+    reference_length_m: _Length = 0.86
     """Way over which the desired yaw rate follows the driver [m]."""
     friction_fraction: _Fraction = 0.85
     """Part of the estimated friction that the desired yaw rate may ask for [-]."""

@@ -9,7 +9,10 @@ with a lag T_a, whose commands take effect one call later:
     T_a da/dt = u_a - a,  T_a ddelta_H/dt = u_H - delta_H
 
 Desired is the turn with the car's own steady yaw rate at the driver's angle (eq. 3), no further than the friction gives
-(eq. 6), and without sideslip. It has the angles f*, g* that solve 0 = A [r*, 0] + B [f*, g*]; the law is
+(eq. 6), and without sideslip. It has the angles f*, g* that solve 0 = A [r*, 0] + B [f*, g*], and beyond that what
+the axles need of slip angle for the forces of that turn more than straight curves would (`AxleSlopes.excess_rad`):
+without it a car near its limit slides outwards by as much. u* are those angles when a demand of now works, the lag T_a
+and a call ahead. The law is
 
     u = u* - K(v) (x - x*),        x = (r, beta, f, g, a, delta_H, u before)
 
@@ -20,6 +23,10 @@ followed by the model.
 
 Where one actuator is known not to work, its angle is given: f* or g* is then where it is, and the other and the
 sideslip beta* that cannot be helped solve 0 = A [r*, beta*] + B [f*, g*]; K is that of the other actuator alone.
+
+The model ends where body, suspensions and steering column move, at some 6 Hz. So R is chosen for a loop that is slower
+than that: its disk margin, opened at both demands, is to be 0.5 at least from 60 to 160 km/h, with the estimator behind
+ideal sensors, which it follows at once, as well as behind those of production cars (`activesteer margins -c lqr`).
 
 Sources: B. D. O. Anderson and J. B. Moore, Optimal Control: Linear Quadratic Methods, 1989; both axles for yaw rate and
 zero sideslip: M. Abe, Vehicle Handling Dynamics, 2009, chapter 8.
@@ -33,6 +40,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from activesteer.controllers.axle_slopes import AxleSlopes
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
 from activesteer.controllers.family_parameters import LqrParameters
 from activesteer.controllers.parameters import ControllerSetup
@@ -49,6 +57,8 @@ STATES: Final = ("yaw_rate", "sideslip", "front", "rear", "superposition", "rear
 """Of the model; the angles in pairs, front before rear."""
 BOTH: Final = (True, True)
 """Both actuators work: superposition, rear steering."""
+_STEADY: Final = 6
+"""What a row of the schedule says of the steady turn, before the rows of K."""
 _FULL_MPS: Final = 8.0
 """From here on the controller does all it does; below it fades out until `MIN_SPEED_MPS` [m/s]."""
 
@@ -86,6 +96,7 @@ class Lqr:
         self._estimator = setup.estimator()
         self._car, self._interval_s = setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
+        self._curves = AxleSlopes(setup)
         self._front_rad = self._rear_rad = 0.0
         self._before = 0.0, 0.0
 
@@ -135,26 +146,43 @@ class Lqr:
         share = -math.expm1(-self._interval_s * speed / p.relaxation_length_m)
         self._front_rad += share * (driver + added - self._front_rad)
         self._rear_rad += share * (turned - self._rear_rad)
+        row = self._gains(works, speed)
         given = 0.0 if works[0] and works[1] else driver + added if works[1] else turned
-        front_r, front_g, rear_r, rear_g, sideslip_r, sideslip_g, *gains = self._gains(works, speed)
-        front, rear = front_r * desired + front_g * given, rear_r * desired + rear_g * given
-        sideslip, steady_added = sideslip_r * desired + sideslip_g * given, front - driver
+        front, rear, sideslip = self._steady(row, works, given, desired, now)
+        # What is demanded now works a call and a lag later.
+        coming = self._reference.ahead(p.actuator_lag_s + self._interval_s)
+        next_front, next_rear, _ = self._steady(row, works, given, coming, now)
+        steady = front - driver, rear
+        held = next_front - driver, next_rear
         errors = (
             now.yaw_rate_radps - desired,
             now.sideslip_rad - sideslip,
             self._front_rad - front,
             self._rear_rad - rear,
-            added - steady_added,
+            added - steady[0],
             turned - rear,
-            self._before[0] - steady_added,
-            self._before[1] - rear,
+            self._before[0] - held[0],
+            self._before[1] - held[1],
         )
-        count = len(errors)
+        count, gains = len(errors), row[_STEADY:]
         demand = (
-            steady_added - sum([gain * error for gain, error in zip(gains[:count], errors, strict=True)]),
-            rear - sum([gain * error for gain, error in zip(gains[count:], errors, strict=True)]),
+            held[0] - sum([gain * error for gain, error in zip(gains[:count], errors, strict=True)]),
+            held[1] - sum([gain * error for gain, error in zip(gains[count:], errors, strict=True)]),
         )
-        return Turn(now, desired, sideslip, (steady_added, rear), demand)
+        return Turn(now, desired, sideslip, steady, demand)
+
+    def _steady(
+        self, row: list[float], works: tuple[bool, bool], given_rad: float, yaw_rate_radps: float, now: Estimate
+    ) -> tuple[float, float, float]:
+        """Front angle, rear angle and sideslip of a steady turn [rad]; arguments as of `turn`, and a row of gains."""
+        front_r, front_g, rear_r, rear_g, sideslip_r, sideslip_g = row[:_STEADY]
+        ay_mps2 = now.speed_mps * yaw_rate_radps
+        front_more, rear_more = self._curves.excess_rad(ay_mps2, now.friction)
+        # An axle whose angle is given gets what it needs from the sideslip, and the other one follows.
+        less = 0.0 if works[0] and works[1] else rear_more if works[0] else front_more
+        front = front_r * yaw_rate_radps + front_g * given_rad + front_more - less
+        rear = rear_r * yaw_rate_radps + rear_g * given_rad + rear_more - less
+        return front, rear, sideslip_r * yaw_rate_radps + sideslip_g * given_rad - less
 
     def apply(self, superposition_rad: float, rear_rad: float) -> None:
         """Says what was demanded of the actuators in the end; where one does not work, where it is."""

@@ -58,27 +58,31 @@ def pulse_responses(
         ControllerError: it does not answer a small pulse in proportion, or its answer does not end, so that it has no
             such response.
     """
+    held = held or {}
     settled = copy.deepcopy(controller)
     _answers(settled, rolling, interval_s, round(_SETTLE_S / interval_s))
     rolling = rolling._replace(time_s=rolling.time_s + _SETTLE_S)
-    count = round(_LENGTH_S / interval_s)
-    found = np.empty((count, len(COMMANDS), len(SIGNALS)))
+    count, period = round(_LENGTH_S / interval_s), max([1, *(calls for calls, _ in held.values())])
+    found = np.zeros((count, len(COMMANDS), len(SIGNALS)))
     for column, signal in enumerate(SIGNALS):
-        calls, first = (held or {}).get(signal, (1, 0))
-        before = copy.deepcopy(settled)
-        _answers(before, rolling, interval_s, first)
-        seen = rolling._replace(time_s=rolling.time_s + first * interval_s)
-        rest = _answers(copy.deepcopy(before), seen, interval_s, count)
-        whole, half = (
-            (_answers(copy.deepcopy(before), seen, interval_s, count, signal, height, calls) - rest) / height
-            for height in (_PULSE[signal], 0.5 * _PULSE[signal])
-        )
-        largest = np.abs(whole).max()
-        if np.abs(whole - half).max() > _LINEAR * largest:
-            raise ControllerError(f"{name} does not answer {signal} in proportion, so that it has no linear form")
-        if np.abs(whole[-count // 10 :]).max() > _LEFT * largest:
-            raise ControllerError(f"{name} still answers a pulse of {signal} after {_LENGTH_S:g} s")
-        found[:, :, column] = whole
+        calls, first = held.get(signal, (1, 0))
+        # What takes in something else only every so many calls may answer otherwise in those between.
+        starts = range(first, first + period, calls)
+        for start in starts:
+            before = copy.deepcopy(settled)
+            _answers(before, rolling, interval_s, start)
+            seen = rolling._replace(time_s=rolling.time_s + start * interval_s)
+            rest = _answers(copy.deepcopy(before), seen, interval_s, count)
+            whole, half = (
+                (_answers(copy.deepcopy(before), seen, interval_s, count, signal, height, calls) - rest) / height
+                for height in (_PULSE[signal], 0.5 * _PULSE[signal])
+            )
+            largest = np.abs(whole).max()
+            if np.abs(whole - half).max() > _LINEAR * largest:
+                raise ControllerError(f"{name} does not answer {signal} in proportion, so that it has no linear form")
+            if np.abs(whole[-count // 10 :]).max() > _LEFT * largest:
+                raise ControllerError(f"{name} still answers a pulse of {signal} after {_LENGTH_S:g} s")
+            found[:, :, column] += whole / len(starts)
     return found
 
 

@@ -26,9 +26,9 @@ class TurnReference:
             interval_s: Time between two steps [s].
         """
         self._gain = SingleTrack(single_track).yaw_rate_gain
-        self._per_speed_spm = interval_s / length_m
+        self._length_m, self._interval_s = length_m, interval_s
         self._most_mps2 = friction_fraction * GRAVITY_MPS2
-        self._asked_rad = 0.0
+        self._asked_rad = self._driver_rad = self._speed_mps = self._limit_radps = 0.0
 
     def step(self, front_steer_rad: float, speed_mps: float, friction: float) -> float:
         """The desired yaw rate now [rad/s].
@@ -38,7 +38,19 @@ class TurnReference:
             speed_mps: Speed > 0 [m/s].
             friction: Friction of the road [-].
         """
-        self._asked_rad -= math.expm1(-self._per_speed_spm * speed_mps) * (front_steer_rad - self._asked_rad)
-        desired = self._gain(speed_mps) * self._asked_rad
-        limit = self._most_mps2 * friction / speed_mps
-        return min(max(desired, -limit), limit)
+        self._driver_rad, self._speed_mps = front_steer_rad, speed_mps
+        self._limit_radps = self._most_mps2 * friction / speed_mps
+        self._asked_rad = self._followed(self._interval_s)
+        return self._desired(self._asked_rad)
+
+    def ahead(self, duration_s: float) -> float:
+        """The desired yaw rate a while after that, if driver and speed stay as they are [rad/s]."""
+        return self._desired(self._followed(duration_s))
+
+    def _followed(self, duration_s: float) -> float:
+        share = -math.expm1(-duration_s * self._speed_mps / self._length_m)
+        return self._asked_rad + share * (self._driver_rad - self._asked_rad)
+
+    def _desired(self, asked_rad: float) -> float:
+        desired = self._gain(self._speed_mps) * asked_rad
+        return min(max(desired, -self._limit_radps), self._limit_radps)

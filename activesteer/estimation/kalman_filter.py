@@ -47,8 +47,9 @@ from activesteer.estimation.two_track_model import (
 
 _DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 0.01])
 """Steps of the differences, in the units of the states."""
-_MOST_BRAKED: Final = 0.5
-"""Fraction of the front axle's friction beyond which lateral forces say nothing of the friction."""
+_MOST_BRAKED: Final = 0.25
+"""Fraction of the front axle's friction beyond which lateral forces say nothing of the friction: brakes then take more
+of them, by a circle of friction that is itself not exact, than `force_fraction`."""
 _CREEP_MPS: Final = 0.05
 """Standard deviation of the lateral speed of a car that hardly moves [m/s]."""
 _CREEP_DENSITY: Final = 0.05
@@ -185,6 +186,11 @@ def predict(known, tyres, memory, duration_s):
             for k in range(n):
                 total += half[row, k] * slope[column, k]
             covariance[row, column] = covariance[column, row] = total
+    if _is_braked(known, memory):
+        # What is not learned must not follow what is: it would be drawn along by what both had in common before.
+        variance = covariance[FRICTION, FRICTION]
+        covariance[FRICTION, :] = covariance[:, FRICTION] = 0.0
+        covariance[FRICTION, FRICTION] = variance
 
 
 @inlined
@@ -206,7 +212,7 @@ def _take_in(state, covariance, row, error, variance):
 
 
 @compiled
-def correct(known, tyres, memory, yaw_rate_radps, ay_mps2):
+def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     """Takes in what the sensors said.
 
     Args:
@@ -215,6 +221,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2):
         memory: Record of `MEMORY`; state and covariance are changed.
         yaw_rate_radps: Yaw rate as measured [rad/s].
         ay_mps2: Lateral acceleration as measured [m/s2].
+        duration_s: Time since they were last taken in [s].
 
     Returns:
         Squared error of both over its expected covariance: of the chi-square distribution with two degrees of freedom.
@@ -245,7 +252,9 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2):
     expected = (front_N * cos_f + rear_N * cos_r + memory.front_along_N * sin_f) / mass
     error = ay_mps2 - expected - GRAVITY_MPS2 * memory.roll_rad - state[AY_OFFSET]
     front, rear = _force_errors(known, front_N, rear_N)
-    variance = known.ay_variance_m2ps4 + (known.ay_fraction * ay_mps2) ** 2 + (front + rear) / (mass * mass)
+    # A force that is wrong stays so: in all that time it counts as one measurement.
+    repeated = 1.0 + 2.0 * known.force_s / duration_s
+    variance = known.ay_variance_m2ps4 + (known.ay_fraction * ay_mps2) ** 2 + repeated * (front + rear) / (mass * mass)
     innovation += error * error / _take_in(state, covariance, row, error, variance)
     state[FRICTION] = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
     return innovation

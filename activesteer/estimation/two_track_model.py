@@ -10,9 +10,11 @@ Per axle i = f, r where there are two:
 
 with the steer angles d, the longitudinal forces X and their moment M_x, slip angles a that build up over the relaxation
 lengths s, the car's own tyre F_y under the wheel's load, and the friction u of the road by similarity. Beside a
-longitudinal force there is left what a circle of friction leaves. The body rolls by p as a mass on a spring: about an
-axis that lies h below the centre of gravity, so that the axles move sideways by h p' beside it; its springs and dampers
-load the wheels. The compliance c_i is what the identified cornering stiffness of the axle has beyond the tyres':
+longitudinal force u is what a circle of friction leaves of it: that lowers the largest force, and hardly that at small
+slip angles, as the Magic Formula of combined slip has it (0.7 of the friction for the brake take 8 % at 2 deg). The
+body rolls by p as a mass on a spring: about an axis that lies h below the centre of gravity, so that the axles move
+sideways by h p' beside it; its springs and dampers load the wheels. The compliance c_i is what the identified cornering
+stiffness of the axle has beyond the tyres':
 
     c_i = 1 / C_i - 1 / (2 C_tyre)
 
@@ -48,8 +50,9 @@ LARGEST_FRICTION: Final = 1.5
 """Friction is not taken for less or more."""
 SLOWEST_MPS: Final = 3.0
 """Slower than this, the car is taken to roll without slip angles [m/s]: the sensors cannot tell them."""
-_LEAST_LEFT: Final = 0.3
-"""Fraction of the lateral force that a wheel keeps whatever its longitudinal force is said to be."""
+_LEAST_LEFT: Final = 0.5
+"""Fraction of its friction that a wheel keeps for lateral force whatever its longitudinal force is said to be: by the
+Magic Formula some half of the lateral force is left at the slip of the largest brake force, at 1 to 6 deg."""
 _CREEP_S: Final = 0.3
 """Time in which a car that hardly moves turns as its wheels are steered [s]."""
 _LONGEST_STEP_S: Final = 0.005
@@ -89,7 +92,7 @@ def axle_force(forces_N, angle_step_rad, load_step_N, angle_rad, load_N, shift_N
         own_N = max(load_N + sign * shift_N, 0.0)
         used = along_N / (friction * own_N + 1.0)
         left = math.sqrt(max(1.0 - used * used, _LEAST_LEFT * _LEAST_LEFT))
-        total_N += left * _between(forces_N, angle_step_rad, load_step_N, size_rad, own_N)
+        total_N += left * _between(forces_N, angle_step_rad, load_step_N, size_rad / left, own_N)
     return math.copysign(friction * total_N, angle_rad)
 
 

@@ -47,3 +47,11 @@ def test_rear_wheels_that_stick_in_mid_manoeuvre_leave_no_yaw_rate_where_the_con
     }
     assert abs(left["integrated"]["yaw_rate_after_1750ms_share"]) < 0.02
     assert abs(left["lqr"]["yaw_rate_after_1750ms_share"]) > 0.05
+
+
+def test_braking_in_a_turn_does_not_make_the_estimator_steer_the_car_in():
+    run = activesteer.simulate("brake_in_turn", "lqr", overrides=PRODUCTION)
+    fast = run["speed_mps"] > 5.0
+    error_rad = (run["estimated_sideslip_rad"] - run["sideslip_rad"])[fast]
+    # A car that slides by a degree is what the controller must not answer to.
+    assert abs(error_rad).max() < math.radians(1.0)

@@ -95,12 +95,14 @@ def one_run(known, tyres, rng: np.random.Generator):
             memory[name] = true[name]
         front_N, rear_N = forces_of(known, tyres, true, state)
         ay_mps2 = (front_N * math.cos(angle_rad) + rear_N) / known.mass_kg
-        ay_mps2 += force_errors(known, tyres, true, state, rng).sum() / known.mass_kg
+        # What stays wrong for a time is, measured again and again, as wrong as one error of this size in each.
+        repeated = math.sqrt(1.0 + 2.0 * known.force_s / INTERVAL_S)
+        ay_mps2 += repeated * force_errors(known, tyres, true, state, rng).sum() / known.mass_kg
         rate = state[YAW_RATE] + state[RATE_OFFSET]
         rate += math.hypot(math.sqrt(known.rate_variance_rad2ps2), known.rate_fraction * rate) * rng.standard_normal()
         felt = ay_mps2 + GRAVITY_MPS2 * true.roll_rad + state[AY_OFFSET]
         felt += math.hypot(math.sqrt(known.ay_variance_m2ps4), known.ay_fraction * felt) * rng.standard_normal()
-        squared.append(correct(known, tyres, memory, rate, felt))
+        squared.append(correct(known, tyres, memory, rate, felt, INTERVAL_S))
     error = (state - memory.state)[MOTION]
     return error @ np.linalg.solve(memory.covariance[np.ix_(MOTION, MOTION)], error), np.mean(squared)
 
