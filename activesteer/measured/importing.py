@@ -15,7 +15,7 @@ from activesteer.errors import RecordingError, nearest_names, shown
 from activesteer.measured.columns import Column, find, read_columns
 from activesteer.measured.map_file import ChannelMap, MeasurementMap, read_map
 from activesteer.measured.motion import moved_car, with_motion
-from activesteer.measured.names import TURNED_IN_SAE, UNITS, Known, is_time, known_column, si_of
+from activesteer.measured.names import TURNED_IN_SAE, UNITS, Known, is_time, known_column, si_of, split_unit
 from activesteer.measured.plausibility import suspicions
 from activesteer.measured.resampling import Samples, gaps, resampled, samples
 from activesteer.recording import Recording
@@ -96,8 +96,8 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
         values[name] = resampled(signal, grid_s)
         if chosen.axes == "sae_j670" and name in TURNED_IN_SAE:
             values[name] = -values[name]
-    taken = {name: f"{source.column.name} [{source.known.unit or '-'}]" for name, source in sources.items()}
-    notes += suspicions(values)
+    taken = {name: _words(source) for name, source in sources.items()}
+    notes += suspicions(values, float(grid_s[1] - grid_s[0]))
     time_s = grid_s - shift_s
     derived = with_motion(time_s, values)
     channels = [_channel(name, table, taken) for name in derived]
@@ -119,6 +119,12 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
         recording.metadata["metrics_error"] = str(error)
         notes.append(f"no metrics of the kind {chosen.kind}: {error}")
     return Import(recording, taken, tuple(notes))
+
+
+def _words(source: _Source) -> str:
+    """Column and unit, which many names say already."""
+    name, unit = source.column.name, source.known.unit or "-"
+    return name if split_unit(name)[1] == unit else f"{name} [{unit}]"
 
 
 def _mapped(
@@ -158,6 +164,8 @@ def _by_name(columns: list[Column], table: Mapping[str, Channel], path: Path, no
             unit = _si_unit(known.channel, table)
             if unit and not known.sure:
                 notes.append(f"{column.name} has no unit and is taken for {unit} (a map can say another)")
+        if (second := f"{column.name} (2)") in names:
+            notes.append(f"of several columns {shown(column.name)} the first is taken; a map can take {shown(second)}")
         sources[known.channel] = _Source(column, known._replace(unit=unit), None)
     if not sources:
         some = ", ".join(shown(name) for name in sorted(names)[:8])

@@ -13,9 +13,12 @@ from activesteer.conventions import GRAVITY_MPS2
 _DEG: Final = math.radians(1.0)
 _UNITS: Final = {
     "rad": ("rad", 1.0), "deg": ("rad", _DEG), "°": ("rad", _DEG), "degree": ("rad", _DEG), "degrees": ("rad", _DEG),
-    "grad": ("rad", _DEG), "rad/s": ("rad/s", 1.0), "radps": ("rad/s", 1.0), "deg/s": ("rad/s", _DEG),
+    "grad": ("rad", _DEG), "grad/s": ("rad/s", _DEG),
+    "deg/sec": ("rad/s", _DEG), "rad/s": ("rad/s", 1.0), "radps": ("rad/s", 1.0), "deg/s": ("rad/s", _DEG),
     "°/s": ("rad/s", _DEG), "degps": ("rad/s", _DEG), "dps": ("rad/s", _DEG), "rpm": ("rad/s", math.pi / 30.0),
-    "1/min": ("rad/s", math.pi / 30.0), "m/s": ("m/s", 1.0), "mps": ("m/s", 1.0), "km/h": ("m/s", 1.0 / 3.6),
+    "1/min": ("rad/s", math.pi / 30.0),
+    "u/min": ("rad/s", math.pi / 30.0), "m/s/s": ("m/s2", 1.0),
+    "m/s": ("m/s", 1.0), "mps": ("m/s", 1.0), "km/h": ("m/s", 1.0 / 3.6),
     "kmh": ("m/s", 1.0 / 3.6), "kph": ("m/s", 1.0 / 3.6), "mph": ("m/s", 0.44704), "m/s2": ("m/s2", 1.0),
     "m/s^2": ("m/s2", 1.0), "m/s²": ("m/s2", 1.0), "mps2": ("m/s2", 1.0), "g": ("m/s2", GRAVITY_MPS2),
     "m": ("m", 1.0), "cm": ("m", 0.01), "mm": ("m", 0.001), "s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6),

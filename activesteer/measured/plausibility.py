@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Final
@@ -12,16 +13,16 @@ from activesteer.conventions import GRAVITY_MPS2, Array
 
 _ALIKE: Final = 0.7
 """Correlation from which on two signals belong to the same motion."""
-_FACTORS: Final = (
-    (math.radians(1.0), "yaw_rate_radps is 57 times too large: it looks like deg/s that were taken as rad/s"),
-    (math.degrees(1.0), "yaw_rate_radps is 57 times too small: it looks like rad/s that were taken as deg/s"),
-    (1.0 / 3.6, "the speed is 3.6 times too large: it looks like km/h that were taken as m/s"),
-    (3.6, "the speed is 3.6 times too small: it looks like m/s that were taken as km/h"),
-    (1.0 / GRAVITY_MPS2, "ay_mps2 is 9.8 times too small: it looks like g that were taken as m/s2"),
-    (GRAVITY_MPS2, "ay_mps2 is 9.8 times too large: it looks like m/s2 that were taken as g"),
-)
-"""ay / (v yaw rate), which is 1 but for the change of the sideslip, and what it means."""
+_MISTAKES: Final = {
+    "yaw_rate_radps": (math.degrees(1.0), "deg/s", "rad/s"),
+    "speed_mps": (3.6, "km/h", "m/s"),
+    "ay_mps2": (1.0 / GRAVITY_MPS2, "g", "m/s2"),
+}
+"""Channel -> how much too large it is where the first unit was taken for the second."""
 _NEAR: Final = math.log(1.5)
+"""Ratios within it are the same: ay/(v yaw rate) is 1 but for the change of the sideslip."""
+_LONGEST_STEP_S: Final = 1.0
+"""Step from which on nothing of a car's motion is seen [s]."""
 _STEER_RANGE: Final = (0.001, 0.15)
 """Yaw rate over speed and steering wheel angle that a car may have [1/m]: 1/(wheelbase x ratio) is 0.02, divided by
 1 + (v/v_ch)^2, and less at the limit; degrees for radians are 57 times beyond."""
@@ -29,20 +30,30 @@ _FASTEST_RADPS: Final = 4.0
 """Yaw rate that no car on its wheels reaches [rad/s]."""
 
 
-def suspicions(channels: Mapping[str, Array]) -> list[str]:
+def suspicions(channels: Mapping[str, Array], step_s: float = 0.01) -> list[str]:
     """What looks like a wrong unit or sign, one line each.
 
     Args:
         channels: Values by channel name, SI, all of one length.
+        step_s: Time between two values [s].
     """
     speed, rate, ay, wheel = (
         channels.get(name) for name in ("speed_mps", "yaw_rate_radps", "ay_mps2", "steering_wheel_rad")
     )
     found: list[str] = []
+    if step_s >= _LONGEST_STEP_S:
+        found.append(f"the time has steps of {step_s:g} s: it looks like ms or us that were taken as s (time_unit)")
     if speed is not None and rate is not None and ay is not None:
         found += _against_acceleration(speed * rate, ay, wheel)
     elif rate is not None and np.abs(rate).max() > _FASTEST_RADPS:
         found.append(f"yaw_rate_radps reaches {np.abs(rate).max():.0f} rad/s: it looks like deg/s")
+    roll = channels.get("roll_rad")
+    signed = any("sign" in line for line in found)
+    if roll is not None and ay is not None and _alike(roll, ay) < -_ALIKE and not signed:
+        found.append(
+            "roll_rad and ay_mps2 are of opposite sign: a car rolls to the outside of the turn, so roll_rad is "
+            'positive to the left, or all are in axes of SAE J670 (axes = "sae_j670" in a map)'
+        )
     opposite = rate is not None and wheel is not None and _alike(wheel, rate) < -_ALIKE
     if opposite and not any("sign" in line for line in found):
         found.append(
@@ -64,11 +75,33 @@ def _against_acceleration(product: Array, ay: Array, wheel: Array | None) -> lis
         if wheel is not None and abs(_alike(wheel, ay)) > _ALIKE:
             guilty = "ay_mps2 is" if _alike(wheel, ay) < 0.0 else "yaw_rate_radps is"
         found.append(f"ay_mps2 and yaw_rate_radps are of opposite sign: {guilty} positive to the right")
-    ratio = float(product @ ay / (product @ product))
-    factor, words = min(_FACTORS, key=lambda each: abs(math.log(abs(ratio) / each[0])))
-    if abs(math.log(abs(ratio) / factor)) < _NEAR:
-        found.append(words)
+    found += _unit_words(abs(float(product @ ay / (product @ product))))
     return found
+
+
+def _unit_words(ratio: float) -> list[str]:
+    """What makes the lateral acceleration so many times speed x yaw rate: the fewest units taken for another one."""
+    if abs(math.log(ratio)) < _NEAR:
+        return []
+    guesses = []
+    for powers in itertools.product((0, 1, -1), repeat=len(_MISTAKES)):
+        would = math.prod(
+            size ** (power if name == "ay_mps2" else -power)
+            for power, (name, (size, _, _)) in zip(powers, _MISTAKES.items(), strict=True)
+        )
+        if abs(math.log(ratio / would)) < _NEAR:
+            guesses.append((sum(map(abs, powers)), abs(math.log(ratio / would)), powers))
+    if not guesses:
+        return [f"ay_mps2 is {ratio:.2g} times speed x yaw rate, nearly 1 in a car: a unit of the three is wrong"]
+    return [_unit_word(name, power) for power, name in zip(min(guesses)[2], _MISTAKES, strict=True) if power]
+
+
+def _unit_word(name: str, power: int) -> str:
+    size, wrong, right = _MISTAKES[name]
+    if power < 0:
+        size, wrong, right = 1.0 / size, right, wrong
+    times = f"{size:.2g} times too large" if size > 1.0 else f"{1.0 / size:.2g} times too small"
+    return f"{name} is {times}: it looks like {wrong} that were taken as {right}"
 
 
 def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:

@@ -56,6 +56,61 @@ def test_a_line_of_units_and_a_preamble_are_understood_and_bytes_of_windows(tmp_
     np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS, atol=1e-7)
 
 
+@pytest.mark.parametrize(
+    ("names", "cells", "coding"),
+    [
+        ('"t [s]","Gierrate [deg/s]","v [km/h]"', '"{t:.3f}","{r:.6f}","72"', "utf-8"),
+        ("t [s];Gierrate [Grad/s];v [km/h];", "{t:.3f};{r:.6f};72;", "utf-16"),
+        ("Zeit;Gierrate [deg/s];v [km/h];Gang", "2024-05-01 23:59:{t:06.3f};{r:.6f};72;D1", "utf-8"),
+        ("Zeit;Gierrate [deg/s];v [km/h]", "09:59:{t:06.3f};{r:.6f};72", "utf-8"),
+    ],
+)
+@pytest.mark.parametrize("comma", [True, False])
+def test_quotes_words_clocks_and_unicode_text_are_understood(tmp_path, names, cells, coding, comma):
+    lines = [cells.format(t=t, r=math.degrees(r)) for t, r in zip(TIME_S, RATE_RADPS, strict=True)]
+    if comma and "2024" not in cells:
+        lines = [line.replace(".", ",") for line in lines]
+    (tmp_path / "a.csv").write_text("\n".join([names, *lines]), encoding=coding)
+    recording = import_file(tmp_path / "a.csv").recording
+    np.testing.assert_allclose(np.diff(recording.time_s), 0.01, atol=1e-6)
+    np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS, atol=1e-7)
+    assert recording["speed_mps"][0] == pytest.approx(20.0)
+
+
+def test_of_columns_of_one_name_the_first_is_taken_which_is_said_and_a_map_takes_another(tmp_path):
+    path = write(tmp_path / "a.csv", "t,yawrate,yawrate,v", [TIME_S, RATE_RADPS, 2.0 * RATE_RADPS, SPEED_MPS])
+    found = import_file(path)
+    check_rate(found.recording, 1.0)
+    assert any("of several columns 'yawrate' the first is taken" in note for note in found.notes)
+    (tmp_path / "map.toml").write_text('[channels]\nyaw_rate_radps = { column = "yawrate (2)" }\n')
+    check_rate(import_file(path, tmp_path / "map.toml").recording, 2.0)
+
+
+def check_rate(recording: Recording, factor: float) -> None:
+    np.testing.assert_allclose(recording["yaw_rate_radps"], factor * RATE_RADPS, atol=1e-8)
+
+
+def test_several_units_that_nobody_said_are_suspected_together_and_milliseconds_too():
+    columns = {
+        "speed_mps": 3.6 * SPEED_MPS, "yaw_rate_radps": np.degrees(RATE_RADPS), "ay_mps2": AY_MPS2 / 9.81,
+        "steering_wheel_rad": np.degrees(WHEEL_RAD),
+    }  # fmt: skip
+    lines = suspicions(columns)
+    assert [line.split()[0] for line in lines] == ["yaw_rate_radps", "speed_mps", "ay_mps2"]
+    assert all("that were taken as" in line for line in lines)
+    right = {"speed_mps": SPEED_MPS, "yaw_rate_radps": RATE_RADPS, "ay_mps2": AY_MPS2}
+    assert suspicions(right, 0.01) == []
+    assert "steps of 10 s" in suspicions(right, 10.0)[0]
+    assert "a unit of the three is wrong" in suspicions({**right, "ay_mps2": 1e5 * AY_MPS2})[0]
+
+
+def test_a_car_that_rolls_into_the_turn_is_suspected():
+    right = {"speed_mps": SPEED_MPS, "yaw_rate_radps": RATE_RADPS, "ay_mps2": AY_MPS2, "roll_rad": 0.01 * AY_MPS2}
+    assert suspicions(right) == []
+    sae = {**right, "yaw_rate_radps": -RATE_RADPS, "ay_mps2": -AY_MPS2}
+    assert "SAE J670" in suspicions(sae)[0]
+
+
 def test_mat_parquet_and_our_own_exports_come_back(tmp_path):
     savemat(tmp_path / "a.mat", {"run": {"t": TIME_S, "YawRate": RATE_RADPS}, "lateral_acceleration": AY_MPS2})
     (tmp_path / "map.toml").write_text(
@@ -127,7 +182,7 @@ def test_gaps_are_bridged_as_long_as_the_map_allows(tmp_path):
 @pytest.mark.parametrize(
     ("factors", "said"),
     [
-        ({"yaw_rate_radps": math.degrees(1.0)}, "57 times too large"),
+        ({"yaw_rate_radps": math.degrees(1.0)}, "57 times too large: it looks like deg/s"),
         ({"yaw_rate_radps": math.radians(1.0)}, "57 times too small"),
         ({"speed_mps": 3.6}, "km/h that were taken as m/s"),
         ({"ay_mps2": 1.0 / 9.81}, "g that were taken as m/s2"),
@@ -157,6 +212,7 @@ def test_a_wrong_unit_or_sign_is_suspected_in_one_line(factors, said):
         ("a.csv", b"time,yaw_rate_radps\n0,0\n1,0\n0.5,0\n", "goes backwards, from 1 to 0.5 s"),
         ("a.csv", b"time,yaw_rate_radps\n0,0\n", "fewer than two samples"),
         ("a.csv", b"time,yaw_rate_radps[bar]\n0,0\n1,1\n", "yaw_rate_radps"),
+        ("a.csv", b"time,yawrate,v\n0,00,0,01,72\n0,01,0,02,72\n", "names 3 columns and has 5"),
         ("a.csv", b"time,foo\n0,0\n1,1\n", "'foo'"),
         ("a.csv", b"u,yaw_rate_radps\n0,0\n1,1\n", "no column is called as a time"),
         ("a.csv", b"time,yawrate,YawRate\n0,0,0\n1,1,1\n", "are both yaw_rate_radps"),

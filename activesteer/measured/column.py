@@ -1,0 +1,57 @@
+"""A column of a file of measured data, whatever its format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from activesteer.conventions import Array
+from activesteer.errors import RecordingError, shown
+from activesteer.files import shown_path
+
+_BROKEN: Final = (Exception,)
+"""What bytes of anybody's make the libraries of these formats raise has no bound."""
+
+
+class Column(NamedTuple):
+    """A column or signal of a file.
+
+    Attributes:
+        name: Its name there.
+        unit: Its unit as the file has it; empty where it does not say.
+        read: Its values, shape (n,), and their own times [s]; None where they share a time column of the file.
+    """
+
+    name: str
+    unit: str
+    read: Callable[[], tuple[Array, Array | None]]
+
+
+@contextmanager
+def understood(path: Path, what: str) -> Iterator[None]:
+    """Stands around what reads a file: whatever it raises becomes a RecordingError of one line."""
+    try:
+        yield
+    except RecordingError:
+        raise
+    except _BROKEN as reason:
+        raise RecordingError(f"{shown_path(path)} is no {what} that can be read: {reason}", value=path) from reason
+
+
+def numbers(values: Any, name: str, path: Path) -> Array:
+    """Values as numbers; instants as seconds since the first one.
+
+    Raises:
+        RecordingError: they are none.
+    """
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "mM":
+            return (array - array[0]).astype("timedelta64[ns]").astype(np.float64) * 1e-9
+        return np.asarray(array, np.float64)
+    except (TypeError, ValueError, IndexError) as reason:
+        raise RecordingError(f"column {shown(name)} holds no numbers: {reason}", file=path.name) from None
