@@ -32,7 +32,8 @@ from activesteer.scenario import resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.comparison import compare
-from activesteer.studies.comparison_figure import comparison_figure
+from activesteer.studies.comparison_figure import comparison_figure, comparison_population_figure
+from activesteer.studies.comparison_population import stored_comparison
 from activesteer.studies.driver_loop import FREQUENCIES_RADPS, driver_loops
 from activesteer.studies.envelope import envelope
 from activesteer.studies.envelope_figure import envelope_figure
@@ -103,6 +104,7 @@ def main(names: Sequence[str]) -> None:
         "tyres": _tyres,
         "brakes": _brakes,
         "comparison": _comparison,
+        "comparison_population": _comparison_population,
     }
     pictures |= {f"envelope_{name}": lambda name=name: {f"envelope_{name}": _envelope(name)} for name in ENVELOPES}
     for name in names or pictures:
@@ -273,6 +275,12 @@ def _comparison() -> dict[str, Figure]:
     """All built-in controllers side by side."""
     with tempfile.TemporaryDirectory() as folder:
         return {"comparison": comparison_figure(compare(COMPARED, folder))}
+
+
+def _comparison_population() -> dict[str, Figure]:
+    """The comparison over a population that belongs to the package."""
+    found = stored_comparison()
+    return {} if found is None else {"comparison_population": comparison_population_figure(found)}
 
 
 def _envelope(name: str) -> Figure:

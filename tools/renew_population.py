@@ -1,16 +1,20 @@
 """Drives the population anew, or what is missing of it, keeps what came of it with the package, and writes its page.
 
     python tools/renew_population.py [-o DIR] [--samples N] [--jobs N]
+    python tools/renew_population.py --comparison [-o DIR] [--samples N] [--jobs N]
 
 500 samples take half an hour on two idle processors; it can be interrupted and called again. A folder that
 `activesteer reproduce --population N -o DIR` has finished is taken as it is. tools/make_claims_table.py is to be called
-afterwards.
+afterwards. The second line does the same with the comparison of controllers, whose table stands in
+docs/chassis_control.md; `tools/make_doc_pictures.py comparison_population` is to be called after it.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -19,10 +23,18 @@ from activesteer.analysis.claims.population import Change, Population, percent
 from activesteer.commands.progress import RunCounter
 from activesteer.quantities import metric_label
 from activesteer.resources import find_study
+from activesteer.studies.comparison_population import ComparisonPopulation, compare_population, store_comparison
+from activesteer.studies.comparison_targets import NONE, REFERENCES
 from activesteer.studies.population import STUDY, population
 from activesteer.studies.population_store import store_population
 
-PAGE: Final = Path(__file__).resolve().parent.parent / "docs" / "population.md"
+DOCS: Final = Path(__file__).resolve().parent.parent / "docs"
+PAGE: Final = DOCS / "population.md"
+CHASSIS_CONTROL: Final = DOCS / "chassis_control.md"
+BEGIN: Final = "<!-- the table is written by tools/renew_population.py -->\n"
+END: Final = "<!-- end of the table -->\n"
+COMPARED: Final = ("none", "ars", "afs", "esc", "lqr", "mpc", "integrated")
+"""Controllers of the comparison that belongs to the package."""
 PRODUCTION: Final = "sensors.preset = production"
 """The share of the samples behind sensors of production cars."""
 _HEAD: Final = """# The population
@@ -74,6 +86,42 @@ def page(found: Population) -> str:
     return head + "\n".join(_claims(found)) + "\n" + _SYSTEMS + "\n".join(_systems(found)) + "\n"
 
 
+def comparison_page(text: str, found: ComparisonPopulation | None) -> str:
+    """The page on chassis control with the table of a comparison in its place.
+
+    Args:
+        text: The page.
+        found: What came of the comparison; None where none is stored.
+    """
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    lines = ["None belongs to the package yet; `tools/renew_population.py --comparison` makes one."]
+    return f"{before}{BEGIN}" + "\n".join(lines if found is None else _comparison(found)) + f"\n{END}{after}"
+
+
+def _comparison(found: ComparisonPopulation) -> list[str]:
+    names = [name for name in found.controllers if name != NONE]
+    versions = ", ".join(f"{name} {version}" for name, version in found.versions.items())
+    lines = [
+        f"{found.samples} samples of the {found.vehicle}, seed {found.seed}; driven with {versions}.",
+        "",
+        _row(f"peak of the sideslip below the lowest of {', '.join(REFERENCES)}", [f"`{name}`" for name in names]),
+        "|---|" + "---|" * len(names),
+    ]
+    for scenario in dict.fromkeys(effect.scenario for effect in found.effects):
+        own = [effect for effect in found.effects if effect.scenario == scenario]
+        lines.append(_row(scenario.replace("_", " "), [str(effect.lower) for effect in own]))
+    totals = [found.total(name) for name in names]
+    lines.append(_row("**all scenarios**", [str(total.lower) for total in totals]))
+    lines.append(_row("of the lost without control, saved", [str(total.saved) for total in totals]))
+    lines.append(_row("of the fine without control, spoiled", [str(total.spoiled) for total in totals]))
+    return [*lines, "", "![Shares of the population by scenario and controller](pictures/comparison_population.png)"]
+
+
+def _row(head: str, cells: Iterable[str]) -> str:
+    return f"| {head} | " + " | ".join(cells) + " |"
+
+
 def _claims(found: Population) -> list[str]:
     return [
         f"| {claim.id} | {STATEMENTS[claim.id].text} | {'yes' if STATEMENTS[claim.id].kind is Kind.DRIVER else ''} | "
@@ -106,14 +154,24 @@ def _number(value: float) -> str:
 def main() -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-o", "--output", type=Path, default=Path("build/population"), metavar="DIR")
+    parser.add_argument("--comparison", action="store_true", help="of controllers, in place of the paper's claims")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="default: build/population or build/comparison"
+    )
     parser.add_argument("--samples", type=int, metavar="N", help="default: that of studies/population.toml")
     parser.add_argument("--jobs", type=int, metavar="N")
     options = parser.parse_args()
+    output = options.output or Path("build", "comparison" if options.comparison else "population")
+    drive = partial(compare_population, COMPARED) if options.comparison else population
     with RunCounter("population", quiet=False) as counter:
-        found = population(options.samples, output=options.output, jobs=options.jobs, progress=counter)
+        found = drive(options.samples, output=output, jobs=options.jobs, progress=counter)
     print(found.to_text())
-    for path in store_population(found, options.output):
+    if isinstance(found, ComparisonPopulation):
+        print(store_comparison(found))
+        text = CHASSIS_CONTROL.read_text(encoding="utf-8")
+        CHASSIS_CONTROL.write_text(comparison_page(text, found), encoding="utf-8")
+        return
+    for path in store_population(found, output):
         print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")
     PAGE.write_text(page(found), encoding="utf-8")
 

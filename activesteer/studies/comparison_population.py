@@ -6,10 +6,12 @@ production cars, of which every sample has others.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -19,8 +21,8 @@ from activesteer.analysis.claims.population import SystemEffect, percent
 from activesteer.analysis.loss import SIDESLIP_PEAKS
 from activesteer.config import read_toml
 from activesteer.errors import ManeuverError, ParameterError, StudyError
-from activesteer.files import finite
-from activesteer.resources import find_maneuver
+from activesteer.files import finite, make_folder, reading, write_text
+from activesteer.resources import find_maneuver, studies_dir
 from activesteer.scenario import FileOrTable
 from activesteer.studies.comparison import CASES, SHOWN, Row
 from activesteer.studies.comparison_targets import (
@@ -42,9 +44,11 @@ from activesteer.theory.shares import wilson_interval
 
 SCENARIOS: Final = tuple(name for name in CASES if name not in ("severe_lane_change", "split_mu_braking"))
 """Those of the comparison but two: one is compared by entry speed, in the other sideslip is not what matters."""
+STORED: Final = "comparison/summary.json"
+"""What is kept with the package of its own one, below the folder of the study files."""
 _PRESET: Final = "sensors.preset"
 _SEED: Final = "sensors.seed"
-_TOTAL: Final = "all scenarios"
+TOTAL: Final = "all scenarios"
 
 
 @dataclass(frozen=True)
@@ -154,7 +158,7 @@ class ComparisonPopulation:
         lower, saved, spoiled = (
             sum((getattr(effect, name) for effect in own), nothing) for name in ("lower", "saved", "spoiled")
         )
-        return Effect(_TOTAL, controller, lower, saved, spoiled, math.nan, math.nan)
+        return Effect(TOTAL, controller, lower, saved, spoiled, math.nan, math.nan)
 
     @property
     def targets(self) -> list[Target]:
@@ -215,7 +219,7 @@ class ComparisonPopulation:
         ]
         named = [name for name in self.controllers if name != NONE]
         totals = [self.total(name) for name in named]
-        for scenario in [*dict.fromkeys(effect.scenario for effect in self.effects), _TOTAL]:
+        for scenario in [*dict.fromkeys(effect.scenario for effect in self.effects), TOTAL]:
             lines.append(scenario)
             lines += [_line(effect) for effect in (*self.effects, *totals) if effect.scenario == scenario]
         if self.failed:
@@ -327,6 +331,33 @@ def summarise(table: pa.Table, planned: StudyFile) -> ComparisonPopulation:
         effects=tuple(_effect(one, lower) for one in found),
         table=tuple(_medians(rows, planned)),
     )
+
+
+def store_comparison(found: ComparisonPopulation) -> Path:
+    """Keeps what came of a comparison with the package, without the medians of all metrics.
+
+    Returns:
+        The file.
+
+    Raises:
+        StudyError: it cannot be written.
+    """
+    path = studies_dir() / STORED
+    make_folder(path.parent, StudyError)
+    return write_text(path, json.dumps(replace(found, table=()).to_json(), indent=1) + "\n", StudyError)
+
+
+def stored_comparison() -> ComparisonPopulation | None:
+    """The comparison that belongs to the package; None where there is none.
+
+    Raises:
+        StudyError: it cannot be read.
+    """
+    path = studies_dir() / STORED
+    if not path.is_file():
+        return None
+    with reading(path, StudyError):
+        return ComparisonPopulation.from_json(json.loads(path.read_text(encoding="utf-8")))
 
 
 def _effect(found: SystemEffect, lower: Mapping[tuple[str, str], Share]) -> Effect:

@@ -18,11 +18,12 @@ from activesteer.analysis.claims import SCENARIOS, STATEMENTS, SYSTEMS
 from activesteer.analysis.claims.population import Population, stored_population
 from activesteer.analysis.loss import is_lost
 from activesteer.recording import Recording
+from activesteer.studies.comparison_population import stored_comparison
 from activesteer.studies.plan import Plan
 from activesteer.studies.population import CHANGES, population_study, summarise
 from activesteer.studies.population_store import stored_runs
 from activesteer.studies.run_task import CLAIM, Row, drive
-from tools.renew_population import PAGE, page
+from tools.renew_population import CHASSIS_CONTROL, PAGE, comparison_page, page
 
 TOLERANCE = 1e-3
 CHECKED = 8
@@ -74,6 +75,11 @@ def test_it_is_of_the_claims_that_there_are_and_of_all_runs():
 
 def test_the_page_says_what_is_stored():
     assert PAGE.read_text(encoding="utf-8") == page(stored())
+
+
+def test_the_page_on_chassis_control_says_what_is_stored():
+    text = CHASSIS_CONTROL.read_text(encoding="utf-8")
+    assert text == comparison_page(text, stored_comparison())
 
 
 def test_nominal_verdicts_are_those_of_the_nominal_runs(runs: dict[str, dict[str, Recording]]):
