@@ -15,6 +15,7 @@ from activesteer.errors import ModelError, ParameterError
 from activesteer.rigs.kc import kinematics_compliance
 from activesteer.rigs.kc.tables import write_tables
 from activesteer.scenario import Car, load_car
+from activesteer.studies.linearisation import linear_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle_builder import new_vehicle
 from activesteer.vehicle_builder.car_table import car_table
@@ -140,6 +141,14 @@ def test_the_state_is_complete(guided: Car) -> None:
             mujoco.mj_step(vehicle.model, vehicle.data)
         ends.append(vehicle.data.qpos.copy())
     np.testing.assert_array_equal(ends[0], ends[1])
+
+
+def test_modes_of_guided_wheels_have_the_names_of_wheels() -> None:
+    """As a car of links: no joint of a corner is left to speak for itself."""
+    modes = linear_car("tesla_model_s", 20.0).modes()
+    parts = {part for mode in modes for part in mode.participation}
+    assert {"front wheel camber", "rear wheel camber", "front wheel steer", "rear wheel fore-aft"} <= parts
+    assert not [part for part in parts if part.startswith(("fl_", "fr_", "rl_", "rr_"))]
 
 
 def test_links_where_curves_are_asked_for_are_an_error() -> None:
