@@ -255,7 +255,8 @@ STANDARD: Final = Standard(
         "Leaving a curve of 50 m at 50 km/h without unusual vibration, self-centring with the hands off, transient "
         "tests by the manufacturer, warning signals, energy reserves, annex 6, steering by assistance systems.",
         f"The radius of the steering wheel, {1000.0 * RIM_RADIUS_M:.0f} mm, and the power assist, a constant fraction "
-        "of the column's torque, are assumptions. The turning radius is that of the centre of gravity's path.",
+        "of the column's torque, are assumptions. The turning radius is that of the centre of gravity's path. "
+        "The force is read every 20 ms.",
         "The car is driven as its file has it, not at its greatest mass: --set load.payload_kg loads it.",
     ),
     examine=_examine,
