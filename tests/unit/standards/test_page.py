@@ -26,7 +26,7 @@ def test_page_shows_all_and_fetches_nothing():
     pytest.importorskip("matplotlib")
     text = page(examination("plain", **{"pass": False}))
     assert text.count("<svg") == 2
-    assert ">fail<" in text
+    assert ">\N{BALLOT X} fail<" in text
     assert 'class="outside"' in text
     assert "0001-01-01" in text
 
