@@ -1,7 +1,7 @@
 """Makes the drawings of axes and signs in the documentation: `python tools/make_doc_drawings.py`.
 
-They are drawn in the axes that they explain, in metres: what is at y = 1 here is on the left of the car. Plain SVG on
-white, without fonts or scripts of their own.
+They are drawn in the axes that they explain, in metres: what is at y = 1 here is on the left of the car. Plain SVG
+without fonts or scripts of their own, light, and dark where the reader's system is.
 """
 
 from __future__ import annotations
@@ -13,6 +13,14 @@ from typing import Final
 
 PICTURES: Final = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 INK, AXIS, MOTION, FORCE, BODY = "#222222", "#0072b2", "#009e73", "#d55e00", "#e8e8e8"
+_IN_THE_DARK: Final = {
+    "#ffffff": "#1e2129", INK: "#e4e6ea", AXIS: "#4aa8e0", MOTION: "#2bbd8e", FORCE: "#f0843c",
+    BODY: "#3a3f4a", "#bbbbbb": "#6b7280",
+}  # fmt: skip
+_RULES: Final = "".join(
+    f'[{part}="{light}"]{{{part}:{dark}}}' for light, dark in _IN_THE_DARK.items() for part in ("fill", "stroke")
+)
+_DARK: Final = f"@media (prefers-color-scheme:dark){{{_RULES}}}"
 WHEELBASE_M, TRACK_M, CG_M = 2.637, 1.53, 1.082
 WHEEL_M: Final = (0.63, 0.205)
 BACK_M: Final = 0.55
@@ -104,7 +112,8 @@ class Drawing:
         return (
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self._width:.0f} {self._height:.0f}" '
             f'width="{self._width:.0f}" height="{self._height:.0f}" font-family="sans-serif" font-size="14">\n'
-            f'<title>{title}</title>\n<rect width="100%" height="100%" fill="#ffffff"/>\n{body}\n</svg>\n'
+            f"<title>{title}</title>\n<style>{_DARK}</style>\n"
+            f'<rect width="100%" height="100%" fill="#ffffff"/>\n{body}\n</svg>\n'
         )
 
 

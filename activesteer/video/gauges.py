@@ -111,6 +111,9 @@ class Gauges:
         area, scale = size[0] * size[1], min(size[1] / _HEIGHT, size[0] / 640.0)
         while self._fit(scale) > _ROWS_SHARE * area and scale > _SMALLEST:
             scale *= 0.95
+        while len(self._readings) > 1 and self._columns[-1] > size[0]:
+            self._readings.pop()
+            self._columns = self._places()
         left = LARGEST_SHARE * area - self._fit(scale)
         height = min(_TALLEST_PLAN * size[1], math.sqrt(max(left, 0.0) / max(1, len(dials)) / _PLAN_ASPECT))
         self._plan = int(_PLAN_ASPECT * height), int(height)
@@ -157,7 +160,7 @@ class Gauges:
             value = self._text.getlength(_WIDEST.get(reading.channel, "-8.88"))
             name = self._small.getlength(f"{reading.short} {reading.unit.name}")
             places.append(places[-1] + name + value + 2.8 * gap)
-        return [min(round(place), self._size[0]) for place in places]
+        return [round(place) for place in places]
 
     def _title_area(self) -> float:
         words = f"{self._title}  {self._note}  88.88 s"

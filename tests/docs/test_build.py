@@ -38,6 +38,11 @@ def test_pages_load_nothing_from_elsewhere(site: Path) -> None:
         assert found is None, f"{page.relative_to(site)}: {found and found[0]}"
 
 
+def test_pages_for_the_disk_promise_no_search(site: Path) -> None:
+    """Browsers run none of its scripts there; `make site` has it."""
+    assert 'data-md-component="search"' not in (site / "index.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("page", "name"),
     [
