@@ -51,7 +51,7 @@ def _compare(options: argparse.Namespace) -> int:
         print_json(found.to_json())
         return 0 if found.inside else 1
     for file, shift_s in zip(options.files, found.shifts_s, strict=False):
-        later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{1e3 * shift_s:+.1f} ms"
+        later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{round(1e3 * shift_s, 1) + 0.0:+.1f} ms"
         print(f"time shift of {file}: {later}")
     for each in found.quantities:
         label, residual, tolerance, share, _ = words(each)
