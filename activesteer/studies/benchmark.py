@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import multiprocessing
 import os
 import tempfile
@@ -32,6 +33,8 @@ _ROUNDS: Final = 5
 _CALLS: Final = 5000
 _CONTROLLER: Final = "ars"
 """The most costly of the built-in controllers."""
+_FAMILY: Final = {"estimator_lqr_us": "lqr", "integrated_us": "integrated", "mpc_us": "mpc"}
+"""What controllers with an estimator cost, and which they are; all but the first need a solver that is an extra."""
 _RUNS_PER_PROCESS: Final = 4
 
 
@@ -50,7 +53,9 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
         `path_following_step_us` (the same in a slalom, with a driver who looks at a path), `with_file_step_us`
         (the step steer written as MCAP), `sedan_step_us` (the second car, in memory), `production_step_us` (the step
         steer in memory with the sensors of production cars); `sensors_and_brakes_us` (their share of a step: sensors,
-        brakes and the working anti-lock system, see `chassis_benchmark`); the ratios of the closed loops to
+        brakes and the working anti-lock system, see `chassis_benchmark`); `estimator_lqr_us`, `integrated_us`, `mpc_us`
+        (what these controllers, each with its estimator, add to a step of the same step steer without control; the last
+        two where their solver is installed); the ratios of the closed loops to
         `bare_step_us`, and to the engine alone on the same drive; real-time factors; `threads_2_speedup` (how much
         faster two simulations come to their ends in two threads of one process than one after the other);
         `step_steers_per_min` (whole runs, building the car included, by as many processes as there are processors); and
@@ -74,8 +79,15 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
             "production_step_us": lambda: _closed_loop(sensed),
             "sensors_and_brakes_us": stop.step_us,
             "two_threads_step_us": lambda: _in_threads(scenario, 2),
+            "without_control_us": lambda: _closed_loop(sensed, "none"),
         }
+        solver = importlib.util.find_spec("daqp") is not None
+        family = {name: system for name, system in _FAMILY.items() if solver or system == "lqr"}
+        for name, system in family.items():
+            stages[name] = lambda system=system: _closed_loop(sensed, system)
         best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
+    without_us = best.pop("without_control_us")
+    best |= {name: best[name] - without_us for name in family}
     step_us = 1e6 * driven.vehicle.timestep_s
     for stage in ("closed_loop", "path_following", "with_file"):
         engine = "path_engine" if stage == "path_following" else "engine"
@@ -180,8 +192,8 @@ def _repeat(step: Callable[..., object], model: mujoco.MjModel, data: mujoco.MjD
         step(model, data)
 
 
-def _closed_loop(scenario: Scenario) -> float:
-    simulation = ClosedLoop(scenario, _CONTROLLER)
+def _closed_loop(scenario: Scenario, controller: str = _CONTROLLER) -> float:
+    simulation = ClosedLoop(scenario, controller)
     recorder = Recorder(simulation.vehicle, simulation.steps)
 
     def run() -> None:

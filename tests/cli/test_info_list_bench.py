@@ -122,6 +122,7 @@ def test_bench_has_the_promised_keys(call, monkeypatch):
     sensed = found["production_step_us"] / found["closed_loop_step_us"]
     assert found["production_to_ideal_ratio"] == pytest.approx(sensed)
     assert "sensors_and_brakes_us" in found
+    assert "estimator_lqr_us" in found
     engine = found["closed_loop_step_us"] / found["engine_step_us"]
     assert found["closed_loop_to_engine_ratio"] == pytest.approx(engine)
     engine = found["path_following_step_us"] / found["path_engine_step_us"]
