@@ -133,7 +133,8 @@ def test_car_and_tyre_forces_are_seen_from_above_left_is_up(alone: dict[float, P
     rows, columns = np.nonzero(shell)
     assert np.ptp(columns) > 1.5 * np.ptp(rows)
     assert np.abs(np.mean([columns.min(), columns.max()]) / pixels.shape[1] - 0.5) < 0.1
-    arrows = np.argwhere((pixels.min(axis=-1) > 150) & (np.ptp(pixels, axis=-1) < 40))
+    red, green, blue = np.moveaxis(pixels, -1, 0)
+    arrows = np.argwhere((red > 130) & (green < 90) & (blue > 70))
     beside = arrows[(arrows[:, 0] < rows.min()) | (arrows[:, 0] > rows.max())]
     assert len(beside) > 10
     run = drives["ars"]
