@@ -19,6 +19,22 @@ _Length = Annotated[float, Range(0.01, 5.0)]
 
 
 @dataclass(frozen=True)
+class ServoParameters:
+    """What the servos of both axles can, as `lqr`, `integrated` and `mpc` know it; angles at the road wheels."""
+
+    lag_s: _Lag = 0.025
+    """Lag of both [s]."""
+    rear_limit_rad: _Limit = math.radians(3.0)
+    """Most rear angle [rad]."""
+    rear_rate_radps: _Rate = math.radians(28.0)
+    """Rate of the rear steering [rad/s]."""
+    superposition_limit_rad: _Limit = math.radians(3.0)
+    """Most angle added at the front [rad]."""
+    superposition_rate_radps: _Rate = math.radians(29.0)
+    """Rate of the superposition [rad/s]."""
+
+
+@dataclass(frozen=True)
 class SideslipRearSteerParameters:
     """Rear steering with a sideslip term (`ars_sideslip`); all else is that of [controllers.ars]."""
 
@@ -43,14 +59,8 @@ class LqrParameters:
     """Way over which the desired yaw rate follows the driver [m]."""
     friction_fraction: _Fraction = 0.85
     """Part of the estimated friction that the desired yaw rate may ask for [-]."""
-    actuator_lag_s: _Lag = 0.025
-    """Lag of both actuators in the model [s]."""
     relaxation_length_m: _Length = 0.8
     """Way over which a tyre builds up its force, in the model [m]."""
-    rear_limit_rad: _Limit = math.radians(3.0)
-    """Most rear angle demanded [rad]."""
-    superposition_limit_rad: _Limit = math.radians(3.0)
-    """Most angle added at the front [rad]."""
 
 
 @dataclass(frozen=True)
@@ -97,10 +107,6 @@ class IntegratedParameters:
     """Part of the friction under a wheel, standing still, that its brake may use [-]."""
     ahead_s: _Lag = 0.1
     """Time ahead for which the rates of the actuators count [s]."""
-    superposition_rate_radps: _Rate = math.radians(29.0)
-    """Rate of the superposition [rad/s]."""
-    rear_rate_radps: _Rate = math.radians(28.0)
-    """Rate of the rear steering [rad/s]."""
     tolerance_rad: _Limit = math.radians(0.3)
     """Distance of an actuator from its demand that does not count [rad]."""
     window_s: _Lag = 0.06
@@ -125,15 +131,5 @@ class MpcParameters:
     """Way over which the desired yaw rate follows the driver [m]."""
     friction_fraction: _Fraction = 0.85
     """Part of the estimated friction that the desired yaw rate may ask for [-]; all of it is the envelope's bound."""
-    actuator_lag_s: _Lag = 0.025
-    """Lag of both actuators in the model [s]."""
     relaxation_length_m: _Length = 0.8
     """Way over which an axle builds up its force, in the model [m]."""
-    rear_limit_rad: _Limit = math.radians(3.0)
-    """Most rear angle demanded [rad]."""
-    superposition_limit_rad: _Limit = math.radians(3.0)
-    """Most angle added at the front [rad]."""
-    superposition_rate_radps: _Rate = math.radians(29.0)
-    """Rate of the superposition [rad/s]."""
-    rear_rate_radps: _Rate = math.radians(28.0)
-    """Rate of the rear steering [rad/s]."""

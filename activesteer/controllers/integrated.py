@@ -58,9 +58,9 @@ class Integrated:
             setup: What it may know of the car.
         """
         self._lqr = Lqr.from_vehicle(setup)
-        self._parameters = p = setup.gains.integrated
-        self._limits_rad = np.array([setup.gains.lqr.superposition_limit_rad, setup.gains.lqr.rear_limit_rad])
-        self._reach_rad = p.ahead_s * np.array([p.superposition_rate_radps, p.rear_rate_radps])
+        self._parameters, servos = (p := setup.gains.integrated), setup.gains.servos
+        self._limits_rad = np.array([servos.superposition_limit_rad, servos.rear_limit_rad])
+        self._reach_rad = p.ahead_s * np.array([servos.superposition_rate_radps, servos.rear_rate_radps])
         self._car, self._slopes = setup.single_track, AxleSlopes(setup)
         self._supervised = [SupervisedActuator(p.tolerance_rad, p.window_s, setup.timestep_s) for _ in range(2)]
         self._solve = solver()

@@ -93,6 +93,7 @@ class Lqr:
             setup: What it may know of the car.
         """
         p = self._parameters = setup.gains.lqr
+        self._servos = setup.gains.servos
         self._estimator = setup.estimator()
         self._car, self._interval_s = setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
@@ -112,15 +113,15 @@ class Lqr:
             command: What the driver does.
             measurement: What the car's sensors say.
         """
-        p, turn = self._parameters, self.turn(command, measurement)
+        servos, turn = self._servos, self.turn(command, measurement)
         speed_mps = turn.estimate.speed_mps
         if speed_mps < MIN_SPEED_MPS:
             self.apply(0.0, 0.0)
             return ActuatorCommand(estimate=turn.estimate)
         fade = min((speed_mps - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
         wished_added, wished_rear = (fade * angle for angle in turn.demand_rad)
-        added = min(max(wished_added, -p.superposition_limit_rad), p.superposition_limit_rad)
-        rear = min(max(wished_rear, -p.rear_limit_rad), p.rear_limit_rad)
+        added = min(max(wished_added, -servos.superposition_limit_rad), servos.superposition_limit_rad)
+        rear = min(max(wished_rear, -servos.rear_limit_rad), servos.rear_limit_rad)
         self.apply(added, rear)
         saturated = (added, rear) != (wished_added, wished_rear)
         steady = turn.steady_rad[1]
@@ -150,7 +151,7 @@ class Lqr:
         given = 0.0 if works[0] and works[1] else driver + added if works[1] else turned
         front, rear, sideslip = self._steady(row, works, given, desired, now)
         # What is demanded now works a call and a lag later.
-        coming = self._reference.ahead(p.actuator_lag_s + self._interval_s)
+        coming = self._reference.ahead(self._servos.lag_s + self._interval_s)
         next_front, next_rear, _ = self._steady(row, works, given, coming, now)
         steady = front - driver, rear
         held = next_front - driver, next_rear
@@ -190,7 +191,7 @@ class Lqr:
 
     def _gains(self, works: tuple[bool, bool], speed_mps: float) -> list[float]:
         """The row of the schedule at a speed."""
-        rows = schedule(self._car, self._parameters, self._interval_s, works)
+        rows = schedule(self._car, self._parameters, self._servos.lag_s, self._interval_s, works)
         place = min(max(speed_mps / SPEED_STEP_MPS - 1.0, 0.0), len(rows) - 1.000001)
         index = int(place)
         part = place - index
@@ -199,13 +200,18 @@ class Lqr:
 
 @lru_cache(maxsize=64)
 def schedule(
-    car: SingleTrackParameters, parameters: LqrParameters, interval_s: float, works: tuple[bool, bool] = BOTH
+    car: SingleTrackParameters,
+    parameters: LqrParameters,
+    servo_lag_s: float,
+    interval_s: float,
+    works: tuple[bool, bool] = BOTH,
 ) -> tuple[tuple[float, ...], ...]:
     """Gains at `SPEEDS_MPS`.
 
     Args:
         car: The car as it is known.
-        parameters: Weights and lags.
+        parameters: Weights and relaxation length.
+        servo_lag_s: Lag of both servos [s].
         interval_s: Time between two calls [s].
         works: Whether superposition and rear steering do.
 
@@ -216,7 +222,7 @@ def schedule(
     return tuple(
         (
             *steady_turn(car, speed_mps, works).ravel().tolist(),
-            *feedback(car, parameters, speed_mps, interval_s, works).ravel().tolist(),
+            *feedback(car, parameters, servo_lag_s, speed_mps, interval_s, works).ravel().tolist(),
         )
         for speed_mps in SPEEDS_MPS
     )
@@ -243,7 +249,7 @@ def steady_turn(car: SingleTrackParameters, speed_mps: float, works: tuple[bool,
 
 
 def model(
-    car: SingleTrackParameters, parameters: LqrParameters, speed_mps: float, interval_s: float
+    car: SingleTrackParameters, parameters: LqrParameters, servo_lag_s: float, speed_mps: float, interval_s: float
 ) -> tuple[Array, Array]:
     """The model from one call to the next, for inputs that are held.
 
@@ -252,7 +258,7 @@ def model(
     """
     inner, both = np.zeros((8, 8)), np.eye(2)
     inner[:2, :2], inner[:2, 2:4] = SingleTrack(car).matrices(speed_mps)
-    tyre_1ps, actuator_1ps = speed_mps / parameters.relaxation_length_m, 1.0 / parameters.actuator_lag_s
+    tyre_1ps, actuator_1ps = speed_mps / parameters.relaxation_length_m, 1.0 / servo_lag_s
     inner[2:4, 2:4], inner[2:4, 4:6] = -tyre_1ps * both, tyre_1ps * both
     inner[4:6, 4:6], inner[4:6, 6:] = -actuator_1ps * both, actuator_1ps * both
     from scipy.linalg import expm  # noqa: PLC0415 - slow to import, and not every run needs it
@@ -267,6 +273,7 @@ def model(
 def feedback(
     car: SingleTrackParameters,
     parameters: LqrParameters,
+    servo_lag_s: float,
     speed_mps: float,
     interval_s: float,
     works: tuple[bool, bool] = BOTH,
@@ -274,7 +281,7 @@ def feedback(
     """K at a speed, shape (2, 8): superposition and rear angle per deviation of `STATES`; 0 for what does not work."""
     import control  # noqa: PLC0415 - takes longer to import than a run takes to start
 
-    a, b = model(car, parameters, speed_mps, interval_s)
+    a, b = model(car, parameters, servo_lag_s, speed_mps, interval_s)
     q = np.zeros((8, 8))
     q[0, 0], q[1, 1] = parameters.yaw_rate_scale_radps**-2, parameters.sideslip_scale_rad**-2
     weights = np.array([parameters.superposition_scale_rad**-2, parameters.rear_scale_rad**-2])

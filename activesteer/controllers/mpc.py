@@ -87,12 +87,13 @@ class Mpc:
         Args:
             setup: What it may know of the car.
         """
-        p = self._parameters = setup.gains.mpc
+        p, servos = setup.gains.mpc, setup.gains.servos
+        self._parameters, self._servo_lag_s = p, servos.lag_s
         self._estimator, self._car, self._interval_s = setup.estimator(), setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         self._slopes, self._solve = AxleSlopes(setup), solver()
-        self._limits_rad = np.array([p.superposition_limit_rad, p.rear_limit_rad])
-        self._reach_rad = np.array([p.superposition_rate_radps, p.rear_rate_radps]) * setup.timestep_s
+        self._limits_rad = np.array([servos.superposition_limit_rad, servos.rear_limit_rad])
+        self._reach_rad = np.array([servos.superposition_rate_radps, servos.rear_rate_radps]) * setup.timestep_s
         self._front_rad = self._rear_rad = 0.0
         self._before_rad = np.zeros(2)
 
@@ -123,7 +124,7 @@ class Mpc:
         cuts = [axle.force_rad - slope * axle.slip_angle_rad for axle, slope in zip(axles, slopes, strict=True)]
         grid_mps = max(_SPEED_STEP_MPS * round(speed / _SPEED_STEP_MPS), 2.0 * _SPEED_STEP_MPS)
         front, rear, _ = (gain * desired for gain in steady_gains(self._car, grid_mps))
-        problem = envelope_problem(self._car, p, self._interval_s, grid_mps, *slopes)
+        problem = envelope_problem(self._car, p, self._servo_lag_s, self._interval_s, grid_mps, *slopes)
         z = np.array([
             now.yaw_rate_radps, now.sideslip_rad, self._front_rad, self._rear_rad, added, turned,
             *cuts, driver, desired, front - driver, rear, *self._before_rad,
@@ -158,6 +159,7 @@ def steady_gains(car: SingleTrackParameters, speed_mps: float) -> tuple[float, f
 def envelope_problem(
     car: SingleTrackParameters,
     parameters: MpcParameters,
+    servo_lag_s: float,
     interval_s: float,
     speed_mps: float,
     front_slope: float = 1.0,
@@ -167,14 +169,15 @@ def envelope_problem(
 
     Args:
         car: The car as it is known.
-        parameters: Weights and lags.
+        parameters: Weights and relaxation length.
+        servo_lag_s: Lag of both servos [s].
         interval_s: Time between two calls, the step of the model [s].
         speed_mps: Speed [m/s].
         front_slope: Force over slip angle of the front axle, 1 at no slip angle [-].
         rear_slope: The same of the rear axle [-].
     """
     p, size = parameters, len(STATES) + len(GIVEN)
-    a, b = model(car, p, interval_s, speed_mps, front_slope, rear_slope)
+    a, b = model(car, p, servo_lag_s, interval_s, speed_mps, front_slope, rear_slope)
     steps, unknowns = sum(_BLOCKS) + 1, 2 * len(_BLOCKS)
     block_of = np.repeat(np.arange(len(_BLOCKS)), _BLOCKS)
     r, beta, rear = (STATES.index(name) for name in ("yaw_rate", "sideslip", "rear"))
@@ -225,6 +228,7 @@ def envelope_problem(
 def model(
     car: SingleTrackParameters,
     parameters: MpcParameters,
+    servo_lag_s: float,
     interval_s: float,
     speed_mps: float,
     front_slope: float,
@@ -245,7 +249,7 @@ def model(
     inner, both = np.zeros((size + 2, size + 2)), np.eye(2)
     inner[:2, :2], inner[:2, 2:4] = SingleTrack(softer).matrices(speed_mps)
     inner[:2, 6:8] = SingleTrack(car).matrices(speed_mps)[1]
-    tyre_1ps, actuator_1ps = speed_mps / parameters.relaxation_length_m, 1.0 / parameters.actuator_lag_s
+    tyre_1ps, actuator_1ps = speed_mps / parameters.relaxation_length_m, 1.0 / servo_lag_s
     inner[2:4, 2:4], inner[2:4, 4:6] = -tyre_1ps * both, tyre_1ps * both
     inner[2, 8] = tyre_1ps
     inner[4:6, 4:6], inner[4:6, size:] = -actuator_1ps * both, actuator_1ps * both

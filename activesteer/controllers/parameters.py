@@ -12,6 +12,7 @@ from activesteer.controllers.family_parameters import (
     IntegratedParameters,
     LqrParameters,
     MpcParameters,
+    ServoParameters,
     SideslipRearSteerParameters,
 )
 from activesteer.errors import ControllerError
@@ -85,6 +86,8 @@ class ControllerParameters:
     """Active rear steering."""
     afs: FrontSuperpositionParameters = FrontSuperpositionParameters()
     """Active front steering."""
+    servos: ServoParameters = ServoParameters()
+    """What controllers beyond the paper's know of the actuators of both axles."""
     ars_sideslip: SideslipRearSteerParameters = SideslipRearSteerParameters()
     """Rear steering with a sideslip term."""
     lqr: LqrParameters = LqrParameters()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.controllers import load_controller
-from activesteer.controllers.family_parameters import LqrParameters
+from activesteer.controllers.family_parameters import LqrParameters, ServoParameters
 from activesteer.controllers.lqr import SPEEDS_MPS, STATES, feedback, model, schedule, steady_turn
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.scenario import resolve
@@ -16,7 +16,7 @@ from activesteer.theory.single_track import SingleTrack
 from tests.unit.controllers.cars import CAR, held, measured, steering
 
 INTERVAL_S = 0.005
-PARAMETERS = LqrParameters()
+PARAMETERS, LAG_S = LqrParameters(), ServoParameters().lag_s
 
 
 @pytest.fixture(scope="module")
@@ -31,9 +31,9 @@ def first(known, command, measurement):
 @pytest.mark.parametrize("speed_mps", [15.0, 40.0])
 def test_turn_without_sideslip_repeats_itself_in_the_model(speed_mps):
     desired_radps = 0.1
-    row = schedule(CAR, PARAMETERS, INTERVAL_S)[SPEEDS_MPS.index(speed_mps)]
+    row = schedule(CAR, PARAMETERS, LAG_S, INTERVAL_S)[SPEEDS_MPS.index(speed_mps)]
     front, rear = (gain * desired_radps for gain in (row[0], row[2]))
-    a, b = model(CAR, PARAMETERS, speed_mps, INTERVAL_S)
+    a, b = model(CAR, PARAMETERS, LAG_S, speed_mps, INTERVAL_S)
     state = np.array([desired_radps, 0.0, *[front, rear] * 3])
     assert a @ state + b @ (front, rear) == pytest.approx(state, abs=1e-12)
 
@@ -44,23 +44,23 @@ def test_turn_with_one_axle_given_repeats_itself_too_with_the_sideslip_that_belo
     front, rear, sideslip = steady_turn(CAR, 20.0, works) @ (desired_radps, given_rad)
     assert (rear if works[0] else front) == given_rad
     assert sideslip != 0.0
-    a, b = model(CAR, PARAMETERS, 20.0, INTERVAL_S)
+    a, b = model(CAR, PARAMETERS, LAG_S, 20.0, INTERVAL_S)
     state = np.array([desired_radps, sideslip, *[front, rear] * 3])
     assert a @ state + b @ (front, rear) == pytest.approx(state, abs=1e-12)
 
 
 def test_what_does_not_work_is_not_asked():
     for axle, works in enumerate([(False, True), (True, False)]):
-        gain = feedback(CAR, PARAMETERS, 20.0, INTERVAL_S, works)
+        gain = feedback(CAR, PARAMETERS, LAG_S, 20.0, INTERVAL_S, works)
         assert not gain[axle].any()
-        a, b = model(CAR, PARAMETERS, 20.0, INTERVAL_S)
+        a, b = model(CAR, PARAMETERS, LAG_S, 20.0, INTERVAL_S)
         assert np.abs(np.linalg.eigvals(a - b @ gain)).max() < 1.0
 
 
 def test_model_without_lags_is_the_single_track_model():
     speed_mps = 25.0
-    quick = LqrParameters(actuator_lag_s=0.001, relaxation_length_m=0.01)
-    a, b = model(CAR, quick, speed_mps, INTERVAL_S)
+    quick = LqrParameters(relaxation_length_m=0.01)
+    a, b = model(CAR, quick, 0.001, speed_mps, INTERVAL_S)
     state, angles = np.zeros(len(STATES)), np.array([0.01, 0.004])
     for _ in range(2000):
         state = a @ state + b @ angles
@@ -70,8 +70,8 @@ def test_model_without_lags_is_the_single_track_model():
 
 def test_feedback_makes_the_model_settle_faster_at_every_speed():
     for speed_mps in SPEEDS_MPS:
-        a, b = model(CAR, PARAMETERS, speed_mps, INTERVAL_S)
-        gain = feedback(CAR, PARAMETERS, speed_mps, INTERVAL_S)
+        a, b = model(CAR, PARAMETERS, LAG_S, speed_mps, INTERVAL_S)
+        gain = feedback(CAR, PARAMETERS, LAG_S, speed_mps, INTERVAL_S)
         assert np.abs(np.linalg.eigvals(a - b @ gain)).max() < np.abs(np.linalg.eigvals(a)).max()
 
 
@@ -90,9 +90,9 @@ def test_answers_are_mirrored(known):
 
 def test_angles_end_at_their_limits_and_say_so(known):
     answer = first(known, steering(0.0), measured(1.0))
-    limit = known.gains.lqr.rear_limit_rad
+    limit = known.gains.servos.rear_limit_rad
     assert answer.rear_steer_demand_rad == limit == math.radians(3.0)
-    assert answer.superposition_demand_rad == -known.gains.lqr.superposition_limit_rad
+    assert answer.superposition_demand_rad == -known.gains.servos.superposition_limit_rad
     assert answer.saturated
 
 

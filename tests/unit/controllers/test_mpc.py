@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.controllers import load_controller
 from activesteer.controllers.axle_slopes import AxleSlopes
-from activesteer.controllers.family_parameters import MpcParameters
+from activesteer.controllers.family_parameters import MpcParameters, ServoParameters
 from activesteer.controllers.lqr import steady_turn
 from activesteer.controllers.mpc import GIVEN, STATES, envelope_problem, model
 from activesteer.controllers.quadratic_programme import solver
@@ -19,7 +19,7 @@ from tests.unit.controllers.cars import CAR, held, measured, steering
 
 pytest.importorskip("daqp")
 INTERVAL_S, SPEED_MPS = 0.01, 25.0
-PARAMETERS = MpcParameters()
+PARAMETERS, LAG_S = MpcParameters(), ServoParameters().lag_s
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def state(**values: float):
 def test_steady_turn_repeats_itself_in_the_model():
     desired_radps = 0.1
     front, rear, _ = steady_turn(CAR, SPEED_MPS)[:, 0] * desired_radps
-    a, b = model(CAR, PARAMETERS, INTERVAL_S, SPEED_MPS, 1.0, 1.0)
+    a, b = model(CAR, PARAMETERS, LAG_S, INTERVAL_S, SPEED_MPS, 1.0, 1.0)
     z = state(yaw_rate=desired_radps, front=front, rear=rear, superposition=front, rear_actuator=rear)
     assert a @ z + b @ (front, rear) == pytest.approx(z, abs=1e-12)
 
@@ -43,16 +43,16 @@ def test_steady_turn_repeats_itself_in_the_model():
 def test_axle_with_half_the_slope_and_an_intercept_for_the_rest_moves_the_car_as_the_whole_axle_does():
     slip_rad = 0.02
     moving = {"front": slip_rad, "superposition": slip_rad}
-    a, b = model(CAR, PARAMETERS, INTERVAL_S, SPEED_MPS, 1.0, 1.0)
+    a, b = model(CAR, PARAMETERS, LAG_S, INTERVAL_S, SPEED_MPS, 1.0, 1.0)
     whole = a @ state(**moving) + b @ (slip_rad, 0.0)
-    a, b = model(CAR, PARAMETERS, INTERVAL_S, SPEED_MPS, 0.5, 1.0)
+    a, b = model(CAR, PARAMETERS, LAG_S, INTERVAL_S, SPEED_MPS, 0.5, 1.0)
     half = a @ state(**moving, front_intercept=0.5 * slip_rad) + b @ (slip_rad, 0.0)
     # The car has hardly begun to turn, so that its slip angle is still the angle of the wheels.
     assert half[:2] == pytest.approx(whole[:2], rel=0.02)
 
 
 def test_envelope_bounds_the_predicted_yaw_rate_and_costs_nothing_where_it_is_kept():
-    problem = envelope_problem(CAR, PARAMETERS, INTERVAL_S, SPEED_MPS)
+    problem = envelope_problem(CAR, PARAMETERS, LAG_S, INTERVAL_S, SPEED_MPS)
     # The driver asks for 0.3 rad/s; the road gives 0.2.
     front, rear, _ = steady_turn(CAR, SPEED_MPS)[:, 0] * 0.3
     z = state(driver=front, desired=0.3, rear_steady=rear)
@@ -80,12 +80,12 @@ def test_car_that_turns_by_itself_gets_rear_wheels_with_the_turn_and_front_wheel
 
 
 def test_angles_and_their_rates_end_at_their_limits(known):
-    controller, p = load_controller("mpc", known), known.gains.mpc
+    controller, servos = load_controller("mpc", known), known.gains.servos
     first = controller.step(steering(0.0), measured(0.5, SPEED_MPS))
-    assert first.rear_steer_demand_rad == pytest.approx(INTERVAL_S * p.rear_rate_radps)
-    assert first.superposition_demand_rad == pytest.approx(-INTERVAL_S * p.superposition_rate_radps)
+    assert first.rear_steer_demand_rad == pytest.approx(INTERVAL_S * servos.rear_rate_radps)
+    assert first.superposition_demand_rad == pytest.approx(-INTERVAL_S * servos.superposition_rate_radps)
     last = held(controller, steering(0.0), measured(0.5, SPEED_MPS), 30)
-    assert last.rear_steer_demand_rad == pytest.approx(p.rear_limit_rad)
+    assert last.rear_steer_demand_rad == pytest.approx(servos.rear_limit_rad)
 
 
 def test_slip_angle_of_the_largest_force_shrinks_with_the_friction(known):
