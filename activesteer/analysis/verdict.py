@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from activesteer.analysis.loss import CONES_MISSED, IN_LANES, SIDESLIP_PEAKS, has_spun
+from activesteer.analysis.loss import SIDESLIP_PEAKS
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.judgement import judge
+from activesteer.analysis.report.results import kept, losses
 from activesteer.quantities import metric_label, metric_number
 from activesteer.recording import Recording
 
@@ -16,7 +17,7 @@ _ALSO: Final = ("yaw_rate_steady_state_radps", "stopping_distance_m", "steering_
 
 
 def outcome(recording: Recording) -> str:
-    """Whether a car was held, kept to its course and hit cones, and its key figures.
+    """What went wrong in a run and what it kept to, in the words of the report, and its key figures.
 
     Args:
         recording: The run.
@@ -24,17 +25,8 @@ def outcome(recording: Recording) -> str:
     metadata, metrics = recording.metadata, recording.metrics
     if not metadata.get("complete", True):
         return f"the run did not end properly: {metadata.get('error', 'no reason is recorded')}"
-    said = []
+    said = [*losses(metrics), *kept(metrics)]
     peaks = [name for name in SIDESLIP_PEAKS if name in metrics]
-    if peaks and has_spun(metrics):
-        said.append("the car is lost")
-    if IN_LANES in metrics:
-        over_m = max(metrics.get("lane_overstep_m", 0.0), 0.0)
-        said.append("keeps to its lanes" if metrics[IN_LANES] == 1.0 else f"leaves its lanes by {over_m:.2f} m")
-    for name, did in (("cones_hit", "hits"), (CONES_MISSED, "misses")):
-        if name in metrics:
-            count = round(metrics[name])
-            said.append(f"{did} {count or 'no'} cone{'s' if count != 1 else ''}")
     for name in (*peaks[:1], *_ALSO):
         if name in metrics:
             words, unit, _ = metric_label(name)

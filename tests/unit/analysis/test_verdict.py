@@ -16,9 +16,11 @@ def run(**metrics: float) -> Recording:
 
 def test_lanes_cones_and_sideslip_are_said_with_their_sizes():
     good = run(stays_in_lanes=1.0, lane_overstep_m=-0.2, cones_hit=0.0, sideslip_peak_abs_rad=math.radians(1.5))
-    assert outcome(good) == "keeps to its lanes, hits no cones, sideslip peak 1.500 deg"
+    assert outcome(good) == "stays in the lanes, hits no cone, sideslip peak 1.500 deg"
     bad = run(stays_in_lanes=0.0, lane_overstep_m=0.5, cones_hit=1.0, sideslip_peak_abs_rad=math.radians(50.0))
-    assert outcome(bad) == "the car is lost, leaves its lanes by 0.50 m, hits 1 cone, sideslip peak 50.000 deg"
+    assert outcome(bad) == (
+        "lost at 50 deg of sideslip, leaves the lane by 0.50 m, hits 1 cone, sideslip peak 50.000 deg"
+    )
 
 
 def test_a_run_that_broke_off_says_why():
@@ -28,4 +30,4 @@ def test_a_run_that_broke_off_says_why():
 
 def test_every_run_has_a_line_in_its_order():
     lines = verdict({"ars": run(cones_hit=2.0), "none": run(cones_hit=0.0)})
-    assert lines == ["ars: hits 2 cones", "none: hits no cones"]
+    assert lines == ["ars: hits 2 cones", "none: hits no cone"]

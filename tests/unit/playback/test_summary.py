@@ -35,7 +35,7 @@ def test_runs_of_different_manoeuvres_are_all_named() -> None:
 
 
 def test_what_came_out_stands_above_the_numbers() -> None:
-    text = summary(runs_of({"ars": circle(0.1)}), ["ars: keeps to its lanes", "S1 passed: something"])
+    text = summary(runs_of({"ars": circle(0.1)}), ["ars: stays in the lanes", "S1 passed: something"])
     lines = text.splitlines()
-    assert lines[2:4] == ["- **ars:** keeps to its lanes", "- **S1 passed:** something"]
-    assert text.index("keeps to its lanes") < text.index("| metric |")
+    assert lines[2:4] == ["- **ars:** stays in the lanes", "- **S1 passed:** something"]
+    assert text.index("stays in the lanes") < text.index("| metric |")
