@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from activesteer.analysis.frequency_response import INPUT, FrequencyResponse, response_of
 from activesteer.analysis.series import timestep
@@ -63,6 +62,8 @@ def random_response(
     """
     if not recordings:
         raise RecordingError("there is no run with random steering")
+    from scipy import signal  # noqa: PLC0415 - slow to import, and lists of standards do not need it
+
     total, averages, step_s = np.zeros((3, 1), dtype=np.complex128), 0.0, 1.0
     for recording in recordings:
         step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))

@@ -53,6 +53,8 @@ class StopSignals:
     def watch(self) -> None:
         """Watches for signals from now on, until the process ends."""
         self._watching = True
+        # Where processes are cut off, one of multiprocessing's own clears up behind them; that is no news to a user.
+        sys.warnoptions.append("ignore:resource_tracker:UserWarning")
         read, write = os.pipe()
         os.set_blocking(write, False)
         # Python runs its handlers between its own instructions only; this byte is written at once, whatever runs.

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from numpy.typing import ArrayLike
 
 from activesteer.quantities import metric_label, metric_number
-
-if TYPE_CHECKING:
-    from activesteer.standards.standard import Run
 
 
 class Curve(NamedTuple):
@@ -107,7 +104,15 @@ def axis_label(name: str) -> str:
     return f"{words} [{unit}]"
 
 
-def time_panels(runs: Mapping[str, Run], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
+class OverTime(Protocol):
+    """A run whose channels can be drawn."""
+
+    def over_time(self, channel: str, *, begin_s: float = 0.0, **words: Any) -> Curve:
+        """A channel over the time from an instant [s]."""
+        ...
+
+
+def time_panels(runs: Mapping[str, OverTime], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
     """Channels of runs over time, a panel each.
 
     Args:

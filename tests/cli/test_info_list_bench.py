@@ -108,13 +108,17 @@ def test_info_of_something_else_is_an_error(call, tmp_path, data, told):
     assert str(path) in answer.err
 
 
+DIFFERENCES = {"estimator_lqr_us", "integrated_us", "mpc_us"}
+
+
 def test_bench_has_the_promised_keys(call, monkeypatch):
     monkeypatch.setattr("activesteer.studies.benchmark._RUNS_PER_PROCESS", 1)
     told = call("bench", "--rounds", "1", "--json")
     assert told.status == 0
     assert told.err == ""
     assert set(told.json) >= KEYS
-    assert all(value > 0.0 for value in told.json.values())
+    # What a controller costs is the difference of two loops: on a busy machine it may be less than nothing.
+    assert all(value > 0.0 for name, value in told.json.items() if name not in DIFFERENCES)
     found = told.json
     assert found["closed_loop_to_bare_ratio"] == pytest.approx(found["closed_loop_step_us"] / found["bare_step_us"])
     assert found["with_file_to_bare_ratio"] == pytest.approx(found["with_file_step_us"] / found["bare_step_us"])

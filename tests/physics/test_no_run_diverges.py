@@ -53,7 +53,7 @@ class Case(NamedTuple):
                     table[steering]["steering_wheel_deg"] = 90.0
         speed_mps = max(self.speed_kmh, 15.0) / 3.6
         if "speed" not in table:
-            table["speed_kmh"] = 3.6 * speed_mps if table["kind"] in COURSES else self.speed_kmh
+            table["speed_kmh"] = 3.6 * speed_mps if table["kind"] in (*COURSES, "straight_braking") else self.speed_kmh
         if table["kind"] in COURSES:
             table["duration_s"] = min(60.0, COURSES[table["kind"]] / speed_mps + 4.0)
         elif table["kind"] in ("open_loop", "slowly_increasing_steer", "constant_radius", "random_steer"):
