@@ -12,7 +12,7 @@ from activesteer.errors import SimulationDiverged
 from activesteer.quantities import display_unit
 from activesteer.standards.page_parts import Curve, Panel, Picture, Table, cell, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
-from activesteer.studies.fault_map import FIGURES
+from activesteer.studies.fault_figures import FIGURES
 
 
 class Effort(NamedTuple):

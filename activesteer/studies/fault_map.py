@@ -25,18 +25,13 @@ from activesteer.scenario import FileOrTable, resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
+from activesteer.studies.fault_figures import FIGURES
 from activesteer.studies.workers import Workers, in_parallel
 
 OFFSET_AT_S: Final = 1.0
 """How long after the beginning of a fault the lateral offset is taken [s]."""
 TURN_MPS2: Final = 4.0
 """Lateral acceleration of the turn, and the greatest of the lane change [m/s2]."""
-
-FIGURES: Final = (
-    "yaw_rate_change_radps", "ay_change_mps2", "lateral_offset_1s_m", "lateral_offset_1s_driver_m",
-    "steering_correction_rad", "fault_tolerant_time_s",
-)  # fmt: skip
-"""What is said of a fault; see `FaultMap`."""
 
 _RESOLUTION_S: Final = 0.005
 """To this the fault-tolerant time is found [s]."""
