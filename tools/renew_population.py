@@ -23,7 +23,8 @@ from activesteer.analysis.claims.population import Change, Population, percent
 from activesteer.commands.progress import RunCounter
 from activesteer.quantities import metric_label
 from activesteer.resources import find_study
-from activesteer.studies.comparison_population import ComparisonPopulation, compare_population, store_comparison
+from activesteer.studies.comparison_population import compare_population, store_comparison
+from activesteer.studies.comparison_shares import ComparisonPopulation
 from activesteer.studies.comparison_targets import NONE, REFERENCES
 from activesteer.studies.population import STUDY, population
 from activesteer.studies.population_store import store_population

@@ -137,7 +137,8 @@ def _report(result: Reproduction, folder: Path) -> Path | None:
 
 
 def _population(options: argparse.Namespace) -> int:
-    from activesteer.studies.comparison_population import ComparisonPopulation, compare_population
+    from activesteer.studies.comparison_population import compare_population
+    from activesteer.studies.comparison_shares import ComparisonPopulation
     from activesteer.studies.population import population
 
     if options.figures and options.controllers is None:

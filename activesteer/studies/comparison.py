@@ -22,9 +22,8 @@ from activesteer.errors import ParameterError
 from activesteer.files import make_folder
 from activesteer.quantities import metric_label
 from activesteer.recording import Recording, check_target
-from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, resolve
-from activesteer.studies.comparison_targets import Target, targets, targets_text
+from activesteer.studies.comparison_targets import Target, short, targets, targets_text
 from activesteer.studies.envelope import LINES, entry_speed
 from activesteer.studies.reproduction import Progress, drive
 from activesteer.studies.workers import in_parallel
@@ -62,6 +61,10 @@ SENSORS: Final = {"sensors.preset": "production", "sensors.seed": 1}
 """What all of them see the car through."""
 ENTRY_SEEDS: Final = (1, 2, 3)
 """Sensors with which the highest entry speed of the severe lane change is looked for."""
+ENTRY_DRIVER: Final = "expert"
+"""Who drives there, as in ISO 3888-2: the default driver leaves its lanes at every speed, whatever the controller."""
+ENTRY_LINE: Final = {"lane.margin_m": 0.15}
+"""How far his line keeps from the cones, the middle one of those in the test of ISO 3888-2."""
 _LANE_CHANGE: Final = "severe_lane_change"
 _LABEL: Final = 41
 _COLUMN: Final = 7
@@ -127,7 +130,7 @@ class Comparison:
             before = scenario
             words, unit, factor = metric_label(metric)
             label = f"  {words} [{unit}]"
-            shown = [f"{values[name] * factor:.3g}" if name in values else "-" for name in self.controllers]
+            shown = [short(values.get(name, math.nan) * factor) for name in self.controllers]
             cells = "".join(f"{text:>{width}}" for text, width in zip(shown, columns, strict=True))
             lines.append(f"{label:{_LABEL}}{cells}")
         return "\n".join([*lines, *(["", targets_text(self.targets)] if self.targets else [])])
@@ -201,8 +204,8 @@ def compare(
 
 
 def _entry_speed(vehicle: FileOrTable, controller: str, seed: int) -> float:
-    overrides = SENSORS | {"sensors.seed": seed}
-    found = entry_speed(_LANE_CHANGE, vehicle, overrides, LINES["lane_change"], DEFAULT_DRIVER, controller)
+    overrides = SENSORS | ENTRY_LINE | {"sensors.seed": seed}
+    found = entry_speed(_LANE_CHANGE, vehicle, overrides, LINES["lane_change"], ENTRY_DRIVER, controller)
     return math.nan if found is None else found / 3.6
 
 

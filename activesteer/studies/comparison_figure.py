@@ -12,8 +12,8 @@ from activesteer.analysis.claims.population import percent
 from activesteer.plotting import new_figure, save
 from activesteer.quantities import metric_label
 from activesteer.studies.comparison import Comparison
-from activesteer.studies.comparison_population import ComparisonPopulation
-from activesteer.studies.comparison_targets import REFERENCES
+from activesteer.studies.comparison_shares import ComparisonPopulation
+from activesteer.studies.comparison_targets import REFERENCES, short
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,8 +52,7 @@ def comparison_figure(made: Comparison) -> Figure:
             value = abs(values[name])
             if base > 0.0 and value > 0.0:
                 ratios[row, column] = math.log(value / base)
-            text = f"{values[name] * factor:.3g}"
-            axes.text(column, row, text, ha="center", va="center", fontsize="x-small")
+            axes.text(column, row, short(values[name] * factor), ha="center", va="center", fontsize="x-small")
     span = math.log(_RANGE)
     axes.imshow(ratios, cmap="RdBu_r", vmin=-span, vmax=span, aspect="auto", alpha=0.5)
     axes.set_xticks(range(len(made.controllers)), made.controllers, fontsize="small")

@@ -54,21 +54,21 @@ class _Rule(NamedTuple):
     strict: bool = False
 
     def judged(self, controller: str, values: Mapping[str, float]) -> Target | None:
-        """What became of it; None where a value is missing.
+        """What became of it, a failure where a value was looked for and not found; None where it was not looked for.
 
         Args:
             controller: Who is asked.
             values: Controller -> value of the metric.
         """
+        if not values:
+            return None
         value = abs(values.get(controller, math.nan))
         bound = self.factor * (abs(values.get(self.than, math.nan)) if self.than else 1.0)
-        if math.isnan(bound) or controller not in values:
-            return None
         words, unit, factor = metric_label(self.metric)
         sign = ("<" if not self.above else ">") + ("" if self.strict else "=")
         whose = f", {self.factor:.0%} of {self.than}" if self.factor != 1.0 else f" of {self.than}"
         text = (
-            f"{self.scenario}: {words} {value * factor:.3g} {unit}, asked for {sign} {bound * factor:.3g} {unit}"
+            f"{self.scenario}: {words} {short(value * factor)} {unit}, asked for {sign} {short(bound * factor)} {unit}"
             f"{whose if self.than else ''}"
         )
         further = value > bound if self.above else value < bound
@@ -107,6 +107,11 @@ def targets(controllers: Sequence[str], rows: Iterable[Any]) -> list[Target]:
         rule.judged(name, known.get((rule.scenario, rule.metric), {})) for name in asked(controllers) for rule in _RULES
     )
     return [target for target in judged if target is not None]
+
+
+def short(value: float) -> str:
+    """A number with three digits; a hyphen where there is none."""
+    return "-" if math.isnan(value) else f"{value:.3g}"
 
 
 def targets_text(found: Sequence[Target]) -> str:

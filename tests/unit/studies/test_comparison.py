@@ -68,8 +68,9 @@ def test_targets_are_for_those_beyond_the_paper_and_bounds_are_kept_as_they_are_
 
 
 def test_a_run_without_the_metric_fails_its_target():
-    made = made_up(none=(0.1, 2.2, 14.0), lqr=(0.01, math.nan, math.nan))
+    made = made_up(none=(0.1, math.nan, 14.0), lqr=(0.01, 2.1, math.nan))
     assert [target.passed for target in made.targets] == [True, False, False]
+    assert "entry speed - km/h, asked for > 50.4 km/h of none" in made.to_text()
 
 
 def test_the_table_of_seven_controllers_fits_a_terminal():

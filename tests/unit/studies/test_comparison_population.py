@@ -13,13 +13,8 @@ import pytest
 from activesteer.cli import main
 from activesteer.errors import ParameterError, StudyError
 from activesteer.studies import comparison_population as module
-from activesteer.studies.comparison_population import (
-    SCENARIOS,
-    ComparisonPopulation,
-    Share,
-    comparison_study,
-    summarise,
-)
+from activesteer.studies.comparison_population import SCENARIOS, comparison_study, summarise
+from activesteer.studies.comparison_shares import ComparisonPopulation, Share
 from activesteer.studies.factor_values import FactorValues, label_of
 from activesteer.studies.population import population_study
 from activesteer.studies.study_file import StudyFile, read_study
