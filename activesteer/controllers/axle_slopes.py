@@ -112,8 +112,8 @@ class AxleSlopes:
         """
         place = abs(ay_mps2) / friction / _AY_STEP_MPS2
         size = math.copysign(friction, ay_mps2)
-        front, rear = (_between(excesses, place) for excesses in self._excesses)
-        return size * front, size * rear
+        front, rear = self._excesses
+        return size * _between(front, place), size * _between(rear, place)
 
     def _axle(self, axle: int, slip_angle_rad: float, friction: float) -> Axle:
         curve, place = self._curves[axle], abs(slip_angle_rad) / friction / self._step_rad

@@ -36,6 +36,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from operator import mul
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -98,6 +99,7 @@ class Lqr:
         self._car, self._interval_s = setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         self._curves = AxleSlopes(setup)
+        self._schedules: dict[tuple[bool, bool], tuple[tuple[float, ...], ...]] = {}
         self._front_rad = self._rear_rad = 0.0
         self._before = 0.0, 0.0
 
@@ -165,10 +167,10 @@ class Lqr:
             self._before[0] - held[0],
             self._before[1] - held[1],
         )
-        count, gains = len(errors), row[_STEADY:]
+        second = _STEADY + len(errors)
         demand = (
-            held[0] - sum([gain * error for gain, error in zip(gains[:count], errors, strict=True)]),
-            held[1] - sum([gain * error for gain, error in zip(gains[count:], errors, strict=True)]),
+            held[0] - sum(map(mul, row[_STEADY:second], errors)),
+            held[1] - sum(map(mul, row[second:], errors)),
         )
         return Turn(now, desired, sideslip, steady, demand)
 
@@ -191,7 +193,9 @@ class Lqr:
 
     def _gains(self, works: tuple[bool, bool], speed_mps: float) -> list[float]:
         """The row of the schedule at a speed."""
-        rows = schedule(self._car, self._parameters, self._servos.lag_s, self._interval_s, works)
+        if (rows := self._schedules.get(works)) is None:
+            rows = schedule(self._car, self._parameters, self._servos.lag_s, self._interval_s, works)
+            self._schedules[works] = rows
         place = min(max(speed_mps / SPEED_STEP_MPS - 1.0, 0.0), len(rows) - 1.000001)
         index = int(place)
         part = place - index
