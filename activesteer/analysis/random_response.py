@@ -47,7 +47,7 @@ def random_response(
     where the response dies away within a second. The error is that of small deviations: coherence above some 0.3.
 
     Args:
-        recordings: Runs with different random steering, of at least `SEGMENT_S` each.
+        recordings: Runs with different random steering, of at least `SEGMENT_S` each, all with one time step.
         output: Channel.
         lowest_Hz: Least frequency [Hz].
         highest_Hz: Greatest frequency [Hz].
@@ -64,27 +64,23 @@ def random_response(
         raise RecordingError("there is no run with random steering")
     from scipy import signal  # noqa: PLC0415 - slow to import, and lists of standards do not need it
 
-    total, averages, step_s = np.zeros((3, 1), dtype=np.complex128), 0.0, 1.0
+    step_s = timestep(np.asarray(recordings[0].time_s, dtype=np.float64))
+    length = round(SEGMENT_S / step_s)
+    spectra, counts = [], []
     for recording in recordings:
-        step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))
-        length = round(SEGMENT_S / step_s)
         u, y = (np.asarray(recording[name], dtype=np.float64) for name in (input_channel, output))
         if len(u) < length:
             raise RecordingError(
                 f"a run of {len(u) * step_s:.3g} s is too short for an average; {SEGMENT_S:g} s are needed",
                 value=len(u) * step_s,
             )
-        count = 1 + (len(u) - length) // (length - length // 2)
         pairs = ((u, u), (y, y), (u, y))
-        spectra = count * np.stack(
-            [np.asarray(signal.csd(*pair, fs=1.0 / step_s, nperseg=length)[1]) for pair in pairs]
-        )
-        total = total + spectra
-        averages += count / _HANN_OVERLAP
-    power_u, power_y, cross = total
-    lines_Hz = np.asarray(np.fft.rfftfreq(round(SEGMENT_S / step_s), step_s), dtype=np.float64)
+        spectra.append([signal.csd(*pair, fs=1.0 / step_s, nperseg=length)[1] for pair in pairs])
+        counts.append(1 + (len(u) - length) // (length - length // 2))
+    power_u, power_y, cross = np.average(spectra, axis=0, weights=counts)
+    power_u, power_y, averages = power_u.real, power_y.real, sum(counts) / _HANN_OVERLAP
+    lines_Hz = np.asarray(np.fft.rfftfreq(length, step_s), dtype=np.float64)
     inside = (lines_Hz >= lowest_Hz - 1e-9) & (lines_Hz <= highest_Hz + 1e-9)
-    power_u, power_y = power_u.real, power_y.real
     largest = float(power_u.max())
     found = response_of(lines_Hz[inside], power_u[inside], power_y[inside], cross[inside], input_channel, largest)
     with np.errstate(divide="ignore"):

@@ -61,7 +61,8 @@ def add_to(commands: Any) -> None:
 
 def _fault_map(options: argparse.Namespace) -> int:
     from activesteer.errors import nearest_names
-    from activesteer.studies.fault_map import PRESETS, Limits, fault_map
+    from activesteer.studies.fault_map import Limits, fault_map
+    from activesteer.studies.fault_situations import PRESETS
 
     if options.preset not in PRESETS:
         raise ParameterError(

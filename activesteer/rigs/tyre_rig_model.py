@@ -9,7 +9,7 @@ import numpy as np
 
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.loading import chain_to
+from activesteer.vehicle.loading import SLIP_RATES, chain_to
 
 _MJCF: Final = """
 <mujoco model="tyre rig">
@@ -69,10 +69,9 @@ def compile_rig(
         chain_length=len(chain),
         chain=chain,
     )
-    rates = ("deflection_x_rate_mps", "deflection_y_rate_mps", "deflection_z_rate_radps")
     actuators = [
-        fb.filled(fb.ACTUATOR, kind=fb.KIND_SLIP, act=address, slot=fb.output_slot(0, rate), **fb.IN_ORDER)
-        for address, rate in zip(states, rates, strict=True)
+        fb.filled(fb.ACTUATOR, kind=fb.KIND_SLIP, act=address, userdata=fb.output_slot(0, rate), **fb.IN_ORDER)
+        for address, rate in zip(states, SLIP_RATES.values(), strict=True)
     ]
     sections = {"wheels": [mounted], "tyres": [np.atleast_1d(tyre.record)], "actuators": actuators}
     array = fb.pack(fb.new_header(model, carrier, []), sections)

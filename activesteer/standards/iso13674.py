@@ -91,27 +91,12 @@ def _examine(ground: Ground) -> Findings:
         Table(
             f"Weave, {WEAVE_Hz:g} Hz, {angle_deg:.1f} deg",
             ("abscissa", "ordinate", "gradient", "ordinate dead band", "abscissa dead band"),
-            [
-                (
-                    row["abscissa"],
-                    row["ordinate"],
-                    *(cell(row[key], 4) for key in list(row)[2:]),
-                )
-                for row in loops
-            ],
+            [(row["abscissa"], row["ordinate"], *(cell(row[key], 4) for key in list(row)[2:])) for row in loops],
         ),
         Table(
             f"Transition through straight ahead, {TRANSITION_DEGPS:g} deg/s",
             ("abscissa", "ordinate", "slope", "intercept"),
-            [
-                (
-                    row["abscissa"],
-                    row["ordinate"],
-                    cell(row["slope"], 4),
-                    cell(row["intercept"], 4),
-                )
-                for row in lines
-            ],
+            [(row["abscissa"], row["ordinate"], cell(row["slope"], 4), cell(row["intercept"], 4)) for row in lines],
         ),
     ]
     pictures = [Picture("Weave", _panels(periodic)), Picture("Transition", _panels(through))]

@@ -12,7 +12,8 @@ import numpy as np
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.standards.standard import Run
 from activesteer.studies import run_task
-from activesteer.studies.fault_map import PRESETS, fault_map
+from activesteer.studies.fault_map import fault_map
+from activesteer.studies.fault_situations import PRESETS
 from activesteer.studies.study import study
 from activesteer.studies.workers import Workers
 

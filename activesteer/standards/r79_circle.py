@@ -46,7 +46,7 @@ CIRCLES: Final = {"circle_100m": "left", "circle_100m_right": "right"}
 _TURNED_S: Final = 3.0
 """Time in which the steering wheel comes to the Ackermann angle of the radius: a third more is left to the car [s]."""
 _BEGIN_S: Final = 0.5
-_CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "vx_mps")
+_CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "speed_mps")
 
 
 class Reached(NamedTuple):
@@ -70,7 +70,7 @@ def reached(run: Run, radius_m: float) -> Reached:
     """
     if not run.channels:
         return Reached(math.nan, math.nan)
-    tighter = np.abs(run["yaw_rate_radps"]) * radius_m >= np.abs(run["vx_mps"])
+    tighter = np.abs(run["yaw_rate_radps"]) * radius_m >= run["speed_mps"]
     if not tighter.any():
         return Reached(math.nan, math.nan)
     first = int(np.argmax(tighter))
@@ -256,7 +256,8 @@ STANDARD: Final = Standard(
         "tests by the manufacturer, warning signals, energy reserves, annex 6, steering by assistance systems.",
         f"The radius of the steering wheel, {1000.0 * RIM_RADIUS_M:.0f} mm, and the power assist, a constant fraction "
         "of the column's torque, are assumptions. The turning radius is that of the centre of gravity's path. "
-        "The force is read every 20 ms.",
+        "The ramp of the steering wheel begins at once, as no hand does: what its inertia takes for 5 ms (17 N at the "
+        "sedan's) is not counted, the force is read every 20 ms.",
         "The car is driven as its file has it, not at its greatest mass: --set load.payload_kg loads it.",
     ),
     examine=_examine,

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 
 _LEAD_S: Final = 0.2
+"""So long before what time is counted from a curve over time begins [s]."""
 SIDES: Final = {"left": 1.0, "right": -1.0}
 """Side to which a car is steered -> sign of the steering wheel angle, ISO 8855."""
 
@@ -87,7 +88,7 @@ class Run:
             **words: Of `Curve`.
         """
         values = self.channels.get(channel, np.empty(0))
-        time_s = np.arange(len(values)) * CURVE_STEP_S - begin_s
+        time_s = self.time_s[: len(values)] - begin_s
         shown = time_s >= -_LEAD_S
         return Curve(time_s[shown], display_unit(channel).factor * values[shown], **words)
 
@@ -128,7 +129,7 @@ class Ground(Protocol):
         """Drives the faults of the controller's actuators and sensors.
 
         Args:
-            preset: Name of speeds and situations, one of `studies.fault_map.PRESETS`.
+            preset: Name of speeds and situations, one of `studies.fault_situations.PRESETS`.
 
         Returns:
             The rows of the map.

@@ -26,21 +26,13 @@ from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
 from activesteer.studies.fault_figures import FIGURES
+from activesteer.studies.fault_situations import LANE_M, PRESETS, SITUATIONS, path_of
 from activesteer.studies.workers import Workers, in_parallel
 
 OFFSET_AT_S: Final = 1.0
 """How long after the beginning of a fault the lateral offset is taken [s]."""
-TURN_MPS2: Final = 4.0
-"""Lateral acceleration of the turn, and the greatest of the lane change [m/s2]."""
-
 _RESOLUTION_S: Final = 0.005
 """To this the fault-tolerant time is found [s]."""
-_LANE_M: Final = 3.5
-_SPACING_M: Final = 1.0
-_ENTRY_S: Final = 2.0
-_STEADY_S: Final = 2.5
-_QUINTIC_PEAK: Final = 10.0 / math.sqrt(3.0)
-"""Greatest second derivative of 10 s^3 - 15 s^4 + 6 s^5; it is reached at s = 0.5 - 1 / sqrt(12)."""
 
 
 @dataclass(frozen=True)
@@ -59,60 +51,6 @@ class Limits:
     window_s: Annotated[float, Range(OFFSET_AT_S, 10.0)] = 2.0
     """How long after the beginning of a fault is looked at [s]."""
 
-
-class Situation(NamedTuple):
-    """A path that the driver follows, and when faults begin on it.
-
-    Attributes:
-        curvature: Speed [m/s], time since the start [s] -> curvature of the path [1/m].
-        fault_s: Speed [m/s] -> when faults begin [s].
-    """
-
-    curvature: Callable[[float, float], float]
-    fault_s: Callable[[float], float]
-
-
-def _entry(time_s: float) -> float:
-    """Rises from 0 to 1 without a kink."""
-    return 0.5 - 0.5 * math.cos(math.pi * min(max(time_s / _ENTRY_S, 0.0), 1.0))
-
-
-def _lane_change_s() -> float:
-    """How long the change of lane takes, for its greatest lateral acceleration [s]."""
-    return math.sqrt(_QUINTIC_PEAK * _LANE_M / TURN_MPS2)
-
-
-def _lane_change(speed_mps: float, time_s: float) -> float:
-    fraction = (time_s - 1.0) / _lane_change_s()
-    if not 0.0 < fraction < 1.0:
-        return 0.0
-    return _LANE_M * fraction * (60.0 + fraction * (120.0 * fraction - 180.0)) / (_lane_change_s() * speed_mps) ** 2
-
-
-SITUATIONS: Final = {
-    "straight": Situation(lambda speed, time: 0.0, lambda speed: 1.0),
-    "turn": Situation(lambda speed, time: TURN_MPS2 / speed**2 * _entry(time), lambda speed: _ENTRY_S + _STEADY_S),
-    "lane_change": Situation(_lane_change, lambda speed: 1.0 + (0.5 - 1.0 / math.sqrt(12.0)) * _lane_change_s()),
-    "circle_100m": Situation(lambda speed, time: _entry(time) / 100.0, lambda speed: _ENTRY_S + _STEADY_S),
-    "circle_100m_right": Situation(lambda speed, time: -_entry(time) / 100.0, lambda speed: _ENTRY_S + _STEADY_S),
-}
-"""Straight ahead; a left turn of 4 m/s2; a change of lane by 3.5 m to the left with as much, the fault at the
-first peak of its curvature; a circle of 100 m, that of UN R79, annex 4, for cars, to the left and to the right."""
-
-
-class Preset(NamedTuple):
-    """Speeds and situations that belong together."""
-
-    speeds_kmh: tuple[float, ...]
-    situations: tuple[str, ...]
-
-
-PRESETS: Final = {
-    "usual": Preset((60.0, 100.0, 140.0), ("straight", "turn", "lane_change")),
-    # Cars and light vans, by extracts of UN R79, revision 4, annex 4, and of GB 17675-2021, which takes it over.
-    "un_r79": Preset((80.0,), ("circle_100m", "circle_100m_right")),
-}
-"""Name -> what is driven."""
 
 _ALL_KINDS: Final = (
     "stuck", "runaway=left", "runaway=right", "float", "offset=1deg", "reversed", "delayed=0.1s", "dropout",
@@ -216,31 +154,17 @@ def _cell(
 ) -> list[dict[str, Any]]:
     """All faults at one speed in one situation."""
     begin_s = SITUATIONS[situation].fault_s(speed_kmh / 3.6)
-    table = _maneuver(situation, speed_kmh / 3.6, begin_s + limits.window_s)
+    table = path_of(situation, speed_kmh / 3.6, begin_s + limits.window_s)
     scenario = resolve(table, vehicle, overrides, driver)
     width_m = scenario.car.config.width_m
     if limits.lateral_offset_m is None:
-        limits = replace(limits, lateral_offset_m=0.5 * (_LANE_M - width_m))
+        limits = replace(limits, lateral_offset_m=0.5 * (LANE_M - width_m))
     longest_delay_s = max(fault.delay_s or 0.0 for fault in faults.values())
     runs = _Runs(ClosedLoop(scenario, controller), begin_s, longest_delay_s)
     return [
         {"fault": text, "speed_kmh": speed_kmh, "situation": situation, **_judged(runs, fault, limits)}
         for text, fault in faults.items()
     ]
-
-
-def _maneuver(situation: str, speed_mps: float, duration_s: float) -> dict[str, Any]:
-    """The manoeuvre of a situation: a path, some seconds longer than the car will come."""
-    curvature = SITUATIONS[situation].curvature
-    steps = math.ceil(speed_mps * (duration_s + 4.0) / _SPACING_M)
-    times = (np.arange(steps) + 0.5) * _SPACING_M / speed_mps
-    heading = np.cumsum([0.0, *(_SPACING_M * curvature(speed_mps, float(time)) for time in times)])
-    along = 0.5 * (heading[:-1] + heading[1:])
-    x, y = (np.concatenate(([0.0], _SPACING_M * np.cumsum(part))) for part in (np.cos(along), np.sin(along)))
-    return {
-        "kind": "follow_path", "name": situation, "speed_mps": speed_mps, "duration_s": duration_s,
-        "path": {"x_m": x.tolist(), "y_m": y.tolist()},
-    }  # fmt: skip
 
 
 class _Motion(NamedTuple):

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -25,26 +26,25 @@ def _axle(table: Mapping[str, Any], axle: str, **changes: Any) -> dict[str, Any]
     return {**table, "curves": {**curves, axle: {**curves[axle], **changes}}}
 
 
-def _flat(axle: str, curve: str) -> Change:
-    """A curve over travel stays at its static value."""
+def _over_travel(axle: str, curve: str, changed: Callable[[float, float], float]) -> Change:
+    """A curve over travel: its value and the static one -> its value in place of it."""
 
     def change(table: Mapping[str, Any]) -> dict[str, Any]:
         given = table["curves"][axle]
         static = float(np.interp(0.0, given["travel_m"], given[curve]))
-        return _axle(table, axle, **{curve: [static] * len(given[curve])})
+        return _axle(table, axle, **{curve: [changed(value, static) for value in given[curve]]})
 
     return change
+
+
+def _flat(axle: str, curve: str) -> Change:
+    """A curve over travel stays at its static value."""
+    return _over_travel(axle, curve, lambda _, static: static)
 
 
 def _static(axle: str, curve: str) -> Change:
     """A curve over travel goes through zero."""
-
-    def change(table: Mapping[str, Any]) -> dict[str, Any]:
-        given = table["curves"][axle]
-        static = float(np.interp(0.0, given["travel_m"], given[curve]))
-        return _axle(table, axle, **{curve: [value - static for value in given[curve]]})
-
-    return change
+    return _over_travel(axle, curve, lambda value, static: value - static)
 
 
 def _compliance(axle: str, change: Callable[[Array], None]) -> Change:
@@ -71,6 +71,7 @@ def _least_toe(compliance: Array) -> None:
     others = [index for index in range(5) if index != _TOE]
     coupling = compliance[_TOE, others]
     least = float(coupling @ np.linalg.solve(compliance[np.ix_(others, others)], coupling))
+    # A little more than what keeps the matrix positive, also where side force does nothing.
     compliance[_TOE, _TOE] = max(1.05 * least, 1e-2 * compliance[_TOE, _TOE])
 
 
@@ -85,9 +86,8 @@ def _stiff_camber(compliance: Array) -> None:
 
 def _turned_toe(compliance: Array) -> None:
     """Side force turns the wheel the other way."""
-    others = [index for index in range(5) if index != _TOE]
-    compliance[_TOE, others] *= -1.0
-    compliance[others, _TOE] *= -1.0
+    compliance[_TOE, :] *= -1.0
+    compliance[:, _TOE] *= -1.0
 
 
 def _ratio(factor: float) -> Change:
@@ -113,10 +113,7 @@ def _progressive(at_lock: float, lock_m: float) -> Change:
 
 def _both(*changes: Change) -> Change:
     def change(table: Mapping[str, Any]) -> dict[str, Any]:
-        result = dict(table)
-        for each in changes:
-            result = each(result)
-        return result
+        return functools.reduce(lambda result, each: each(result), changes, dict(table))
 
     return change
 

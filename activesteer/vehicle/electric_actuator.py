@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Final
 
 from activesteer.config import Range
 
 Positive = Annotated[float, Range(1e-9)]
+STOP_BEYOND: Final = 1.03
+"""Where the end stops are, over the travel at the limit: an assumption."""
 
 
 @dataclass(frozen=True)

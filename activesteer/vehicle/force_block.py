@@ -3,8 +3,9 @@
 One block of numbers per model holds everything the callbacks need: sizes, indices, tyres, dampers, drag, the areas of
 the road and the dynamics of the actuators. So the compiled code is the same for every car and can be cached on disk,
 and models of one process may differ. It is made of records whose fields are float64, an index too, since that is all
-that the engine keeps: a `HEADER`, and behind it the sections. The block is the last custom numeric of the model and
-ends with its own start and a marker, by which the callbacks recognise a model of ours.
+that the engine keeps: a `HEADER`, and behind it the sections. A field that is called as an array of the engine (`act`,
+`qpos`, `userdata`), or as what these are counted by (`body`, `dof`, `tendon`), is a place in it. The block is the last
+custom numeric of the model and ends with its own start and a marker, by which the callbacks recognise a model of ours.
 """
 
 from __future__ import annotations
@@ -55,12 +56,14 @@ DAMPER: Final = _record(
 """One for each damper: a tendon, its place in the sparse tendon Jacobian, and a piecewise linear curve, velocities
 positive in compression, forces positive where they push apart."""
 
-ACTUATOR: Final = _record("kind", "act", "low", "high", "scale", "offset", "lag_s", "rate_limit", "slot", "stiffness",
-    "drive_fraction", "dof", "tendon", "vibration", "wound_limit", "record")  # fmt: skip
-"""One for each actuator, in the model's order: its `KIND`, where its state stands, and what its kind needs. `low` and
-`high` bound its command; `scale` and `offset` stand between the command and what is made of it, see `IN_ORDER`; `slot`
-says where the callback leaves the rate of a tyre's state; `dof` or `tendon` is what a brake or friction acts on, the
-other one below 0; `record` is the place among `links` or `screws`."""
+ACTUATOR: Final = _record(
+    "kind", "act", "low", "high", "scale", "offset", "lag_s", "rate_limit", "userdata", "stiffness", "drive_fraction",
+    "dof", "tendon", "vibration", "wound_limit", "record",
+)  # fmt: skip
+"""One for each actuator, in the model's order: its `KIND`, and what its kind needs. `low` and `high` bound its command;
+`scale` and `offset` stand between the command and what is made of it, see `IN_ORDER`; at `userdata` the callback leaves
+the rate of a tyre's state; `dof` or `tendon` is what a brake or friction acts on, the other one below 0; `record` is
+the place among `links` or `screws`."""
 KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE, KIND_FRICTION, KIND_DRIVE = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 """What an actuator is; without a dynamics of ours `KIND_NONE`."""
 KIND_LINK, KIND_SCREW, KIND_MOTOR = 6.0, 7.0, 8.0
@@ -73,18 +76,21 @@ overlap. They count while the header's `areas_felt` is 1, which `Vehicle.rebase`
 yet."""
 
 LINK: Final = _record(
-    "tendon", "rest_m", "stiffness_Npm", "backlash_m", "act", "screw_act", "sign", "out", ("angle", POWERS)
+    "tendon", "rest_m", "stiffness_Npm", "backlash_m", "act", "screw_act", "sign", "userdata",
+    ("angle", POWERS),
 )  # fmt: skip
-"""One for each toe link with a screw in it (`toe_link_screws`), with the coefficients of angle over travel."""
+"""One for each toe link with a screw in it (`toe_link_screws`), with the coefficients of angle over travel. `act` is by
+how much it is longer, `screw_act` the position of its screw; at `userdata` its angle is left for its sensor."""
 
 SCREW: Final = _record(
     "act", "motor_act", "command", "lead_mprad", "inertia_kgm2", "position_gain_1ps", "speed_gain_1ps",
     "speed_limit_radps", "peak_Nm", "stall_Nm", "slope_Nmsprad", "power_W", "friction_Nm", "load_friction", "stop_m",
-    "tolerance_m", "seized", "out", "n_links", ("links", 2), "column", "column_stiffness_Npm", "column_rest_m",
+    "tolerance_m", "seized", "userdata", "n_links", ("links", 2), "column", "column_stiffness_Npm", "column_rest_m",
     "column_arm_m", ("travel", POWERS),
 )  # fmt: skip
 """One for each screw and its motor, with the places of its links and the coefficients of travel over angle. The
-superposition's motor has such a record too: its travel is an angle [rad], and it has the steering column for links."""
+superposition's motor has such a record too: its travel is an angle [rad], and it has the steering column for links. At
+`userdata` torque and whether it is at a limit are left for its sensor; `command` is the actuator that is asked."""
 
 GUIDE: Final = _record(
     "qpos", "dof", "side", "rack", "rack_dof", "travel_table", "rack_table", ("stiffness", 25), ("damping", 25),
@@ -116,7 +122,7 @@ WHEEL_OUTPUT: Final = _record(
     "friction_utilisation", "mu", "contact_x_m", "contact_y_m",
 )  # fmt: skip
 """What the callback writes for each wheel at the beginning of mjData.userdata. Behind these stand the force of each
-damper and what the sensors of screws say (`out`), and last, which it does not write, how many faults act."""
+damper and what the sensors of screws and motors say, and last, which it does not write, how many faults act."""
 USERDATA_PER_WHEEL: Final = WHEEL_OUTPUT.itemsize // 8
 
 
@@ -142,17 +148,12 @@ def new_header(model: mujoco.MjModel, chassis: int, chassis_dofs: list[int]) -> 
     Returns:
         The header, shape (1,).
     """
-    header = np.zeros(1, HEADER)
-    sizes = {
-        "n_dofs": model.nv, "n_bodies": model.nbody, "n_userdata": model.nuserdata, "n_activations": model.na,
-        "n_controls": model.nu, "n_tendons": model.ntendon, "n_tendon_jacobian": model.nJten,
-        "n_coordinates": model.nq, "chassis_body": chassis, "chassis_root": model.body_rootid[chassis],
-        "n_chassis_dofs": len(chassis_dofs),
-    }  # fmt: skip
-    for name, size in sizes.items():
-        header[name] = size
-    header["chassis_dofs"][0, : len(chassis_dofs)] = chassis_dofs
-    return header
+    return filled(
+        HEADER, n_dofs=model.nv, n_bodies=model.nbody, n_userdata=model.nuserdata, n_activations=model.na,
+        n_controls=model.nu, n_tendons=model.ntendon, n_tendon_jacobian=model.nJten, n_coordinates=model.nq,
+        chassis_body=chassis, chassis_root=model.body_rootid[chassis], n_chassis_dofs=len(chassis_dofs),
+        chassis_dofs=chassis_dofs,
+    )  # fmt: skip
 
 
 def filled(record_type: np.dtype[Any], /, **values: Any) -> NDArray[Any]:

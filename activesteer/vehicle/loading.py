@@ -28,7 +28,7 @@ from activesteer.vehicle.superposition_actuator import MOTOR, NAME, fit_motor, m
 from activesteer.vehicle.toe_link_screws import fit_screws, screw_records, sensor_range
 
 _USER_DYNAMICS: Final = int(mujoco.mjtDyn.mjDYN_USER)
-_RATES: Final = {
+SLIP_RATES: Final = {
     "slip_x": "deflection_x_rate_mps",
     "slip_y": "deflection_y_rate_mps",
     "slip_z": "deflection_z_rate_radps",
@@ -162,9 +162,10 @@ def _force_block(
         if _friction(name, parameters)[0] > 0.0:
             # Friction in the vehicle file is not to be lost because the model has no place for it.
             find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+    mounted = {corner: _tyre(corner, tyres) for corner in CORNERS}
     sections: dict[str, list[NDArray[Any]]] = {
-        "wheels": [_wheel(model, corner, parameters, _tyre(corner, tyres), road) for corner in CORNERS],
-        "tyres": [np.atleast_1d(_tyre(corner, tyres).record) for corner in CORNERS],
+        "wheels": [_wheel(model, corner, parameters, tyre, road) for corner, tyre in mounted.items()],
+        "tyres": [np.atleast_1d(tyre.record) for tyre in mounted.values()],
         "dampers": [_damper(model, corner, parameters) for corner in CORNERS],
         "areas": [np.array([area], fb.AREA) for area in road.areas()],
     }
@@ -264,8 +265,8 @@ def _actuator(
 def _dynamics(model: mujoco.MjModel, index: int, name: str, parameters: VehicleParameters) -> dict[str, float]:
     """Kind of an actuator, and the fields that it needs."""
     corner, _, state = name.partition("_")
-    if state in _RATES:
-        return {"kind": fb.KIND_SLIP, "slot": fb.output_slot(CORNERS.index(corner), _RATES[state])}
+    if state in SLIP_RATES:
+        return {"kind": fb.KIND_SLIP, "userdata": fb.output_slot(CORNERS.index(corner), SLIP_RATES[state])}
     if state == "drive":
         fraction = parameters.powertrain.wheel_fractions[CORNERS.index(corner)]
         return {"kind": fb.KIND_DRIVE, "drive_fraction": fraction, "lag_s": parameters.powertrain.lag_s}

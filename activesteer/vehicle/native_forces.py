@@ -25,19 +25,16 @@ from activesteer.vehicle.dry_friction import friction_rate
 from activesteer.vehicle.engine_layout import EngineLayout, engine_layout
 from activesteer.vehicle.native_guide import guides
 from activesteer.vehicle.native_memory import array_at, f64_pointer, records_at, word
+from activesteer.vehicle.native_screws import screw_rate
 from activesteer.vehicle.powertrain import CLUTCH_OPEN, drive_limits
 
 _MARKER: Final = fb.MARKER
-_CONTACT_S: Final = 3e-4
-"""Time in which a screwed link finds its place in the play; of 0, the linearised car would have no such mode [s]."""
 _headers_at: Final = records_at(fb.HEADER)
 _wheels_at: Final = records_at(fb.WHEEL)
 _tyres_at: Final = records_at(TYRE_RECORD)
 _dampers_at: Final = records_at(fb.DAMPER)
 _actuators_at: Final = records_at(fb.ACTUATOR)
 _areas_at: Final = records_at(fb.AREA)
-_links_at: Final = records_at(fb.LINK)
-_screws_at: Final = records_at(fb.SCREW)
 _outputs_at: Final = records_at(fb.WHEEL_OUTPUT)
 
 
@@ -241,111 +238,6 @@ def _friction_rate(entry, qvel, ten_velocity, state, timestep_s):
     return friction_rate(state, speed, vibration, entry.wound_limit, timestep_s)
 
 
-@inlined
-def _polynomial(coefficients, x):
-    """Value of a polynomial without a constant term."""
-    value = 0.0
-    for power in range(fb.POWERS - 1, -1, -1):
-        value = (value + coefficients[power]) * x
-    return value
-
-
-@inlined
-def _played(link, screw_m, longer_m):
-    """By how much a link is longer where its screw stands, within the play, as the length asks that it has."""
-    half = 0.5 * link.backlash_m
-    return min(max(longer_m, screw_m - half), screw_m + half)
-
-
-@inlined
-def _link_rate(link, state, act, ten_length, userdata, timestep_s):
-    screw_m = link.sign * act[int(link.screw_act)]
-    userdata[int(link.out)] = _polynomial(link.angle, screw_m)
-    target = _played(link, screw_m, ten_length[int(link.tendon)] - link.rest_m)
-    return -math.expm1(-timestep_s / _CONTACT_S) * (target - state) / timestep_s
-
-
-@inlined
-def _motor_load(links, screw, act, ten_length):
-    """Torque of the load at the motor, positive where it helps forwards, and the sum of its parts' magnitudes [N m]."""
-    lead = screw.lead_mprad
-    if screw.n_links == 0.0:
-        stretch = ten_length[int(screw.column)] - screw.column_rest_m
-        load = -screw.column_stiffness_Npm * stretch * screw.column_arm_m * lead
-        return load, abs(load)
-    load, carried = 0.0, 0.0
-    for index in range(int(screw.n_links)):
-        link = links[int(screw.links[index])]
-        longer_m = ten_length[int(link.tendon)] - link.rest_m
-        tension = link.stiffness_Npm * (longer_m - act[int(link.act)])
-        load += link.sign * tension * lead
-        carried += abs(tension) * lead
-    return load, carried
-
-
-@inlined
-def _motor_rate(links, screw, asked, act, ctrl, ten_length, userdata, speed, timestep_s):
-    """Rate of a motor's speed: position and speed loop within current, voltage and power, load, dry friction."""
-    out = int(screw.out)
-    userdata[out] = userdata[out + 1] = 0.0
-    if screw.seized != 0.0:
-        return -speed / timestep_s
-    angle = asked.scale * ctrl[int(screw.command)] + asked.offset
-    beyond = angle < asked.low or angle > asked.high
-    angle = min(max(angle, asked.low), asked.high)
-    position, lead = act[int(screw.act)], screw.lead_mprad
-    missing = (_polynomial(screw.travel, angle) - position) / lead
-    limit = screw.speed_limit_radps
-    wanted = min(max(screw.position_gain_1ps * missing, -limit), limit)
-    load, carried = _motor_load(links, screw, act, ten_length)
-    friction = screw.friction_Nm + screw.load_friction * carried
-    # The speed loop, its integral part settled: what the speed asked for needs against load and friction.
-    target = speed - (wanted - speed) * math.expm1(-screw.speed_gain_1ps * timestep_s)
-    per_torque = timestep_s / screw.inertia_kgm2
-    needed = (target - speed) / per_torque - load + math.copysign(friction, target)
-    if abs(missing) * lead <= screw.tolerance_m and abs(load) <= friction:
-        # It is there, and the screw holds by itself: no current.
-        needed = 0.0
-    low, high = _motor_limits(screw, speed)
-    torque = min(max(needed, low), high)
-    userdata[out] = torque
-    userdata[out + 1] = 1.0 if beyond or torque != needed or abs(wanted) == limit else 0.0
-    free = speed + per_torque * (torque + load)
-    new = math.copysign(max(abs(free) - per_torque * friction, 0.0), free)
-    reached = position + timestep_s * lead * new
-    if reached > screw.stop_m:
-        new = (screw.stop_m - position) / (timestep_s * lead)
-    elif reached < -screw.stop_m:
-        new = (-screw.stop_m - position) / (timestep_s * lead)
-    return (new - speed) / timestep_s
-
-
-@inlined
-def _screw_rate(block, header, actuators, entry, act, ctrl, ten_length, userdata, timestep_s):
-    """Rate of a screwed link's change of length, of a screw's position, or of its motor's speed."""
-    state = act[int(entry.act)]
-    links = _links_at(block, header.links, header.n_links)
-    if entry.kind == fb.KIND_LINK:
-        return _link_rate(links[int(entry.record)], state, act, ten_length, userdata, timestep_s)
-    screw = _screws_at(block, header.screws, header.n_screws)[int(entry.record)]
-    if entry.kind == fb.KIND_SCREW:
-        return screw.lead_mprad * act[int(screw.motor_act)]
-    asked = actuators[int(screw.command)]
-    return _motor_rate(links, screw, asked, act, ctrl, ten_length, userdata, state, timestep_s)
-
-
-@inlined
-def _motor_limits(screw, speed):
-    """Least and greatest torque that current, voltage and power allow at a speed [N m]."""
-    high = min(screw.peak_Nm, max(screw.stall_Nm - screw.slope_Nmsprad * speed, 0.0))
-    low = -min(screw.peak_Nm, max(screw.stall_Nm + screw.slope_Nmsprad * speed, 0.0))
-    if speed > 0.0:
-        high = min(high, screw.power_W / speed)
-    elif speed < 0.0:
-        low = max(low, screw.power_W / speed)
-    return low, high
-
-
 def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0915 - three functions in one
     """Compiles the three callbacks, or loads them from numba's cache.
 
@@ -392,7 +284,7 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0
         entry = actuators[actuator]
         kind = entry.kind
         if kind == fb.KIND_SLIP:
-            return array_at(data, d_userdata, int(header.n_userdata))[int(entry.slot)]
+            return array_at(data, d_userdata, int(header.n_userdata))[int(entry.userdata)]
         state = array_at(data, d_act, int(header.n_activations))[int(entry.act)]
         command = entry.scale * array_at(data, d_ctrl, int(header.n_controls))[actuator] + entry.offset
         if kind == fb.KIND_SERVO:
@@ -411,7 +303,7 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0
         elif kind == fb.KIND_BRAKE:
             rate = _brake_rate(entry, qvel, command, state, timestep_s)
         elif kind >= fb.KIND_LINK:
-            rate = _screw_rate(
+            rate = screw_rate(
                 block, header, actuators, entry, array_at(data, d_act, int(header.n_activations)),
                 array_at(data, d_ctrl, int(header.n_controls)), array_at(data, d_ten_length, int(header.n_tendons)),
                 array_at(data, d_userdata, int(header.n_userdata)), timestep_s,

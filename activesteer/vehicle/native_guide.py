@@ -20,9 +20,9 @@ from activesteer.compilation import inlined
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_memory import records_at
 
-_GUIDES_AT: Final = records_at(fb.GUIDE)
-_TABLES_AT: Final = records_at(fb.CURVE_TABLE)
-_NUMBERS_AT: Final = records_at(np.dtype(np.float64))
+_guides_at: Final = records_at(fb.GUIDE)
+_tables_at: Final = records_at(fb.CURVE_TABLE)
+_numbers_at: Final = records_at(np.dtype(np.float64))
 _HEAD: Final = fb.CURVE_TABLE.itemsize // 8
 
 
@@ -84,12 +84,12 @@ def _hardened(record, spring, e0, e1, e2, e3, e4):
 @inlined
 def guides(block, header, qpos, qvel, qfrc):
     """Adds the forces of all guided wheels."""
-    records = _GUIDES_AT(block, header.guides, header.n_guides)
-    curves = _NUMBERS_AT(block, header.curves, header.n_curves)
+    records = _guides_at(block, header.guides, header.n_guides)
+    curves = _numbers_at(block, header.curves, header.n_curves)
     for index in range(records.size):
         record = records[index]
-        travel = _TABLES_AT(block, header.curves + record.travel_table, 1)[0]
-        rack = _TABLES_AT(block, header.curves + record.rack_table, 1)[0]
+        travel = _tables_at(block, header.curves + record.travel_table, 1)[0]
+        rack = _tables_at(block, header.curves + record.rack_table, 1)[0]
         tc, rc = curves[int(record.travel_table) + _HEAD :], curves[int(record.rack_table) + _HEAD :]
         p, d, side = int(record.qpos), int(record.dof), record.side
         z, vz, s, vs = qpos[p + 2], qvel[d + 2], 0.0, 0.0
@@ -98,9 +98,7 @@ def guides(block, header, qpos, qvel, qfrc):
             s, vs = side * qpos[int(record.rack)], side * qvel[int(record.rack_dof)]
             on_rack = _place(rack, s)
         moved = z, vz, s, vs
-        e0, r0, z0, s0, l0, m0 = _strain(
-            record, travel, tc, rack, rc, 0, 1.0 * qpos[p], 1.0 * qvel[d], moved, on_travel, on_rack
-        )
+        e0, r0, z0, s0, l0, m0 = _strain(record, travel, tc, rack, rc, 0, qpos[p], qvel[d], moved, on_travel, on_rack)
         e1, r1, z1, s1, l1, m1 = _strain(
             record, travel, tc, rack, rc, 1, side * qpos[p + 1], side * qvel[d + 1], moved, on_travel, on_rack
         )
@@ -108,7 +106,7 @@ def guides(block, header, qpos, qvel, qfrc):
             record, travel, tc, rack, rc, 2, side * qpos[p + 4], side * qvel[d + 4], moved, on_travel, on_rack
         )
         e3, r3, z3, s3, l3, m3 = _strain(
-            record, travel, tc, rack, rc, 3, 1.0 * qpos[p + 5], 1.0 * qvel[d + 5], moved, on_travel, on_rack
+            record, travel, tc, rack, rc, 3, qpos[p + 5], qvel[d + 5], moved, on_travel, on_rack
         )
         e4, r4, z4, s4, l4, m4 = _strain(
             record, travel, tc, rack, rc, 4, side * qpos[p + 3], side * qvel[d + 3], moved, on_travel, on_rack
@@ -135,5 +133,5 @@ def guides(block, header, qpos, qvel, qfrc):
         qfrc[d + 4] -= side * (u2 - w2)
         qfrc[d + 5] -= u3 - w3
         if record.rack >= 0.0:
-            on_rack = u0 * s0 + u1 * s1 + u2 * s2 + u3 * s3 + u4 * s4 - _row(ss, 0, w0, w1, w2, w3, w4)
-            qfrc[int(record.rack_dof)] += side * on_rack
+            handed_on = u0 * s0 + u1 * s1 + u2 * s2 + u3 * s3 + u4 * s4 - _row(ss, 0, w0, w1, w2, w3, w4)
+            qfrc[int(record.rack_dof)] += side * handed_on

@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from activesteer.config import Range
 from activesteer.errors import ModelError, ParameterError
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.electric_actuator import ElectricActuator, known
+from activesteer.vehicle.electric_actuator import STOP_BEYOND, ElectricActuator, known
 from activesteer.vehicle.named_parts import tendon_arms
 
 NAME: Final = "superposition"
 MOTOR: Final = "_motor"
 """How the state beside an actuator is called that is the speed of its motor; so is its sensor."""
 _COLUMN: Final = "steering_column"
-_STOP_BEYOND: Final = 1.03
 
 
 @dataclass(frozen=True)
@@ -119,10 +118,10 @@ def motor_record(model: mujoco.MjModel, actuator: SuperpositionActuator) -> NDAr
         "motor_act": float(model.actuator_actadr[model.actuator(NAME + MOTOR).id]),
         "command": float(index),
         "lead_mprad": 1.0 / known(actuator.gear),
-        "stop_m": _STOP_BEYOND * float(model.actuator_ctrlrange[index, 1]),
+        "stop_m": STOP_BEYOND * float(model.actuator_ctrlrange[index, 1]),
         "tolerance_m": known(actuator.position_tolerance_rad),
         # What it says stands last of all sensors, before how many faults act.
-        "out": float(model.nuserdata - 3),
+        "userdata": float(model.nuserdata - 3),
         "column": float(column),
         "column_stiffness_Npm": float(model.tendon_stiffness[column]),
         "column_rest_m": float(model.tendon_lengthspring[column, 0]),

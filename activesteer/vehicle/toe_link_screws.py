@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from activesteer.errors import ModelError
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.electric_actuator import known
+from activesteer.vehicle.electric_actuator import STOP_BEYOND, known
 from activesteer.vehicle.rear_actuator import RearActuator
 from activesteer.vehicle.superposition_actuator import MOTOR
 from activesteer.vehicle.toe_link_kinematics import toe_link_map
@@ -34,8 +34,6 @@ from activesteer.vehicle.toe_link_kinematics import toe_link_map
 CORNERS: Final = ("rl", "rr")
 LINKS: Final = ("toe_link", "tie_rod")
 """What a rear toe link may be called behind its corner."""
-STOP_BEYOND: Final = 1.03
-"""Where the end stops are, over the travel at the limit."""
 SCREW: Final = "_screw"
 """How the state beside an actuator is called that is its screw's: of its own side, or `rear_screw` in the middle."""
 
@@ -139,7 +137,7 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
     places: dict[str, tuple[float, int]] = {}
     links: list[NDArray[Any]] = []
     screws: list[NDArray[Any]] = []
-    outs = model.nuserdata - 1 - sensor_range(model)[1]
+    said = model.nuserdata - 1 - sensor_range(model)[1]
     for index, (corner, tendon) in enumerate(zip(CORNERS, names, strict=True)):
         part = "rear" if central else corner
         places[f"{corner}_steer"] = (fb.KIND_LINK, index)
@@ -153,7 +151,7 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
             act=_act(model, f"{corner}_steer"),
             screw_act=_act(model, part + SCREW),
             sign=-1.0 if central and corner == "rr" else 1.0,
-            out=outs + index,
+            userdata=said + index,
             angle=maps[index].angle_of_travel,
         )
         links.append(link)
@@ -170,7 +168,7 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
             lead_mprad=lead,
             stop_m=STOP_BEYOND * max(mapped.travel_m for mapped in maps),
             tolerance_m=known(actuator.position_tolerance_m),
-            out=outs + len(CORNERS) + 2 * index,
+            userdata=said + len(CORNERS) + 2 * index,
             n_links=len(moved),
             links=moved,
             travel=travel,

@@ -9,13 +9,13 @@ from typing import Any
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.standards.standard import Run
 
-Driven = Callable[[str, Mapping[str, Any]], Mapping[str, float] | str]
-"""Series, case -> metrics, or why there are none."""
+Driven = Callable[[str, Mapping[str, Any]], Mapping[str, float] | str | Run]
+"""Series, case -> metrics, or why there are none; a whole run where channels are looked at."""
 
 
 @dataclass
 class WrittenGround:
-    """Gives the metrics that a test writes, and keeps what was asked for."""
+    """Gives what a test writes, and keeps what was asked for."""
 
     driven: Driven
     vehicle: FileOrTable = "compact"
@@ -36,8 +36,13 @@ class WrittenGround:
         # Every case must be one that can be driven.
         resolve(maneuver, self.vehicle, {**(overrides or {}), **self.changed, **cases[0]})
         self.asked.setdefault(series, []).extend(dict(case) for case in cases)
-        found = [(case, self.driven(series, case)) for case in cases]
-        return [Run(case, *(({}, {}, one) if isinstance(one, str) else (one, {}, ""))) for case, one in found]
+        return [_run(case, self.driven(series, case)) for case in cases]
 
     def fault_map(self, preset: str) -> list[dict[str, Any]]:
         raise NotImplementedError
+
+
+def _run(case: Mapping[str, Any], found: Mapping[str, float] | str | Run) -> Run:
+    if isinstance(found, Run):
+        return found
+    return Run(case, {}, {}, found) if isinstance(found, str) else Run(case, found, {}, "")

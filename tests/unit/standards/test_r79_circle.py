@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
 from activesteer.files import json_text
-from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.standards.examination import examine
 from activesteer.standards.r79_circle import EFFORTS, RIM_RADIUS_M, STANDARD, reached
 from activesteer.standards.standard import Run
-from activesteer.studies.fault_map import FIGURES, PRESETS
+from activesteer.studies.fault_figures import FIGURES
+from activesteer.studies.fault_situations import PRESETS
+from tests.unit.standards.grounds import WrittenGround
 from tests.unit.standards.signals import run_of, times
 
 SPEED_MPS = 10.0 / 3.6
@@ -25,33 +25,16 @@ def spiral(tightest_m: float, force_N: float, side: float = 1.0) -> Run:
     """The curvature rises steadily for 4 s, and the force at the rim with it, to that at the end."""
     rising = np.clip(times(5.0) - 0.5, 0.0, 4.0) / 4.0
     return run_of({
-        "yaw_rate_radps": side * SPEED_MPS / tightest_m * rising, "vx_mps": np.full_like(rising, SPEED_MPS),
+        "yaw_rate_radps": side * SPEED_MPS / tightest_m * rising, "speed_mps": np.full_like(rising, SPEED_MPS),
         "hand_torque_Nm": side * RIM_RADIUS_M * force_N * rising, "steering_wheel_rad": side * rising,
     })  # fmt: skip
 
 
-class SpiralGround:
+class SpiralGround(WrittenGround):
     """A car whose steering effort and whose faults are written down."""
 
     def __init__(self, tightest_m: float = 9.0, force_N: float = 100.0) -> None:
-        self._spiral = tightest_m, force_N
-        self.asked: list[dict[str, Any]] = []
-
-    def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
-        return resolve(maneuver, "compact", overrides)
-
-    def drive(
-        self,
-        series: str,
-        maneuver: FileOrTable,
-        cases: Sequence[Mapping[str, Any]],
-        overrides: Mapping[str, Any] | None = None,
-        curves: Sequence[str] = (),
-    ) -> list[Run]:
-        for case in cases:
-            resolve(maneuver, "compact", {**(overrides or {}), **case})
-        self.asked += [dict(case) for case in cases]
-        return [spiral(*self._spiral, math.copysign(1.0, case["steer.rate_degps"])) for case in cases]
+        super().__init__(lambda _, case: spiral(tightest_m, force_N, math.copysign(1.0, case["steer.rate_degps"])))
 
     def fault_map(self, preset: str) -> list[dict[str, Any]]:
         one = dict.fromkeys(FIGURES, 0.1) | {"fault": "rear:stuck", "fault_tolerant_time_s": None}
@@ -72,9 +55,10 @@ def test_intact_and_without_power_assist_to_both_sides():
     found = STANDARD.examine(ground)
     assert found.passed is True
     assert [row["direction"] for row in found.values["efforts"]] == ["left", "right"] * 2
-    assert [case.get("steering.assist_fraction") for case in ground.asked] == [None, None, 0.0, 0.0]
+    intact, failed = ground.asked.values()
+    assert [case.get("steering.assist_fraction") for case in (*intact, *failed)] == [None, None, 0.0, 0.0]
     # To 12 m the wheel is turned further than to 20 m, by as much as the circle is tighter.
-    assert ground.asked[0]["steer.rate_degps"] == pytest.approx(20.0 / 12.0 * ground.asked[2]["steer.rate_degps"])
+    assert intact[0]["steer.rate_degps"] == pytest.approx(20.0 / 12.0 * failed[0]["steer.rate_degps"])
 
 
 @pytest.mark.parametrize(

@@ -11,15 +11,9 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.scenario import resolve
-from activesteer.studies.fault_map import (
-    SITUATIONS,
-    TURN_MPS2,
-    FaultMap,
-    Limits,
-    _maneuver,  # pyright: ignore[reportPrivateUsage]
-    fault_map,
-)
+from activesteer.studies.fault_map import FaultMap, Limits, fault_map
 from activesteer.studies.fault_map_figure import draw_fault_map
+from activesteer.studies.fault_situations import SITUATIONS, TURN_MPS2, path_of
 from tests.raising import raises
 
 FAULTS = ("rear:runaway=left", "rear:runaway=right", "rear:stuck")
@@ -53,7 +47,7 @@ def test_the_tolerated_time_keeps_the_limits_and_a_little_more_breaks_them(made:
 
     tolerant_s = made.rows[0]["fault_tolerant_time_s"]
     assert 0.0 < tolerant_s < 0.1
-    table = _maneuver("straight", 100.0 / 3.6, 3.0)
+    table = path_of("straight", 100.0 / 3.6, 3.0)
 
     def used(length_s: float) -> float:
         """The greatest share of a limit."""
@@ -77,7 +71,7 @@ def test_wider_limits_tolerate_longer() -> None:
 @pytest.mark.parametrize("name", ["turn", "lane_change", "circle_100m", "circle_100m_right"])
 def test_the_paths_have_the_curvature_that_they_shall_have(name: str) -> None:
     speed = 80.0 / 3.6
-    maneuver: Any = resolve(_maneuver(name, speed, 6.0)).maneuver
+    maneuver: Any = resolve(path_of(name, speed, 6.0)).maneuver
     x, y = np.array(maneuver.path.x_m), np.array(maneuver.path.y_m)
     heading = np.unwrap(np.arctan2(np.diff(y), np.diff(x)))
     curvature = (-1.0 if name.endswith("_right") else 1.0) * np.diff(heading)
