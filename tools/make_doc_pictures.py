@@ -3,7 +3,7 @@
 One for every manoeuvre and those of the pages on controllers, drivers and tyres. Without names all are made, in two
 minutes and another two for each envelope; to be run again when the car, a controller or a manoeuvre has changed. What
 `activesteer run MANEUVER --plot` draws is taken where it says something; driving straight and standing are shown by
-other channels, and the sweep as the frequency response that it is driven for.
+other channels, and sweep and random steering as the frequency response that they are driven for.
 """
 
 from __future__ import annotations
@@ -49,12 +49,7 @@ COLUMN_DOTS_PER_INCH: Final = 150
 COLOURS: Final = 128
 """A plot has few colours and their shades: a palette makes the file a third as large."""
 SYSTEMS: Final = ("none", "ars", "afs")
-CONTROL_FREE: Final = frozenset({"slowly_increasing_steer", "constant_radius", "open_loop", "straight_braking"})
-"""Kinds that are there to look at the car itself, or in which no system has anything to do."""
-
 CORNER_WORDS: Final = {"fl": "front left", "rl": "rear left"}
-
-
 COMPARED: Final = ("none", "ars", "afs", "ars_sideslip", "esc", "lqr", "mpc", "integrated")
 """Controllers of the page on chassis control."""
 
@@ -117,9 +112,9 @@ def main(names: Sequence[str]) -> None:
 def _manoeuvre(name: str) -> Figure:
     scenario = prepared(resolve(name))
     kind = scenario.maneuver.kind
-    controllers = ("none",) if kind in CONTROL_FREE else SYSTEMS
-    runs = {controller: run_scenario(scenario, controller) for controller in controllers}
-    if kind == "sine_sweep":
+    # In those of PANELS no system has anything to do.
+    runs = {system: run_scenario(scenario, system) for system in (("none",) if name in PANELS else SYSTEMS)}
+    if kind in {"sine_sweep", "random_steer"}:
         return _frequency_responses(runs)
     if name not in PANELS:
         return _draw(kind, runs)
