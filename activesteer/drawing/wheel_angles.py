@@ -51,6 +51,25 @@ def factors(recordings: Sequence[Recording]) -> tuple[int, ...]:
     return tuple(found)
 
 
+def angles_at(recording: Recording, time_s: Array | float) -> Array:
+    """Steer angles of the wheels at some instants, between the rows of a recording.
+
+    Args:
+        recording: The run.
+        time_s: The instants [s], of any shape.
+
+    Returns:
+        Angles [rad], left positive, shape (..., 4); nan where they were not recorded.
+    """
+    return np.stack(
+        [
+            np.interp(time_s, recording.time_s, recording[name]) if name in recording else np.full_like(time_s, np.nan)
+            for name in CHANNELS
+        ],
+        axis=-1,
+    )
+
+
 def wedges(angle_rad: Array, factor: Sequence[int]) -> Array:
     """Wedges from straight ahead to where the wheels point, their tips at the origin.
 

@@ -266,16 +266,6 @@ def _least_span(channel: str) -> float:
     return 100.0 if channel.endswith("_force_N") else quantity_of(channel).min_span
 
 
-def _range_for(low: float, high: float, least: float) -> tuple[float, float]:
-    reach = max(1.05 * high, -1.05 * low, 0.5 * least)
-    power = 10.0 ** math.floor(math.log10(reach))
-    if low >= -0.02 * high:  # of one sign
-        steps = next(step for step in (2.4, 3.4, 6.4, 24.0) if step * power >= reach)
-        return -0.05 * steps * power, steps * power
-    steps = next(step for step in (1.2, 2.3, 3.2, 12.0) if step * power >= reach)
-    return -steps * power, steps * power
-
-
 def views_by_corner(plot: Plot, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
     """A view for each wheel of a plot of the wheels, where the lines of the runs are distinguished by their colours."""
     shown = []

@@ -15,6 +15,7 @@ from activesteer.drawing.colours import bytes_of
 from activesteer.drawing.wheel_angles import (
     CHANNELS,
     SLICES,
+    angles_at,
     factors,
     plan,
     tips_beside,
@@ -50,7 +51,7 @@ def send_wheel_angles(stream: rr.RecordingStream, run: Run, runs: Sequence[Run])
         return
     recording, size = run.recording, footprint_of(run.recording.metadata) or Footprint()
     time_s = recording.poses.time_s[run.poses][::_EVERY]
-    angles = np.stack([np.interp(time_s, recording.time_s, recording[name]) for name in CHANNELS], axis=1)
+    angles = angles_at(recording, time_s)
     factor = factors([other.recording for other in runs])
     texts = [words(float(angle)) for row in angles for angle in row]
     when = times(time_s)

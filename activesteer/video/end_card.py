@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from activesteer.drawing.colours import bytes_of
-from activesteer.video.gauges import PANEL, WHITE, font, write
+from activesteer.video.lettering import PANEL, WHITE, font, text_scale, write
 
-_HEIGHT: Final = 480.0
 _TITLE, _TEXT, _LINE, _MARGIN, _BAR = 17.0, 12.0, 20.0, 16.0, 5.0
 _SHADE: Final = (*PANEL[:3], 225)
 
@@ -31,7 +30,7 @@ def end_card(
     Returns:
         What lays it over a picture.
     """
-    scale = min(size[1] / _HEIGHT, size[0] / 640.0)
+    scale = text_scale(size)
     margin, line, bar = (value * scale for value in (_MARGIN, _LINE, _BAR))
     large, text = font(_TITLE * scale), font(_TEXT * scale)
     room = size[0] - 4.0 * margin - 2.0 * bar

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS, run_looks
-from activesteer.drawing import tyre_forces
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.recording import Recording
 from activesteer.road.course import course_of
@@ -100,14 +99,11 @@ class Film:
         self._tracks = [actor.track for actor in actors]
         maneuver = every[0].metadata.get("maneuver", {})
         title = str(maneuver.get("title") or maneuver.get("name") or "")
-        notes = [f"speed x {settings.speed:g}"] if settings.speed != 1.0 else []
-        if any(name in run for run in every for name in tyre_forces.CHANNELS):
-            notes.append(f"force arrows: 1 m = {tyre_forces.force_scale(every) / 1000.0:.2g} kN")
         groups = [[actor] for actor in actors] if settings.layout == "side-by-side" else [actors]
         edges = np.linspace(0, settings.size[0], len(groups) + 1).astype(int)
         self._panes = [
-            _Pane(group, every, settings, (int(width), settings.size[1]), title if first else "", ", ".join(notes))
-            for group, width, first in zip(groups, np.diff(edges), [True] + [False] * len(groups), strict=False)
+            _Pane(group, every, settings, (int(width), settings.size[1]), "" if number else title)
+            for number, (group, width) in enumerate(zip(groups, np.diff(edges), strict=True))
         ]
         self._end = end_card(title, verdict, [actor.colour for actor in actors], settings.size)
 
@@ -184,7 +180,6 @@ class _Pane:
         settings: Settings,
         size: tuple[int, int],
         title: str,
-        note: str,
     ) -> None:
         first = actors[0]
         self._tracks = [actor.track for actor in actors]
@@ -197,13 +192,15 @@ class _Pane:
         metadata = first.recording.metadata
         self._size = size
         self._scene = RenderScene(cars, course_of(metadata), road_of(metadata), size)
-        dials = [Dials(actor.recording, actor.label, actor.colour) for actor in actors]
-        self._gauges = Gauges(dials, title, size, note, every)
+        notes = [f"speed x {settings.speed:g}"] if settings.speed != 1.0 else []
         self._labels = Labels(size)
         self._markings = None
         if self._view.marked:
             footprint = first.size or Footprint()
             self._markings = Markings(first.recording, first.track, footprint, first.colour, every)
+            notes += [self._markings.note] if self._markings.note else []
+        dials = [Dials(actor.recording, actor.label, actor.colour) for actor in actors]
+        self._gauges = Gauges(dials, title, size, ", ".join(notes), every)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
         self._canvas: Offscreen | None = None

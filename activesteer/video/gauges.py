@@ -4,29 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from activesteer.drawing import wheel_angles
 from activesteer.drawing.colours import bytes_of
 from activesteer.quantities import quantity_of
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint, footprint_of
+from activesteer.video.lettering import GREY, PANEL, WHITE, font, text_scale, write
 
-Colour = tuple[int, int, int, int]
-Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
-
-_HEIGHT: Final = 480.0
-"""Sizes below are pixels of a picture of this height; others are scaled with it."""
-PANEL: Final = (16, 18, 22, 190)
-WHITE: Final = (245, 246, 248, 255)
-GREY: Final = (176, 181, 189, 255)
 _YELLOW: Final = (255, 205, 70, 255)
 _BODY: Final = (70, 76, 86, 255)
+# Sizes below are pixels of a picture of 640 x 480; see `text_scale`.
 _TITLE_ROW: Final = 19.0
 _ROW: Final = 17.0
 _TEXT: Final = 11.5
@@ -107,8 +100,7 @@ class Gauges:
             for reading in READINGS
             if reading.channel not in _ADDED or any(_used(recording, reading.channel) for recording in recordings)
         ]
-        # Rows are as wide as 640 x 480 pixels let them be; a narrow or flat picture gets smaller ones.
-        area, scale = size[0] * size[1], min(size[1] / _HEIGHT, size[0] / 640.0)
+        area, scale = size[0] * size[1], text_scale(size)
         while self._fit(scale) > _ROWS_SHARE * area and scale > _SMALLEST:
             scale *= 0.95
         while len(self._readings) > 1 and self._columns[-1] > size[0]:
@@ -203,7 +195,7 @@ class Gauges:
         width, height = self._plan
         large = Image.new("RGBA", (width * _SIDE, height * _SIDE), PANEL)
         size = footprint_of(dial.recording.metadata) or Footprint()
-        angles = np.array([dial.value(channel, time_s) for channel in wheel_angles.CHANNELS])
+        angles = wheel_angles.angles_at(dial.recording, time_s)
         plan = wheel_angles.plan(size, angles, self._factors)
         pen, colour = ImageDraw.Draw(large), (*bytes_of(dial.colour), 255)
         # All of the car, and of the wedges before its front wheels.
@@ -221,7 +213,9 @@ class Gauges:
             pen.line(at(wedge[:2]), WHITE, line)
         sideslip = dial.value("sideslip_rad", time_s)
         if math.isfinite(sideslip) and dial.value("speed_mps", time_s) > MIN_SPEED_MPS:
-            _arrow(pen, at, (0.5 * -size.wheelbase_m, 0.0), sideslip, line)
+            arrow = at(_arrow((-0.5 * size.wheelbase_m, 0.0), sideslip))
+            pen.line(arrow[:2], _YELLOW, line)
+            pen.polygon(arrow[2:], _YELLOW)
         shrunk = large.resize((width, height), Image.Resampling.BOX)
         for row, wheel, x in ((0.02, 0, 0.0), (0.97, 2, -size.wheelbase_m)):
             mean = wheel_angles.words(float(np.mean(angles[wheel : wheel + 2])))
@@ -231,12 +225,11 @@ class Gauges:
         return shrunk
 
 
-def _arrow(pen: ImageDraw.ImageDraw, at: object, start: tuple[float, float], angle_rad: float, line: int) -> None:
+def _arrow(start: tuple[float, float], angle_rad: float) -> NDArray[np.float64]:
+    """Both ends of its shaft, then the corners of its head [m], shape (5, 2)."""
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     shape = np.array([(0.0, 0.0), (1.5, 0.0), (1.9, 0.0), (1.45, 0.2), (1.45, -0.2)])
-    points = at(np.array(start) + shape @ np.array([(cos, sin), (-sin, cos)]))  # type: ignore[operator]
-    pen.line(points[:2], _YELLOW, line)
-    pen.polygon(points[2:], _YELLOW)
+    return np.array(start) + shape @ np.array([(cos, sin), (-sin, cos)])
 
 
 def _used(recording: Recording, channel: str) -> bool:
@@ -244,36 +237,3 @@ def _used(recording: Recording, channel: str) -> bool:
         return False
     values = np.abs(recording[channel])
     return bool(np.max(values[np.isfinite(values)], initial=0.0) >= _MIN_ANGLE_RAD)
-
-
-def write(
-    layer: Image.Image, place: tuple[float, float], text: str, colour: Colour, face: Font, anchor: str = "lm"
-) -> None:
-    """Writes a text; most are written again in the next picture, so they are kept.
-
-    Args:
-        layer: Where to.
-        place: Where its anchor is [pixels].
-        text: The text.
-        colour: Its colour.
-        face: The font.
-        anchor: As in Pillow.
-    """
-    if text:
-        drawn, (left, top) = _drawn(text, colour, face, anchor)
-        at = round(place[0] + left), round(place[1] + top)
-        layer.paste(drawn, at, drawn)
-
-
-@lru_cache(maxsize=2000)
-def _drawn(text: str, colour: Colour, face: Font, anchor: str) -> tuple[Image.Image, tuple[float, float]]:
-    left, top, right, bottom = ImageDraw.Draw(Image.new("L", (1, 1))).textbbox((0, 0), text, face, anchor)
-    drawn = Image.new("RGBA", (math.ceil(right - left) + 2, math.ceil(bottom - top) + 2), (*colour[:3], 0))
-    ImageDraw.Draw(drawn).text((-left, -top), text, colour, face, anchor)
-    return drawn, (left, top)
-
-
-@lru_cache(maxsize=100)
-def font(points: float) -> Font:
-    """The font of everything that is written over pictures, in a size [pixels]."""
-    return ImageFont.load_default(max(6.0, points))

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from activesteer.conventions import Array
-from activesteer.video.gauges import PANEL, WHITE, font, write
+from activesteer.video.lettering import PANEL, WHITE, font, text_scale, write
 from activesteer.video.markings import Label
 
 _TEXT: Final = 10.5
-_HEIGHT: Final = 480.0
 
 
 class Labels:
@@ -28,7 +27,7 @@ class Labels:
             size: Width and height of the pictures [pixels].
         """
         self._size = size
-        self._scale = min(size[1] / _HEIGHT, size[0] / 640.0)
+        self._scale = text_scale(size)
         self._font = font(_TEXT * self._scale)
 
     def draw(self, pixels: NDArray[np.uint8], scene: mujoco.MjvScene, labels: Sequence[Label]) -> NDArray[np.uint8]:

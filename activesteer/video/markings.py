@@ -42,7 +42,11 @@ class Label(NamedTuple):
 
 
 class Markings:
-    """Those of one car."""
+    """Those of one car.
+
+    Attributes:
+        note: The scale of its arrows, in words; nothing where it has none.
+    """
 
     def __init__(
         self, recording: Recording, track: Track, size: Footprint, colour: str, shown_with: Sequence[Recording]
@@ -59,19 +63,12 @@ class Markings:
         self._track, self._rgb = track, shares_of(colour)
         self._tips = wheel_angles.tips_beside(size)
         self._factors = wheel_angles.factors(shown_with)
-        self._time_s = recording.time_s
-        self._angles = None
-        if all(name in recording for name in wheel_angles.CHANNELS):
-            self._angles = np.stack([recording[name] for name in wheel_angles.CHANNELS])
-        self._arrows = None
+        self._recording = recording
+        self._arrows, self.note = None, ""
         if all(name in recording for name in tyre_forces.CHANNELS):
-            self._arrows = tyre_forces.force_arrows(recording, tyre_forces.force_scale(shown_with))
-
-    def angles(self, time_s: float) -> Array | None:
-        """Steer angles of the wheels at an instant [rad], shape (4,); None where they were not recorded."""
-        if self._angles is None:
-            return None
-        return np.array([np.interp(time_s, self._time_s, row) for row in self._angles])
+            scale_NpM = tyre_forces.force_scale(shown_with)
+            self._arrows = tyre_forces.force_arrows(recording, scale_NpM)
+            self.note = f"force arrows: 1 m = {scale_NpM / 1000.0:.2g} kN"
 
     def add(self, scene: mujoco.MjvScene, time_s: float) -> list[Label]:
         """Adds them to what is going to be drawn.
@@ -84,8 +81,8 @@ class Markings:
             What is to be written over the picture.
         """
         labels = []
-        angles = self.angles(time_s)
-        if angles is not None:
+        if wheel_angles.CHANNELS[0] in self._recording:
+            angles = wheel_angles.angles_at(self._recording, time_s)
             origin, heading = self._track.chassis(time_s), self._track.heading(time_s)
             cos, sin = np.cos(heading), np.sin(heading)
             turn = np.array([(cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)])
@@ -97,7 +94,7 @@ class Markings:
                 words = wheel_angles.words(float(angle))
                 labels.append(Label(f"{words}, x{factor}" if words else "", place, place + turn @ (0.0, outside, 0.0)))
         if self._arrows is not None:
-            row = int(np.clip(np.searchsorted(self._time_s, time_s), 0, len(self._time_s) - 1))
+            row = min(int(np.searchsorted(self._recording.time_s, time_s)), len(self._recording) - 1)
             for origin, vector in zip(self._arrows[0][row], self._arrows[1][row], strict=True):
                 if np.isfinite([origin, vector]).all() and np.linalg.norm(vector) > 2.0 * _ARROW_M:
                     _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, _ARROW_M, origin, origin + vector, _ARROW_RGBA)

@@ -1,0 +1,59 @@
+"""Letters over pictures: the font, its colours, and how large it is in a picture of some size."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Final
+
+from PIL import Image, ImageDraw, ImageFont
+
+Colour = tuple[int, int, int, int]
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
+
+PANEL: Final = (16, 18, 22, 190)
+"""What texts stand on."""
+WHITE: Final = (245, 246, 248, 255)
+GREY: Final = (176, 181, 189, 255)
+
+
+def text_scale(size: tuple[int, int]) -> float:
+    """By how much what is laid out for a picture of 640 x 480 is enlarged, so that it fits in width and height.
+
+    Args:
+        size: Width and height of the pictures [pixels].
+    """
+    return min(size[0] / 640.0, size[1] / 480.0)
+
+
+def write(
+    layer: Image.Image, place: tuple[float, float], text: str, colour: Colour, face: Font, anchor: str = "lm"
+) -> None:
+    """Writes a text; most are written again in the next picture, so they are kept.
+
+    Args:
+        layer: Where to.
+        place: Where its anchor is [pixels].
+        text: The text.
+        colour: Its colour.
+        face: The font.
+        anchor: As in Pillow.
+    """
+    if text:
+        drawn, (left, top) = _drawn(text, colour, face, anchor)
+        at = round(place[0] + left), round(place[1] + top)
+        layer.paste(drawn, at, drawn)
+
+
+@lru_cache(maxsize=2000)
+def _drawn(text: str, colour: Colour, face: Font, anchor: str) -> tuple[Image.Image, tuple[float, float]]:
+    left, top, right, bottom = ImageDraw.Draw(Image.new("L", (1, 1))).textbbox((0, 0), text, face, anchor)
+    drawn = Image.new("RGBA", (math.ceil(right - left) + 2, math.ceil(bottom - top) + 2), (*colour[:3], 0))
+    ImageDraw.Draw(drawn).text((-left, -top), text, colour, face, anchor)
+    return drawn, (left, top)
+
+
+@lru_cache(maxsize=100)
+def font(points: float) -> Font:
+    """The font of everything that is written over pictures, in a size [pixels]."""
+    return ImageFont.load_default(max(6.0, points))
