@@ -124,6 +124,12 @@ class Vehicle:
         def sensor(name: str) -> int:
             return int(model.sensor_adr[find(model, mujoco.mjtObj.mjOBJ_SENSOR, name)])
 
+        def joint(name: str) -> int:
+            return find(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+
+        self._root, self._root_dof = int(model.jnt_qposadr[joint("root")]), int(model.jnt_dofadr[joint("root")])
+        if self._root or self._root_dof:
+            raise ModelError("the free joint 'root' of the chassis must be the first joint of the model")
         self._ctrl = data.ctrl
         self._places = Places(
             *(actuator(name) for name in ("steering_wheel", "superposition", "rl_steer", "rr_steer")),
@@ -135,7 +141,7 @@ class Vehicle:
                     "chassis_orientation",
                 )
             ),
-            yaw_dof=int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")]) + 5,
+            yaw_dof=self._root_dof + 5,
         )  # fmt: skip
         self._wheels = Wheels(
             [actuator(f"{corner}_drive") for corner in CORNERS],
@@ -150,14 +156,8 @@ class Vehicle:
         self._plan_address = self._plan.ctypes.data
         self._forces = fb.header_of(model)
         self._gear: float = CLUTCH_OPEN
-        self._root = int(model.jnt_qposadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
-        self._root_dof = int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
-        self._spins = [
-            int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_spin")]) for corner in CORNERS
-        ]
+        self._spins = [int(model.jnt_dofadr[joint(f"{corner}_spin")]) for corner in CORNERS]
         self._spin_armature_kgm2 = model.dof_armature[self._spins].tolist()
-        if self._root or self._root_dof:
-            raise ModelError("the free joint 'root' of the chassis must be the first joint of the model")
 
     def _place(self) -> None:
         """Static equilibrium at the origin of the world, heading along x."""

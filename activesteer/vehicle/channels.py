@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.brakes.records import PER_WHEEL, PLACES
-from activesteer.conventions import CORNERS, Array, yaw_of
+from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError, nearest_names
 from activesteer.sensors.block import MEASURED
 from activesteer.signals import Channel
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.car_motion import MOTION_SENSORS, CarMotion
 from activesteer.vehicle.command_row import COMMAND_CHANNELS
 from activesteer.vehicle.estimate_row import ESTIMATE_CHANNELS
 from activesteer.vehicle.guide_model import GUIDE
@@ -30,16 +31,6 @@ from activesteer.vehicle.native_channels import (
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.superposition_actuator import MOTOR, NAME
 from activesteer.vehicle.toe_link_screws import SCREW
-
-_STANDSTILL_MPS: Final = 0.2
-"""Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""
-_ROCKS_BACK_MPS: Final = 1.0
-"""Likewise backwards below this speed, as where a car that has stopped swings back on suspension and tyres [m/s]."""
-
-_MOTION_SENSORS: Final = (
-    "cg_position", "front_axle_position", "chassis_orientation", "cg_velocity", "cg_accelerometer", "cg_gyro",
-)  # fmt: skip
-"""What `_Frame` reads."""
 
 _CORNER_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 
@@ -107,7 +98,7 @@ class ChannelMap:
         self._model = model
         self._parameters = parameters
         self._sensors = {model.sensor(index).name: index for index in range(model.nsensor)}
-        for name in _MOTION_SENSORS:
+        for name in MOTION_SENSORS:
             # They are read block by block; a missing one is to show now.
             self._sensor(name)
         self._signals = [
@@ -158,7 +149,7 @@ class ChannelMap:
             saturations(rows.ctrl, rows.act, rows.actuator_force, laws, out, places)
             # What follows works on whole columns, many times.
             rows = rows._replace(sensordata=np.asfortranarray(rows.sensordata))
-            self._frame = _Frame(rows, self._sensor, self._model.opt.gravity, last_yaw_rad)
+            self._car_motion = CarMotion(rows.sensordata, self._sensor, self._model.opt.gravity, last_yaw_rad)
             for place, values in self._computed:
                 out[:, place] = values(rows)
 
@@ -171,7 +162,7 @@ class ChannelMap:
 
     def _motion(self) -> list[Signal]:
         def of(name: str, unit: str, meaning: str, *, exact: bool = False) -> Signal:
-            return Signal(Channel(name, unit, meaning, "vehicle", not exact), lambda _: getattr(self._frame, name))
+            return Signal(Channel(name, unit, meaning, "vehicle", not exact), lambda _: getattr(self._car_motion, name))
 
         return [
             of("x_m", "m", "position of the centre of gravity, world x", exact=True),
@@ -477,45 +468,6 @@ def _of_kind(kind: type[AxialForce | Actuator], wanted: list[tuple[int, Any]]) -
     """What compiled code takes of a kind of channel: the laws, and the places of the channels."""
     here = [(values, place) for place, values in wanted if isinstance(values, kind)]
     return np.array([law for law, _ in here], record_of(kind)), np.array([place for _, place in here], np.intp)
-
-
-class _Frame:
-    """Motion of the centre of gravity in the axes of ISO 8855, from sensors in world and body axes."""
-
-    def __init__(self, rows: RawRows, sensor: Callable[[str], slice], gravity: Array, last_yaw_rad: float) -> None:
-        def columns(name: str) -> list[Array]:
-            part = sensor(name)
-            return [rows.sensordata[:, column] for column in range(part.start, part.stop)]
-
-        self.x_m, self.y_m, self.z_m = columns("cg_position")
-        self.front_axle_x_m, self.front_axle_y_m, _ = columns("front_axle_position")
-        w, x, y, z = columns("chassis_orientation")
-        # Body axes in the world: yaw, pitch, roll in this order (ISO 8855).
-        yaw = yaw_of(rows.sensordata[:, sensor("chassis_orientation")])
-        turned = np.diff(yaw, prepend=last_yaw_rad)
-        # Unwrapping takes longer than all the rest; where no jump is to be taken out, it adds 0.
-        jumps = not np.abs(turned).max() < np.pi
-        self.yaw_rad = np.unwrap(np.concatenate(([last_yaw_rad], yaw)))[1:] if jumps else yaw + 0.0
-        self.pitch_rad = np.arcsin(np.clip(2 * (w * y - x * z), -1.0, 1.0))
-        self.roll_rad = np.arctan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
-        cos, sin = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
-        vx, vy, self.vz_mps = columns("cg_velocity")
-        self.vx_mps = vx * cos + vy * sin
-        self.vy_mps = vy * cos - vx * sin
-        self.speed_mps = np.hypot(vx, vy)
-        slowest = np.where(self.vx_mps < 0.0, _ROCKS_BACK_MPS, _STANDSTILL_MPS)
-        self.sideslip_rad = np.where(self.speed_mps > slowest, np.arctan2(self.vy_mps, self.vx_mps), 0.0)
-        ax, ay, az = columns("cg_accelerometer")
-        cp, sp = np.cos(self.pitch_rad), np.sin(self.pitch_rad)
-        cr, sr = np.cos(self.roll_rad), np.sin(self.roll_rad)
-        # An accelerometer measures the specific force: turned into the road plane, gravity (which has a part there on a
-        # grade) is added to get the acceleration.
-        self.ax_mps2 = cp * ax + sp * (sr * ay + cr * az) + gravity[0] * cos
-        self.ay_mps2 = cr * ay - sr * az - gravity[0] * sin
-        self.az_mps2 = -sp * ax + cp * (sr * ay + cr * az) + gravity[2]
-        self.roll_rate_radps, self.pitch_rate_radps, body_yaw = columns("cg_gyro")
-        # Euler angle rate about the road's normal, not the body's z axis.
-        self.yaw_rate_radps = (sr * self.pitch_rate_radps + cr * body_yaw) / cp
 
 
 def _toe(axis: Array) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import activesteer
+from activesteer import Simulation
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.recording import Recording
 from activesteer.scenario import Scenario, resolve
@@ -51,6 +52,19 @@ def in_the_corner(controller: str = "none", steps: int = 900) -> ClosedLoop:
     simulation = ClosedLoop(step_steer_scenario(), controller)
     simulation.advance(steps)
     return simulation
+
+
+def assert_goes_on_bit_by_bit(overrides: dict[str, Any], save_at: int, back_after: int) -> None:
+    """A step steer with `ars`, saved at a step and put back some steps later, ends as if it had never been away."""
+    whole = activesteer.simulate("step_steer", "ars", overrides=overrides)
+    simulation = Simulation("step_steer", "ars", overrides=overrides)
+    simulation.advance(save_at)
+    state = simulation.save_state()
+    simulation.advance(back_after)
+    simulation.restore_state(state)
+    simulation.advance(3)
+    simulation.run()
+    np.testing.assert_array_equal(simulation.recording().values, whole.values)
 
 
 def go_on(simulation: ClosedLoop, steps: int) -> NDArray[np.float64]:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer import Simulation
 from activesteer.faults import fault_table
 from activesteer.sensors.parameters import RANDOM
 from activesteer.sensors.presets import PRESETS
 from activesteer.sensors.sensor_kinds import Sensor
+from tests.physics.runs import assert_goes_on_bit_by_bit
 
 HARDWARE: dict[str, Any] = {
     "rear_actuator.preset": "screw_3deg",
@@ -38,14 +38,7 @@ def turn(side: float = 1.0) -> dict[str, Any]:
 
 def test_what_follows_a_saved_state_and_a_second_run_are_the_same_to_the_last_bit() -> None:
     overrides = {**turn(), **HARDWARE, "sensors.seed": 3, "fault": FAULTS}
-    whole = activesteer.simulate("step_steer", "ars", overrides=overrides)
-    simulation = Simulation("step_steer", "ars", overrides=overrides)
-    simulation.advance(960)
-    state = simulation.save_state()
-    simulation.advance(200)
-    simulation.restore_state(state)
-    simulation.run()
-    np.testing.assert_array_equal(simulation.recording().values, whole.values)
+    assert_goes_on_bit_by_bit(overrides, save_at=960, back_after=200)
 
 
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])

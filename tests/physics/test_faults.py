@@ -11,6 +11,7 @@ import activesteer
 from activesteer import ActuatorCommand, Recording, Simulation
 from activesteer.errors import ManeuverError
 from activesteer.faults import fault_table
+from tests.physics.runs import assert_goes_on_bit_by_bit
 
 AT_S = 1.0
 ROW = round(1000 * AT_S)
@@ -212,15 +213,7 @@ def test_a_state_saved_in_the_midst_of_faults_goes_on_bit_by_bit() -> None:
         "rl_wheel_speed_sensor:dropout@0.5",
     )
     overrides = {**STEP, "fault": [fault_table(text) for text in texts]}
-    whole = activesteer.simulate("step_steer", "ars", overrides=overrides)
-    simulation = Simulation("step_steer", "ars", overrides=overrides)
-    simulation.advance(950)
-    state = simulation.save_state()
-    simulation.advance(800)
-    simulation.restore_state(state)
-    simulation.advance(3)
-    simulation.run()
-    np.testing.assert_array_equal(simulation.recording().values, whole.values)
+    assert_goes_on_bit_by_bit(overrides, save_at=950, back_after=800)
 
 
 def test_after_the_last_fault_the_car_is_as_built() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer import ActuatorCommand, Recording, Simulation
+from activesteer import ActuatorCommand, Recording
 from activesteer.errors import ParameterError
 from activesteer.faults import fault_table
 from activesteer.rigs import kinematics_compliance
@@ -17,6 +17,7 @@ from activesteer.scenario import load_car
 from activesteer.studies.linearisation import linearise
 from activesteer.vehicle.rear_actuator import PRESETS
 from activesteer.vehicle.toe_link_kinematics import evaluated, toe_link_map
+from tests.physics.runs import assert_goes_on_bit_by_bit
 from tests.raising import raises
 
 SCREW = {"rear_actuator.preset": "screw_3deg"}
@@ -145,14 +146,7 @@ def test_left_and_right_mirror() -> None:
 
 def test_a_saved_state_goes_on_bit_by_bit() -> None:
     overrides = {**TURN, **SCREW, "fault": [fault_table("rear:stuck@0.9-1.1")]}
-    whole = activesteer.simulate("step_steer", "ars", overrides=overrides)
-    simulation = Simulation("step_steer", "ars", overrides=overrides)
-    simulation.advance(700)
-    state = simulation.save_state()
-    simulation.advance(500)
-    simulation.restore_state(state)
-    simulation.run()
-    np.testing.assert_array_equal(simulation.recording().values, whole.values)
+    assert_goes_on_bit_by_bit(overrides, save_at=700, back_after=500)
 
 
 def test_a_seized_screw_stays_and_a_broken_one_lets_the_link_go() -> None:
