@@ -21,7 +21,7 @@ import numpy as np
 from PIL import Image
 
 from activesteer import study
-from activesteer.analysis.figures import BY_KIND, style, time_histories
+from activesteer.analysis.figures import BY_KIND, style, time_histories, time_panels
 from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.analysis.linear_plots import driver_loops_figure
@@ -118,7 +118,7 @@ def _manoeuvre(name: str) -> Figure:
         return _frequency_responses(runs)
     if name not in PANELS:
         return _draw(kind, runs)
-    figure = style.time_figure(runs, PANELS[name])
+    figure = time_panels.time_figure(runs, PANELS[name])
     for axis in figure.get_axes():
         low, high = axis.get_ylim()
         if high - low < MIN_SPAN:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from activesteer.analysis.loss import SIDESLIP_PEAKS
+from activesteer.analysis.loss import SIDESLIP_PEAKS, kept, losses
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.judgement import judge
-from activesteer.analysis.report.results import kept, losses
 from activesteer.quantities import metric_label, metric_number
 from activesteer.recording import Recording
 

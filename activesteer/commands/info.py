@@ -19,7 +19,7 @@ def add_to(commands: Any) -> None:
 
 
 def _info(options: argparse.Namespace) -> int:
-    from activesteer.analysis.report.results import kept, losses
+    from activesteer.analysis.loss import kept, losses
     from activesteer.analysis.tables import comparison
     from activesteer.recording import Recording
 

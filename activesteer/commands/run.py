@@ -96,7 +96,7 @@ def _paint(name: str, value: float, first: float, text: str) -> str:
 
 def _print_outcomes(metrics: Mapping[str, Mapping[str, float]]) -> None:
     """What each run lost or kept, below its numbers."""
-    from activesteer.analysis.report.results import kept, losses
+    from activesteer.analysis.loss import kept, losses
 
     for label, found in metrics.items():
         for words, colour in ((losses(found), BAD), (kept(found), GOOD)):

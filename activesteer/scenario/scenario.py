@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, Final
 
 from activesteer.config import check_overruled, field_in_unit, field_path, key_hint, key_paths, leaf_keys, to_table
@@ -109,6 +111,7 @@ def resolve(
     for key, value in changes.items():
         part, path = _which_part(key, kind)
         sorted_out[part].append(Override(key, tuple(path), value))
+    of_file = table
     table, source = applied(kind, table, source, sorted_out["maneuver"])
     car = car_with(vehicle, sorted_out["vehicle"])
     if any(field.name == "vehicle_width_m" for field in fields(kind)):
@@ -119,7 +122,16 @@ def resolve(
     built = build_maneuver(table, source)
     if is_recording(maneuver):
         built = build_maneuver(led(table, car.on(built.road).steering_lag_s), source)
-    return Scenario(built, car, who, changes, made_from)
+    return Scenario(_with_speed_in_title(built, of_file), car, who, changes, made_from)
+
+
+def _with_speed_in_title(built: Maneuver, of_file: Mapping[str, Any]) -> Maneuver:
+    """The manoeuvre; where its title says the speed of its file and another is driven, with that one in the title."""
+    said = f"{of_file.get('speed_kmh', math.nan):g} km/h"
+    driven = f"{3.6 * built.speed_mps:.4g} km/h"
+    if driven == said or built.title != of_file.get("title"):
+        return built
+    return replace(built, title=re.sub(rf"\b{said}", driven, built.title))
 
 
 def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:

@@ -18,6 +18,7 @@ from activesteer.validation.page import page
 from activesteer.validation.programme import Validation
 from activesteer.validation.reference import ReferenceData
 from activesteer.validation.study import Response
+from tests.contrast import contrast
 from tests.unit.analysis.synthetic import step_steer
 from tests.unit.analysis.synthetic_files import recording_of
 
@@ -67,6 +68,18 @@ def test_both_pages_have_one_frame_and_one_stylesheet():
     assert styles[0]
     assert styles[1]
     assert styles[0][0] == styles[1][0]
+
+
+def test_every_text_can_be_read_on_every_page():
+    """They have one stylesheet: its colours by day and by night."""
+    pytest.importorskip("matplotlib")
+    modes = [
+        dict(re.findall(r"--(\w+): (#\w{6})", each))
+        for each in re.split(r"@media", page(result("plain"), {}), maxsplit=1)
+    ]
+    inks = ("ink", "quiet", "link", "passed", "failed", "known")
+    pairs = [(ink, paper) for ink in inks for paper in ("paper", "shade", "differs")] + [("ink", "outside")]
+    assert min(contrast(colours[ink], colours[paper]) for colours in modes for ink, paper in pairs) >= 4.5
 
 
 def test_json_in_a_page_comes_back_and_opens_nothing():

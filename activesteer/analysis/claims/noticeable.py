@@ -29,9 +29,17 @@ STEERING_WHEEL_RAD: Final = math.radians(5.0)
 
 def noticeable(metric: str) -> float:
     """The size for a metric, by its name [SI]; 0 where none of these sizes is meant for it."""
-    if metric.startswith("steering_wheel") and metric.endswith("_rad"):
-        return STEERING_WHEEL_RAD
-    return next((size for suffix, size in _BY_SUFFIX.items() if metric.endswith(suffix)), 0.0)
+    return next((size for word, unit, size in _METRICS if word in metric and metric.endswith(unit)), 0.0)
 
 
-_BY_SUFFIX: Final = {"_radps": YAW_RATE_RADPS, "_srad": 0.0, "_rad": SIDESLIP_RAD, "_s": TIME_S, "_m": TRACK_M}
+_METRICS: Final = (
+    ("rear_steer", "_rad", STEER_RAD),
+    ("superposition", "_rad", STEER_RAD),
+    ("sideslip_steady_state", "_rad", SETTLED_SIDESLIP_RAD),
+    ("sideslip", "_rad", SIDESLIP_RAD),
+    ("steering_wheel", "_rad", STEERING_WHEEL_RAD),
+    ("yaw_rate", "_radps", YAW_RATE_RADPS),
+    ("", "_s", TIME_S),
+    ("", "_m", TRACK_M),
+)
+"""What is in the name of a metric, and its unit; the first that fits counts."""

@@ -195,10 +195,11 @@ class Population:
 
 
 def percent(share: float) -> str:
-    """A share in whole percent, 0 and 100 only where it is exactly that."""
-    if share in (0.0, 1.0) or math.isnan(share):
-        return f"{100.0 * share:.0f}"
-    return f"{min(99.0, max(1.0, round(100.0 * share))):.0f}"
+    """A share in whole percent; within one percent of 0 or 100 with the digit that tells it from them."""
+    value = 100.0 * share
+    beyond = min(value, 100.0 - value)
+    decimals = max(0, -math.floor(math.log10(beyond))) if beyond > 0.0 else 0
+    return f"{value:.{decimals}f}"
 
 
 @functools.cache

@@ -95,8 +95,8 @@ class Scorecard:
         lines = [f"    {'nominal':<14}  population"] if beside else []
         for claim, verdict, reason, share in self.judged:
             short = {Verdict.FAILED: "FAILED", Verdict.UNEXPECTED: "passed!"}.get(verdict, verdict.value)
-            held = f"{percent(share.share):>3} %  {share.verdict.value:<13}  " if share is not None else ""
-            lines.append(f"{claim.id}  {short:<14}  {held or (' ' * 22 if beside else '')}{claim.text}")
+            held = f"{percent(share.share):>4} %  {share.verdict.value:<13}  " if share is not None else ""
+            lines.append(f"{claim.id}  {short:<14}  {held or (' ' * 23 if beside else '')}{claim.text}")
             lines += [f"{'':20}{line}" for line in number_lines(claim.values)]
             if claim.obstacle:
                 lines.append(f"{'':20}nothing is proved: {claim.obstacle}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.figures import style
+from activesteer.analysis.figures import style, time_panels
 from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, Curve
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS, RUN_DASHES, RunLook
@@ -42,7 +42,7 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
     Source: V. Dorsch, Mecatronics-REM 2012, figure 11.
     """
     curves = style.curves(recordings)
-    figure = new_figure(width_in=style.COLUMN_IN, height_in=1.1 + 5 * style.PANEL_IN)
+    figure = new_figure(width_in=style.COLUMN_IN, height_in=1.1 + 5 * time_panels.PANEL_IN)
     axes: list[Axes] = list(figure.subplots(5, 1, sharex=True))
     for curve in curves:
         style.draw(axes[0], curve, YAW_RATE, label=curve.look.label)
@@ -52,7 +52,7 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
         style.draw_added(axes[1], curve, width=2.2)
     style.plain(axes[0], YAW_RATE.axis_title)
     style.plain(axes[1], FRONT.axis_title)
-    style.fill_panels(axes[2:], curves, (LATERAL, SIDESLIP, ROLL))
+    time_panels.fill_panels(axes[2:], curves, (LATERAL, SIDESLIP, ROLL))
     figure.align_ylabels(axes)
     style.name_curves(
         figure, axes[0], [("desired", 1.0, style.DOTTED), ("front wheels", 0.8, "-"), ("added by a system", 2.2, "-")]
@@ -112,7 +112,7 @@ def figure_2(
                     linestyle=(0.0, RUN_DASHES[place]), label=label,
                 )  # fmt: skip
         style.plain(axis, panel.axis_title)
-    style.finish_time(axes, [car])
+    time_panels.finish_time(axes, [car])
     figure.align_ylabels(axes)
     style.name_curves(figure, axes[0])
     return save(figure, Path(path), RecordingError)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from activesteer.analysis import sine_with_dwell
-from activesteer.analysis.figures import style
+from activesteer.analysis.figures import style, time_panels
 from activesteer.analysis.figures.style import ADDED, LATERAL, ROLL, SIDESLIP, SPEED, STEERING_WHEEL, YAW_RATE
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
@@ -19,48 +19,48 @@ Recordings = Mapping[str, RecordingLike]
 
 def figure_12(recordings: Recordings) -> Figure:
     """Steering wheel angle of the sine with dwell: open loop, so that the curves lie over each other."""
-    figure = style.time_figure(recordings, (STEERING_WHEEL,))
+    figure = time_panels.time_figure(recordings, (STEERING_WHEEL,))
     _mark_instants(figure, recordings)
     return figure
 
 
 def figure_13(recordings: Recordings) -> Figure:
     """Response to the sine with dwell, with the instants at which the yaw rate is judged."""
-    figure = style.time_figure(recordings, (YAW_RATE, ADDED, LATERAL, SIDESLIP))
+    figure = time_panels.time_figure(recordings, (YAW_RATE, ADDED, LATERAL, SIDESLIP))
     _mark_instants(figure, recordings)
     return figure
 
 
 def sine_with_dwell_figure(recordings: Recordings) -> Figure:
     """Figures 12 and 13 in one."""
-    figure = style.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, ADDED, LATERAL, SIDESLIP))
+    figure = time_panels.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, ADDED, LATERAL, SIDESLIP))
     _mark_instants(figure, recordings)
     return figure
 
 
 def steering_and_yaw_rate(recordings: Recordings) -> Figure:
     """Figures 16 and 20: what the driver does, and how the car turns."""
-    return style.time_figure(recordings, (STEERING_WHEEL, YAW_RATE))
+    return time_panels.time_figure(recordings, (STEERING_WHEEL, YAW_RATE))
 
 
 def lateral_response(recordings: Recordings) -> Figure:
     """Figures 17 and 21: lateral acceleration, added angles, sideslip."""
-    return style.time_figure(recordings, (LATERAL, ADDED, SIDESLIP))
+    return time_panels.time_figure(recordings, (LATERAL, ADDED, SIDESLIP))
 
 
 def figure_23(recordings: Recordings) -> Figure:
     """All but the sideslip on a slippery road."""
-    return style.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, LATERAL, ADDED))
+    return time_panels.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, LATERAL, ADDED))
 
 
 def figure_24(recordings: Recordings) -> Figure:
     """Sideslip on a slippery road."""
-    return style.time_figure(recordings, (SIDESLIP,))
+    return time_panels.time_figure(recordings, (SIDESLIP,))
 
 
 def general(recordings: Recordings) -> Figure:
     """What makes sense for any manoeuvre."""
-    return style.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, LATERAL, SIDESLIP, ROLL, SPEED))
+    return time_panels.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, LATERAL, SIDESLIP, ROLL, SPEED))
 
 
 def _mark_instants(figure: Figure, recordings: Recordings) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from activesteer.analysis import lanes, track
 from activesteer.analysis.bands import TRACK
 from activesteer.analysis.course_view import CourseView, view_of
-from activesteer.analysis.figures import style
+from activesteer.analysis.figures import style, time_panels
 from activesteer.analysis.figures.style import Curve
 from activesteer.analysis.source import RecordingLike, read_course, read_footprint
 from activesteer.errors import RecordingError
@@ -71,7 +71,7 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
     _draw_tracks(above, recordings)
     axes: list[Axes] = [figure.add_subplot(grid[1])]
     axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(2, 1 + len(panels))]
-    style.fill_panels(axes, drawn, panels)
+    time_panels.fill_panels(axes, drawn, panels)
     for axis in axes[:-1]:
         axis.tick_params(labelbottom=False)
     figure.align_ylabels(axes)

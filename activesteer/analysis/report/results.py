@@ -8,13 +8,14 @@ from enum import StrEnum
 from typing import Final, NamedTuple
 
 from activesteer.analysis.claims.noticeable import noticeable
-from activesteer.analysis.loss import CONES_MISSED, IN_LANES, SIDESLIP_PEAKS, has_spun
+from activesteer.analysis.claims.path_following import CONES_HIT
+from activesteer.analysis.claims.slalom import CONES_MISSED
+from activesteer.analysis.claims.slippery import OVERSTEP
+from activesteer.analysis.loss import SIDESLIP_PEAKS, kept, losses
 from activesteer.analysis.report.groups import Group, Run
 from activesteer.analysis.report.tables import difference_text, number
 from activesteer.quantities import metric_label
 
-LANE_OVERSTEP: Final = "lane_overstep_m"
-CONES_HIT: Final = "cones_hit"
 MAX_FIGURES: Final = 6
 """More key figures than this are no longer read at a glance."""
 
@@ -78,7 +79,7 @@ class Result(NamedTuple):
 KEY_FIGURES: Final = (
     KeyFigure("Cones hit", (CONES_HIT,)),
     KeyFigure("Cones missed", (CONES_MISSED,)),
-    KeyFigure("Beyond the lane", (LANE_OVERSTEP,), float),
+    KeyFigure("Beyond the lane", (OVERSTEP,), float),
     KeyFigure("Stopping distance", ("stopping_distance_m",)),
     KeyFigure("Peak sideslip", SIDESLIP_PEAKS),
     KeyFigure("Settled yaw rate", ("yaw_rate_steady_state_radps",), None),
@@ -145,34 +146,6 @@ def worth(metric: str, value: float, first: float) -> Change:
     if _near(metric, size, before):
         return Change.SAME
     return Change.BETTER if size < before else Change.WORSE
-
-
-def losses(metrics: Mapping[str, float]) -> Iterator[str]:
-    """What went wrong in a run with these metrics, in words."""
-    peak = next((abs(metrics[name]) for name in SIDESLIP_PEAKS if name in metrics), None)
-    if peak is not None and has_spun(metrics):
-        yield f"lost at {math.degrees(peak):.0f} deg of sideslip" if math.isfinite(peak) else "lost"
-    if IN_LANES in metrics and metrics[IN_LANES] != 1.0:
-        beyond = metrics.get(LANE_OVERSTEP, math.nan)
-        yield f"leaves the lane by {beyond:.2f} m" if beyond > 0.0 else "does not get through the lanes"
-    if missed := metrics.get(CONES_MISSED):
-        yield f"misses {_cones(missed)}"
-    if hit := metrics.get(CONES_HIT):
-        yield f"hits {_cones(hit)}"
-
-
-def kept(metrics: Mapping[str, float]) -> Iterator[str]:
-    """What a run with these metrics kept to, in words; nothing where there is nothing to keep to."""
-    if metrics.get(IN_LANES) == 1.0:
-        yield "stays in the lanes"
-    if metrics.get(CONES_MISSED) == 0.0:
-        yield "passes all cones"
-    if metrics.get(CONES_HIT) == 0.0:
-        yield "hits no cone"
-
-
-def _cones(count: float) -> str:
-    return "some cones" if math.isnan(count) else f"{count:.0f} cone{'s' if count != 1.0 else ''}"
 
 
 def _figure(figure: KeyFigure, name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> Figure:

@@ -107,9 +107,9 @@ def test_the_share_of_the_population_stands_beside_the_nominal_verdict():
     claims = [claim("S1", True), claim("S2", True), claim("D1", False), claim("D2", True)]
     card = scorecard(claims, known={"D1": "why"}, population=population)
     lines = card.to_text().splitlines()
-    assert "S1  passed           99 %  holds          text of S1" in lines
-    assert "D1  not reproduced    0 %  does not hold  text of D1" in lines
-    assert "D2  passed                                text of D2" in lines
+    assert "S1  passed            99 %  holds          text of S1" in lines
+    assert "D1  not reproduced     0 %  does not hold  text of D1" in lines
+    assert "D2  passed                                 text of D2" in lines
     assert lines[-3:] == ["  holds          S1", "  depends        S2 (road.mu)", "  does not hold  D1"]
     first, *_, last = card.to_json()["claims"]
     assert (first["population"]["verdict"], first["population"]["share"]) == ("holds", 0.99)

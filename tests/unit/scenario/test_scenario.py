@@ -82,6 +82,14 @@ def test_overrides_reach_manoeuvre_and_vehicle_in_any_unit():
     assert scenario.car.config.factors.mass == 1.1
 
 
+def test_title_says_the_speed_that_is_driven():
+    assert resolve("slalom").maneuver.title == "Slalom 45 m, 100 km/h, dry"
+    assert resolve("slalom", overrides={"speed_kmh": 131}).maneuver.title == "Slalom 45 m, 131 km/h, dry"
+    own = {"speed_kmh": 131, "title": "as at 100 km/h"}
+    assert resolve("slalom", overrides=own).maneuver.title == "as at 100 km/h"
+    assert resolve("drive_off_and_stop", overrides={"speed_kmh": 10}).maneuver.title.count("30 km/h") == 1
+
+
 def test_controllers_are_told_nothing_of_the_road():
     dry, slippery = (resolve("step_steer", overrides={"road.mu": mu}).controller_setup(0.001) for mu in (0.9, 0.3))
     assert dry == slippery
