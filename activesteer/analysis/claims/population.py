@@ -197,7 +197,7 @@ class Population:
 def percent(share: float) -> str:
     """A share in whole percent; within one percent of 0 or 100 with the digit that tells it from them."""
     value = 100.0 * share
-    beyond = min(value, 100.0 - value)
+    beyond = float(f"{min(value, 100.0 - value):.1g}")
     decimals = max(0, -math.floor(math.log10(beyond))) if beyond > 0.0 else 0
     return f"{value:.{decimals}f}"
 

@@ -8,7 +8,7 @@ import math
 import pytest
 
 from activesteer.analysis.claims import Claim, Kind, Statement, Verdict, not_reproduced, scorecard
-from activesteer.analysis.claims.population import ClaimShare, Population
+from activesteer.analysis.claims.population import ClaimShare, Population, percent
 from activesteer.errors import ParameterError
 from tests.raising import raises
 
@@ -118,3 +118,15 @@ def test_the_share_of_the_population_stands_beside_the_nominal_verdict():
 
 def test_a_car_without_a_population_has_no_shares():
     assert "population" not in scorecard([claim("S1", True)], "a car that nobody knows").to_text()
+
+
+def test_a_small_share_is_not_rounded_to_another_one():
+    assert [percent(count / 500) for count in (0, 1, 3, 5, 210, 497, 500)] == [
+        "0",
+        "0.2",
+        "0.6",
+        "1",
+        "42",
+        "99.4",
+        "100",
+    ]
