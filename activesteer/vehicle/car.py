@@ -29,7 +29,7 @@ from activesteer.vehicle.command_row import CARRIED_OUT, COMMANDS, write_command
 from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.estimate_row import write_estimate
 from activesteer.vehicle.loading import load_model
-from activesteer.vehicle.named_parts import find, tendon_arms
+from activesteer.vehicle.named_parts import find, sensor_columns, tendon_arms
 from activesteer.vehicle.native_forces import install_native_forces
 from activesteer.vehicle.native_step import FASTEST_MPS, Places, Wheels, sensed, step_plan
 from activesteer.vehicle.parameters import VehicleParameters
@@ -121,9 +121,6 @@ class Vehicle:
         def actuator(name: str) -> int:
             return find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
 
-        def sensor(name: str) -> int:
-            return int(model.sensor_adr[find(model, mujoco.mjtObj.mjOBJ_SENSOR, name)])
-
         def joint(name: str) -> int:
             return find(model, mujoco.mjtObj.mjOBJ_JOINT, name)
 
@@ -134,7 +131,7 @@ class Vehicle:
         self._places = Places(
             *(actuator(name) for name in ("steering_wheel", "superposition", "rl_steer", "rr_steer")),
             *(
-                sensor(name)
+                sensor_columns(model, name).start
                 for name in (
                     "cg_velocimeter", "cg_accelerometer", "steering_wheel_angle", "superposition_angle",
                     "rl_steer_angle", "rr_steer_angle", "fl_wheel_speed", "cg_position", "cg_velocity",

@@ -28,6 +28,22 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
     return index
 
 
+def is_there(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
+    """Whether something has this name."""
+    return mujoco.mj_name2id(model, kind, name) >= 0
+
+
+def sensor_columns(model: mujoco.MjModel, name: str) -> slice:
+    """Where a sensor's values stand in `sensordata`.
+
+    Raises:
+        ModelError: there is none of this name.
+    """
+    index = find(model, mujoco.mjtObj.mjOBJ_SENSOR, name)
+    start = int(model.sensor_adr[index])
+    return slice(start, start + int(model.sensor_dim[index]))
+
+
 def tendon_arms(model: mujoco.MjModel, name: str) -> dict[str, float]:
     """Joint -> what a fixed tendon gains in length per coordinate of it; empty where there is no such tendon.
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
 from activesteer.conventions import Array, yaw_of
+from activesteer.signals import Channel
 
 _STANDSTILL_MPS: Final = 0.2
 """Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""
@@ -18,30 +19,57 @@ MOTION_SENSORS: Final = (
     "cg_position", "front_axle_position", "chassis_orientation", "cg_velocity", "cg_accelerometer", "cg_gyro",
 )  # fmt: skip
 """What `CarMotion` reads."""
+_EXACT: Final = ("x_m", "y_m", "yaw_rad", "front_axle_x_m", "front_axle_y_m")
+"""Channels that grow with the way, and so need more than 32 bit in a file."""
+MOTION_CHANNELS: Final = tuple(
+    Channel(name, unit, meaning, "vehicle", name not in _EXACT)
+    for name, unit, meaning in (
+        ("x_m", "m", "position of the centre of gravity, world x"),
+        ("y_m", "m", "position of the centre of gravity, world y (left)"),
+        ("z_m", "m", "height of the centre of gravity above the road"),
+        ("yaw_rad", "rad", "yaw angle, left positive, unwrapped"),
+        ("roll_rad", "rad", "roll angle, positive to the right"),
+        ("pitch_rad", "rad", "pitch angle, positive nose down"),
+        ("vx_mps", "m/s", "longitudinal velocity of the centre of gravity, in the road plane"),
+        ("vy_mps", "m/s", "lateral velocity of the centre of gravity, in the road plane, left positive"),
+        ("vz_mps", "m/s", "vertical velocity of the centre of gravity"),
+        ("speed_mps", "m/s", "speed of the centre of gravity over the road"),
+        ("yaw_rate_radps", "rad/s", "yaw rate, left positive"),
+        ("roll_rate_radps", "rad/s", "roll rate, body-fixed"),
+        ("pitch_rate_radps", "rad/s", "pitch rate, body-fixed"),
+        ("ax_mps2", "m/s2", "longitudinal acceleration, in the road plane"),
+        ("ay_mps2", "m/s2", "lateral acceleration, in the road plane, left positive"),
+        ("az_mps2", "m/s2", "vertical acceleration"),
+        ("sideslip_rad", "rad", "sideslip angle at the centre of gravity, atan(vy/vx)"),
+        ("front_axle_x_m", "m", "position of the middle of the front axle, world x"),
+        ("front_axle_y_m", "m", "position of the middle of the front axle, world y"),
+    )
+)
+"""Channels of the members of a `CarMotion`."""
 
 
 class CarMotion:
     """Motion of the centre of gravity in the axes of ISO 8855, from sensors in world and body axes."""
 
-    def __init__(self, sensordata: Array, sensor: Callable[[str], slice], gravity: Array, last_yaw_rad: float) -> None:
+    def __init__(self, sensordata: Array, sensors: Mapping[str, slice], gravity: Array, last_yaw_rad: float) -> None:
         """Evaluates all of it; the members are called as the channels.
 
         Args:
             sensordata: What the engine's sensors say, shape (n, all sensors).
-            sensor: Name of one of `MOTION_SENSORS` -> its columns.
+            sensors: Columns of each of `MOTION_SENSORS`.
             gravity: Acceleration of gravity in the world [m/s2].
             last_yaw_rad: Yaw angle of the row before the first one, which the angle is unwrapped from [rad].
         """
 
         def columns(name: str) -> list[Array]:
-            part = sensor(name)
+            part = sensors[name]
             return [sensordata[:, column] for column in range(part.start, part.stop)]
 
         self.x_m, self.y_m, self.z_m = columns("cg_position")
         self.front_axle_x_m, self.front_axle_y_m, _ = columns("front_axle_position")
         w, x, y, z = columns("chassis_orientation")
         # Body axes in the world: yaw, pitch, roll in this order (ISO 8855).
-        yaw = yaw_of(sensordata[:, sensor("chassis_orientation")])
+        yaw = yaw_of(sensordata[:, sensors["chassis_orientation"]])
         turned = np.diff(yaw, prepend=last_yaw_rad)
         # Unwrapping takes longer than all the rest; where no jump is to be taken out, it adds 0.
         jumps = not np.abs(turned).max() < np.pi

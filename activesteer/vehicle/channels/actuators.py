@@ -1,0 +1,76 @@
+"""Channels of the actuators: torques of drive, brakes and motors, dry friction, and what is at a limit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+
+from activesteer.vehicle.channels.native_channels import Actuator
+from activesteer.vehicle.channels.raw_rows import Column, Signal, signal
+from activesteer.vehicle.named_parts import is_there, sensor_columns
+from activesteer.vehicle.superposition_actuator import MOTOR, NAME
+from activesteer.vehicle.toe_link_screws import SCREW
+
+
+def actuator_signals(model: mujoco.MjModel) -> Iterator[Signal]:
+    """Torques of drive and brakes, dry friction, and whether a servo without a motor of its own is at a limit.
+
+    Args:
+        model: The car.
+    """
+    for index in range(model.nu):
+        name, force = model.actuator(index).name, Column("actuator_force", index)
+        if name.endswith(("_drive", "_brake")):
+            yield signal("vehicle", f"{name}_torque_Nm", "Nm", f"torque of {name} on the wheel", force)
+        elif name.endswith("_friction"):
+            part = name.removesuffix("_friction")
+            sign = "positive resists compression" if part.endswith("damper") else "positive pushes to the left"
+            yield signal("links", f"{name}_N", "N", f"dry friction of {part}, {sign}", force)
+        elif (
+            model.actuator_actadr[index] >= 0
+            and model.actuator_gainprm[index, 0] > 0.0
+            and model.actuator_trntype[index] != int(mujoco.mjtTrn.mjTRN_TENDON)
+            and not _has_motor(model, name)
+        ):
+            meaning = f"1 where {name} is at its angle, rate or torque limit"
+            yield signal("vehicle", f"{name}_saturated", "", meaning, _limits(model, index))
+
+
+def motor_signals(model: mujoco.MjModel) -> Iterator[Signal]:
+    """What the motors of screws in the toe links, and of the superposition, do.
+
+    Args:
+        model: The car.
+    """
+    for name, words in (
+        ("rl", "of the left toe link"), ("rr", "of the right toe link"), ("rear", "of both toe links"),
+        (NAME, "of the superposition"),
+    ):  # fmt: skip
+        if not _has_motor(model, name):
+            continue
+        torque = sensor_columns(model, name + MOTOR).start
+        flag = "saturated" if name == NAME else "steer_saturated"
+        for what, unit, meaning, values in (
+            *([] if name == NAME else [("screw_m", "m", "travel of the screw", _state(model, name + SCREW))]),
+            ("motor_speed_radps", "rad/s", "speed of the motor", _state(model, name + MOTOR)),
+            ("motor_torque_Nm", "Nm", "torque of the motor", Column("sensordata", torque)),
+            (flag, "", "1 at a limit of angle, speed, torque or supply of the motor", Column("sensordata", torque + 1)),
+        ):
+            yield signal("vehicle", f"{name}_{what}", unit, f"{meaning} {words}", values)
+
+
+def _has_motor(model: mujoco.MjModel, name: str) -> bool:
+    return is_there(model, mujoco.mjtObj.mjOBJ_SENSOR, name + MOTOR)
+
+
+def _state(model: mujoco.MjModel, name: str) -> Column:
+    """The activation of an actuator."""
+    return Column("act", int(model.actuator_actadr[model.actuator(name).id]))
+
+
+def _limits(model: mujoco.MjModel, index: int) -> Actuator:
+    force = model.actuator_forcerange[index] if model.actuator_forcelimited[index] else (-np.inf, np.inf)
+    lag_and_rate, angle = model.actuator_dynprm[index, :2], model.actuator_ctrlrange[index]
+    return Actuator._make((index, model.actuator_actadr[index], *lag_and_rate, *angle, *force))

@@ -1,0 +1,107 @@
+"""Channels of the four wheels: tyre forces and slips, contact with the road, position against the chassis, brakes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from activesteer.brakes.records import PER_WHEEL, PLACES
+from activesteer.conventions import CORNERS, Array
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.channels.raw_rows import Column, Signal, Values, signal
+from activesteer.vehicle.named_parts import sensor_columns
+
+_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+_TYRE: Final = (
+    ("fx_N", "tyre_fx_N", "N", "longitudinal tyre force at the contact point, ISO-W"),
+    ("fy_N", "tyre_fy_N", "N", "lateral tyre force at the contact point, ISO-W, left positive"),
+    ("fz_N", "tyre_fz_N", "N", "vertical tyre force"),
+    ("mx_Nm", "tyre_mx_Nm", "Nm", "overturning moment"),
+    ("my_Nm", "tyre_my_Nm", "Nm", "rolling resistance moment, negative rolling forward"),
+    ("mz_Nm", "tyre_mz_Nm", "Nm", "aligning moment"),
+    ("slip_ratio", "slip_ratio", "", "transient longitudinal slip, positive drives"),
+    ("slip_angle_rad", "slip_angle_rad", "rad", "transient slip angle, positive gives negative force"),
+    ("inclination_rad", "inclination_rad", "rad", "inclination of the wheel against the road about +x"),
+    ("loaded_radius_m", "loaded_radius_m", "m", "distance of wheel centre and contact point"),
+    ("limited", "tyre_limited", "", "1 where the tyre is outside its file's range of validity"),
+    ("contact_x_m", "contact_x_m", "m", "contact point with the road, world x"),
+    ("contact_y_m", "contact_y_m", "m", "contact point with the road, world y"),
+    ("mu", "mu", "", "friction of the road at the contact point"),
+    (
+        "friction_utilisation", "friction_utilisation", "",
+        "fraction of the tyre's peak friction at its load that is used",
+    ),
+)  # fmt: skip
+"""Output of the native forces -> its channel: name, unit, meaning."""
+_BRAKES: Final = (
+    ("demand_Pa", "brake_pressure_demand_Pa", "Pa", "brake pressure that driver and controller ask for", "corners"),
+    ("pressure_Pa", "brake_pressure_Pa", "Pa", "pressure in the wheel brake", "corners"),
+    ("phase", "abs_phase", "", "anti-lock control: 0 off, 1 releases, 2 recovers, 3 builds up pressure", "corners"),
+    ("reference_mps", "abs_speed_mps", "m/s", "speed of the car as the brakes' control unit estimates it", "vehicle"),
+    ("tcs_active", "tcs_active", "", "1 while traction control limits the drive", "vehicle"),
+)
+"""Field of `BRAKE_STATE` -> its channels: name, unit, meaning, group."""
+
+
+def corner_signals(model: mujoco.MjModel) -> Iterator[Signal]:
+    """What each wheel does: its tyre, and where it is against the chassis.
+
+    Args:
+        model: The car.
+    """
+    at_rest = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, at_rest)
+    for index, (corner, words) in enumerate(_WORDS.items()):
+
+        def of(
+            name: str, unit: str, meaning: str, values: Values, *, corner: str = corner, words: str = words
+        ) -> Signal:
+            return signal("corners", f"{corner}_{name}", unit, f"{meaning}, {words}", values)
+
+        for field, name, unit, meaning in _TYRE:
+            yield of(name, unit, meaning, Column("userdata", fb.output_slot(index, field)))
+        height = sensor_columns(model, f"{corner}_wheel_position").start + 2
+        axis = sensor_columns(model, f"{corner}_wheel_axis")
+        speed = Column("sensordata", sensor_columns(model, f"{corner}_wheel_speed").start)
+        damper = Column("userdata", len(CORNERS) * fb.USERDATA_PER_WHEEL + index)
+        travel, steer, camber = _against_chassis(height, _design_height(model, at_rest, corner), axis)
+        yield of("wheel_speed_radps", "rad/s", "rotational speed", speed)
+        yield of("travel_m", "m", "wheel travel from the design position, bump positive", travel)
+        yield of("steer_rad", "rad", "steer angle of the wheel against the chassis, left positive", steer)
+        yield of("camber_rad", "rad", "inclination of the wheel against the chassis about +x", camber)
+        yield of("damper_force_N", "N", "damper force, positive resists compression", damper)
+
+
+def brake_signals() -> Iterator[Signal]:
+    """Pressures, and what the control unit of the brakes knows and does."""
+    for field, name, unit, meaning, group in _BRAKES:
+        first = PLACES[field]
+        if field in PER_WHEEL:
+            for index, (corner, words) in enumerate(_WORDS.items()):
+                yield signal(group, f"{corner}_{name}", unit, f"{meaning}, {words}", Column("brakes", first + index))
+        else:
+            yield signal(group, name, unit, meaning, Column("brakes", first))
+
+
+def toe(axis: Array) -> Array:
+    """Steer angle of a wheel from its spin axis in chassis axes, shape (n, 3)."""
+    return np.arctan2(-axis[:, 0], axis[:, 1])
+
+
+def _against_chassis(height: int, design_m: float, axis: slice) -> tuple[Values, Values, Values]:
+    """Travel, steer angle and camber from the sensors of a wheel's height and of its spin axis."""
+    return (
+        lambda rows: rows.sensordata[:, height] - design_m,
+        lambda rows: toe(rows.sensordata[:, axis]),
+        lambda rows: np.arcsin(rows.sensordata[:, axis.start + 2]),
+    )
+
+
+def _design_height(model: mujoco.MjModel, at_rest: mujoco.MjData, corner: str) -> float:
+    """Height of a wheel centre in vehicle axes in the design position [m]."""
+    chassis = model.body("chassis").id
+    offset = at_rest.xpos[model.body(f"{corner}_wheel").id] - at_rest.xpos[chassis]
+    return float((at_rest.xmat[chassis].reshape(3, 3).T @ offset)[2])

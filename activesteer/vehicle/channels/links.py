@@ -1,0 +1,49 @@
+"""Channels of the axial forces in links, springs, anti-roll bars and stops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+
+from activesteer.conventions import Array
+from activesteer.vehicle.channels.native_channels import AxialForce
+from activesteer.vehicle.channels.raw_rows import RawRows, Signal, Values, signal
+from activesteer.vehicle.guide_model import GUIDE
+
+
+def link_signals(model: mujoco.MjModel) -> Iterator[Signal]:
+    """Axial forces of everything that is a tendon with a stiffness of its own; tension positive."""
+    for index in range(model.ntendon):
+        if model.tendon_stiffness[index] == 0.0 and not model.tendon_stiffnesspoly[index].any():
+            continue
+        if model.tendon(index).name.endswith(GUIDE):
+            # Five springs that stand for all links of a wheel; none of them is a part of the car.
+            continue
+        # What a damper's tendon has of a spring are the stops at both ends of its travel.
+        name = model.tendon(index).name.replace("_damper", "_stop")
+        yield signal("links", f"{name}_force_N", "N", f"axial force of {name}, tension positive", _force(model, index))
+
+
+def axial_force(model: mujoco.MjModel, tendon: int) -> AxialForce:
+    """The law of a tendon's own stiffness."""
+    stiffness = model.tendon_stiffness[tendon], *model.tendon_stiffnesspoly[tendon]
+    return AxialForce._make((tendon, *stiffness, model.tendon_damping[tendon], *model.tendon_lengthspring[tendon]))
+
+
+def _force(model: mujoco.MjModel, tendon: int) -> Values:
+    """That law, and of a link whose length a screw changes also what its actuator adds."""
+    law = axial_force(model, tendon)
+    along = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
+    screws = np.flatnonzero(along & (model.actuator_trnid[:, 0] == tendon) & (model.actuator_gainprm[:, 0] > 0.0))
+    if not screws.size:
+        return law
+    actuator = int(screws[0])
+
+    def force(rows: RawRows) -> Array:
+        stretch = rows.ten_length[:, tendon] - law.low_m
+        passive = law.stiffness_Npm * stretch + law.damping_Nspm * rows.ten_velocity[:, tendon]
+        return passive - rows.actuator_force[:, actuator]
+
+    return force

@@ -1,0 +1,73 @@
+"""Channels of the steering: from the steering wheel to the wheels, and what the hands feel."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import mujoco
+
+from activesteer.vehicle.channels.corners import toe
+from activesteer.vehicle.channels.links import axial_force
+from activesteer.vehicle.channels.native_channels import AxialForce
+from activesteer.vehicle.channels.raw_rows import Column, Signal, signal
+from activesteer.vehicle.named_parts import find, sensor_columns, tendon_arms
+from activesteer.vehicle.parameters import Steering
+
+
+def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:
+    """Angles of steering wheel, superposition and wheels, torque of the hands, travel of the rack.
+
+    Args:
+        model: The car.
+        steering: Its ratio and its assistance.
+    """
+    of, ratio, felt = partial(signal, "vehicle"), steering.ratio, 1.0 - steering.assist_fraction
+    wheel, added, rack, rl, rr = (
+        sensor_columns(model, name).start
+        for name in ("steering_wheel_angle", "superposition_angle", "rack_travel", "rl_steer_angle", "rr_steer_angle")
+    )
+    fl_axis, fr_axis = (sensor_columns(model, f"{corner}_wheel_axis") for corner in ("fl", "fr"))
+    demand = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, "steering_wheel")
+    return [
+        of(
+            "steering_wheel_rad", "rad", "steering wheel angle, left positive, not wrapped",
+            Column("sensordata", wheel),
+        ),
+        of(
+            "steering_wheel_demand_rad", "rad", "steering wheel angle that the driver demands", Column("ctrl", demand),
+        ),
+        of(
+            "hand_torque_Nm", "Nm", "torque of the hands at the steering wheel, left positive",
+            _column_torque(model, felt) or (lambda rows: felt * rows.actuator_force[:, demand]),
+        ),
+        of(
+            "front_steer_rad", "rad", "mean steer angle of the front wheels against the chassis",
+            lambda rows: 0.5 * (toe(rows.sensordata[:, fl_axis]) + toe(rows.sensordata[:, fr_axis])),
+        ),
+        of(
+            "superposition_rad", "rad", "angle added by the front superposition, at the road wheel",
+            lambda rows: rows.sensordata[:, added] / ratio,
+        ),
+        of(
+            "rear_steer_rad", "rad", "mean angle of the rear steering actuators",
+            lambda rows: 0.5 * (rows.sensordata[:, rl] + rows.sensordata[:, rr]),
+        ),
+        of("rack_m", "m", "rack travel, positive steers left", Column("sensordata", rack)),
+    ]  # fmt: skip
+
+
+def _column_torque(model: mujoco.MjModel, felt: float) -> AxialForce | None:
+    """A fraction of the torque that the column carries [N m]; None where there is no column.
+
+    The actuator that stands for the hands does not say it: its force is that of the demand of this step against the
+    angle at its beginning, and the engine carries out what is left of it at the end.
+    """
+    arms = tendon_arms(model, "steering_column")
+    if "steering_wheel" not in arms:
+        return None
+    tension = axial_force(model, model.tendon("steering_column").id)
+    scale = felt * arms["steering_wheel"]
+    return tension._replace(
+        stiffness_Npm=scale * tension.stiffness_Npm, second_Npm2=scale * tension.second_Npm2,
+        third_Npm3=scale * tension.third_Npm3, damping_Nspm=scale * tension.damping_Nspm,
+    )  # fmt: skip
