@@ -64,29 +64,45 @@ def drift(known, memory, state, duration_s, rng):
     state[YAW_RATE] += math.sqrt(known.yaw_density_rad2ps3 * duration_s) * rng.standard_normal()
 
 
-def force_errors(known, tyres, memory, state, rng):
-    """Errors of both axles' forces, drawn [N]."""
-    forces_N = np.abs(forces_of(known, tyres, memory, state))
-    return (known.force_std_N + known.force_fraction * forces_N) * rng.standard_normal(2)
+def force_stds_N(known, tyres, memory, state):
+    """Standard deviations of what is wrong with both axles' forces [N]."""
+    return known.force_std_N + known.force_fraction * np.abs(forces_of(known, tyres, memory, state))
 
 
-def one_run(known, tyres, rng: np.random.Generator):
-    """NEES of the motion at the end, and mean NIS, of a car that is the filter's own model."""
+def white(known, rng):
+    """Errors over a step [s] and at its end [-], in turn and relative to their size, as the filter takes them: white,
+    with as much power as those that stay for a time."""
+    while True:
+        yield math.sqrt(2.0 * known.force_s * INTERVAL_S) * rng.standard_normal(2)
+        yield math.sqrt(1.0 + 2.0 * known.force_s / INTERVAL_S) * rng.standard_normal(2)
+
+
+def lasting(known, rng):
+    """The same as they are meant: each stays for `force_s`, in the motion and in what is measured alike."""
+    error, kept = rng.standard_normal(2), math.exp(-INTERVAL_S / known.force_s)
+    while True:
+        yield INTERVAL_S * error
+        error = kept * error + math.sqrt(1.0 - kept**2) * rng.standard_normal(2)
+        yield error
+
+
+def one_run(known, tyres, rng: np.random.Generator, kind):
+    """NEES of the motion at the end, and mean NIS, of a car that is the filter's own model but for errors of a kind."""
     true, memory = np.zeros(1, MEMORY)[0], np.zeros(1, MEMORY)[0]
     true["speed_mps"] = memory["speed_mps"] = SPEED_MPS
     begin(known, memory)
     state = memory.state + np.linalg.cholesky(memory.covariance + 1e-16 * np.eye(N_STATES)) @ rng.standard_normal(
         N_STATES
     )
-    squared = []
+    squared, errors = [], kind(known, rng)
     for step in range(STEPS):
         angle_rad = 0.03 * math.sin(math.pi * step * INTERVAL_S)
         true["front_angle_rad"] = memory["front_angle_rad"] = angle_rad
         predict(known, tyres, memory, INTERVAL_S)
-        errors_N = force_errors(known, tyres, true, state, rng) * math.sqrt(2.0 * known.force_s * INTERVAL_S)
+        errors_Ns = force_stds_N(known, tyres, true, state) * next(errors)
         follow(known, tyres, true, state, INTERVAL_S, state)
-        state[LATERAL_SPEED] += errors_N.sum() / known.mass_kg
-        state[YAW_RATE] += errors_N @ (known.cg_to_front_m, -known.cg_to_rear_m) / known.yaw_inertia_kgm2
+        state[LATERAL_SPEED] += errors_Ns.sum() / known.mass_kg
+        state[YAW_RATE] += errors_Ns @ (known.cg_to_front_m, -known.cg_to_rear_m) / known.yaw_inertia_kgm2
         drift(known, true, state, INTERVAL_S, rng)
         front_N, rear_N = forces_of(known, tyres, true, state)
         ay_mps2 = (front_N * math.cos(angle_rad) + rear_N) / known.mass_kg
@@ -95,9 +111,7 @@ def one_run(known, tyres, rng: np.random.Generator):
             memory[name] = true[name]
         front_N, rear_N = forces_of(known, tyres, true, state)
         ay_mps2 = (front_N * math.cos(angle_rad) + rear_N) / known.mass_kg
-        # What stays wrong for a time is, measured again and again, as wrong as one error of this size in each.
-        repeated = math.sqrt(1.0 + 2.0 * known.force_s / INTERVAL_S)
-        ay_mps2 += repeated * force_errors(known, tyres, true, state, rng).sum() / known.mass_kg
+        ay_mps2 += force_stds_N(known, tyres, true, state) @ next(errors) / known.mass_kg
         rate = state[YAW_RATE] + state[RATE_OFFSET]
         rate += math.hypot(math.sqrt(known.rate_variance_rad2ps2), known.rate_fraction * rate) * rng.standard_normal()
         felt = ay_mps2 + GRAVITY_MPS2 * true.roll_rad + state[AY_OFFSET]
@@ -108,12 +122,19 @@ def one_run(known, tyres, rng: np.random.Generator):
 
 
 def test_errors_in_its_own_model_are_those_of_its_covariance(known_and_tyres, rng):
-    known, tyres = known_and_tyres
-    nees, nis = np.mean([one_run(known, tyres, rng) for _ in range(RUNS)], axis=0)
+    nees, nis = np.mean([one_run(*known_and_tyres, rng, white) for _ in range(RUNS)], axis=0)
     low, high = bounds(len(MOTION), RUNS)
     assert low < nees < high
     low, high = bounds(2, RUNS * STEPS)
     assert low < nis < high
+
+
+def test_forces_that_stay_wrong_make_the_motion_as_wrong_and_single_measurements_less(known_and_tyres, rng):
+    nees, nis = np.mean([one_run(*known_and_tyres, rng, lasting) for _ in range(RUNS)], axis=0)
+    low, high = bounds(len(MOTION), RUNS)
+    assert low < nees < high
+    # What is wrong all the time is taken for less again and again: one measurement is nearer than the filter expects.
+    assert nis < bounds(2, RUNS * STEPS)[0]
 
 
 @pytest.mark.slow
