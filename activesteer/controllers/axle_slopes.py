@@ -20,7 +20,8 @@ _AY_STEP_MPS2: Final = 0.2
 _ROUNDS: Final = 8
 """Rounds in which force and load of a wheel agree to a thousandth."""
 _MOST: Final = 0.95
-"""Part of an axle's largest force up to which they are: beyond it the slip angle says nothing of the force [-]."""
+"""Part of an axle's largest force up to which they are: at it one percent of force is 0.3 deg of slip
+angle by the compact's tyre, at 0.99 it is 0.7 deg, and the friction is not known to a percent [-]."""
 
 
 class Axle(NamedTuple):

@@ -41,7 +41,8 @@ class EstimatorParameters:
     force_fraction: _NotNegative = 0.03
     """... and per force: loads, combined slip, camber."""
     force_s: _Positive = 0.05
-    """How long that stays so [s]."""
+    """How long that stays so [s]: between what tyres, 0.02 s, and body, 1/(2 pi 2.2 Hz) = 0.07 s, take to follow. From
+    0.0125 to 0.2 s no scenario's RMS error of the sideslip moves by more than 0.03 deg."""
     along_fraction: _NotNegative = 0.2
     """Standard deviation of a wheel's longitudinal force, per force: pads, and roads with two sides."""
     rate_fraction: _NotNegative = 0.005

@@ -122,7 +122,8 @@ def one_run(known, tyres, rng: np.random.Generator, kind):
 
 
 def test_errors_in_its_own_model_are_those_of_its_covariance(known_and_tyres, rng):
-    nees, nis = np.mean([one_run(*known_and_tyres, rng, white) for _ in range(RUNS)], axis=0)
+    known, tyres = known_and_tyres
+    nees, nis = np.mean([one_run(known, tyres, rng, white) for _ in range(RUNS)], axis=0)
     low, high = bounds(len(MOTION), RUNS)
     assert low < nees < high
     low, high = bounds(2, RUNS * STEPS)
@@ -130,7 +131,8 @@ def test_errors_in_its_own_model_are_those_of_its_covariance(known_and_tyres, rn
 
 
 def test_forces_that_stay_wrong_make_the_motion_as_wrong_and_single_measurements_less(known_and_tyres, rng):
-    nees, nis = np.mean([one_run(*known_and_tyres, rng, lasting) for _ in range(RUNS)], axis=0)
+    known, tyres = known_and_tyres
+    nees, nis = np.mean([one_run(known, tyres, rng, lasting) for _ in range(RUNS)], axis=0)
     low, high = bounds(len(MOTION), RUNS)
     assert low < nees < high
     # What is wrong all the time is taken for less again and again: one measurement is nearer than the filter expects.
