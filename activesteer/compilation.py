@@ -162,6 +162,12 @@ def content_key(source: Path) -> str:
     Raises:
         OSError: the file cannot be read.
     """
+    return hashlib.sha256(f"{_versions()}\n{_sources_key(source)}".encode()).hexdigest()
+
+
+@functools.cache
+def _sources_key(source: Path) -> str:
+    """Digest of all sources behind a file, its own included."""
     package = source.parent
     while (package.parent / "__init__.py").is_file():
         package = package.parent
@@ -172,7 +178,7 @@ def content_key(source: Path) -> str:
         if file not in found:
             found.add(file)
             left.extend(_imported(file, package))
-    digest = hashlib.sha256(_versions().encode())
+    digest = hashlib.sha256()
     for file in sorted(found):
         digest.update(f"\n{file.relative_to(package)}\n".encode())
         digest.update(_content(file))

@@ -35,11 +35,11 @@ def fit_guides(spec: mujoco.MjSpec, curves: Curves) -> None:
     Raises:
         ModelError: the model's joints are not those of a guided knuckle.
     """
-    from scipy.linalg import eigh  # noqa: PLC0415 - slow to import, and only axles of curves need it
-
     corners = [corner for corner in CORNERS if curves.axle(corner) is not None]
     if not corners:
         return
+    from scipy.linalg import eigh  # noqa: PLC0415 - slow to import, and only axles of curves need it
+
     model = spec.compile()
     for corner in corners:
         axle = curves.axle(corner)
