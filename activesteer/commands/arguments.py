@@ -160,8 +160,9 @@ def add_jobs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one per processor)")
 
 
-def add_scheduler(parser: argparse.ArgumentParser) -> None:
-    """Adds `--scheduler`."""
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Adds `--jobs` and `--scheduler`."""
+    add_jobs(parser)
     parser.add_argument(
         "--scheduler", metavar="ADDRESS",
         help="work on a Dask cluster instead: tcp://host:8786, or the file of `dask scheduler --scheduler-file`",
@@ -207,6 +208,8 @@ def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = 
     values = dict(given or {})
     for path in options.override_files:
         table, source = read_toml(path)
+        if not table:
+            raise source.fail((), 'replaces nothing; a line as "road.mu" = 0.4 is needed')
         for key in table:
             if key in values:
                 raise source.fail((key,), "is given twice; leave one out")

@@ -8,11 +8,10 @@ from typing import Any
 from activesteer.commands.arguments import (
     add_controller,
     add_figures_folder,
-    add_jobs,
     add_json,
     add_overrides,
-    add_scheduler,
     add_vehicle,
+    add_workers,
     overrides_of,
 )
 from activesteer.commands.output import print_json
@@ -35,8 +34,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument("--speeds-kmh", metavar="V,V", help="speeds of the map (default: the manoeuvre's +-30)")
     parser.add_argument("--lines-m", metavar="D,D", help="lane.margin_m or cones.offset_m of the map")
     add_figures_folder(parser)
-    add_jobs(parser)
-    add_scheduler(parser)
+    add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_envelope)
 

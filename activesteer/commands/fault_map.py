@@ -11,11 +11,10 @@ from activesteer.commands.arguments import (
     add_controller,
     add_driver,
     add_figures_folder,
-    add_jobs,
     add_json,
     add_overrides,
-    add_scheduler,
     add_vehicle,
+    add_workers,
     overrides_of,
     pairs,
 )
@@ -53,8 +52,7 @@ def add_to(commands: Any) -> None:
         help="what a fault may do: yaw_rate_degps (3), ay_mps2 (1), lateral_offset_m (the lane's), window_s (2)",
     )  # fmt: skip
     add_figures_folder(parser)
-    add_jobs(parser)
-    add_scheduler(parser)
+    add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_fault_map)
 

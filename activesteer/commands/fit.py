@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler
+from activesteer.commands.arguments import add_json, add_output, add_workers
 from activesteer.commands.output import print_entry, print_json
 from activesteer.commands.progress import ProgressBar
 
@@ -27,8 +27,7 @@ def add_to(commands: Any) -> None:
         "study", type=Path, metavar="STUDY.toml", help="a study with recordings for manoeuvres and a table [fit]"
     )
     add_output(parser, "DIR", "folder for fit.json, fit.html and overrides.toml; none are written without it")
-    add_jobs(parser)
-    add_scheduler(parser)
+    add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_fit)
 

@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler, add_vehicle
+from activesteer.commands.arguments import add_json, add_output, add_vehicle, add_workers
 from activesteer.commands.output import coloured, print_json
 from activesteer.commands.progress import ProgressBar, RunCounter
 from activesteer.errors import ParameterError
@@ -26,7 +26,7 @@ def add_to(commands: Any) -> None:
     )
     add_output(parser, "DIR", words)
     add_vehicle(parser)
-    add_jobs(parser)
+    add_workers(parser)
     parser.add_argument("--figures", action="store_true", help="also draw the paper's figures, or the comparison's")
     parser.add_argument(
         "--population", type=int, metavar="N",
@@ -39,7 +39,6 @@ def add_to(commands: Any) -> None:
         "step at 120 km/h, the severe lane change, braking on split friction and in a turn, a turn across snow",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, metavar="S", help="of the population's sample (default: the stored one's)")
-    add_scheduler(parser)
     add_json(parser)
     parser.set_defaults(action=_reproduce)
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler
+from activesteer.commands.arguments import add_json, add_output, add_workers
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import RunCounter
 from activesteer.errors import StudyError
@@ -17,8 +17,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser("study", help="drive many runs over varied parameters; say how far they are")
     parser.add_argument("study", metavar="STUDY_OR_DIR", help="a study file or its name, or the folder of a study")
     add_output(parser, "DIR", "folder for the results; a study that is there is gone on with")
-    add_jobs(parser)
-    add_scheduler(parser)
+    add_workers(parser)
     parser.add_argument("--limit", type=int, metavar="N", help="make at most N runs now and leave the rest")
     parser.add_argument("--status", action="store_true", help="only say how far the study in DIR is")
     parser.add_argument("--report", action="store_true", help="only write DIR/report.html, of the runs that are done")

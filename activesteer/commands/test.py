@@ -8,12 +8,11 @@ from typing import Any
 from activesteer.commands.arguments import (
     add_controller,
     add_driver,
-    add_jobs,
     add_json,
     add_output,
     add_overrides,
-    add_scheduler,
     add_vehicle,
+    add_workers,
     overrides_of,
 )
 from activesteer.commands.output import coloured, print_entry, print_json
@@ -31,8 +30,7 @@ def add_to(commands: Any) -> None:
     add_driver(parser, default="whom the standard asks for")
     add_overrides(parser)
     add_output(parser, "DIR", "folder for page, JSON and runs, which is gone on with; none are written without it")
-    add_jobs(parser)
-    add_scheduler(parser)
+    add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_test)
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler
+from activesteer.commands.arguments import add_json, add_output, add_workers
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 
@@ -20,8 +20,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument("study", metavar="STUDY", help="a study file with a table [tune], or its name")
     add_output(parser, "DIR", "folder of the search; one that is there is gone on with", "tuning")
     parser.add_argument("--trials", type=int, metavar="N", help="sets to have tried in the end (default: the file's)")
-    add_jobs(parser)
-    add_scheduler(parser)
+    add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_tune)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from activesteer.commands.arguments import add_jobs, add_json, add_output, add_scheduler
+from activesteer.commands.arguments import add_json, add_output, add_workers
 from activesteer.commands.output import BAD, painted, print_json
 from activesteer.commands.progress import ProgressBar
 
@@ -37,8 +37,7 @@ def add_to(commands: Any) -> None:
         help="of a car that was measured on the road: how often mass, tyre, radius, lateral acceleration are drawn",
     )  # fmt: skip
     parser.add_argument("--timestep", type=float, default=0.001, metavar="S", help="our step [s] (default: 0.001)")
-    add_jobs(parser)
-    add_scheduler(parser)
+    add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_validate)
 

@@ -11,9 +11,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.config import field_in_unit
 from activesteer.conventions import Array
-from activesteer.errors import ActiveSteerError, RecordingError, StudyError, nearest_names
+from activesteer.driver import is_driver_file
+from activesteer.errors import ActiveSteerError, StudyError
+from activesteer.measured.fit_data import measured_of, noise_of
 from activesteer.measured.fit_file import FitTable, read_fit
 from activesteer.measured.fit_result import Compared, Fit, Parameter, notes_of
 from activesteer.measured.intervals import intervals, told_apart, without_effect
@@ -25,15 +26,13 @@ from activesteer.simulation.runner import run_scenario
 from activesteer.studies.factor_values import FactorValues, label_of
 from activesteer.studies.factors import Factor
 from activesteer.studies.plan import Plan
-from activesteer.studies.run_task import Settings, engine_lock, prepare_worker
+from activesteer.studies.run_task import Settings, prepare_worker
 from activesteer.studies.study_file import StudyFile
 from activesteer.studies.workers import TaskQueue, Workers, workers_for
 
 _SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1ps2": 8.0}
 """Unless the study says otherwise the recorded speed is held to 0.1 %; a driver's gains leave 0.3 %, which would be
 taken for a property of the car."""
-_FEWEST: Final = 20
-"""Samples of a channel in a recording that are needed at least."""
 
 
 class FitProgress(NamedTuple):
@@ -50,22 +49,6 @@ class FitProgress(NamedTuple):
     done: int
     total: int
     misfit: float
-
-
-class _Measured(NamedTuple):
-    """A recording, in the time of the manoeuvre that it became.
-
-    Attributes:
-        name: Of its file.
-        begin_s: Instant of the recording that is zero in the manoeuvre [s].
-        time_s: Instants at which channels are compared [s], shape (n,).
-        channels: What was measured there, SI; not finite where nothing was.
-    """
-
-    name: str
-    begin_s: float
-    time_s: Array
-    channels: dict[str, Array]
 
 
 def fit(
@@ -105,13 +88,13 @@ class _Problem:
     def __init__(self, study: StudyFile, table: FitTable) -> None:
         recordings = [Recording.open(Path(str(path))) for path in study.maneuvers]
         names = [label_of(path) for path in study.maneuvers]
-        held = {} if ":" in str(study.driver) else _SPEED_HOLD
+        held = _SPEED_HOLD if is_driver_file(study.driver) else {}
         known = {key: value for key, value in held.items() if key not in study.keys} | study.overrides
         first = resolve(open_loop_of(recordings[0], names[0]), study.vehicles[0], known, study.driver)
         car = first.car.on(first.maneuver.road, study.timestep_s)
-        self._noise = _noise(table, study, [channel.name for channel in car.channels.channels])
+        self._noise = noise_of(study, table, [channel.name for channel in car.channels.channels])
         self._measured = [
-            _measured(recording, name, list(self._noise), table, study)
+            measured_of(recording, name, study, table, self._noise)
             for recording, name in zip(recordings, names, strict=True)
         ]
         maneuvers = [
@@ -187,11 +170,12 @@ class _Problem:
                 "changes nothing of these channels in these recordings that their noise would not hide; leave it out",
             )
         if together := told_apart(slopes):
-            first, *others = (keys[place] for place in together)
+            first, *others = same = [keys[place] for place in together]
             raise source.fail(
                 ("factors", first),
                 f"cannot be told from {' and '.join(others)} by these recordings: together they can be changed so that "
                 "nothing of these channels changes; give all but one of them in [overrides]",
+                same,
             )
 
     def result(self, found: Found) -> Fit:
@@ -242,55 +226,11 @@ def drive(
         channels: Which are wanted.
     """
     try:
-        with engine_lock:
-            scenario = resolve(settings.maneuvers[recording][1], settings.vehicles[0][1], overrides, settings.driver)
-            run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.timestep_s)
+        scenario = resolve(settings.maneuvers[recording][1], settings.vehicles[0][1], overrides, settings.driver)
+        run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.timestep_s)
     except ActiveSteerError as error:
         return str(error)
     return {name: np.interp(time_s, run.time_s, run[name]) for name in channels}
-
-
-def _noise(table: FitTable, study: StudyFile, known: list[str]) -> dict[str, float]:
-    """Channel -> standard deviation, SI."""
-    found: dict[str, float] = {}
-    for key, value in table.noise.items():
-        name, factor = field_in_unit(key, known)
-        if name is None:
-            raise study.source.fail(
-                ("fit", "noise", key), f"there is no such channel; {nearest_names(key, known)}", key
-            )
-        if name in found:
-            raise study.source.fail(("fit", "noise", key), "is given twice, in two units", key)
-        found[name] = value * factor
-    return found
-
-
-def _measured(recording: Recording, name: str, channels: list[str], table: FitTable, study: StudyFile) -> _Measured:
-    for channel in channels:
-        if channel not in recording:
-            have = [each.name for each in recording.channels]
-            raise study.source.fail(
-                ("fit", "noise", channel), f"{name} has no such channel; {nearest_names(channel, have)}", channel, have
-            )
-    if not len(recording):
-        raise RecordingError("has no rows", file=f"{name}.mcap")
-    begin_s = float(recording.time_s[0])
-    time_s = np.asarray(recording.time_s, np.float64)
-    # The last row of a run is one step before its end.
-    inside = time_s <= time_s[-1] - study.timestep_s
-    if table.from_s is not None:
-        inside &= time_s >= table.from_s
-    if table.until_s is not None:
-        inside &= time_s <= table.until_s
-    values = {channel: np.asarray(recording[channel], np.float64)[inside] for channel in channels}
-    for channel, each in values.items():
-        if np.count_nonzero(np.isfinite(each)) < _FEWEST:
-            raise RecordingError(
-                f"{channel} has {np.count_nonzero(np.isfinite(each))} samples to compare, and {_FEWEST} are needed; it "
-                f"is recorded from {time_s[0]:g} to {time_s[-1]:g} s, and compared from fit.from_s to fit.until_s",
-                file=f"{name}.mcap",
-            )
-    return _Measured(name, begin_s, time_s[inside] - begin_s, values)
 
 
 def _start(factor: Factor, table: FitTable, scenario: Any, study: StudyFile) -> float:

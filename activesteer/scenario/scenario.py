@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, Final
 
@@ -132,6 +132,27 @@ def _with_speed_in_title(built: Maneuver, of_file: Mapping[str, Any]) -> Maneuve
     if driven == said or built.title != of_file.get("title"):
         return built
     return replace(built, title=re.sub(rf"\b{said}", driven, built.title))
+
+
+def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequence[str]) -> None:
+    """For what makes a manoeuvre, or chooses who drives, itself: overrides are of other parts, or of the road.
+
+    Args:
+        overrides: Dotted key -> value, as for `resolve`.
+        scenario: What was resolved with them.
+        parts: `vehicle`, `driver`: those that overrides may change.
+
+    Raises:
+        ParameterError: one changes another part.
+    """
+    for key, value in overrides.items():
+        part, path = _which_part(key, type(scenario.maneuver))
+        if part not in parts and path[0] != "road":
+            allowed = [*parts, "road"]
+            raise ParameterError(
+                f"is of the {part}, which is made here; keys of {' and '.join(allowed)} can be changed",
+                key=key, value=value, allowed=allowed, overridden=True,
+            )  # fmt: skip
 
 
 def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:

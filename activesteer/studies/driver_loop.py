@@ -260,7 +260,8 @@ def driver_loops(
     setup, who = scenario.controller_setup(DEFAULT_TIMESTEP_S), scenario.driver.parameters
     known = SingleTrack(setup.single_track)
     found = []
-    for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides):
+    of_car = {key: value for key, value in (overrides or {}).items() if not key.startswith("driver.")}
+    for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], of_car):
         gains = steering_gains(car.speed_mps, known.matrices, who, setup.steering_ratio)
         for name in controllers:
             linear = linear_controller(name, setup, car.speed_mps)

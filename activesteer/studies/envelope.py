@@ -200,7 +200,7 @@ def envelope(
         lines_m: Values of the line of the map [m]; those of `LINES` where not given.
         output: Folder for the studies of the map, which can be gone on with; they are not kept where not given.
         jobs: Number of processes; that of the processors where not given.
-        scheduler: Address of a Dask scheduler that drives the map instead.
+        scheduler: Address of a Dask scheduler, or its scheduler file, that does all of it instead.
         progress: Called with what is done, how many runs or searches are, and how many there are.
 
     Returns:
@@ -231,7 +231,7 @@ def envelope(
     pairs = [(driver, controller) for driver in drivers for controller in controllers]
     search = functools.partial(entry_speed, maneuver, vehicle, given, line)
     tell = report("entry speeds")
-    found = in_parallel(search, pairs, jobs, lambda _, done: tell(done, len(pairs)))
+    found = in_parallel(search, pairs, jobs, lambda _, done: tell(done, len(pairs)), scheduler=scheduler)
     entry_speeds = [
         {"driver": label_of(driver), "controller": controller, "entry_speed_kmh": speed}
         for (driver, controller), speed in zip(pairs, found, strict=True)

@@ -21,7 +21,7 @@ from activesteer.conventions import Array
 from activesteer.errors import ParameterError, SimulationDiverged, nearest_names
 from activesteer.faults import Fault, fault_table
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, resolve
+from activesteer.scenario import FileOrTable, check_parts, resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
@@ -156,6 +156,7 @@ def _cell(
     begin_s = SITUATIONS[situation].fault_s(speed_kmh / 3.6)
     table = path_of(situation, speed_kmh / 3.6, begin_s + limits.window_s)
     scenario = resolve(table, vehicle, overrides, driver)
+    check_parts(overrides, scenario, ("vehicle", "driver"))
     width_m = scenario.car.config.width_m
     if limits.lateral_offset_m is None:
         limits = replace(limits, lateral_offset_m=0.5 * (LANE_M - width_m))

@@ -33,7 +33,7 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.config import Range
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError
-from activesteer.scenario import FileOrTable, resolve
+from activesteer.scenario import FileOrTable, check_parts, resolve
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.studies.discrete_time_map import INPUTS, OUTPUTS, DiscreteTimeMap
 from activesteer.vehicle.modes import Mode, find_modes
@@ -214,6 +214,7 @@ def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, 
     }  # fmt: skip
     sliding = {**(overrides or {}), "vehicle.friction.rack_N": 0.0}
     scenario = resolve(straight, vehicle, sliding)
+    check_parts(overrides or {}, scenario, ("vehicle",))
     config = scenario.car.config
     smooth = replace(
         config,

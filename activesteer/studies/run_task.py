@@ -8,7 +8,6 @@ import fnmatch
 import functools
 import itertools
 import tempfile
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -36,8 +35,6 @@ CLAIM: Final = "claim_"
 CURVE: Final = "curve_"
 """What the name of a column begins with that holds a channel over time."""
 _VERSION: Final = "version of "
-engine_lock = threading.Lock()
-"""The engine's callbacks belong to the process: of a worker's threads, one drives at a time."""
 
 
 class Status(StrEnum):
@@ -171,17 +168,16 @@ def drive(settings: Settings, requests: Sequence[Request]) -> list[Row]:
     Returns:
         A row for each.
     """
-    with engine_lock:
-        if problem := _problem(digest({"expected": settings.expected}), settings):
-            return [failed_row(settings, request, Status.FAILED, problem) for request in requests]
-        rows: list[Row] = []
-        place = 0
-        while place < len(requests):
-            group = [other for other in requests[place:] if _same_drive(other, requests[place])]
-            rows += _drive_sample(settings, group)
-            place += len(group)
-        _give_memory_back()
-        return rows
+    if problem := _problem(digest({"expected": settings.expected}), settings):
+        return [failed_row(settings, request, Status.FAILED, problem) for request in requests]
+    rows: list[Row] = []
+    place = 0
+    while place < len(requests):
+        group = [other for other in requests[place:] if _same_drive(other, requests[place])]
+        rows += _drive_sample(settings, group)
+        place += len(group)
+    _give_memory_back()
+    return rows
 
 
 def _give_memory_back() -> None:

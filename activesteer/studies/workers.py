@@ -23,6 +23,8 @@ from activesteer.studies import dask_cluster
 
 _ATTEMPTS: Final = 3
 """How often a task is begun before it counts as the one that kills its worker; the last time it is alone."""
+_engine: Final = threading.RLock()
+"""The engine's callbacks belong to the process: of a worker's threads, one does a task at a time."""
 
 
 class WorkerDied(StudyError):  # noqa: N818 - an event, named as one
@@ -264,7 +266,12 @@ class TaskQueue:
             self._submit(self._waiting.popleft())
 
     def _submit(self, task: _Task) -> None:
-        self._running[self._workers.submit(task.function, *task.arguments)] = task
+        self._running[self._workers.submit(_alone, task.function, *task.arguments)] = task
+
+
+def _alone(function: Callable[..., Any], *arguments: Any) -> Any:
+    with _engine:
+        return function(*arguments)
 
 
 @contextlib.contextmanager

@@ -50,6 +50,20 @@ def test_linearise_takes_other_values_of_the_car(capsys):
     assert "act_rl_screw" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (["linearise", "--set", "speed_kmh=60"], "maneuver"),
+        (["linearise", "--set", "driver.preview_s=1"], "driver"),
+        (["driver", "-c", "none", "--set", "settle_s=1"], "maneuver"),
+        (["fault-map", "--jobs", "1", "--speeds-kmh", "60", "--set", "speed_kmh=50"], "maneuver"),
+    ],
+)
+def test_what_makes_its_manoeuvre_itself_takes_no_override_of_it(capsys, words, part):
+    assert main(words) == 1
+    assert f"is of the {part}, which is made here" in capsys.readouterr().err
+
+
 def test_linearise_needs_a_speed(capsys):
     assert main(["linearise", "--speed-kmh", "0"]) == 1
     assert "speed_mps" in capsys.readouterr().err

@@ -11,10 +11,11 @@ import pytest
 
 import activesteer
 from activesteer.config import read_toml
-from activesteer.errors import ActiveSteerError
+from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.measured.fit_page import write_fit
 from activesteer.measured.fitting import fit
 from activesteer.recording import Recording
+from tests.raising import raises
 
 TRUTH = {"factors.tyre_cornering_stiffness": 0.9, "factors.yaw_inertia": 1.15}
 NOISE = {"yaw_rate_radps": math.radians(0.2), "ay_mps2": 0.1}
@@ -86,7 +87,7 @@ def test_a_parameter_at_the_end_of_a_range_that_is_too_narrow_is_said(folder):
     [
         ({"fit": {"noise": {}}}, "fit.noise: is empty"),
         ({"fit": {"noise": {"yaw_rate_dgps": 0.2}}}, "fit.noise.yaw_rate_dgps: there is no such channel; did you mean"),
-        ({"fit": {"noise": {"roll_deg": 0.2}}}, "fit.noise.roll_rad: a has no such channel"),
+        ({"fit": {"noise": {"roll_deg": 0.2}}}, "fit.noise.roll_deg: a has no such channel"),
         ({"fit": {"noise": {"ay_mps2": 0.0}}}, "fit.noise.ay_mps2: 0.0 is out of range"),
         ({"fit": {"noise": {"yaw_rate_degps": 1, "yaw_rate_radps": 1}}}, "yaw_rate_radps: is given twice"),
         ({"fit": {**STUDY["fit"], "from_s": 1.5}}, "has 9 samples to compare, and 20 are needed"),
@@ -129,3 +130,14 @@ def test_of_20_intervals_16_at_least_hold_the_truth(truth, tmp_path, monkeypatch
         for one in fit(STUDY, jobs=1).parameters:
             held[one.key] += abs(one.value - TRUTH[one.key]) < one.half_width
     assert min(held.values()) >= 16
+
+
+def test_factors_that_only_count_together_are_named_after_the_first_round(folder):
+    # At one speed the desired yaw rate is a number times the steering wheel's angle, whatever goes into that number.
+    factors = {
+        "vehicle.single_track.characteristic_speed_kmh": {"uniform": [84.0, 90.0]},
+        "vehicle.single_track.cg_to_front_m": {"uniform": [1.05, 1.11]},
+    }
+    overrides = {**STUDY["overrides"], "vehicle.controllers.ars.prediction_gain": 0.0}
+    with raises(StudyError, key=f"factors.{next(iter(factors))}", value=list(factors)):
+        fit({**STUDY, "controllers": ["ars"], "overrides": overrides, "factors": factors}, jobs=1)

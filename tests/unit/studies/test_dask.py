@@ -7,18 +7,21 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import psutil
 import pytest
 
-from activesteer import study
+from activesteer import simulate, study
 from activesteer.errors import StudyError
+from activesteer.measured.fitting import fit
 from activesteer.studies.fault_map import fault_map
-from activesteer.studies.workers import TaskQueue, workers_for
+from activesteer.studies.workers import TaskQueue, Workers, in_parallel, workers_for
 from tests.raising import raises
 from tests.unit.studies.short import RATIO, short_study, write_controller
 
@@ -80,6 +83,20 @@ def test_a_cluster_gives_the_same_bits_as_this_process(cluster, tmp_path):
 def test_a_cluster_drives_a_fault_map_as_this_process_does(cluster):
     cell: dict[str, Any] = {"faults": ["rear:stuck"], "speeds_kmh": [60.0], "situations": ["straight", "turn"]}
     assert fault_map("ars", **cell, scheduler=str(cluster.file)).rows == fault_map("ars", **cell, jobs=1).rows
+
+
+@pytest.mark.slow
+def test_a_cluster_fits_as_this_process_does(cluster, tmp_path):
+    step = {"time_s": [0.1, 0.3], "steering_wheel_deg": [0.0, 40.0]}
+    short = {"kind": "open_loop", "speed_kmh": 80.0, "duration_s": 1.0, "settle_s": 0.3, "hold_last": True}
+    simulate({**short, "steering": step}, overrides={"factors.yaw_inertia": 1.1}).save(tmp_path / "a.mcap")
+    table = {
+        "maneuvers": [str(tmp_path / "a.mcap")],
+        "overrides": {"settle_s": 0.3},
+        "factors": {"factors.yaw_inertia": {"uniform": [0.8, 1.4]}},
+        "fit": {"noise": {"yaw_rate_degps": 0.2}},
+    }
+    assert fit(table, scheduler=str(cluster.file)).to_json() == fit(table, jobs=1).to_json()
 
 
 @pytest.mark.slow
@@ -177,6 +194,33 @@ def test_ten_thousand_tasks_come_back_each_once(jobs):
         tasks = ((number, _same, number) for number in range(10_000))
         found = [(outcome.key, outcome.value) for outcome in TaskQueue(workers).outcomes(tasks)]
     assert sorted(found) == [(number, number) for number in range(10_000)]
+
+
+class Threads(ThreadPoolExecutor):
+    """A worker of a cluster that was started with four threads."""
+
+    in_flight = 8
+
+    def died(self, _: BaseException) -> bool:
+        return False
+
+
+BUSY = threading.Lock()
+
+
+def _finds_nobody_else(_: int) -> bool:
+    alone = BUSY.acquire(blocking=False)
+    if alone:
+        time.sleep(0.005)  # in which another thread may begin
+        BUSY.release()
+    return alone
+
+
+def test_of_a_workers_threads_one_does_a_task_at_a_time():
+    with Threads(4) as workers:
+        assert all(in_parallel(_finds_nobody_else, [(number,) for number in range(16)], workers=cast(Workers, workers)))
+        alone = [task.result() for task in [workers.submit(_finds_nobody_else, number) for number in range(16)]]
+    assert not all(alone)  # without the queue they meet
 
 
 @pytest.mark.slow

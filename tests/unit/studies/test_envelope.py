@@ -92,7 +92,7 @@ def test_what_has_no_gates_has_no_entry_speed() -> None:
 
 
 def test_a_map_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "in_parallel", lambda _, pairs, *__: [50.0] * len(pairs))
+    monkeypatch.setattr(module, "in_parallel", lambda _, pairs, *__, **___: [50.0] * len(pairs))
     found = envelope("double_lane_change", ("none",), speeds_kmh=(60.0, 140.0), lines_m=(0.15,), jobs=1)
     assert found.cells("typical") == {(60.0, 0.15): State.NOBODY, (140.0, 0.15): State.ALL}
     assert found.nominal == (80.0, 0.2)

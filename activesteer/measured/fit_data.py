@@ -1,0 +1,102 @@
+"""What a fit compares with: channels of recordings, and how noisy each is."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from activesteer.config import field_in_unit
+from activesteer.conventions import Array
+from activesteer.errors import RecordingError, nearest_names
+from activesteer.measured.fit_file import FitTable
+from activesteer.recording import Recording
+from activesteer.studies.study_file import StudyFile
+
+_FEWEST: Final = 20
+"""Samples of a channel in a recording that are needed at least."""
+
+
+class Measured(NamedTuple):
+    """A recording, in the time of the manoeuvre that it became.
+
+    Attributes:
+        name: Of its file.
+        begin_s: Instant of the recording that is zero in the manoeuvre [s].
+        time_s: Instants at which channels are compared [s], shape (n,).
+        channels: What was measured there, SI; not finite where nothing was.
+    """
+
+    name: str
+    begin_s: float
+    time_s: Array
+    channels: dict[str, Array]
+
+
+def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[str, float]:
+    """Channel -> standard deviation of its noise, SI.
+
+    Args:
+        study: For error messages.
+        table: Its table [fit].
+        known: Channels of a run.
+
+    Raises:
+        StudyError: there is no such channel, or it is given twice.
+    """
+    found: dict[str, float] = {}
+    for key, value in table.noise.items():
+        name, factor = field_in_unit(key, known)
+        if name is None:
+            raise study.source.fail(
+                ("fit", "noise", key), f"there is no such channel; {nearest_names(key, known)}", key
+            )
+        if name in found:
+            raise study.source.fail(("fit", "noise", key), "is given twice, in two units", key)
+        found[name] = value * factor
+    return found
+
+
+def measured_of(
+    recording: Recording, name: str, study: StudyFile, table: FitTable, channels: Collection[str]
+) -> Measured:
+    """What is compared of a recording.
+
+    Args:
+        recording: The recording.
+        name: Of its file.
+        study: For error messages, and its step.
+        table: Its table [fit].
+        channels: Which are compared.
+
+    Raises:
+        StudyError: it lacks a channel.
+        RecordingError: it has too few samples of one.
+    """
+    for channel in channels:
+        if channel not in recording:
+            have = [each.name for each in recording.channels]
+            key = next(key for key in table.noise if field_in_unit(key, (channel,))[0])
+            raise study.source.fail(
+                ("fit", "noise", key), f"{name} has no such channel; {nearest_names(channel, have)}", channel, have
+            )
+    if not len(recording):
+        raise RecordingError("has no rows", file=f"{name}.mcap")
+    begin_s = float(recording.time_s[0])
+    time_s = np.asarray(recording.time_s, np.float64)
+    # The last row of a run is one step before its end.
+    inside = time_s <= time_s[-1] - study.timestep_s
+    if table.from_s is not None:
+        inside &= time_s >= table.from_s
+    if table.until_s is not None:
+        inside &= time_s <= table.until_s
+    values = {channel: np.asarray(recording[channel], np.float64)[inside] for channel in channels}
+    for channel, each in values.items():
+        if np.count_nonzero(np.isfinite(each)) < _FEWEST:
+            raise RecordingError(
+                f"{channel} has {np.count_nonzero(np.isfinite(each))} samples to compare, and {_FEWEST} are needed; it "
+                f"is recorded from {time_s[0]:g} to {time_s[-1]:g} s, and compared from fit.from_s to fit.until_s",
+                file=f"{name}.mcap",
+            )
+    return Measured(name, begin_s, time_s[inside] - begin_s, values)
