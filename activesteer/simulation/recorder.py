@@ -85,7 +85,7 @@ class Recorder:
         capacity = steps if keep else min(self._block_rows, steps)
         self._yaw_column = [channel.name for channel in self.channels].index("yaw_rad")
         self._yaw_rad = 0.0
-        self._raw = vehicle.raw_rows(self._block_rows)
+        self._raw = vehicle.rows.empty(self._block_rows)
         self._pose_every = max(1, round(POSE_INTERVAL_S / vehicle.timestep_s))
         bodies = len(vehicle.body_names)
         self._kept = _Kept.empty(capacity, self._poses_before(capacity) + 1, len(self.channels), bodies)
@@ -166,7 +166,7 @@ class Recorder:
         """
         # Into the place of the next row, which is free.
         row = self.rows - self._flushed
-        for raw, now in zip(self._raw, self._vehicle.present_row(command, asked), strict=True):
+        for raw, now in zip(self._raw, self._vehicle.rows.present(command, asked), strict=True):
             raw[row] = now[0]
         values = np.empty((row + 1, len(self.channels)))
         self._evaluate(row + 1, values)

@@ -98,12 +98,12 @@ class DiscreteTimeMap:
         size, rest = len(self.local.names), (np.zeros(len(self.local.names)), np.zeros(len(INPUTS)))
         count = size if of == "x" else len(INPUTS)
         following = np.empty((2 * count, size))
-        rows = self.vehicle.raw_rows(2 * count)
+        rows = self.vehicle.rows.empty(2 * count)
         for row in range(2 * count):
             x, u = (part.copy() for part in rest)
             (x if of == "x" else u)[row % count] = _DIFFERENCE if row < count else -_DIFFERENCE
             following[row] = self(x, u)
-            for block, live in zip(rows, self.vehicle.live_arrays(), strict=True):
+            for block, live in zip(rows, self.vehicle.rows.live(), strict=True):
                 block[row] = live
         outputs = np.empty((2 * count, len(self.vehicle.channels.channels)))
         self.vehicle.channels.evaluate(rows, outputs)

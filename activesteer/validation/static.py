@@ -68,8 +68,8 @@ def _rolling(vehicle: Vehicle, speed_mps: float) -> dict[str, float]:
     model, data = vehicle.model, vehicle.data
     mujoco.mj_forward(model, data)
     # The channels of one row: what the sensors and the callback say of this instant.
-    rows = vehicle.raw_rows(1)
-    for row, live in zip(rows, vehicle.live_arrays(), strict=True):
+    rows = vehicle.rows.empty(1)
+    for row, live in zip(rows, vehicle.rows.live(), strict=True):
         row[0] = live
     values = np.empty((1, len(vehicle.channels.channels)))
     vehicle.channels.evaluate(rows, values)

@@ -1,8 +1,9 @@
 """The car in MuJoCo: MJCF and parameters in, commands in, measurements and raw rows out."""
 
-from activesteer.vehicle.car import Vehicle, engine_warnings_held
+from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.channels import ChannelMap, RawRows
-from activesteer.vehicle.native_step import TAPE
+from activesteer.vehicle.divergence import engine_warnings_held
 from activesteer.vehicle.parameters import VehicleParameters
+from activesteer.vehicle.step_plan import TAPE
 
 __all__ = ["TAPE", "ChannelMap", "RawRows", "Vehicle", "VehicleParameters", "engine_warnings_held"]

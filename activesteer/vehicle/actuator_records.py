@@ -10,23 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.named_parts import find
 from activesteer.vehicle.toe_link_screws import SCREW
 
 
 class ActuatorRecords:
     """Views of the records of a compiled car: what is written into them acts from the next step on."""
 
-    def __init__(self, model: mujoco.MjModel, rear: tuple[int, int]) -> None:
+    def __init__(self, model: mujoco.MjModel) -> None:
         """Finds the block.
 
         Args:
             model: The car, compiled and with its block.
-            rear: Actuators of the left and the right rear wheel.
+
+        Raises:
+            ModelError: it has no actuators for rear steering.
         """
         self._model = model
         self._actuators = fb.section_of(model, "actuators")
         self._links, self._screws = fb.section_of(model, "links"), fb.section_of(model, "screws")
-        self._rear = rear
+        self._rear = [find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in ("rl_steer", "rr_steer")]
 
     def of(self, actuator: int) -> NDArray[Any]:
         """The `ACTUATOR` record of an actuator, shape (1,)."""

@@ -7,7 +7,6 @@ is a point of rest, about which the car can be linearised.
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import mujoco
@@ -15,7 +14,7 @@ import numpy as np
 
 from activesteer.conventions import CORNERS, Array, yaw_of
 from activesteer.vehicle.car import Vehicle
-from activesteer.vehicle.named_parts import find
+from activesteer.vehicle.chassis_heading import turn_chassis_back
 
 _AXES: Final = ("x", "y", "z", "roll", "pitch", "yaw")
 _JOINT_DOFS: Final = {0: _AXES, 1: ("_x", "_y", "_z"), 2: ("",), 3: ("",)}
@@ -75,7 +74,6 @@ class LocalState:
             *(f"d_{name}" for name in dof_names),
             *(f"act_{actuators[int(adr)]}" for adr in self._activations),
         )
-        self._chassis_dof = int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "root")])
         self.take_reference()
 
     def take_reference(self) -> None:
@@ -113,14 +111,8 @@ class LocalState:
 
     def _turn_home(self) -> None:
         """Puts the car at the origin of the road with heading 0 and unturned wheels; its motion stays."""
-        data, first = self.vehicle.data, self._chassis_dof
+        data = self.vehicle.data
         # Heading of the chassis' x axis (ISO 8855): a rotation about that axis leaves it alone.
-        yaw = float(yaw_of(data.qpos[3:7]))
-        turned = np.empty(4)
-        mujoco.mju_mulQuat(turned, np.array([math.cos(yaw / 2), 0.0, 0.0, -math.sin(yaw / 2)]), data.qpos[3:7])
+        turn_chassis_back(data, 0.5 * float(yaw_of(data.qpos[3:7])))
         data.qpos[:2] = 0.0
-        data.qpos[3:7] = turned
         data.qpos[self._spins] = 0.0
-        vx, vy = data.qvel[first : first + 2]
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        data.qvel[first : first + 2] = cos * vx + sin * vy, cos * vy - sin * vx

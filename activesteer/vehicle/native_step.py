@@ -6,106 +6,36 @@ looks up once; so the compiled code is the same for every car.
 
 from __future__ import annotations
 
-import ctypes
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
-import mujoco
-import numpy as np
 from llvmlite import ir
-from mujoco import _functions
 from numba import carray, from_dtype, types
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
 from activesteer.brakes.control_unit import step_brakes
 from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE
 from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS
-from activesteer.sensors.block import AX, WHEEL_SPEEDS, SensorBlock, measured
+from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.sensors.signal_chain import CHAIN
 from activesteer.signals import Measurement, Motion
+from activesteer.vehicle.channels.raw_rows import ENGINE_ARRAYS
+from activesteer.vehicle.chassis_heading import YAW_DOF
 from activesteer.vehicle.command_row import BRAKES, COMMAND_ROW
-from activesteer.vehicle.engine_layout import engine_layout
 from activesteer.vehicle.native_memory import f64_pointer, pointer_to
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
+from activesteer.vehicle.step_plan import N_SOURCES, N_WARNINGS, STEP_PLAN, TAPE
 
 FASTEST_MPS: Final = 200.0
 """No car of ours goes faster; a speed beyond it, or none at all, is a run that has diverged [m/s]."""
 
 _N_WHEELS: Final = len(CORNERS)
-_ENGINE_ARRAYS: Final = 7
-"""Arrays of the engine that a row is copied from; behind them come the commands, what the sensors say, the brakes, and
-what is estimated."""
-_SOURCES: Final = _ENGINE_ARRAYS + 4
-_WARNINGS: Final = len(mujoco.mjtWarning.__members__) - 1
+_ENGINE_ARRAYS: Final = len(ENGINE_ARRAYS)
+"""They are the first of the arrays that a row is copied from."""
 _EXPONENT: Final = 0x7FF0000000000000
 """Bits of a float64 that are all set where it is not finite, and only there."""
 
-
-class Wheels(NamedTuple):
-    """How torques come to the four wheels, order of `CORNERS`."""
-
-    drives: Sequence[int]
-    """Controls of the drive."""
-    brakes: Sequence[int]
-    """Controls of the brakes."""
-    drive_fractions: Sequence[float]
-    """What each gets of the drive torque."""
-
-
-class Places(NamedTuple):
-    """Where in the engine's arrays the step finds what it needs."""
-
-    steering_wheel: int
-    """Control of the steering wheel; so the next three."""
-    superposition: int
-    rear_left: int
-    rear_right: int
-    velocimeter: int
-    """First place in `sensordata`; so the following."""
-    accelerometer: int
-    steering_wheel_angle: int
-    superposition_angle: int
-    rear_left_angle: int
-    rear_right_angle: int
-    wheel_speed: int
-    position: int
-    velocity: int
-    orientation: int
-    yaw_dof: int
-    """Place of the yaw rate in `qvel`."""
-
-
-_ADDRESSES: Final = (
-    "mj_step", "model", "data", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata", "positions", "quaternions",
-    "n_bodies", "brake_setup", "brake_state",
-)  # fmt: skip
-STEP_PLAN: Final = np.dtype(
-    (
-        np.record,
-        [
-            *((name, np.intp) for name in (*_ADDRESSES, *Places._fields)),
-            ("ratio", np.float64),
-            *((name, np.intp, (_N_WHEELS,)) for name in ("drives", "brakes")),
-            ("drive_fractions", np.float64, (_N_WHEELS,)),
-            *((name, np.intp) for name in ("n_sensors", "sensors", "sensor_memory", "sensor_memory_size")),
-            ("timestep_s", np.float64),
-            ("wheel_radii_m", np.float64, (_N_WHEELS,)),
-            ("sources", np.intp, (_SOURCES,)),
-            ("sizes", np.intp, (_SOURCES,)),
-        ],
-    )
-)
-TAPE: Final = np.dtype(
-    (
-        np.record,
-        [(name, np.intp) for name in ("room", "row", "row_bytes", "rows", "pose_every", "position", "quaternion")],
-    )
-)
-"""Where steps are recorded: for how many rows there is room, the address of the next row and how far it is to the one
-behind it, how many rows were taken, after how many the bodies' poses are taken too, and where the next ones go."""
 _tape_pointer: Final = pointer_to(from_dtype(TAPE))
 _plan_pointer: Final = pointer_to(from_dtype(STEP_PLAN))
 _command_pointer: Final = pointer_to(from_dtype(COMMAND_ROW))
@@ -114,85 +44,6 @@ _setup_pointer: Final = pointer_to(from_dtype(BRAKE_SETUP))
 _state_pointer: Final = pointer_to(from_dtype(BRAKE_STATE))
 _bits_pointer: Final = pointer_to(types.int64)
 _counter_pointer: Final = pointer_to(types.int32)
-
-
-def step_plan(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    recorded: Sequence[NDArray[np.float64]],
-    places: Places,
-    wheels: Wheels,
-    ratio: float,
-    sensors: SensorBlock | None,
-    brakes: tuple[NDArray[Any], NDArray[Any]],
-) -> NDArray[Any]:
-    """Looks up all addresses.
-
-    Args:
-        model: The car.
-        data: Its state; both must outlive the plan.
-        recorded: The arrays that a row is copied from, in its order: the engine's, and behind them a `COMMAND_ROW`.
-        places: Where the step finds what it needs.
-        wheels: How torques come to the wheels.
-        ratio: Overall steering ratio.
-        sensors: What is between the truth and the measurement; must outlive the plan. None where nothing is.
-        brakes: `BRAKE_SETUP` and `BRAKE_STATE`; must outlive the plan too.
-
-    Returns:
-        The plan, shape (1,), at an address that stays.
-    """
-    plan = np.zeros(1, STEP_PLAN)
-    values: Mapping[str, int] = {
-        "mj_step": ctypes.cast(ctypes.CDLL(_functions.__file__).mj_step, ctypes.c_void_p).value or 0,
-        "model": model._address,
-        "data": data._address,
-        "time": data._address + engine_layout().d_time,
-        "warnings": data.warning.number.ctypes.data,
-        "qvel": data.qvel.ctypes.data,
-        "n_dofs": model.nv,
-        "ctrl": data.ctrl.ctypes.data,
-        "sensordata": data.sensordata.ctypes.data,
-        # Without the world, which is the engine's body 0.
-        "positions": data.xpos[1:].ctypes.data,
-        "quaternions": data.xquat[1:].ctypes.data,
-        "n_bodies": model.nbody - 1,
-        "brake_setup": brakes[0].ctypes.data,
-        "brake_state": brakes[1].ctypes.data,
-        **places._asdict(),
-    }
-    for name, value in wheels._asdict().items():
-        plan[name] = value
-    for name, value in values.items():
-        plan[name] = value
-    plan["ratio"] = ratio
-    plan["timestep_s"] = model.opt.timestep
-    read_through(plan, sensors)
-    record_from(plan, recorded)
-    return plan
-
-
-def record_from(plan: NDArray[Any], recorded: Sequence[NDArray[np.float64]]) -> None:
-    """Has rows copied from these arrays.
-
-    Args:
-        plan: A `STEP_PLAN`; changed.
-        recorded: As for `step_plan`; they must outlive the plan.
-    """
-    plan["sources"] = [array.ctypes.data for array in recorded]
-    plan["sizes"] = [array.size for array in recorded]
-
-
-def read_through(plan: NDArray[Any], sensors: SensorBlock | None) -> None:
-    """Puts other sensors between the truth and the measurement.
-
-    Args:
-        plan: A `STEP_PLAN`, shape (1,).
-        sensors: The sensors; must outlive the plan. None for none.
-    """
-    plan["n_sensors"] = 0
-    if sensors is not None:
-        plan["n_sensors"], plan["sensors"] = len(sensors.chains), sensors.chains.ctypes.data
-        plan["sensor_memory"], plan["sensor_memory_size"] = sensors.memory.ctypes.data, sensors.memory.size
 
 
 @intrinsic
@@ -222,13 +73,13 @@ def _all_finite(address, size):
 def _sense(plan):
     """Whether all is well, and the members of `Measurement` and of `Motion`."""
     s = carray(f64_pointer(plan.sensordata), (plan.sizes[0],))
-    yaw_rate = carray(f64_pointer(plan.qvel), (plan.n_dofs,))[plan.yaw_dof]
+    yaw_rate = carray(f64_pointer(plan.qvel), (plan.n_dofs,))[YAW_DOF]
     speed = s[plan.velocimeter]
     sane = -FASTEST_MPS < speed < FASTEST_MPS and _all_finite(plan.qvel, plan.n_dofs)
     for index in range(_ENGINE_ARRAYS):
         sane &= _all_finite(plan.sources[index], plan.sizes[index])
-    warnings = carray(_counter_pointer(plan.warnings), (2 * _WARNINGS,))
-    for index in range(_WARNINGS):
+    warnings = carray(_counter_pointer(plan.warnings), (2 * N_WARNINGS,))
+    for index in range(N_WARNINGS):
         sane &= warnings[2 * index] == 0
     w, x, y, z = s[plan.orientation], s[plan.orientation + 1], s[plan.orientation + 2], s[plan.orientation + 3]
     yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
@@ -266,7 +117,7 @@ def _record(plan, tape):
     if tape.room == 0:
         return
     place = tape.row
-    for index in range(_SOURCES):
+    for index in range(N_SOURCES):
         _copy(plan.sources[index], place, plan.sizes[index])
         place += 8 * plan.sizes[index]
     if tape.rows % tape.pose_every == 0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from activesteer.conventions import Array
 from activesteer.signals import Channel
@@ -28,6 +28,10 @@ class RawRows(NamedTuple):
     """A `BRAKE_STATE`."""
     estimate: Array
     """The members of an `Estimate`; empty where no controller makes one."""
+
+
+ENGINE_ARRAYS: Final = RawRows._fields[: RawRows._fields.index("commands")]
+"""Those of the engine, which calls them so too."""
 
 
 class Column(NamedTuple):

@@ -104,7 +104,7 @@ def test_the_commands_reach_their_actuators() -> None:
 
 def test_what_a_controller_asks_of_brakes_and_drive_comes_on_top_of_the_driver() -> None:
     vehicle = standing()
-    rows = vehicle.raw_rows(1)
+    rows = vehicle.rows.empty(1)
     tape, poses = np.zeros(1, TAPE), np.empty((2, vehicle.model.nbody, 4))
     asked = ActuatorCommand(brake_torque_demand_Nm=(300.0, 0.0, -50.0, 20.0), drive_torque_change_Nm=-200.0)
     for _ in range(100):

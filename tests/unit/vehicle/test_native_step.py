@@ -41,7 +41,7 @@ def test_a_step_is_the_engine_s_own() -> None:
 
 def test_a_row_is_a_copy_of_the_engine_s_arrays() -> None:
     vehicle = _rolling()
-    rows, bodies = vehicle.raw_rows(3), vehicle.model.nbody - 1
+    rows, bodies = vehicle.rows.empty(3), vehicle.model.nbody - 1
     positions_m, quaternions = np.zeros((2, bodies, 3)), np.zeros((2, bodies, 4))
     tape = np.zeros(1, TAPE)
     tape["row"], tape["row_bytes"], tape["room"] = rows.sensordata.ctypes.data, rows.sensordata.strides[0], 3
@@ -52,7 +52,7 @@ def test_a_row_is_a_copy_of_the_engine_s_arrays() -> None:
         if row % 2 == 0:
             np.testing.assert_array_equal(positions_m[row // 2], vehicle.data.xpos[1:])
             np.testing.assert_array_equal(quaternions[row // 2], vehicle.data.xquat[1:])
-        for name, live in zip(RawRows._fields, vehicle.live_arrays(), strict=True):
+        for name, live in zip(RawRows._fields, vehicle.rows.live(), strict=True):
             np.testing.assert_array_equal(getattr(rows, name)[row], live, err_msg=name)
     vehicle.step(COMMAND, STEER, tape.ctypes.data)
     assert tape["rows"][0] == 3, "where there is no room, nothing is written"

@@ -1,0 +1,73 @@
+"""The four wheels in the engine: what couples them to the drive, how they roll, how heavy they are to turn."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from activesteer.conventions import CORNERS, Array
+from activesteer.signals import WheelTorques
+from activesteer.vehicle.named_parts import find
+from activesteer.vehicle.parameters import Powertrain
+from activesteer.vehicle.powertrain import CLUTCH_OPEN
+from activesteer.vehicle.step_plan import Wheels
+
+
+class WheelSet:
+    """The wheels of a car, in the order of `CORNERS`.
+
+    Attributes:
+        torques: How torques come to them.
+        spins: Their degrees of freedom of rotation.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, powertrain: Powertrain) -> None:
+        """Looks them up.
+
+        Args:
+            model: The car.
+            data: Its state.
+            powertrain: What drives them.
+
+        Raises:
+            ModelError: the model lacks a part of one.
+        """
+
+        def found(kind: mujoco.mjtObj, ending: str) -> list[int]:
+            return [find(model, kind, corner + ending) for corner in CORNERS]
+
+        self._model, self._data, self._ctrl, self._powertrain = model, data, data.ctrl, powertrain
+        self.torques = Wheels(
+            found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_drive"),
+            found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_brake"),
+            powertrain.wheel_fractions,
+        )
+        self.spins: list[int] = model.jnt_dofadr[found(mujoco.mjtObj.mjOBJ_JOINT, "_spin")].tolist()
+        self._bodies = found(mujoco.mjtObj.mjOBJ_BODY, "_wheel")
+        self._armature_kgm2: list[float] = model.dof_armature[self.spins].tolist()
+
+    def engage(self, gear: float) -> None:
+        """Couples the engine to the driven wheels, each of which then carries its part of the inertia, or frees it."""
+        inertia_kgm2 = 0.0 if gear == CLUTCH_OPEN else self._powertrain.inertia_kgm2
+        for dof, own, fraction in zip(self.spins, self._armature_kgm2, self._powertrain.wheel_fractions, strict=True):
+            self._model.dof_armature[dof] = own + fraction * inertia_kgm2
+
+    def apply(self, torques: WheelTorques) -> None:
+        """Torques of the wheels, one by one: past the engine, so at once and whatever that can give."""
+        self._ctrl[self.torques.drives] = torques.drive_Nm
+        self._ctrl[self.torques.brakes] = torques.brake_Nm
+
+    def heights_m(self) -> Array:
+        """Heights of the wheels' centres, shape (4,) [m]: what they roll on, roughly."""
+        return self._data.xpos[self._bodies, 2]
+
+    def inertias_kgm2(self) -> list[float]:
+        """What each turns with against the rest of the car."""
+        inertias_kgm2 = []
+        unit, product = np.zeros(self._model.nv), np.zeros(self._model.nv)
+        for spin in self.spins:
+            unit[:] = 0.0
+            unit[spin] = 1.0
+            mujoco.mj_mulM(self._model, self._data, product, unit)
+            inertias_kgm2.append(float(product[spin]))
+        return inertias_kgm2
