@@ -139,9 +139,7 @@ def car_with(vehicle: FileOrTable, overrides: list[Override]) -> Car:
     files |= {f"mjcf/{model}/{name}": text for name, text in model_files(mjcf).items()}
     front_tyre = _tyre(front, config)
     new = front_tyre, front_tyre if rear == front else _tyre(rear, config)
-    front_tyre = config.factors.on_tyre(new[0])
-    fitted = front_tyre, front_tyre if rear == front else config.factors.on_tyre(new[1])
-    return Car(config, mjcf, fitted, new, files=files)
+    return Car(config, mjcf, config.factors.on_tyres(*new), new, files=files)
 
 
 def _tyre(path: Path, config: VehicleConfig) -> TyreParameters:

@@ -108,11 +108,13 @@ def _compile(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Gives the drive its state, brakes and friction their stiffness; forces follow the activation at a step's end."""
+    """Gives drive, brakes, friction and servos what MJCF does not say; forces follow the activation at a step's end."""
     for actuator in spec.actuators:
         if actuator.name.endswith("_drive"):
             actuator.dyntype = mujoco.mjtDyn.mjDYN_USER
         actuator.actearly = int(actuator.dyntype) == _USER_DYNAMICS
+        if actuator.name == NAME or actuator.name.endswith("_steer"):
+            actuator.dynprm[0] *= parameters.factors.servo_lag
         if actuator.name.endswith("_brake"):
             actuator.gainprm[0] = -parameters.brakes.stiffness_Nmprad
         if actuator.name.endswith("_friction"):

@@ -220,18 +220,29 @@ class Factors:
     """On the tyres' LMUX and LMUY."""
     tyre_cornering_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
     """On the tyres' LKY."""
+    front_cornering_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
+    """On that of the front tyres beside it."""
+    rear_cornering_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
+    """On that of the rear tyres beside it."""
     tyre_slip_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
     """On the tyres' LKX."""
     tyre_vertical_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
     """On the tyres' LCZ."""
+    servo_lag: Annotated[float, Range(0.1, 5.0)] = 1.0
+    """On the lag of the model's servos of rear wheels and superposition; a screw and a motor have none."""
 
-    def on_tyre(self, tyre: TyreParameters) -> TyreParameters:
-        """The tyre with its own scale factors multiplied; itself where nothing is to be scaled."""
+    def on_tyres(self, front: TyreParameters, rear: TyreParameters) -> tuple[TyreParameters, TyreParameters]:
+        """The tyres of both axles with their own scale factors multiplied; themselves where nothing is to be scaled."""
+        stiffnesses = self.front_cornering_stiffness, self.rear_cornering_stiffness
+        fitted = self._on_tyre(front, stiffnesses[0])
+        return fitted, fitted if rear is front and len({*stiffnesses}) == 1 else self._on_tyre(rear, stiffnesses[1])
+
+    def _on_tyre(self, tyre: TyreParameters, cornering_stiffness: float) -> TyreParameters:
         scales = {
             "LMUX": self.tyre_friction,
             "LMUY": self.tyre_friction,
             "LKX": self.tyre_slip_stiffness,
-            "LKY": self.tyre_cornering_stiffness,
+            "LKY": self.tyre_cornering_stiffness * cornering_stiffness,
             "LCZ": self.tyre_vertical_stiffness,
         }
         changes = {key: factor * tyre[key] for key, factor in scales.items() if factor != 1.0}
@@ -277,3 +288,17 @@ class VehicleParameters:
     """Nothing where not given."""
     factors: Factors = Factors()
     """All 1 where not given."""
+
+    def __post_init__(self) -> None:
+        """No factor without effect.
+
+        Raises:
+            ParameterError: one is on the lag of servos where there are none.
+        """
+        lag = self.factors.servo_lag
+        if lag != 1.0 and self.rear_actuator.is_screw and self.superposition_actuator.is_geared:
+            raise ParameterError(
+                "has no effect on screws and a geared motor, whose lag follows from their own numbers",
+                key="factors.servo_lag",
+                value=lag,
+            )

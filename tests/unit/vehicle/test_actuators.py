@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from activesteer.conventions import CORNERS
+from activesteer.errors import ParameterError
 from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.vehicle import TAPE, Vehicle
 from activesteer.vehicle.powertrain import Drive
+from tests.raising import raises
 from tests.unit.vehicle.cars import activation, actuator, dof, floating, standing, step
 
 SERVOS = ("superposition", "rl_steer", "rr_steer")
@@ -33,6 +35,16 @@ def test_a_small_step_follows_with_the_lag(name: str) -> None:
     assert activation(vehicle, name) / target == pytest.approx(1.0 - math.exp(-1.0), abs=0.02)
     step(vehicle, round(9.0 * lag_s / vehicle.timestep_s))
     assert activation(vehicle, name) == pytest.approx(target, rel=1e-3)
+
+
+def test_servos_of_a_longer_lag_are_as_much_slower_and_no_factor_is_without_effect() -> None:
+    for name in SERVOS:
+        assert lag_and_rate(standing({"factors.servo_lag": 1.2}), name)[0] == pytest.approx(
+            1.2 * lag_and_rate(standing(), name)[0]
+        )
+    motors = {"rear_actuator.preset": "screw_3deg", "superposition_actuator.preset": "strain_wave"}
+    with raises(ParameterError, key="factors.servo_lag", value=1.2):
+        standing({"factors.servo_lag": 1.2, **motors})
 
 
 @pytest.mark.parametrize("name", SERVOS)

@@ -147,6 +147,9 @@ def test_factors_reach_springs_bars_dampers_and_tyres() -> None:
     standard = load_car().tyres[0]
     assert tyre["LMUY"] == pytest.approx(0.8 * standard["LMUY"])
     assert tyre["LKY"] == pytest.approx(1.1 * standard["LKY"])
+    axles = {"factors.tyre_cornering_stiffness": 1.1, "factors.rear_cornering_stiffness": 0.9}
+    stiffnesses = [tyre["LKY"] / standard["LKY"] for tyre in load_car(overrides=axles).tyres]
+    assert stiffnesses == pytest.approx([1.1, 1.1 * 0.9])
 
 
 def test_damper_factor_multiplies_the_force_of_a_damper() -> None:
