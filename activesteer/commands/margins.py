@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands.arguments import add_controller, add_json, add_overrides, add_vehicle, overrides_of
 from activesteer.commands.output import print_json
+from activesteer.commands.progress import RunCounter
+
+if TYPE_CHECKING:
+    from activesteer.studies.margins import LoopMargins
 
 _COLUMNS: Final = {
     "speed_kmh": "km/h",
@@ -34,19 +38,16 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--speed-kmh", type=float, action="append", metavar="V", help="may be repeated (default: 60, 80 ... 160)"
     )
+    parser.add_argument(
+        "--study", metavar="STUDY", help="the smallest over the samples of a study, by its file or name: its factors "
+        "on the car, its design and overrides; controllers know the car without its factors",
+    )  # fmt: skip
     add_json(parser)
     parser.set_defaults(action=_margins)
 
 
 def _margins(options: argparse.Namespace) -> int:
-    from activesteer.studies.margins import SPEEDS_KMH, loop_margins
-
-    found = loop_margins(
-        options.controller or ("ars", "afs"),
-        options.vehicle,
-        options.speed_kmh or SPEEDS_KMH,
-        overrides_of(options),
-    )
+    found = _found(options)
     rows = [margins.to_json() for margins in found]
     if options.json:
         print_json(rows)
@@ -55,4 +56,22 @@ def _margins(options: argparse.Namespace) -> int:
     for row in rows:
         values = (row[key] for key in _COLUMNS)
         print(" ".join(f"{value:>14}" if isinstance(value, str) else f"{value:14.3g}" for value in values))
+    if options.study:
+        least = min(rows, key=lambda row: row["disk_margin"])
+        changed = ", ".join(f"{key} = {value:.3g}" for key, value in least["factors"].items())
+        where = f"{least['controller']}, {least['loop']}, {least['speed_kmh']:.0f} km/h"
+        print(f"smallest disk margin {least['disk_margin']:.3g}: {where}, with {changed}")
     return 0
+
+
+def _found(options: argparse.Namespace) -> list[LoopMargins]:
+    from activesteer.studies.margins import SPEEDS_KMH, loop_margins
+
+    speeds_kmh, overrides = options.speed_kmh or SPEEDS_KMH, overrides_of(options)
+    controllers = options.controller or ("ars", "afs")
+    if options.study is None:
+        return loop_margins(controllers, options.vehicle, speeds_kmh, overrides)
+    from activesteer.studies.worst_margins import worst_margins
+
+    with RunCounter("margins", quiet=options.json) as counter:
+        return worst_margins(options.study, controllers, options.vehicle, speeds_kmh, overrides, counter)

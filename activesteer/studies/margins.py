@@ -24,8 +24,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -100,7 +100,10 @@ def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) ->
     )
 
 
-def _weakest(margins: Sequence[Margins]) -> Margins:
+def weakest(margins: Sequence[Margins]) -> Margins:
+    """The smallest of each; where one loop is unstable, there are none."""
+    if unstable := [each for each in margins if each.disk == 0.0]:
+        return unstable[0]
     return Margins(*(float(np.fmin.reduce(values)) for values in zip(*map(astuple, margins), strict=True)))
 
 
@@ -202,12 +205,14 @@ class LoopMargins:
         loop: Where it is opened: one of `LOOPS`, or `BOTH`.
         speed_kmh: Speed [km/h].
         margins: What was found.
+        factors: Of many cars, what is varied in that of the smallest disk margin: key -> value.
     """
 
     controller: str
     loop: str
     speed_kmh: float
     margins: Margins
+    factors: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Its figures."""
@@ -219,6 +224,7 @@ class LoopMargins:
             "phase_margin_deg": math.degrees(self.margins.phase_rad),
             "delay_margin_s": self.margins.delay_s,
             "disk_margin": self.margins.disk,
+            **({"factors": dict(self.factors)} if self.factors else {}),
         }
 
 
@@ -242,30 +248,62 @@ def loop_margins(
         ControllerError: a controller has no linear form.
         ActiveSteerError: an input is wrong.
     """
-    found = []
+    return next(margins_of_cars(controllers, vehicle, speeds_kmh, [overrides or {}]))
+
+
+def straight_on(speed_mps: float) -> dict[str, Any]:
+    """The table of a manoeuvre at a speed in which nobody steers [m/s]."""
+    return {"kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0}
+
+
+def margins_of_cars(
+    controllers: Sequence[Any],
+    vehicle: FileOrTable,
+    speeds_kmh: Sequence[float],
+    cars: Iterable[Mapping[str, Any]],
+) -> Iterator[list[LoopMargins]]:
+    """The same of several cars, one after the other; a controller that knows the same of them is looked at once.
+
+    Args:
+        controllers: As for `simulate`.
+        vehicle: Name, path, or table of a vehicle.
+        speeds_kmh: Speeds [km/h].
+        cars: Overrides of each: dotted key -> value.
+
+    Raises:
+        ControllerError: a controller has no linear form.
+        ActiveSteerError: an input is wrong.
+    """
     plugins = [find_controller(given) for given in controllers]
-    for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides):
-        table = {"kind": "open_loop", "name": "straight", "speed_mps": car.speed_mps, "duration_s": 1.0}
-        scenario = resolve(table, vehicle, overrides)
-        rolling = _rolling(scenario)
-        for given, plugin in zip(controllers, plugins, strict=True):
-            unit_s = interval_s(plugin, scenario.car.config.controllers, car.timestep_s)
-            setup = _fully_active(scenario.controller_setup(unit_s))
-            sensors = scenario.car.config.sensors.all()
-            answer = _answer(given, plugin.label, setup, sensors, rolling, plugin.make(setup))
-            returned = round_trip(car, answer, scenario, unit_s, FREQUENCIES_RADPS)
-            stable = is_stable(returned)
-            loops: dict[str, tuple[Response, ...]] = {
-                loop: (opened(returned, loop),)
-                for index, loop in enumerate(LOOPS)
-                if np.abs(returned[:, index]).max() > 0.0
-            }
-            if len(loops) == len(LOOPS):
-                loops[BOTH] = opened_at_both(returned)
-            for loop, parts in loops.items():
-                margins = _weakest([margins_of(part, FREQUENCIES_RADPS, stable) for part in parts])
-                found.append(LoopMargins(plugin.label, loop, 3.6 * car.speed_mps, margins))
-    return found
+    answers: dict[tuple[int, float, ControllerSetup], Callable[[Array], Response]] = {}
+    for overrides in cars:
+        found: list[LoopMargins] = []
+        for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides):
+            scenario = resolve(straight_on(car.speed_mps), vehicle, overrides)
+            for number, plugin in enumerate(plugins):
+                unit_s = interval_s(plugin, scenario.car.config.controllers, car.timestep_s)
+                setup = _fully_active(scenario.controller_setup(unit_s))
+                key = number, car.speed_mps, setup
+                if key not in answers:
+                    answers[key] = _answer(controllers[number], plugin.label, scenario, setup, plugin.make(setup))
+                returned = round_trip(car, answers[key], scenario, unit_s, FREQUENCIES_RADPS)
+                found += _of_loops(plugin.label, 3.6 * car.speed_mps, returned)
+        yield found
+
+
+def _of_loops(controller: str, speed_kmh: float, returned: Response) -> list[LoopMargins]:
+    stable = is_stable(returned)
+    loops: dict[str, tuple[Response, ...]] = {
+        loop: (opened(returned, loop),) for index, loop in enumerate(LOOPS) if np.abs(returned[:, index]).max() > 0.0
+    }
+    if len(loops) == len(LOOPS):
+        loops[BOTH] = opened_at_both(returned)
+    return [
+        LoopMargins(
+            controller, loop, speed_kmh, weakest([margins_of(part, FREQUENCIES_RADPS, stable) for part in parts])
+        )
+        for loop, parts in loops.items()
+    ]
 
 
 def _rolling(scenario: Scenario) -> Measurement:
@@ -293,16 +331,12 @@ def _ideal(scenario: Scenario) -> Any:
 
 
 def _answer(
-    given: Any,
-    name: str,
-    setup: ControllerSetup,
-    sensors: Mapping[str, Sensor],
-    rolling: Measurement,
-    made: Controller,
+    given: Any, name: str, scenario: Scenario, setup: ControllerSetup, made: Controller
 ) -> Callable[[Array], Response]:
     """The controller's frequency response, demands per measurement."""
+    rolling = _rolling(scenario)
     if not has_linear_form(given):
-        return _answer_to_samples(sensors, made, rolling, setup.timestep_s, name)
+        return _answer_to_samples(scenario.car.config.sensors.all(), made, rolling, setup.timestep_s, name)
     form = linear_controller(given, setup, rolling.speed_mps)
 
     def response(frequencies_radps: Array) -> Response:
