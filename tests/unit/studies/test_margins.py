@@ -12,7 +12,7 @@ from activesteer.cli import main
 from activesteer.controllers import load_controller
 from activesteer.controllers.linear_form import linear_controller
 from activesteer.controllers.response import SIGNALS, pulse_responses
-from activesteer.errors import ControllerError
+from activesteer.errors import ControllerError, ParameterError, StudyError
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand
 from activesteer.simulation.runner import simulate
@@ -27,7 +27,10 @@ from activesteer.studies.margins import (
     opened,
     opened_at_both,
     round_trip,
+    weakest,
 )
+from activesteer.studies.worst_margins import worst_margins
+from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup
 
 STEP_S, GAIN_1PS = 1e-3, 8.0
@@ -205,3 +208,39 @@ def test_command_prints_the_margins_of_every_loop(capsys):
         assert 0.010 < ideal["delay_margin_s"] - production["delay_margin_s"] < 0.0175
         assert production["disk_margin"] < ideal["disk_margin"]
     assert [(row["controller"], row["loop"]) for row in found["ideal"]] == [("ars", "rear"), ("afs", "superposition")]
+
+
+SPREAD = {
+    "maneuvers": ["step_steer"],
+    "factors": {
+        "speed_kmh": {"grid": [80.0, 120.0], "maneuvers": ["step_steer"]},
+        "factors.servo_lag": {"grid": [0.5, 2.0]},
+    },
+}
+
+
+def test_worst_margins_are_those_of_single_cars_that_the_controller_does_not_know():
+    cars = [{"factors.servo_lag": 0.5}, {"factors.servo_lag": 2.0}]
+    other = {"factors.mass": 1.1, "factors.rear_cornering_stiffness": 0.9, "load.cg_forward_change_m": 0.1}
+    known = {resolve("step_steer", overrides=car).controller_setup(0.001) for car in ({}, other, *cars)}
+    assert len(known) == 1
+    found = worst_margins(SPREAD, ["ars"], speeds_kmh=[100.0])[0]
+    quick, nominal, slow = (
+        loop_margins(["ars"], speeds_kmh=[100.0], overrides=car)[0].margins for car in (cars[0], {}, cars[1])
+    )
+    assert found.margins == weakest([quick, slow])
+    # A servo that is slower than the controller knows takes phase, one that is quicker gives some.
+    assert slow.phase_rad < nominal.phase_rad < quick.phase_rad
+    assert found.factors == cars[1]
+
+
+def test_a_loop_that_is_unstable_in_one_car_has_no_margins():
+    unstable = margins_of(integrator(), FREQUENCIES_RADPS, stable=False)
+    assert weakest([margins_of(integrator(0.05), FREQUENCIES_RADPS), unstable]) is unstable
+
+
+def test_what_a_study_varies_and_the_speed_are_given_in_one_place():
+    with raises(StudyError, key="factors.factors.servo_lag"):
+        worst_margins(SPREAD, ["ars"], speeds_kmh=[100.0], overrides={"factors.servo_lag": 1.1})
+    with raises(ParameterError, key="speed_kmh"):
+        loop_margins(["ars"], speeds_kmh=[100.0], overrides={"speed_kmh": 80.0})
