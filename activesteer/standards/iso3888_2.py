@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from typing import Final
 
 from activesteer.standards.page_parts import Curve, Panel, Picture, Table, cell, time_panels
@@ -99,20 +101,31 @@ def _words(speed_kmh: float | None) -> str:
 
 
 def _table(driven: dict[str, list[Run]]) -> Table:
-    rows = [
-        (
-            side, f"{run.case['speed_kmh']:.0f}", f"{run.case['lane.margin_m']:.2f}",
-            cell(run.metric("lane_overstep_m"), 3), cell(run.metric("cones_hit"), 0),
-            cell(3.6 * run.metric("speed_end_mps"), 1), "clean" if is_clean(run) else run.error or "not clean",
-        )
-        for side, runs in driven.items()
-        for run in runs
-    ]  # fmt: skip
+    """A row for each entry speed, the lines that were tried beside each other."""
+    rows = []
+    for side, runs in driven.items():
+        for speed_kmh, group in groupby(runs, key=lambda run: run.case["speed_kmh"]):
+            lines = list(group)
+            best = best_run(lines, speed_kmh)
+            end_mps = math.nan if best is None else best.metric("speed_end_mps")
+            clean = any(is_clean(run) for run in lines)
+            rows.append((
+                side, f"{speed_kmh:.0f}", *(_room(run) for run in lines), cell(3.6 * end_mps, 1),
+                "clean" if clean else "not clean",
+            ))  # fmt: skip
     columns = (
-        "first to the", "entry speed [km/h]", "margin of the line [m]", "body beyond the lanes [m], below 0 inside",
-        "cones hit", "speed at the end [km/h]", "",
+        "first to the", "entry speed [km/h]",
+        *(f"line with {margin:g} m of margin: body beyond the lanes [m]" for margin in MARGINS_M),
+        "speed at the end of the best [km/h]", "",
     )  # fmt: skip
-    return Table("Entry speeds", columns, rows, frozenset(i for i, row in enumerate(rows) if row[-1] != "clean"))
+    outside = frozenset(i for i, row in enumerate(rows) if row[-1] != "clean")
+    return Table("Entry speeds; a body that is inside is beyond the lanes by less than 0", columns, rows, outside)
+
+
+def _room(run: Run) -> str:
+    cones = run.metric("cones_hit")
+    hit = f", {cones:.0f} cone{'s' if cones > 1.0 else ''}" if cones > 0.0 else ""
+    return run.error or cell(run.metric("lane_overstep_m"), 3) + hit
 
 
 def _pictures(ground: Ground, speeds: dict[str, float | None], driven: dict[str, list[Run]]) -> list[Picture]:

@@ -50,6 +50,13 @@ def test_one_clean_line_is_enough_and_a_car_that_tips_over_is_a_row():
     tipped = [row for row in found.values["runs"] if row["speed_kmh"] == 80.0]
     assert len(tipped) == 6
     assert all(row["error"] == "the car tips over" and not row["clean"] for row in tipped)
+    table = found.tables[0]
+    rows = {(row[0], row[1]): row for row in table.rows}
+    assert rows["left", "50"][2:] == ("0.000, 1 cone", "-0.100", "0.000, 1 cone", "-", "clean")
+    assert rows["right", "80"][2:5] == ("the car tips over",) * 3
+    assert {row[1] for index, row in enumerate(table.rows) if index not in table.outside} == {
+        "35", "40", "45", "50", "51", "52",
+    }  # fmt: skip
 
 
 def test_the_run_that_is_shown_is_clean_where_there_is_one():
