@@ -4,32 +4,24 @@ from __future__ import annotations
 
 import json
 import os
-import stat
-import struct
-import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from google.protobuf.message import DecodeError
-from mcap.data_stream import ReadDataStream
-from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, DataEnd, Metadata, Schema
+from mcap.records import Channel
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from activesteer.errors import RecordingError
-from activesteer.files import reading, shown_path
+from activesteer.files import shown_path
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.contents import (
     MAX_BODIES,
     MAX_CHANNELS,
     MAX_CHUNK_BYTES,
     MAX_FILE_BYTES,
-    MAX_OTHER_BYTES,
     MAX_OTHER_RECORDS,
     MAX_ROWS,
     check_metadata,
@@ -47,6 +39,7 @@ from activesteer.recording.format import (
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
 )
+from activesteer.recording.records import Records, opened, read_records, words_of
 from activesteer.recording.rows import (
     BROKEN,
     FileRows,
@@ -63,17 +56,6 @@ from activesteer.signals import Channel as SignalChannel
 
 MAX_LOADED_VALUES: Final = 2**25
 """Values that are read at once, 256 MiB; those of a longer recording stay in the file until they are needed."""
-_RECORD: Final = struct.Struct("<BQ")
-_PIECE_BYTES: Final = 2**20
-_READ: Final = {
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-    Opcode.METADATA: Metadata,
-    Opcode.ATTACHMENT: Attachment,
-}
-"""Records that are kept; chunks are read later, and all others only repeat what these say."""
-_REFUSED: Final = (0, Opcode.FOOTER, Opcode.MESSAGE)
-"""No record, what stands only behind the end, and a message outside of a chunk."""
 _END_OF_TIME_NS: Final = 2**35 * 10**9
 
 
@@ -103,72 +85,6 @@ class Contents(NamedTuple):
     damage: str
 
 
-@dataclass
-class _Records:
-    """The records of a file, chunks as places.
-
-    Attributes:
-        position: End of the records that were read.
-        crc: Checksum of all bytes up to there.
-        complete: The end of the data section was reached; what follows only repeats what is there.
-        damage: What is broken, and where.
-    """
-
-    position: int = len(MCAP0_MAGIC)
-    crc: int = zlib.crc32(MCAP0_MAGIC)
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    topics: dict[int, Channel] = field(default_factory=dict)
-    metadata: list[Metadata] = field(default_factory=list)
-    attachments: dict[str, bytes] = field(default_factory=dict)
-    chunks: list[tuple[int, int]] = field(default_factory=list)
-    complete: bool = False
-    damage: str = ""
-    _bytes: int = 0
-    _count: int = 0
-
-    def read_next(self, descriptor: int, size: int) -> None:
-        """Read one record, and put the position behind it; where that fails, to where the record would have ended.
-
-        Raises:
-            RecordingError: it is not allowed here, too large, or broken.
-        """
-        start, self.position = self.position, size + 1
-        head = read_bytes(descriptor, start, min(_RECORD.size, size - start))
-        opcode, length = _RECORD.unpack(head)
-        first = start + _RECORD.size
-        self.position = first + length
-        if opcode in _REFUSED:
-            raise RecordingError(f"a record has opcode {opcode}")
-        if self.position > size:
-            raise RecordingError(f"a record of {length} bytes reaches beyond the end")
-        if opcode in _READ:
-            self._bytes, self._count = self._bytes + length, self._count + 1
-            if self._bytes > MAX_OTHER_BYTES or self._count > MAX_OTHER_RECORDS:
-                raise RecordingError("attachments, schemas and metadata are larger than those of a recording may be")
-            self._take(opcode, read_bytes(descriptor, first, length))
-        elif opcode == Opcode.CHUNK:
-            self.chunks.append((first, length))
-        elif opcode == Opcode.DATA_END:
-            declared = DataEnd.read(ReadDataStream(BytesIO(read_bytes(descriptor, first, length)))).data_section_crc
-            self.complete = True
-            if declared not in (0, self.crc):
-                raise RecordingError(f"the checksum of the file is {self.crc} in place of {declared}")
-        self.crc = zlib.crc32(head, self.crc)
-        for piece in range(first, self.position, _PIECE_BYTES):
-            self.crc = zlib.crc32(read_bytes(descriptor, piece, min(_PIECE_BYTES, self.position - piece)), self.crc)
-
-    def _take(self, opcode: int, content: bytes) -> None:
-        record = _READ[Opcode(opcode)].read(ReadDataStream(BytesIO(content)))
-        if isinstance(record, Schema):
-            self.schemas[record.id] = record
-        elif isinstance(record, Channel):
-            self.topics[record.id] = record
-        elif isinstance(record, Metadata):
-            self.metadata.append(record)
-        else:
-            self.attachments[record.name] = record.data
-
-
 def read_mcap(path: Path) -> Contents:
     """Read a file that `McapWriter` wrote.
 
@@ -181,7 +97,7 @@ def read_mcap(path: Path) -> Contents:
     Raises:
         RecordingError: the file cannot be opened, is no MCAP file or none of ours, or is damaged before its first row.
     """
-    descriptor = _opened(path)
+    descriptor = opened(path)
     kept = False
     try:
         size = os.fstat(descriptor).st_size
@@ -193,7 +109,7 @@ def read_mcap(path: Path) -> Contents:
                 value=size,
                 allowed=MAX_FILE_BYTES,
             )
-        records = _records(descriptor, size)
+        records = read_records(descriptor, size)
         try:
             contents = _decode(descriptor, records)
         except RecordingError as error:
@@ -203,44 +119,14 @@ def read_mcap(path: Path) -> Contents:
             ) from None
         kept = isinstance(contents.values, FileRows)
     except (*BROKEN, DecodeError, LookupError, TypeError, AttributeError) as error:
-        raise RecordingError(f"{shown_path(path)} is damaged: {_words(error)}", value=path) from None
+        raise RecordingError(f"{shown_path(path)} is damaged: {words_of(error)}", value=path) from None
     finally:
         if not kept:
             os.close(descriptor)
     return contents
 
 
-def _opened(path: Path) -> int:
-    """A file descriptor of a file; anything else may never end."""
-    with reading(path, RecordingError):
-        # Opening a pipe must not wait for whoever writes to it.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-    mode = os.fstat(descriptor).st_mode
-    if stat.S_ISREG(mode):
-        return descriptor
-    os.close(descriptor)
-    what = "Is a directory" if stat.S_ISDIR(mode) else "it is no file, but a device or a pipe"
-    raise RecordingError(f"cannot read {shown_path(path)}: {what}", value=path)
-
-
-def _records(descriptor: int, size: int) -> _Records:
-    """Collect all records up to the end of the data section."""
-    records = _Records()
-    while not records.complete:
-        start = records.position
-        try:
-            records.read_next(descriptor, size)
-        except (RecordingError, *BROKEN) as error:
-            # A record that reaches beyond the end of the file is what a killed process leaves behind. A file that
-            # goes on behind it, or that was ended properly, is damaged.
-            ended = os.pread(descriptor, len(MCAP0_MAGIC), size - len(MCAP0_MAGIC)) == MCAP0_MAGIC
-            if records.position <= size or ended:
-                records.damage = f"bytes {start} to {min(records.position, size)} cannot be read: {_words(error)}"
-            break
-    return records
-
-
-def _decode(descriptor: int, records: _Records) -> Contents:
+def _decode(descriptor: int, records: Records) -> Contents:
     metadata, metrics = _metadata(records)
     topics: dict[str, Channel] = {}
     for topic in records.topics.values():
@@ -265,7 +151,7 @@ def _decode(descriptor: int, records: _Records) -> Contents:
             data, crc = messages_of(_content(descriptor, start, length))
             block = rows.add(Place(start, length, crc), data, decoder)
         except (RecordingError, *BROKEN) as error:
-            records.damage = f"the chunk in bytes {start} to {start + length} cannot be read: {_words(error)}"
+            records.damage = f"the chunk in bytes {start} to {start + length} cannot be read: {words_of(error)}"
             metadata["complete"] = False
             break
         scenes += block.others.get(scene.id, ()) if scene else ()
@@ -331,7 +217,7 @@ class _Rows:
         return values_of(self._blocks, self._rows, len(channels)), poses_of(self._blocks, sets, decoder.body_names)
 
 
-def _channels(records: _Records, topics: Mapping[str, Channel]) -> tuple[ChannelTable, dict[int, Group]]:
+def _channels(records: Records, topics: Mapping[str, Channel]) -> tuple[ChannelTable, dict[int, Group]]:
     described: dict[int, SignalChannel] = {}
     groups: dict[int, Group] = {}
     for name, topic in topics.items():
@@ -358,7 +244,7 @@ def _channels(records: _Records, topics: Mapping[str, Channel]) -> tuple[Channel
     return ChannelTable(described[column] for column in sorted(described)), groups
 
 
-def _metadata(records: _Records) -> tuple[dict[str, Any], dict[str, float]]:
+def _metadata(records: Records) -> tuple[dict[str, Any], dict[str, float]]:
     found: int | None = None
     texts: dict[str, str] = {}
     metrics: dict[str, float] = {}
@@ -394,9 +280,3 @@ def _bodies(topic: Channel | None) -> tuple[str, ...]:
     if len({WORLD, *names}) != len(names) + 1:
         raise RecordingError(f"body names must differ from each other and from {WORLD!r}")
     return tuple(names)
-
-
-def _words(error: BaseException) -> str:
-    if isinstance(error, RecordingError):
-        return str(error)
-    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,13 +9,13 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from activesteer.errors import RecordingError
-from activesteer.files import reading, shown_path, writing
+from activesteer.files import shown_path
 from activesteer.recording.arrays import nanoseconds, shaped
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.container import McapFile
@@ -40,7 +39,6 @@ from activesteer.recording.format import (
     SCENE_TOPIC,
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
-    is_recording_start,
     metadata_texts,
 )
 from activesteer.recording.scene import ScenePart, encode_scene
@@ -52,13 +50,13 @@ from activesteer.recording.schemas import (
     state_schema,
     state_schema_name,
 )
+from activesteer.recording.target import open_target
 from activesteer.signals import Channel
 from activesteer.version import __version__
 
 _ROWS_PER_CHUNK = 1000
 _CHUNK_BYTES = MAX_CHUNK_BYTES // 8
 """Size of a chunk of very wide rows, without poses."""
-_START_BYTES = 64
 _ERROR_LETTERS = 2000
 _BLOCKS_IN_FLIGHT = 1  # More would be lost when the process is killed, and held when the disk is slow.
 
@@ -121,7 +119,7 @@ class McapWriter:
         self._row_count = 0
         self._saved_ns = -1
         self._pending: list[tuple[int, Future[None]]] = []
-        self._stream = _open(self.path, overwrite=overwrite)
+        self._stream = open_target(self.path, overwrite=overwrite)
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="mcap-writer")
         self._closed = False
         try:
@@ -308,66 +306,3 @@ class McapWriter:
         self._thread.shutdown(wait=True, cancel_futures=True)
         with suppress(OSError):  # Whoever called has the first error in hand.
             self._stream.close()
-
-
-def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Says now what would be wrong with writing a recording there; touches nothing.
-
-    Args:
-        path: The file.
-        overwrite: Whether a recording that exists may be replaced; any other file never is.
-
-    Raises:
-        RecordingError: its folder does not exist or may not be written to, or something is there that is not replaced.
-    """
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)
-    if path.is_dir():
-        raise RecordingError(f"cannot write {path}: Is a directory", value=path)
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise RecordingError(f"cannot write {path}: Permission denied", value=path)
-    if not path.is_file():  # nothing there, or a device
-        return
-    if not overwrite:
-        raise RecordingError(f"cannot write {path}: it exists already", value=path)
-    with reading(path, RecordingError), path.open("rb") as stream:
-        ours = is_recording_start(stream.read(_START_BYTES))
-    if not ours:
-        raise RecordingError(
-            f"cannot write {path}: it exists already and is no recording of activesteer; delete it, or choose another "
-            "name",
-            value=path,
-        )
-
-
-def _open(path: Path, *, overwrite: bool) -> BinaryIO:
-    """A new file that no one else can write to as long as it is open; it takes the place of one that exists.
-
-    Whoever has opened the old one keeps it: it is deleted, not changed.
-    """
-    check_target(path, overwrite=overwrite)
-    with writing(path, RecordingError):
-        if path.is_file():
-            with path.open("rb") as old:
-                _lock(old, path)
-                with suppress(PermissionError):  # A file that may be written to in a folder that may not.
-                    Path(os.path.realpath(path)).unlink()
-        stream = path.open("wb" if overwrite else "xb")
-    try:
-        _lock(stream, path)
-    except RecordingError:
-        stream.close()
-        raise
-    return stream
-
-
-def _lock(stream: BinaryIO, path: Path) -> None:
-    try:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise RecordingError(
-            f"cannot write {shown_path(path)}: another run or program is writing it", value=path
-        ) from None
-    except OSError:
-        return  # A file system without locks.

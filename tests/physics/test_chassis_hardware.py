@@ -45,7 +45,7 @@ def test_what_follows_a_saved_state_and_a_second_run_are_the_same_to_the_last_bi
     ("vehicle", "tolerance", "of_the_peak"), [("compact", 1e-6, 1e-10), ("sedan", 1e-6, 1e-4), ("sedan", 1e-9, 1e-6)]
 )
 def test_left_and_right_mirror_where_sensors_have_no_chance(vehicle, tolerance, of_the_peak) -> None:
-    """The compact to rounding, 2e-12 of the peak; the sedan, whose links stand for rigid ones, for two reasons less.
+    """The compact to rounding, 2e-12 of the peak; the sedan less, whose links stand for rigid ones. It has two reasons.
 
     Its superposition gives way by no more than 7e-7 rad. Of that 6e-5 differ, what the engine's conjugate gradients
     leave at a tolerance of 1e-6; with 1e-9 it is 8e-8, with 1e-12 the same. The rest is the rounding of lengths, which

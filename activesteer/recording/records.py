@@ -1,0 +1,146 @@
+"""The records of an MCAP file up to the first one that is broken; all sizes that they declare are limited."""
+
+from __future__ import annotations
+
+import os
+import stat
+import struct
+import zlib
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import Final
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, DataEnd, Metadata, Schema
+from mcap.writer import MCAP0_MAGIC
+
+from activesteer.errors import RecordingError
+from activesteer.files import reading, shown_path
+from activesteer.recording.contents import MAX_OTHER_BYTES, MAX_OTHER_RECORDS
+from activesteer.recording.rows import BROKEN, read_bytes
+
+_RECORD: Final = struct.Struct("<BQ")
+_PIECE_BYTES: Final = 2**20
+_READ: Final = {
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.METADATA: Metadata,
+    Opcode.ATTACHMENT: Attachment,
+}
+"""Records that are kept; chunks are read later, and all others only repeat what these say."""
+_REFUSED: Final = (0, Opcode.FOOTER, Opcode.MESSAGE)
+"""No record, what stands only behind the end, and a message outside of a chunk."""
+
+
+@dataclass
+class Records:
+    """The records of a file, chunks as places.
+
+    Attributes:
+        position: End of the records that were read.
+        crc: Checksum of all bytes up to there.
+        complete: The end of the data section was reached; what follows only repeats what is there.
+        damage: What is broken, and where.
+    """
+
+    position: int = len(MCAP0_MAGIC)
+    crc: int = zlib.crc32(MCAP0_MAGIC)
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    topics: dict[int, Channel] = field(default_factory=dict)
+    metadata: list[Metadata] = field(default_factory=list)
+    attachments: dict[str, bytes] = field(default_factory=dict)
+    chunks: list[tuple[int, int]] = field(default_factory=list)
+    complete: bool = False
+    damage: str = ""
+    _bytes: int = 0
+    _count: int = 0
+
+    def read_next(self, descriptor: int, size: int) -> None:
+        """Read one record, and put the position behind it; where that fails, to where the record would have ended.
+
+        Raises:
+            RecordingError: it is not allowed here, too large, or broken.
+        """
+        start, self.position = self.position, size + 1
+        head = read_bytes(descriptor, start, min(_RECORD.size, size - start))
+        opcode, length = _RECORD.unpack(head)
+        first = start + _RECORD.size
+        self.position = first + length
+        if opcode in _REFUSED:
+            raise RecordingError(f"a record has opcode {opcode}")
+        if self.position > size:
+            raise RecordingError(f"a record of {length} bytes reaches beyond the end")
+        if opcode in _READ:
+            self._bytes, self._count = self._bytes + length, self._count + 1
+            if self._bytes > MAX_OTHER_BYTES or self._count > MAX_OTHER_RECORDS:
+                raise RecordingError("attachments, schemas and metadata are larger than those of a recording may be")
+            self._take(opcode, read_bytes(descriptor, first, length))
+        elif opcode == Opcode.CHUNK:
+            self.chunks.append((first, length))
+        elif opcode == Opcode.DATA_END:
+            declared = DataEnd.read(ReadDataStream(BytesIO(read_bytes(descriptor, first, length)))).data_section_crc
+            self.complete = True
+            if declared not in (0, self.crc):
+                raise RecordingError(f"the checksum of the file is {self.crc} in place of {declared}")
+        self.crc = zlib.crc32(head, self.crc)
+        for piece in range(first, self.position, _PIECE_BYTES):
+            self.crc = zlib.crc32(read_bytes(descriptor, piece, min(_PIECE_BYTES, self.position - piece)), self.crc)
+
+    def _take(self, opcode: int, content: bytes) -> None:
+        record = _READ[Opcode(opcode)].read(ReadDataStream(BytesIO(content)))
+        if isinstance(record, Schema):
+            self.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self.topics[record.id] = record
+        elif isinstance(record, Metadata):
+            self.metadata.append(record)
+        else:
+            self.attachments[record.name] = record.data
+
+
+def opened(path: Path) -> int:
+    """A file descriptor of a file; anything else may never end.
+
+    Raises:
+        RecordingError: it cannot be read, or is no file.
+    """
+    with reading(path, RecordingError):
+        # Opening a pipe must not wait for whoever writes to it.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return descriptor
+    os.close(descriptor)
+    what = "Is a directory" if stat.S_ISDIR(mode) else "it is no file, but a device or a pipe"
+    raise RecordingError(f"cannot read {shown_path(path)}: {what}", value=path)
+
+
+def read_records(descriptor: int, size: int) -> Records:
+    """Collect all records up to the end of the data section.
+
+    Args:
+        descriptor: Descriptor of the file.
+        size: Its size [byte].
+    """
+    records = Records()
+    while not records.complete:
+        start = records.position
+        try:
+            records.read_next(descriptor, size)
+        except (RecordingError, *BROKEN) as error:
+            # A record that reaches beyond the end of the file is what a killed process leaves behind. A file that
+            # goes on behind it, or that was ended properly, is damaged.
+            ended = os.pread(descriptor, len(MCAP0_MAGIC), size - len(MCAP0_MAGIC)) == MCAP0_MAGIC
+            if records.position <= size or ended:
+                records.damage = f"bytes {start} to {min(records.position, size)} cannot be read: {words_of(error)}"
+            break
+    return records
+
+
+def words_of(error: BaseException) -> str:
+    """What an error of ours or of a library says of broken bytes."""
+    if isinstance(error, RecordingError):
+        return str(error)
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -1,0 +1,81 @@
+"""The place where a recording is going to be written: whether it may be, and that nobody else writes there."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from activesteer.errors import RecordingError
+from activesteer.files import reading, shown_path, writing
+from activesteer.recording.format import is_recording_start
+
+_START_BYTES: Final = 64
+
+
+def check_target(path: str | Path, *, overwrite: bool = True) -> None:
+    """Says now what would be wrong with writing a recording there; touches nothing.
+
+    Args:
+        path: The file.
+        overwrite: Whether a recording that exists may be replaced; any other file never is.
+
+    Raises:
+        RecordingError: its folder does not exist or may not be written to, or something is there that is not replaced.
+    """
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)
+    if path.is_dir():
+        raise RecordingError(f"cannot write {path}: Is a directory", value=path)
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise RecordingError(f"cannot write {path}: Permission denied", value=path)
+    if not path.is_file():  # nothing there, or a device
+        return
+    if not overwrite:
+        raise RecordingError(f"cannot write {path}: it exists already", value=path)
+    with reading(path, RecordingError), path.open("rb") as stream:
+        ours = is_recording_start(stream.read(_START_BYTES))
+    if not ours:
+        raise RecordingError(
+            f"cannot write {path}: it exists already and is no recording of activesteer; delete it, or choose another "
+            "name",
+            value=path,
+        )
+
+
+def open_target(path: Path, *, overwrite: bool) -> BinaryIO:
+    """A new file that no one else can write to as long as it is open; it takes the place of one that exists.
+
+    Whoever has opened the old one keeps it: it is deleted, not changed.
+
+    Raises:
+        RecordingError: see `check_target`; or another program is writing it.
+    """
+    check_target(path, overwrite=overwrite)
+    with writing(path, RecordingError):
+        if path.is_file():
+            with path.open("rb") as old:
+                _lock(old, path)
+                with suppress(PermissionError):  # A file that may be written to in a folder that may not.
+                    Path(os.path.realpath(path)).unlink()
+        stream = path.open("wb" if overwrite else "xb")
+    try:
+        _lock(stream, path)
+    except RecordingError:
+        stream.close()
+        raise
+    return stream
+
+
+def _lock(stream: BinaryIO, path: Path) -> None:
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise RecordingError(
+            f"cannot write {shown_path(path)}: another run or program is writing it", value=path
+        ) from None
+    except OSError:
+        return  # A file system without locks.
