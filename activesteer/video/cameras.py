@@ -18,7 +18,7 @@ CAMERAS: Final = ("chase", "top", "wheel")
 CUTAWAY: Final = 0.12
 """Opacity of a body through which the suspension is to be seen."""
 
-_WHEELS_SEEN: Final = 0.45
+_WHEELS_SEEN: Final = 0.25
 """Opacity of a body through which the wheels are to be seen from above."""
 
 

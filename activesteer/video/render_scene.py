@@ -21,6 +21,7 @@ from activesteer.road.course import Course
 from activesteer.road.footprint import Footprint
 from activesteer.road.road import Road
 from activesteer.video.road import add_areas, add_course, add_road
+from activesteer.video.sky import SKY, add_sky
 
 CHASSIS: Final = "chassis"
 """Body that cameras follow."""
@@ -48,20 +49,17 @@ _BASE: Final = """
     <headlight ambient="0.42 0.42 0.42" diffuse="0.32 0.32 0.32" specular="0.05 0.05 0.05"/>
     <global offwidth="{width}" offheight="{height}"/>
     <!-- Lengths in units of the extent below: 0.3 m and 600 m. -->
-    <map znear="0.075" zfar="150" haze="0.15"/>
-    <quality shadowsize="0" offsamples="4"/>
-    <rgba haze="0.78 0.83 0.88 1"/>
+    <map znear="0.075" zfar="150"/>
+    <!-- Round parts are small; with the usual 28 x 16 faces each they would cost a third of a picture. -->
+    <quality shadowsize="0" offsamples="4" numslices="20" numstacks="6" numquads="2"/>
   </visual>
   <statistic center="0 0 0.5" extent="4"/>
-  <asset>
-    <texture name="sky" type="skybox" builtin="gradient" rgb1="0.36 0.52 0.72" rgb2="0.82 0.87 0.91" width="128" height="768"/>
-  </asset>
   <worldbody>
     <light name="sun" type="directional" pos="0 0 20" dir="0.35 0.25 -1" diffuse="0.62 0.6 0.56" specular="0.2 0.2 0.2"
       castshadow="false"/>
   </worldbody>
 </mujoco>
-"""  # noqa: E501
+"""
 
 
 class Car(NamedTuple):
@@ -118,6 +116,7 @@ class RenderScene:
                 add_course(spec, course)
             for number, car in enumerate(cars):
                 _add_car(spec, car, f"{number}/")
+            add_sky(spec)
             self.model = spec.compile()
         except (ValueError, KeyError, TypeError) as reason:
             raise PlaybackError(f"car, course or road of the recording cannot be drawn: {reason!r}") from reason
@@ -127,6 +126,7 @@ class RenderScene:
         ]
         self._chassis = [car.bodies.index(CHASSIS) for car in cars]
         self._shadow = [self._mocap_id(f"{number}/shadow") for number in range(len(cars))]
+        self._sky = self._mocap_id(SKY)
         self._opacity = self.model.geom_rgba[:, 3].copy(), self.model.tendon_rgba[:, 3].copy()
         self._ghosts = [(number, *self._drawn(number)) for number, car in enumerate(cars) if car.ghost]
         mujoco.mj_forward(self.model, self.data)
@@ -163,6 +163,7 @@ class RenderScene:
             share = min(max((apart - _HIDDEN_M) / (_SEEN_M - _HIDDEN_M), 0.0), 1.0)
             self.model.geom_rgba[geoms, 3] = share * self._opacity[0][geoms]
             self.model.tendon_rgba[tendons, 3] = share * self._opacity[1][tendons]
+        self.data.mocap_pos[self._sky, :2] = chassis[0][:2]
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
@@ -203,7 +204,8 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
                 site = f"{prefix}{part.name}/{number}"
                 bodies[body].add_site(name=site, pos=point, group=4)
                 tendon.wrap_site(site)
-    _add_shadow(spec, prefix, solids, _GHOST_OPACITY if car.ghost else 1.0)
+    # Tyres that are seen through the body would be dark on something dark.
+    _add_shadow(spec, prefix, solids, car.shell_opacity * (_GHOST_OPACITY if car.ghost else 1.0))
 
 
 def _add_panel(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: Panel, car: Car, name: str) -> None:

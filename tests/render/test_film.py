@@ -77,7 +77,7 @@ def test_top_camera_shows_the_car_in_the_middle(picture):
     where = np.argwhere(blue(*np.moveaxis(pixels, 2, 0)))
     assert 0.004 < len(where) / pixels[..., 0].size < 0.15
     assert where.mean(axis=0) == pytest.approx([100.0, 160.0], abs=15)
-    long, wide = np.ptp(where[:, 1]), np.ptp(where[:, 0])
+    wide, long = np.subtract(*np.percentile(where, [99, 1], axis=0))  # without the edges of wedges
     assert 1.5 < long / wide < 3.2  # seen from above, nose to the right
 
 
@@ -99,6 +99,14 @@ def test_cutaway_shows_springs_that_the_body_hides(picture):
     whole, cut = (picture(4.0, cutaway=cutaway) for cutaway in (False, True))
     assert share(whole, blue) > 3 * share(cut, blue)
     assert springs(cut[60:]) > springs(whole[60:])
+
+
+def test_from_above_the_wheels_are_seen_through_the_body(drives):
+    with Film({"none": drives["none"]}, Settings(size=(640, 480), camera="top")) as film:
+        pixels = film.picture(0.2).astype(int)
+    # The front left wheel below the bonnet, and the bonnet in the middle between the wheels.
+    wheel, bonnet = pixels[207:212, 368:382], pixels[225:231, 374:384]
+    assert bonnet.mean() - wheel.mean() > 20.0
 
 
 def test_wheel_camera_shows_tyre_and_spring(picture):
@@ -178,7 +186,8 @@ def test_side_by_side_every_car_has_a_picture_of_its_own(drives, folder):
     assert share(right, blue) > 0.02 > share(left, blue)
 
 
-def test_shadow_is_dark_at_the_car_and_has_no_edge(drives):
+def test_shadow_is_dark_at_the_car_and_has_no_edge(drives, monkeypatch):
+    monkeypatch.setattr("activesteer.video.cameras._WHEELS_SEEN", 1.0)  # a body to be seen through has little shadow
     with Film({"none": drives["none"]}, Settings(size=(640, 480), camera="top")) as film:
         pixels = film.picture(0.2).astype(int)
     # From the road behind the car, which begins 80 pixels behind the middle, to its end, beside the path.
