@@ -92,6 +92,21 @@ class StudyError(ActiveSteerError):
     """A study cannot be begun, gone on with, or shown."""
 
 
+def not_installed(error: type[ActiveSteerError], what: str, package: str, extra: str) -> ActiveSteerError:
+    """What needs a package that is not there.
+
+    Args:
+        error: Class of the error.
+        what: What needs it.
+        package: Which package.
+        extra: The extra of activesteer that brings it.
+
+    Returns:
+        The error, to be raised; its value is the package, what is allowed the extra.
+    """
+    return error(f"{what} needs {package}; pip install 'activesteer[{extra}]'", value=package, allowed=extra)
+
+
 def shown(value: object) -> str:
     """A value as an error message repeats it: as Python writes it, a path as it is; of a long one beginning and end."""
     if isinstance(value, os.PathLike):

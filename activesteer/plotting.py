@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, TypeVar
 
 from markupsafe import Markup
 
-from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.errors import ActiveSteerError, ParameterError, not_installed
 from activesteer.files import make_folder, replacing, shown_path
 
 if TYPE_CHECKING:
@@ -31,9 +31,7 @@ def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
     try:
         from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
     except ImportError as error:
-        raise ParameterError(
-            "plots need matplotlib, which is not installed: pip install 'activesteer[plot]'"
-        ) from error
+        raise not_installed(ParameterError, "a plot", "matplotlib", "plot") from error
     # A Figure of its own instead of pyplot: no backend is chosen and no global state touched for the caller.
     figure = Figure(figsize=(width_in, height_in), layout="constrained")
     if title:

@@ -75,7 +75,8 @@ def steering(recording: RecordingLike) -> Steering:
     time_s = np.asarray(recording.time_s, dtype=np.float64)
     angle = low_pass(np.asarray(recording["steering_wheel_rad"]), timestep(time_s), STEERING_CUT_OFF_Hz)
     if abs(angle[0]) > THRESHOLD_RAD:  # more than the offset of a sensor
-        raise RecordingError("the sine with dwell has no beginning: the steering wheel is turned in the first sample")
+        problem = "the sine with dwell has no beginning: the steering wheel is turned in the first sample"
+        raise RecordingError(problem, value=float(angle[0]))
     straight = zeroing_range(time_s, angle)
     angle -= offset(recording["steering_wheel_rad"], straight)
     turned = np.flatnonzero(np.abs(angle) > THRESHOLD_RAD)
@@ -83,13 +84,17 @@ def steering(recording: RecordingLike) -> Steering:
         raise RecordingError(
             f"the recording holds no sine with dwell: the steering wheel turns by "
             f"{math.degrees(float(np.abs(angle).max())):.3g} deg at most, more than "
-            f"{math.degrees(THRESHOLD_RAD):.3g} deg are needed"
+            f"{math.degrees(THRESHOLD_RAD):.3g} deg are needed",
+            value=float(np.abs(angle).max()),
         )
     side = math.copysign(1.0, angle[turned[0]])
     begin_s = crossing_time(time_s, side * angle, THRESHOLD_RAD)
     other = np.flatnonzero(-side * angle > THRESHOLD_RAD)
     if other.size == 0:
-        raise RecordingError("the recording holds no sine with dwell: the steering wheel turns to one side only")
+        raise RecordingError(
+            "the recording holds no sine with dwell: the steering wheel turns to one side only",
+            value=float(np.abs(angle).max()),
+        )
     reversal_s = _crossing_before(time_s, -side * angle, int(other[0]))
     completion_s = _completion(time_s, -side * angle, int(other[0]))
     return Steering(side, begin_s, reversal_s, completion_s, straight)
@@ -154,7 +159,8 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
     if below.size == 0:
         raise RecordingError(
             f"the sine with dwell is not completed: the steering wheel still stands at "
-            f"{math.degrees(abs(float(angle[-1]))):.3g} deg when the run ends"
+            f"{math.degrees(abs(float(angle[-1]))):.3g} deg when the run ends",
+            value=float(angle[-1]),
         )
     end = start + int(below[0])
     fraction = (angle[end - 1] - THRESHOLD_RAD) / (angle[end - 1] - angle[end])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.errors import ControllerError
+from activesteer.errors import ControllerError, not_installed
 
 Solve = Callable[[Array, Array, Array, Array, Array], Array]
 """x that makes x' H x / 2 + f' x least; H, f, A, lower, upper: the first bounds are those of x, the rest those of A
@@ -24,8 +24,7 @@ def solver() -> Solve:
     try:
         import daqp  # noqa: PLC0415 - an extra
     except ImportError as error:
-        problem = "this controller needs the solver DAQP: pip install 'activesteer[control]'"
-        raise ControllerError(problem) from error
+        raise not_installed(ControllerError, "this controller", "daqp", "control") from error
     solve_once: Any = daqp.solve
 
     def solve(h: Array, f: Array, a: Array, lower: Array, upper: Array) -> Array:

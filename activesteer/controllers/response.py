@@ -79,9 +79,13 @@ def pulse_responses(
             )
             largest = np.abs(whole).max()
             if np.abs(whole - half).max() > _LINEAR * largest:
-                raise ControllerError(f"{name} does not answer {signal} in proportion, so that it has no linear form")
+                raise ControllerError(
+                    f"does not answer {signal} in proportion, so that it has no linear form", key=name, value=signal
+                )
             if np.abs(whole[-count // 10 :]).max() > _LEFT * largest:
-                raise ControllerError(f"{name} still answers a pulse of {signal} after {_LENGTH_S:g} s")
+                raise ControllerError(
+                    f"still answers a pulse of {signal} after {_LENGTH_S:g} s", key=name, value=signal
+                )
             found[:, :, column] += whole / len(starts)
     return found
 

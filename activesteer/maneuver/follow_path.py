@@ -78,6 +78,6 @@ def with_csv(table: Mapping[str, Any], own: FilePath | None, source: Source) -> 
         x_m, y_m, lines = read_csv(file)
         check_points(x_m, y_m, lambda index: f"{file.name}, line {lines[index]}")
     except ManeuverError as reason:
-        raise source.fail(("path", "csv"), str(reason)) from reason
+        raise source.fail(("path", "csv"), str(reason), reason.value, reason.allowed) from reason
     filled = {**table, "path": {**points, "x_m": x_m, "y_m": y_m}}
     return filled, {f"path/{file.name}": read_bytes(file, ManeuverError, MAX_CSV_BYTES)}

@@ -57,11 +57,13 @@ def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[in
     count = len(x_m)
     if count != len(y_m) or count < MIN_POINTS:
         raise ManeuverError(
-            f"the path has {count} x_m and {len(y_m)} y_m; as many of each are needed, at least {MIN_POINTS}"
+            f"the path has {count} x_m and {len(y_m)} y_m; as many of each are needed, at least {MIN_POINTS}",
+            value=(count, len(y_m)),
         )
 
     def fail(index: int, problem: str) -> NoReturn:
-        raise ManeuverError(f"{place(index)}: the point ({x_m[index]:g}, {y_m[index]:g}) m {problem}")
+        point = x_m[index], y_m[index]
+        raise ManeuverError(f"{place(index)}: the point ({point[0]:g}, {point[1]:g}) m {problem}", value=point)
 
     gaps = [math.hypot(x_m[i + 1] - x_m[i], y_m[i + 1] - y_m[i]) for i in range(count - 1)]
     for i, gap in enumerate(gaps, 1):

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.errors import RecordingError, nearest_names, shown
+from activesteer.errors import RecordingError, nearest_names, not_installed, shown
 from activesteer.files import is_file, shown_path, why_no_file
 from activesteer.measured.column import Column, numbers, understood
 from activesteer.measured.csv_columns import csv_columns
@@ -124,9 +124,7 @@ def _mdf(path: Path) -> list[Column]:
     try:
         from asammdf import MDF  # noqa: PLC0415 - an extra, and slow to import
     except ImportError as error:
-        raise RecordingError("MDF files need asammdf, which is not installed: pip install 'activesteer[mdf]'") from (
-            error
-        )
+        raise not_installed(RecordingError, "an MDF file", "asammdf", "mdf") from error
     file: Any = None
     problem = ""
     # Of a broken file asammdf leaves half an object, which complains to the terminal when it is deleted.

@@ -163,7 +163,9 @@ def compare(measured: Sequence[Recording], simulated: Recording, standard: str =
     if standard == "iso19364" and _ACROSS not in names:
         raise RecordingError(f"cross plots need {_ACROSS} in every run", value=_ACROSS)
     if not names:
-        raise RecordingError(f"the runs have none of the channels that are compared: {', '.join(TOLERANCES)}")
+        raise RecordingError(
+            f"the runs have none of the channels that are compared: {', '.join(TOLERANCES)}", allowed=tuple(TOLERANCES)
+        )
     shifts = tuple(time_shift(run, simulated) for run in measured)
     made_up = [0.0 if math.isnan(shift) else shift for shift in shifts]
     start = max(simulated.time_s[0], *(run.time_s[0] - shift for run, shift in zip(measured, made_up, strict=True)))

@@ -89,10 +89,10 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
         if bridged:
             begin, end = bridged[0]
             raise RecordingError(
-                f"{name} has no samples from {begin:.3f} to {end:.3f} s; a map allows it with max_gap_s, or leaves it "
+                f"has no samples from {begin:.3f} to {end:.3f} s; a map allows it with max_gap_s, or leaves it "
                 "out with start_s and end_s",
-                file=path.name,
-            )
+                file=path.name, key=name, value=(begin, end),
+            )  # fmt: skip
         values[name] = resampled(signal, grid_s)
         if chosen.axes == "sae_j670" and name in TURNED_IN_SAE:
             values[name] = -values[name]

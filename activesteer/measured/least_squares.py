@@ -105,7 +105,7 @@ def _tried(
     here, *there = answers([place, *(place + step for step in np.diag(steps))])
     if isinstance(here, str):
         if first:
-            raise StudyError(f"where the search begins, the car cannot be driven: {here}")
+            raise StudyError(f"where the search begins, the car cannot be driven: {here}", value=here)
         return None
     sides: list[list[Array]] = []
     for beside in there:

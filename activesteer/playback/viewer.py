@@ -141,7 +141,8 @@ def viewer_binary() -> Path:
         if binary.is_file():
             return binary
     raise PlaybackError(
-        f"the rerun viewer is missing, which the package rerun-sdk brings: reinstall it, or use --save; {_ELSEWHERE}"
+        f"the rerun viewer is missing, which the package rerun-sdk brings: reinstall it, or use --save; {_ELSEWHERE}",
+        value="rerun-sdk",
     )
 
 

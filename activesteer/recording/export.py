@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.errors import RecordingError
+from activesteer.errors import RecordingError, not_installed
 from activesteer.files import finite, replacing
 from activesteer.recording.channels import TIME, ChannelTable
 from activesteer.recording.format import metadata_texts
@@ -68,10 +68,8 @@ def to_dataframe(recording: Exportable) -> pd.DataFrame:
     """
     try:
         import pandas as pd  # noqa: PLC0415 - an extra, and slow to import
-    except ImportError:
-        raise RecordingError(
-            "to_dataframe needs pandas, which is not installed: pip install 'activesteer[data]'"
-        ) from None
+    except ImportError as reason:
+        raise not_installed(RecordingError, "to_dataframe", "pandas", "data") from reason
     index = pd.Index(recording.time_s, name=TIME)
     frame = pd.DataFrame(recording.values, index=index, columns=list(recording.channels.names), copy=True)
     frame.attrs["units"] = {channel.name: channel.unit for channel in recording.channels}

@@ -171,8 +171,9 @@ class FixedMessage:
         wrong = np.flatnonzero(((block ^ template) & constant).any(axis=1))
         if len(wrong):
             raise RecordingError(
-                f"{what}: message {wrong[0]} does not have the fields that its schema lists, in their order"
-            )
+                f"message {wrong[0]} does not have the fields that its schema lists, in their order",
+                key=what, value=int(wrong[0]),
+            )  # fmt: skip
         return self.views(block)
 
     @cached_property

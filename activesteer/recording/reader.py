@@ -114,9 +114,9 @@ def read_mcap(path: Path) -> Contents:
             contents = _decode(descriptor, records)
         except RecordingError as error:
             damage = f" ({records.damage})" if records.damage else ""
-            raise RecordingError(
-                f"{shown_path(path)}: {error}{damage}", value=error.value, allowed=error.allowed
-            ) from None
+            reason = records.reason or error
+            value = path if reason.value is None else reason.value
+            raise RecordingError(f"{shown_path(path)}: {error}{damage}", value=value, allowed=reason.allowed) from None
         kept = isinstance(contents.values, FileRows)
     except (*BROKEN, DecodeError, LookupError, TypeError, AttributeError) as error:
         raise RecordingError(f"{shown_path(path)} is damaged: {words_of(error)}", value=path) from None

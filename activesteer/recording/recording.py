@@ -115,7 +115,7 @@ class Recording:
                 message += f"The {rows} rows up to {contents.time_s[-1]:.3f} s can be read"
             else:
                 message += "Metadata and attachments can be read, but no rows"
-            raise RecordingError(message + ", with Recording.open(path, recover=True)", value=path)
+            raise RecordingError(message + ", with Recording.open(path, recover=True)", value=path, allowed=rows)
         metadata = contents.metadata
         if contents.damage:
             metadata.setdefault("error", f"the file is damaged: {contents.damage}")

@@ -43,6 +43,7 @@ class Records:
         crc: Checksum of all bytes up to there.
         complete: The end of the data section was reached; what follows only repeats what is there.
         damage: What is broken, and where.
+        reason: The error that says so, where it is one of ours.
     """
 
     position: int = len(MCAP0_MAGIC)
@@ -54,6 +55,7 @@ class Records:
     chunks: list[tuple[int, int]] = field(default_factory=list)
     complete: bool = False
     damage: str = ""
+    reason: RecordingError | None = None
     _bytes: int = 0
     _count: int = 0
 
@@ -69,13 +71,16 @@ class Records:
         first = start + _RECORD.size
         self.position = first + length
         if opcode in _REFUSED:
-            raise RecordingError(f"a record has opcode {opcode}")
+            raise RecordingError(f"a record has opcode {opcode}", value=opcode)
         if self.position > size:
             raise RecordingError(f"a record of {length} bytes reaches beyond the end")
         if opcode in _READ:
             self._bytes, self._count = self._bytes + length, self._count + 1
             if self._bytes > MAX_OTHER_BYTES or self._count > MAX_OTHER_RECORDS:
-                raise RecordingError("attachments, schemas and metadata are larger than those of a recording may be")
+                raise RecordingError(
+                    "attachments, schemas and metadata are larger than those of a recording may be",
+                    value=self._bytes, allowed=MAX_OTHER_BYTES,
+                )  # fmt: skip
             self._take(opcode, read_bytes(descriptor, first, length))
         elif opcode == Opcode.CHUNK:
             self.chunks.append((first, length))
@@ -135,6 +140,7 @@ def read_records(descriptor: int, size: int) -> Records:
             ended = os.pread(descriptor, len(MCAP0_MAGIC), size - len(MCAP0_MAGIC)) == MCAP0_MAGIC
             if records.position <= size or ended:
                 records.damage = f"bytes {start} to {min(records.position, size)} cannot be read: {words_of(error)}"
+                records.reason = error if isinstance(error, RecordingError) else None
             break
     return records
 

@@ -32,7 +32,9 @@ def standard_of(name: str) -> Standard:
         ParameterError: there is none of that name, or none is named.
     """
     if not name:
-        raise ParameterError(f"which standard? {nearest_names('', STANDARDS)}")
+        raise ParameterError(f"which standard? {nearest_names('', STANDARDS)}", value=name, allowed=tuple(STANDARDS))
     if name not in STANDARDS:
-        raise ParameterError(f"there is no standard {name!r}; {nearest_names(name, STANDARDS)}", value=name)
+        raise ParameterError(
+            f"there is no standard {name!r}; {nearest_names(name, STANDARDS)}", value=name, allowed=tuple(STANDARDS)
+        )
     return STANDARDS[name]

@@ -117,7 +117,7 @@ def _reference_angle(ground: Ground) -> tuple[float, dict[str, list[float]]]:
     for run, angle in zip(runs, found, strict=True):
         if math.isnan(angle):
             why = run.error or f"it stays below {FIT[1] * REFERENCE_MPS2:.3g} m/s2"
-            raise NoResult(f"A is not found: with {run.case['steer.rate_degps']:g} deg/s of the wheel: {why}")
+            raise NoResult(f"is not found with {run.case['steer.rate_degps']:g} deg/s of the wheel: {why}", key="A")
     rounded = [round(angle, 1) for angle in found]
     sides = {side: rounded[RAMPS * number :][:RAMPS] for number, side in enumerate(signs)}
     return round(sum(rounded) / len(rounded), 1), sides

@@ -62,7 +62,7 @@ class Run:
             RecordingError: the run failed, or the channel was not kept.
         """
         if channel not in self.channels:
-            raise RecordingError(self.error or f"{channel} was not kept")
+            raise RecordingError(self.error or f"{channel} was not kept", value=channel, allowed=tuple(self.channels))
         return self.channels[channel]
 
     def at(self, channel: str, time_s: float) -> float:

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from activesteer.config import Range
 from activesteer.errors import RecordingError
 from activesteer.standards.standard import Ground, NoResult
 
@@ -41,7 +42,10 @@ def steering_wheel_at(ground: Ground, speed_kmh: float, ay_mps2: float) -> float
     except RecordingError as reason:
         raise NoResult(f"the slow ramp at {speed_kmh:g} km/h cannot be driven: {reason}") from reason
     if ay.max() < ay_mps2:
-        raise NoResult(f"the car reaches {ay.max():.3g} m/s2 at {speed_kmh:g} km/h; the test needs {ay_mps2:g} m/s2")
+        raise NoResult(
+            f"the car reaches {ay.max():.3g} m/s2 at {speed_kmh:g} km/h; the test needs {ay_mps2:g} m/s2",
+            value=ay.max(), allowed=Range(ay_mps2),
+        )  # fmt: skip
     # Noise apart, the acceleration rises until it is reached.
     end = int(np.argmax(ay >= ay_mps2))
     rising = np.maximum.accumulate(ay[: end + 1])

@@ -64,7 +64,8 @@ def comparison_study(
         raise ParameterError(
             f"{', '.join(missing)} is missing: the others are compared with {', '.join((NONE, *REFERENCES))}",
             key="--controllers",
-            value=",".join(controllers),
+            value=tuple(controllers),
+            allowed=missing,
         )
     table = population_study(samples, seed, vehicle).to_table()
     factors = {key: dict(value) for key, value in table["factors"].items() if not key.startswith("controllers.")}

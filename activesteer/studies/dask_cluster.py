@@ -8,7 +8,7 @@ from concurrent.futures import CancelledError, Future
 from pathlib import Path
 from typing import Any, Final
 
-from activesteer.errors import StudyError
+from activesteer.errors import StudyError, not_installed
 
 _CONNECT_S: Final = 10
 _WORKERS_S: Final = 30
@@ -110,7 +110,7 @@ def connected(scheduler: str) -> Iterator[Any]:
     try:
         from distributed import Client  # noqa: PLC0415 - an extra
     except ImportError as reason:
-        raise StudyError("--scheduler needs Dask; install activesteer[cluster]") from reason
+        raise not_installed(StudyError, "--scheduler", "distributed", "cluster") from reason
     if "://" in scheduler:
         where: dict[str, Any] = {"address": scheduler}
     elif Path(scheduler).is_file():
@@ -135,14 +135,13 @@ def _compare_versions(found: dict[str, Any]) -> None:
     others = {"the scheduler": found["scheduler"]} | {f"worker {key}": value for key, value in found["workers"].items()}
     for who, theirs in others.items():
         ours, other = here["packages"], (theirs or {}).get("packages", {})
-        wrong = [
-            f"{name} {other.get(name)}, here {ours.get(name)}" for name in _SAME if other.get(name) != ours.get(name)
-        ]
+        wrong = {name: other.get(name) for name in _SAME if other.get(name) != ours.get(name)}
         python = [str(packages.get("python", "")).split(".")[:2] for packages in (ours, other)]
         if python[0] != python[1]:
-            wrong.append(f"Python {other.get('python')}, here {ours.get('python')}")
+            wrong["python"] = other.get("python")
         if wrong:
-            raise StudyError(f"{who} has other versions: {'; '.join(wrong)}")
+            words = "; ".join(f"{name} {version}, here {ours.get(name)}" for name, version in wrong.items())
+            raise StudyError(f"{who} has other versions: {words}", value=wrong)
 
 
 def _line(reason: BaseException) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from activesteer.config import Range, Source, parse_value
-from activesteer.errors import ParameterError, StudyError, nearest_names, shown
+from activesteer.errors import ParameterError, StudyError, nearest_names, not_installed, shown
 from activesteer.files import read_csv
 from activesteer.studies.factors import Factor, Value
 
@@ -115,7 +115,7 @@ def _unit_sample(kind: str, dimensions: int, count: int, seed: list[int]) -> NDA
     try:
         from SALib.sample import morris, sobol  # noqa: PLC0415 - an extra
     except ImportError as reason:
-        raise StudyError(f"{kind} needs SALib; install activesteer[study]", key="design.kind", value=kind) from reason
+        raise not_installed(StudyError, f"design.kind = {kind!r}", "SALib", "study") from reason
     number = int(rng.integers(2**31))
     if kind == "saltelli":
         return np.asarray(sobol.sample(problem, count, calc_second_order=False, seed=number))

@@ -217,6 +217,7 @@ def envelope(
             f"{scenario.maneuver.name} is a {kind}; entry speeds are those of {' and '.join(LINES)}",
             key="maneuver",
             value=kind,
+            allowed=tuple(LINES),
         )
     line = LINES[kind]
     nominal_kmh = 3.6 * scenario.maneuver.speed_mps

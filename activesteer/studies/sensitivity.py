@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.errors import StudyError
+from activesteer.errors import StudyError, not_installed
 from activesteer.studies.design import FOR_INDICES, MORRIS_LEVELS
 from activesteer.studies.factors import Factor
 
@@ -75,7 +75,7 @@ def indices(
     try:
         return _computed(kind, problem, unit, values)
     except ImportError as reason:
-        raise StudyError("sensitivity indices need SALib; install activesteer[study]") from reason
+        raise not_installed(StudyError, "a sensitivity index", "SALib", "study") from reason
 
 
 def _computed(

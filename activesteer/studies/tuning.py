@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 from activesteer.config import Range, build
-from activesteer.errors import StudyError, nearest_names
+from activesteer.errors import StudyError, nearest_names, not_installed
 from activesteer.files import make_folder, write_text
 from activesteer.scenario import FileOrTable
 from activesteer.studies.factor_values import label_of
@@ -149,7 +149,7 @@ def tune(
         import optuna  # noqa: PLC0415 - an extra
         from optuna.storages import JournalStorage, journal  # noqa: PLC0415
     except ImportError as reason:
-        raise StudyError("activesteer tune needs Optuna; install activesteer[study]") from reason
+        raise not_installed(StudyError, "activesteer tune", "optuna", "study") from reason
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     plan = Plan(study)
     folder = make_folder(output, StudyError)

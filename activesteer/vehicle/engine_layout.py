@@ -135,5 +135,8 @@ def measure_engine_layout() -> EngineLayout:
     first = _measure(*_probe(7919, 0.00123456789), 7919)
     second = _measure(*_probe(6421, 0.00098765432), 6421)
     if first != second:
-        raise ModelError(f"MuJoCo {mujoco.__version__}: two models give different struct layouts ({first}, {second})")
+        raise ModelError(
+            f"MuJoCo {mujoco.__version__}: two models give different struct layouts ({first}, {second})",
+            value=(first, second),
+        )
     return first

@@ -139,8 +139,9 @@ def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None)
     if kc is not None and not guided:
         raise ParameterError(
             'no axle of the table is of the type "curves", so the measurements would have no effect; --front curves '
-            "and --rear curves make them so"
-        )
+            "and --rear curves make them so",
+            key="--kc", value=kc,
+        )  # fmt: skip
     return None if kc is None else read_kc(Path(kc), guided)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from activesteer.errors import ParameterError, PlaybackError
+from activesteer.errors import ParameterError, PlaybackError, not_installed
 from activesteer.files import writing
 
 Pixels = NDArray[np.uint8]
@@ -108,9 +108,8 @@ def ffmpeg() -> str:
         return importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
     if found := shutil.which("ffmpeg"):
         return found
-    raise PlaybackError(
-        "an MP4 needs ffmpeg: pip install 'activesteer[video]', or apt-get install ffmpeg; a .gif needs neither"
-    )
+    what = "no program ffmpeg is found (apt-get install ffmpeg; a .gif needs none): an MP4"
+    raise not_installed(PlaybackError, what, "imageio-ffmpeg", "video")
 
 
 class _Mp4:
@@ -137,7 +136,7 @@ class _Mp4:
             self._process.stdin.write(np.ascontiguousarray(pixels).data)
         except OSError:
             self._process.wait()
-            raise PlaybackError(self._complaint()) from None
+            raise self._failure() from None
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         if kind is not None:
@@ -147,7 +146,7 @@ class _Mp4:
         status = self._process.wait()
         try:
             if kind is None and status != 0:
-                raise PlaybackError(self._complaint())
+                raise self._failure()
             if kind is None:
                 with writing(self._path, PlaybackError):
                     self._part.replace(self._path)
@@ -155,10 +154,10 @@ class _Mp4:
             self._log.close()
             self._part.unlink(missing_ok=True)
 
-    def _complaint(self) -> str:
+    def _failure(self) -> PlaybackError:
         self._log.seek(0)
-        lines = self._log.read().decode(errors="replace").strip().splitlines()
-        return f"cannot write {self._path}: ffmpeg says: {lines[-1] if lines else 'nothing'}"
+        said = (self._log.read().decode(errors="replace").strip().splitlines() or ["nothing"])[-1]
+        return PlaybackError(f"cannot write {self._path}: ffmpeg says: {said}", value=said)
 
 
 class _Gif:

@@ -44,16 +44,16 @@ def backend() -> str:
     wanted = os.environ.get("MUJOCO_GL", "").lower()
     # `glfw` draws to hidden windows of a display; whoever names it has one.
     names = [wanted] if wanted in (*BACKENDS, "glfw") else list(BACKENDS)
-    problems = []
+    problems = {}
     for name in names:
         problem = _problem_with(name)
         if problem is None:
             return name
-        problems.append(f"{name}: {problem}")
+        problems[name] = problem
     install = " or ".join(f"apt-get install {BACKENDS[name]}" for name in names if name in BACKENDS)
     chosen = f" (MUJOCO_GL={wanted})" if len(names) == 1 else ""
-    msg = f"no pictures can be drawn here{chosen}: {'; '.join(problems)}"
-    raise PlaybackError(f"{msg}. The libraries come with: {install}" if install else msg)
+    msg = f"no pictures can be drawn here{chosen}: {'; '.join(f'{name}: {why}' for name, why in problems.items())}"
+    raise PlaybackError(f"{msg}. The libraries come with: {install}" if install else msg, value=problems)
 
 
 def _problem_with(name: str) -> str | None:

@@ -50,7 +50,7 @@ def test_recording_without_a_car_is_no_film(call, file, tmp_path):
 
 def test_size_is_width_and_height():
     assert _size("1280x720") == (1280, 720)
-    with pytest.raises(argparse.ArgumentTypeError, match="one such as 1280x720"):
+    with pytest.raises(argparse.ArgumentTypeError):
         _size("big")
 
 

@@ -70,5 +70,6 @@ def test_what_cannot_be_averaged_is_an_error(rng):
         random_response([], "yaw_rate_radps", 0.2, 4.0)
     with raises(RecordingError, value=15.0):
         random_response([run(rng, length_s=15.0)], "yaw_rate_radps", 0.2, 4.0)
-    with pytest.raises(RecordingError, match="does not contain"):
+    with raises(RecordingError) as refused:
         random_response([run(rng)], "yaw_rate_radps", 0.2, 24.0)
+    assert 4.0 < refused.value.value <= 24.0

@@ -92,7 +92,7 @@ def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
         return imported(name, *args, **words)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(ParameterError, match=r"pip install 'activesteer\[plot\]'"):
+    with raises(ParameterError, cause=ImportError, value="matplotlib", allowed="plot"):
         step_steer_figure(three(), tmp_path / "figure.png")
 
 

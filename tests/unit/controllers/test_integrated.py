@@ -15,6 +15,7 @@ from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ControllerError
 from activesteer.scenario import resolve
 from activesteer.signals import Estimate
+from tests.raising import raises
 from tests.unit.controllers.cars import held, measured, steering
 
 pytest.importorskip("daqp")
@@ -110,5 +111,5 @@ def test_slope_of_an_axle_falls_with_its_slip_angle_and_earlier_on_a_slippery_ro
 
 def test_missing_solver_is_told_with_how_to_get_it(known, monkeypatch):
     monkeypatch.setitem(sys.modules, "daqp", None)
-    with pytest.raises(ControllerError, match=r"activesteer\[control\]"):
+    with raises(ControllerError, cause=ImportError, value="daqp", allowed="control"):
         solver()

@@ -120,11 +120,6 @@ def test_wrong_name_is_answered(name, names):
         load_controller(name, setup())
 
 
-def test_unknown_name_is_answered_with_those_that_exist():
-    with pytest.raises(ControllerError, match=r"no controller 'xyz'; known are: .* my_file\.py:MyController"):
-        load_controller("xyz", setup())
-
-
 def test_missing_class_is_answered_with_the_ones_in_the_file(write):
     path = write("from pathlib import Path\nclass MyController: ...\nclass Other: ...\n")
     with raises(ControllerError, value="MyControler", allowed=["MyController", "Other"]):
@@ -133,8 +128,9 @@ def test_missing_class_is_answered_with_the_ones_in_the_file(write):
 
 def test_file_that_does_not_run_is_answered_with_its_line(write):
     path = write("\n1 / 0\n")
-    with pytest.raises(ControllerError, match=r"cannot be run: ZeroDivisionError: .*\(mine\.py, line 6\)"):
+    with raises(ControllerError, cause=ZeroDivisionError, key=f"controller {path}:Mine") as refused:
         load_controller(f"{path}:Mine", setup())
+    assert "mine.py, line 6" in refused.value.problem
     path = write("def step(:\n")
     with raises(ControllerError, cause=SyntaxError, key=f"controller {path}:Mine"):
         load_controller(f"{path}:Mine", setup())
@@ -193,8 +189,9 @@ def test_nonsense_is_answered_with_file_and_class(returning, expression, value, 
 
 
 def test_angle_in_degrees_is_answered_with_field_and_unit(returning):
-    with pytest.raises(ControllerError, match=r"rear_steer_demand_rad = 3\.0; .*radians, not degrees"):
+    with raises(ControllerError, value=3.0, allowed=CONTROLLER.ranges["rear_steer_demand_rad"]) as refused:
         returning("ActuatorCommand(3.0)").step(steering(0.0), measured(0.0))
+    assert "rear_steer_demand_rad" in refused.value.problem
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import pytest
 
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.least_jerk import Bound, least_jerk
+from tests.raising import raises
 
 
 def jerk(path) -> float:
@@ -62,5 +63,5 @@ def test_no_other_path_within_the_bounds_has_less_jerk(rng):
 
 
 def test_bounds_that_contradict_each_other_are_answered():
-    with pytest.raises(ManeuverError, match="no path keeps all bounds"):
+    with raises(ManeuverError):
         least_jerk(0.0, 50.0, 0.0, [Bound(20.0, 0.0, 1.0, 2.0), Bound(20.0, 0.0, 3.0, 4.0)])

@@ -11,6 +11,7 @@ from activesteer.errors import RecordingError
 from activesteer.measured.comparison import TOLERANCES, compare
 from activesteer.recording import Recording
 from activesteer.signals import Channel
+from tests.raising import raises
 
 TIME_S = np.arange(0.0, 5.0, 0.001)
 
@@ -93,7 +94,7 @@ def test_cross_plots_know_no_time():
 
 
 def test_runs_with_nothing_in_common_are_an_error():
-    with pytest.raises(RecordingError, match="none of the channels"):
+    with raises(RecordingError, allowed=tuple(TOLERANCES)):
         compare([run(yaw_rate_radps=TIME_S)], run(ay_mps2=TIME_S))
-    with pytest.raises(RecordingError, match="cross plots need ay_mps2"):
+    with raises(RecordingError, value="ay_mps2"):
         compare([run(yaw_rate_radps=TIME_S)], run(yaw_rate_radps=TIME_S), "iso19364")

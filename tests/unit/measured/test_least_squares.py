@@ -8,6 +8,7 @@ import pytest
 from activesteer.errors import StudyError
 from activesteer.measured.intervals import autocorrelation_time, intervals, told_apart, without_effect
 from activesteer.measured.least_squares import search
+from tests.raising import raises
 
 TIME_S = np.arange(0.0, 4.0, 0.01)
 TRUTH = np.array([0.3, 0.6])
@@ -109,5 +110,5 @@ def test_where_nothing_can_be_driven_the_search_goes_around_or_says_so():
 
     found = search(cliff, np.array([0.05, 0.05]), lambda _: None)
     np.testing.assert_allclose(found.place, TRUTH, atol=1e-5)
-    with pytest.raises(StudyError, match=r"where the search begins.*off the road"):
+    with raises(StudyError, value="off the road"):
         search(cliff, np.array([0.9, 0.5]), lambda _: None)

@@ -93,7 +93,7 @@ def test_what_is_wrong_is_said(
 
 def test_a_missing_viewer_is_named_with_what_works_without(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
-    with pytest.raises(PlaybackError, match=r"viewer is missing.*rerun-sdk.*--save"):
+    with raises(PlaybackError, value="rerun-sdk"):
         show(runs_of({"ars": circle(0.1)}))
 
 
@@ -109,8 +109,9 @@ def test_a_viewer_that_does_not_start_is_named(monkeypatch: pytest.MonkeyPatch, 
 def test_without_a_display_the_error_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
         monkeypatch.delenv(name, raising=False)
-    with pytest.raises(PlaybackError, match=r"there is no display; --web .* --save"):
+    with raises(PlaybackError) as refused:
         show(runs_of({"ars": circle(0.1)}))
+    assert all(word in refused.value.problem for word in ("display", "--web", "--save"))
 
 
 def test_web_serves_the_viewer_to_this_machine_until_it_is_interrupted(file: Path, tmp_path: Path) -> None:

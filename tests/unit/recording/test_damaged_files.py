@@ -74,7 +74,7 @@ def test_an_mcap_file_of_another_program_is_refused(tmp_path: Path) -> None:
     channel = writer.register_channel("/state/vehicle", "json", writer.register_schema("x", "jsonschema", b"{}"))
     writer.add_message(channel, 0, b"{}", 0)
     writer.finish()
-    with pytest.raises(RecordingError, match=r"foreign\.mcap: no recording of activesteer"):
+    with raises(RecordingError, value=path):
         Recording.open(path)
 
 
@@ -88,7 +88,7 @@ def test_a_damaged_block_is_named_and_what_comes_before_it_recovered(recording: 
     data = bytearray(mcap_file.read_bytes())
     data[chunk_ends(mcap_file)[2] - 100] ^= 0xFF  # in the third block
     mcap_file.write_bytes(data)
-    with pytest.raises(RecordingError, match=r"damaged: the chunk in bytes \d+ to \d+.*100 rows up to 0\.990 s"):
+    with raises(RecordingError, value=mcap_file, allowed=2 * BLOCK_ROWS):
         Recording.open(mcap_file)
     recovered = Recording.open(mcap_file, recover=True)
     assert len(recovered) == 2 * BLOCK_ROWS
@@ -101,7 +101,7 @@ def test_damage_outside_the_blocks_is_found_too(mcap_file: Path) -> None:
     data = mcap_file.read_bytes()
     assert data.count(b"<mujoco/>") == 1
     mcap_file.write_bytes(data.replace(b"<mujoco/>", b"<mujoso/>"))
-    with pytest.raises(RecordingError, match=r"damaged.*The 200 rows up to 1\.990 s can be read"):
+    with raises(RecordingError, value=mcap_file, allowed=200):
         Recording.open(mcap_file)
 
 

@@ -42,7 +42,7 @@ def test_data_frame_has_the_channels_over_time(recording: Recording) -> None:
 
 def test_missing_pandas_is_answered_with_what_to_install(recording: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(RecordingError, match=r"needs pandas.*pip install 'activesteer\[data\]'"):
+    with raises(RecordingError, cause=ImportError, value="pandas", allowed="data"):
         recording.to_dataframe()
 
 

@@ -8,6 +8,7 @@ from activesteer.errors import RecordingError
 from activesteer.recording.protobuf import FixedMessage, timestamps, varint
 from activesteer.recording.schemas import state_fields, state_layout, state_schema, state_schema_name
 from activesteer.signals import Channel
+from tests.raising import raises
 
 
 @pytest.mark.parametrize(
@@ -50,7 +51,7 @@ def test_messages_of_another_layout_are_refused() -> None:
     layout = FixedMessage().number(1, "<f8").number(2, "<f8")
     other = layout.allocate(3)
     other[1, 9] ^= 0x08  # the second tag of the second message
-    with pytest.raises(RecordingError, match="/state/x: message 1 does not have the fields"):
+    with raises(RecordingError, key="/state/x", value=1):
         layout.parse(other, "/state/x")
 
 

@@ -72,8 +72,7 @@ def test_a_channel_is_a_read_only_float64_array(mcap_file: Path) -> None:
     channel = opened["fl_tyre_fx_N"]
     assert channel.dtype == np.float64
     assert channel.shape == opened.time_s.shape
-    with pytest.raises(ValueError, match="read-only"):
-        channel[0] = 1.0
+    assert not channel.flags.writeable
     assert "fl_tyre_fx_N" in opened
     assert "fl_tyre" not in opened
 

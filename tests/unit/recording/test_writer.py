@@ -123,7 +123,7 @@ def test_a_closed_file_takes_nothing_more(tmp_path: Path) -> None:
 
 
 def test_a_path_that_cannot_be_written_says_why(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"cannot write .*no/run\.mcap: folder .*no does not exist"):
+    with raises(RecordingError, value=tmp_path / "no"):
         McapWriter(tmp_path / "no" / "run.mcap", SPEED)
     with raises(RecordingError, value=tmp_path):
         McapWriter(tmp_path, SPEED)
@@ -218,7 +218,7 @@ def test_a_disk_that_fills_up_ends_the_recording_with_what_was_saved(
             for second in range(20):
                 writer.write(second + np.arange(1000) * 1e-3, rng.normal(size=(1000, 1)))
 
-        with pytest.raises(RecordingError, match=r"run\.mcap: File too large; saved up to \d\.999 s"):
+        with raises(RecordingError, cause=OSError, value=path):
             run()
         with raises(RecordingError, value=path):
             writer.write([100.0], [[0.0]])

@@ -19,6 +19,7 @@ from activesteer.standards.fmvss126 import STANDARD, amplitudes, verdict
 from activesteer.standards.page import page
 from activesteer.standards.proving_ground import ProvingGround
 from activesteer.standards.standard import Findings, Ground
+from tests.raising import raises
 from tests.unit.standards.grounds import WrittenGround
 
 GOOD = {"factor": 5.0, "yaw_ratio_1s": 0.35, "yaw_ratio_175s": -0.2, "displacement_m": 1.83}
@@ -120,7 +121,7 @@ def test_a_controller_with_which_the_car_cannot_be_tested_does_not_stop_the_othe
     monkeypatch.setattr("activesteer.standards.examination.standard_of", lambda _: standard)
     result = examine("fmvss126", ["ars", "afs"], jobs=1)
     assert result.failed == ["ars"]
-    assert "A is not found" in result.findings["ars"].values["error"]
+    assert "A: " in result.findings["ars"].values["error"]
     assert "it spins" in result.findings["ars"].values["error"]
     assert result.findings["afs"].passed is True
     assert ">no result<" in page(result)
@@ -133,7 +134,7 @@ def test_noisy_sensors_are_drawn_anew_for_each_repetition():
 
 
 def test_a_car_that_does_not_get_to_0_375_g_has_no_a():
-    with pytest.raises(ManeuverError, match="A is not found"):
+    with raises(ManeuverError, key="A"):
         STANDARD.examine(WrittenGround(lambda *_: {"steering_wheel_at_0_3g_rad": math.nan}))
 
 

@@ -110,8 +110,9 @@ def test_a_worker_of_a_cluster_that_dies_is_replaced(cluster, tmp_path):
 @pytest.mark.slow
 def test_a_controller_that_differs_on_a_worker_is_told_before_the_first_run(cluster, tmp_path, monkeypatch):
     monkeypatch.setattr("activesteer.studies.plan.present_inputs", lambda _: {"controller mine.py:Mine": "another"})
-    with pytest.raises(StudyError, match=r"worker tcp.*controller mine.py:Mine"):
+    with raises(StudyError) as refused:
         study(short_study(*MU), output=tmp_path, scheduler=str(cluster.file))
+    assert "controller mine.py:Mine" in refused.value.problem
 
 
 @pytest.mark.slow
@@ -166,7 +167,7 @@ class FakeClient:
 
 @pytest.mark.parametrize("worker", [{"distributed": "2025.1.0"}, {"python": "3.12.1.final.0"}])
 def test_a_worker_with_other_versions_is_told_before_the_first_run(tmp_path, worker):
-    with pytest.raises(StudyError, match=r"worker tcp://w has other versions: \S+ \S+, here \S+"):
+    with raises(StudyError, value=worker):
         study(short_study(*MU), output=tmp_path, client=FakeClient(**worker))
     with workers_for(client=FakeClient()) as workers:
         assert workers.in_flight >= 1

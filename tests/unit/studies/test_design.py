@@ -120,5 +120,6 @@ def test_a_csv_file_without_cases_is_refused(tmp_path, text, line):
     ],
 )
 def test_what_does_not_belong_together_is_refused(parts):
-    with pytest.raises(StudyError, match=r"design|factors"):
+    with raises(StudyError) as refused:
         read_study({"maneuvers": ["step_steer"], **parts})
+    assert refused.value.key.split(".")[0] in ("design", "factors")

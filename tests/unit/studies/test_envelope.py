@@ -13,6 +13,7 @@ from activesteer.recording import Recording
 from activesteer.studies import envelope as module
 from activesteer.studies.envelope import LINES, RANGE_KMH, RESOLUTION_KMH, Envelope, State, _map_row, envelope
 from activesteer.studies.envelope_figure import draw_envelope
+from tests.raising import raises
 
 LANES = LINES["lane_change"]
 
@@ -87,7 +88,7 @@ def test_json_and_picture(tmp_path: Path) -> None:
 
 
 def test_what_has_no_gates_has_no_entry_speed() -> None:
-    with pytest.raises(ParameterError, match="step_steer is a step_steer; entry speeds are those of lane_change"):
+    with raises(ParameterError, key="maneuver", value="step_steer", allowed=tuple(LINES)):
         envelope("step_steer")
 
 

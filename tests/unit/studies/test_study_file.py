@@ -11,6 +11,7 @@ from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.resources import studies_dir
 from activesteer.studies.plan import Plan
 from activesteer.studies.study_file import read_study
+from tests.raising import raises
 
 STEP = {"maneuvers": ["step_steer"], "factors": {"road.mu": {"grid": [0.8, 1.0]}}}
 
@@ -116,7 +117,7 @@ def test_keys_of_cases_may_only_make_sense_together():
     ends = [{"sweep.first_Hz": 0.1, "sweep.last_Hz": 0.5}, {"sweep.first_Hz": 1.0, "sweep.last_Hz": 4.0}]
     assert len(Plan(read_study({"maneuvers": ["sine_sweep"], "design": {"cases": ends}}))) == 2
     ends[1]["sweep.last_Hz"] = 0.9
-    with pytest.raises(ActiveSteerError, match="last_Hz"):
+    with raises(ActiveSteerError, key="sweep.last_Hz"):
         Plan(read_study({"maneuvers": ["sine_sweep"], "design": {"cases": ends}}))
 
 

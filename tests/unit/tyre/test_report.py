@@ -140,7 +140,7 @@ def test_a_folder_that_cannot_be_made_is_an_error(tmp_path: Path) -> None:
 
 def test_without_matplotlib_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    with pytest.raises(ParameterError, match=r"pip install 'activesteer\[plot\]'"):
+    with raises(ParameterError, cause=ImportError, value="matplotlib", allowed="plot"):
         draw(tyre(), tmp_path)
 
 

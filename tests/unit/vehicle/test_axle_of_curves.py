@@ -153,7 +153,7 @@ def test_modes_of_guided_wheels_have_the_names_of_wheels() -> None:
 
 def test_links_where_curves_are_asked_for_are_an_error() -> None:
     car = load_car("compact")
-    with pytest.raises(ModelError, match="fl_x"):
+    with raises(ModelError, value="fl_x"):
         dataclasses.replace(car, config=dataclasses.replace(car.config, curves=other_curves())).on()
 
 

@@ -53,8 +53,9 @@ def test_what_the_engine_says_of_a_model_is_passed_on(
     tmp_path: Path, file: str, old: str, new: str, words: str
 ) -> None:
     model = changed_model(tmp_path, file, old, new)
-    with pytest.raises(ModelError, match=rf"compact\.xml.*{words}"):
+    with raises(ModelError, file=str(model)) as refused:
         dataclasses.replace(load_car(), mjcf=model).on()
+    assert words in refused.value.problem
 
 
 def test_a_renamed_wheel_body_is_named(tmp_path: Path) -> None:

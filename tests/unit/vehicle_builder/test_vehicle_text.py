@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 import tomllib
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from activesteer.sensors.parameters import Sensors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle.rear_actuator import RearActuator
 from activesteer.vehicle_builder import new_vehicle
+from tests.raising import raises
 from tests.unit.vehicle_builder.other_values import all_changed
 from tests.unit.vehicle_builder.tables import COMPACT
 
@@ -98,6 +98,6 @@ def test_a_wrong_actuator_or_sensor_is_refused_before_the_car_is_made(
 ) -> None:
     own = tmp_path / "own.toml"
     own.write_text(COMPACT.read_text(encoding="utf-8") + HARDWARE.replace(old, new), encoding="utf-8")
-    with pytest.raises(ParameterError, match=re.escape(key)):
+    with raises(ParameterError, file="own.toml", key=key):
         new_vehicle("own", own, tmp_path / "own")
     assert not (tmp_path / "own").exists()

@@ -8,6 +8,7 @@ import pytest
 
 from activesteer.errors import PlaybackError
 from activesteer.video import offscreen
+from tests.raising import raises
 
 
 @pytest.fixture(autouse=True)
@@ -33,7 +34,7 @@ def test_what_a_driver_says_is_told(monkeypatch):
     monkeypatch.setattr(offscreen, "_loads", lambda _library: True)
     monkeypatch.setattr(offscreen, "_platform_in_use", lambda: None)
     monkeypatch.setenv("MUJOCO_GL", "egl")
-    with pytest.raises(PlaybackError, match=r"\(MUJOCO_GL=egl\): egl: RuntimeError: no such device\. ") as told:
+    with raises(PlaybackError, value={"egl": "RuntimeError: no such device"}) as told:
         offscreen.backend()
     assert "osmesa" not in str(told.value)
 
@@ -41,7 +42,7 @@ def test_what_a_driver_says_is_told(monkeypatch):
 def test_driver_that_crashes_is_no_crash_here(monkeypatch):
     monkeypatch.setattr(offscreen, "_TRY", "import os; os.abort()")
     monkeypatch.setattr(offscreen, "_platform_in_use", lambda: None)
-    with pytest.raises(PlaybackError, match="egl: ended by signal 6; osmesa: ended by signal 6"):
+    with raises(PlaybackError, value=dict.fromkeys(("egl", "osmesa"), "ended by signal 6")):
         offscreen.backend()
 
 
