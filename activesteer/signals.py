@@ -193,6 +193,8 @@ class ActuatorCommand(NamedTuple):
         drive_torque_change_Nm: Change of the torque that the driver demands at the driven wheels together, forward
             positive [Nm].
         estimate: What the controller takes the motion of the car for, where it uses an estimator.
+        side_difference_Pa: Brake pressure by which one side may exceed the other beyond what the anti-lock system
+            leaves to the driver, since the controller steers against the moment [Pa].
     """
 
     rear_steer_demand_rad: float = 0.0
@@ -204,3 +206,4 @@ class ActuatorCommand(NamedTuple):
     brake_torque_demand_Nm: tuple[float, float, float, float] = NO_BRAKES
     drive_torque_change_Nm: float = 0.0
     estimate: Estimate | None = None
+    side_difference_Pa: float = 0.0

@@ -102,13 +102,14 @@ def _wheel(setup, state, wheel, car_mps2):
 
 
 @compiled
-def antilock(setup, state, ax_mps2):
+def antilock(setup, state, ax_mps2, steered_Pa):
     """One decision for all wheels.
 
     Args:
         setup: A `BRAKE_SETUP`.
         state: Its `BRAKE_STATE`; `limit_Pa`, the phases and `side_Pa` are advanced.
         ax_mps2: Longitudinal acceleration as measured [m/s2].
+        steered_Pa: Difference of the sides that the controller steers against, beyond the driver's [Pa].
     """
     highest = setup.full_pedal_pressure_Pa
     slow = state.reference_mps < setup.lowest_speed_mps
@@ -123,14 +124,14 @@ def antilock(setup, state, ax_mps2):
         else:
             _wheel(setup, state, wheel, ax_mps2 - state.offset_mps2)
         state.allowed_Pa[wheel] = state.limit_Pa[wheel]
-    _hold_sides_together(setup, state)
+    _hold_sides_together(setup, state, steered_Pa)
     if setup.select_low != 0.0:
-        lower = min(state.limit_Pa[2], state.limit_Pa[3])
-        state.allowed_Pa[2] = state.allowed_Pa[3] = lower
+        most = min(state.limit_Pa[2], state.limit_Pa[3]) + setup.rear_side_fraction * steered_Pa
+        state.allowed_Pa[2], state.allowed_Pa[3] = min(state.limit_Pa[2], most), min(state.limit_Pa[3], most)
 
 
 @compiled
-def _hold_sides_together(setup, state):
+def _hold_sides_together(setup, state, steered_Pa):
     """The front wheel with more grip is let off the other's pressure only as fast as a driver can steer against it."""
     if state.phase[0] == OFF and state.phase[1] == OFF:
         state.side_Pa = setup.side_difference_Pa
@@ -139,5 +140,5 @@ def _hold_sides_together(setup, state):
     for wheel in range(2):
         other = 1 - wheel
         if state.phase[other] != OFF:
-            maximum = state.borne_Nm[other] / setup.torque_per_pressure_NmpPa[other] + state.side_Pa
+            maximum = state.borne_Nm[other] / setup.torque_per_pressure_NmpPa[other] + state.side_Pa + steered_Pa
             state.allowed_Pa[wheel] = min(state.allowed_Pa[wheel], maximum)

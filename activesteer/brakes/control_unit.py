@@ -11,7 +11,7 @@ from activesteer.compilation import compiled
 
 
 @compiled
-def step_brakes(setup, state, speeds_radps, ax_mps2, pedal, drive_Nm, asked_Nm):
+def step_brakes(setup, state, speeds_radps, ax_mps2, pedal, drive_Nm, asked_Nm, steered_Pa):
     """One step.
 
     Args:
@@ -22,6 +22,7 @@ def step_brakes(setup, state, speeds_radps, ax_mps2, pedal, drive_Nm, asked_Nm):
         pedal: Brake pedal position, 0 to 1.
         drive_Nm: Drive torque that driver and controller ask for [Nm].
         asked_Nm: Brake torques that the controller asks for [Nm], order of `CORNERS`.
+        steered_Pa: Difference of the sides that the controller steers against [Pa].
 
     Returns:
         The drive torque that is left [Nm].
@@ -36,7 +37,7 @@ def step_brakes(setup, state, speeds_radps, ax_mps2, pedal, drive_Nm, asked_Nm):
         follow_wheels(setup, state, speeds_radps)
         follow_car(setup, state, ax_mps2, braked)
         if setup.abs != 0.0:
-            antilock(setup, state, ax_mps2)
+            antilock(setup, state, ax_mps2, steered_Pa)
         if setup.tcs != 0.0:
             traction(setup, state, drive_Nm, braked)
     flow(setup, state, pedal)

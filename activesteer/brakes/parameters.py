@@ -67,6 +67,9 @@ class Antilock:
     """Pressure by which a front wheel may exceed one that is being released on the other side, at first [Pa] ..."""
     side_difference_rise_Paps: NotNegative = 4e6
     """... and how fast the difference may grow, so that the driver can follow the yaw moment [Pa/s]."""
+    rear_side_fraction: Fraction = 0.5
+    """Part of the difference that a controller steers against which the rear wheels get, too: a rear axle that is
+    braked to its limit holds no side force."""
 
 
 @dataclass(frozen=True)

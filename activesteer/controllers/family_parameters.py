@@ -107,6 +107,13 @@ class IntegratedParameters:
     """Part of the friction under a wheel, standing still, that its brake may use [-]."""
     ahead_s: _Lag = 0.1
     """Time ahead for which the rates of the actuators count [s]."""
+    side_difference_Pa: Annotated[float, Range(0.0, 1e8)] = 3e6
+    """Brake pressure by which one side may exceed the other beyond what the anti-lock system leaves to the driver, of a
+    car that does as it should [Pa]."""
+    side_yaw_rate_radps: _Scale = math.radians(4.0)
+    """Error of the yaw rate at which nothing of it is left [rad/s]."""
+    side_sideslip_rad: _Scale = math.radians(3.0)
+    """Sideslip angle, likewise [rad]."""
     tolerance_rad: _Limit = math.radians(0.3)
     """Distance of an actuator from its demand that does not count [rad]."""
     window_s: _Lag = 0.06

@@ -17,6 +17,11 @@ feedback wants as long as it can. B has the slopes of the axles' curves at the p
 brakes' arms: where an axle slides or is at a limit, more angle gives no more force, and the brakes make what is
 missing. The cost c of a brake force is such that a moment below a threshold is not worth a brake.
 
+On a road with two sides the anti-lock system keeps the brakes of the better one back, for the driver's sake. Since
+the steering takes back the moment of the brakes (see `lqr`), it is told by how much more the sides may differ: by a
+limit, the less of it the further the car is off, and no more than the angles that are left can hold with the tyres as
+they are.
+
 An actuator that does not follow its demand (`SupervisedActuator`) is from then on where it is: the state feedback is
 that of the other one alone, about the turn that can still be had, and its bounds here are its measured position. Nobody
 tells the controller of a fault.
@@ -36,11 +41,12 @@ import numpy as np
 
 from activesteer.controllers.axle_slopes import AxleSlopes
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
-from activesteer.controllers.lqr import Lqr
+from activesteer.controllers.lqr import Lqr, Turn
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.quadratic_programme import solver
 from activesteer.controllers.supervised_actuator import SupervisedActuator
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.conventions import Array
+from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Measurement
 
 _KILO = 1e3
 """Brake forces are counted in kN, so that all unknowns are of like size."""
@@ -74,7 +80,9 @@ class Integrated:
         self._weights = np.array([1.0 / p.moment_scale_Nm, 1.0 / p.force_scale_N])
         self._brake_cost = _KILO * 2.0 * p.brake_threshold_Nm * half_m[0] * self._weights[0] ** 2
         self._stay = np.diag([p.angle_scale_rad**-2] * 2 + [p.brake_scale_N**-2 * _KILO**2] * 4)
-        self._demand_rad = np.zeros(2)
+        self._demand_rad, self._brakes_Nm = np.zeros(2), NO_BRAKES
+        per_pressure_Nm = np.array(known.brake_torque_per_pressure_NmpPa) / self._radii_m
+        self._side_moment_m3 = float(per_pressure_Nm @ np.abs(self._arms_m)) / 2.0
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> Integrated:
@@ -94,10 +102,10 @@ class Integrated:
             for actuator, demand, position in zip(self._supervised, self._demand_rad, at_rad, strict=True)
         )
         works = added_works, rear_works
-        turn = self._lqr.turn(command, measurement, works)
+        turn = self._lqr.turn(command, measurement, works, self._brakes_Nm)
         now = turn.estimate
         if now.speed_mps < MIN_SPEED_MPS:
-            self._demand_rad = np.zeros(2)
+            self._demand_rad, self._brakes_Nm = np.zeros(2), NO_BRAKES
             return ActuatorCommand(estimate=now)
         slopes = self._slopes.at(
             now, command.front_steer_demand_rad + measurement.superposition_rad, measurement.rear_steer_rad
@@ -125,7 +133,7 @@ class Integrated:
         self._demand_rad = found[:2]
         added, rear = found[:2].tolist()
         self._lqr.apply(added, rear)
-        fl, fr, rl, rr = (_KILO * found[2:] * self._radii_m).tolist()
+        self._brakes_Nm = fl, fr, rl, rr = tuple((_KILO * found[2:] * self._radii_m).tolist())
         return ActuatorCommand(
             rear_steer_demand_rad=rear,
             superposition_demand_rad=added,
@@ -136,7 +144,19 @@ class Integrated:
             brake_torque_demand_Nm=(fl, fr, rl, rr),
             drive_torque_change_Nm=-min(max(command.drive_torque_demand_Nm, 0.0), fl + fr + rl + rr),
             estimate=now,
+            side_difference_Pa=self._side_difference(
+                turn, np.where(stuck, 0.0, self._limits_rad - abs(at_rad)), slopes
+            ),
         )
+
+    def _side_difference(self, turn: Turn, left_rad: Array, slopes: tuple[float, float]) -> float:
+        """By how much the brakes of one side may exceed the others, for angles that are left [Pa]."""
+        p, car, now, (front, rear) = self._parameters, self._car, turn.estimate, left_rad.tolist()
+        force_N = min(slopes[0] * car.front_stiffness_Nprad * front, slopes[1] * car.rear_stiffness_Nprad * rear)
+        moment_Nm = (car.cg_to_front_m + car.cg_to_rear_m) * max(force_N, 0.0)
+        off = abs(turn.desired_radps - now.yaw_rate_radps) / p.side_yaw_rate_radps
+        off += abs(now.sideslip_rad - turn.sideslip_rad) / p.side_sideslip_rad
+        return min(max(1.0 - off, 0.0) * p.side_difference_Pa, moment_Nm / self._side_moment_m3)
 
     def _effects(self, front_slope: float, rear_slope: float) -> np.ndarray:
         """Yaw moment [Nm] and side force [N] of both angles [rad] and the brake forces [kN], shape (2, 6)."""

@@ -50,6 +50,10 @@ _MAX_TORQUE_NM: Final = 1e5
 """No brake gives so much, and no engine has so much to be taken back [N m]."""
 
 
+_MAX_PRESSURE_PA: Final = 1e8
+"""No brake gets so much [Pa]."""
+
+
 @dataclass(frozen=True)
 class _ControllerKind(Kind):
     """Controllers; their brake torques are four numbers in one field."""
@@ -85,6 +89,7 @@ CONTROLLER: Final = _ControllerKind(
         "rear_steer_demand_rad": Range(-_MAX_ANGLE_RAD, _MAX_ANGLE_RAD),
         "superposition_demand_rad": Range(-_MAX_ANGLE_RAD, _MAX_ANGLE_RAD),
         "drive_torque_change_Nm": Range(-_MAX_TORQUE_NM, _MAX_TORQUE_NM),
+        "side_difference_Pa": Range(0.0, _MAX_PRESSURE_PA),
     },
     error=ControllerError,
     unchecked=("brake_torque_demand_Nm", "estimate"),

@@ -11,8 +11,12 @@ with a lag T_a, whose commands take effect one call later:
 Desired is the turn with the car's own steady yaw rate at the driver's angle (eq. 3), no further than the friction gives
 (eq. 6), and without sideslip. It has the angles f*, g* that solve 0 = A [r*, 0] + B [f*, g*], and beyond that what
 the axles need of slip angle for the forces of that turn more than straight curves would (`AxleSlopes.excess_rad`):
-without it a car near its limit slides outwards by as much. u* are those angles when a demand of now works, the lag T_a
-and a call ahead. The law is
+without it a car near its limit slides outwards by as much. While the driver brakes, both angles also take back the yaw
+moment M of the brakes, which their pressures say, without any side force:
+
+    f* - M / (l C_V),  g* + M / (l C_H)
+
+u* are those angles when a demand of now works, the lag T_a and a call ahead. The law is
 
     u = u* - K(v) (x - x*),        x = (r, beta, f, g, a, delta_H, u before)
 
@@ -43,11 +47,12 @@ import numpy as np
 
 from activesteer.controllers.axle_slopes import AxleSlopes
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
+from activesteer.controllers.esc import brake_levers
 from activesteer.controllers.family_parameters import LqrParameters
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.turn_reference import TurnReference
 from activesteer.conventions import Array
-from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement
+from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
 SPEED_STEP_MPS: Final = 5.0
@@ -102,6 +107,15 @@ class Lqr:
         self._schedules: dict[tuple[bool, bool], tuple[tuple[float, ...], ...]] = {}
         self._front_rad = self._rear_rad = 0.0
         self._before = 0.0, 0.0
+        known, (front, rear) = setup.estimation, brake_levers(setup)
+        assert known is not None  # there is an estimator
+        self._torque_per_pressure_NmpPa = known.brake_torque_per_pressure_NmpPa
+        self._moment_per_torque = 1.0 / front, -1.0 / front, 1.0 / rear, -1.0 / rear
+        wheelbase_m = self._car.cg_to_front_m + self._car.cg_to_rear_m
+        self._against_radpNm = (
+            -1.0 / (wheelbase_m * self._car.front_stiffness_Nprad),
+            1.0 / (wheelbase_m * self._car.rear_stiffness_Nprad),
+        )
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> Lqr:
@@ -131,13 +145,20 @@ class Lqr:
             rear, added, turn.desired_radps, steady, rear - steady, saturated, estimate=turn.estimate
         )
 
-    def turn(self, command: DriverCommand, measurement: Measurement, works: tuple[bool, bool] = BOTH) -> Turn:
+    def turn(
+        self,
+        command: DriverCommand,
+        measurement: Measurement,
+        works: tuple[bool, bool] = BOTH,
+        own_brakes_Nm: tuple[float, float, float, float] = NO_BRAKES,
+    ) -> Turn:
         """The turn that is asked for, and what the state feedback demands for it; at walking speed none.
 
         Args:
             command: What the driver does.
             measurement: What the car's sensors say.
             works: Whether superposition and rear steering do.
+            own_brakes_Nm: What is asked of the brakes on purpose, order of `CORNERS` [Nm].
         """
         p, now = self._parameters, self._estimator.step(measurement)
         speed, driver = now.speed_mps, command.front_steer_demand_rad
@@ -155,8 +176,13 @@ class Lqr:
         # What is demanded now works a call and a lag later.
         coming = self._reference.ahead(self._servos.lag_s + self._interval_s)
         next_front, next_rear, _ = self._steady(row, works, given, coming, now)
+        against_front, against_rear = 0.0, 0.0
+        if command.brake_pedal > 0.0 and works[0] and works[1]:
+            moment_Nm = self._brakes_moment(measurement, own_brakes_Nm)
+            against_front, against_rear = (moment_Nm * angle for angle in self._against_radpNm)
+        front, rear = front + against_front, rear + against_rear
         steady = front - driver, rear
-        held = next_front - driver, next_rear
+        held = next_front + against_front - driver, next_rear + against_rear
         errors = (
             now.yaw_rate_radps - desired,
             now.sideslip_rad - sideslip,
@@ -186,6 +212,15 @@ class Lqr:
         front = front_r * yaw_rate_radps + front_g * given_rad + front_more - less
         rear = rear_r * yaw_rate_radps + rear_g * given_rad + rear_more - less
         return front, rear, sideslip_r * yaw_rate_radps + sideslip_g * given_rad - less
+
+    def _brakes_moment(self, measurement: Measurement, own_Nm: tuple[float, float, float, float]) -> float:
+        """Yaw moment of the driver's brakes by their pressures [Nm]."""
+        moment_Nm = 0.0
+        for arm, per_pressure, pressure, own in zip(
+            self._moment_per_torque, self._torque_per_pressure_NmpPa, measurement.brake_pressure_Pa, own_Nm, strict=True
+        ):
+            moment_Nm += arm * max(per_pressure * pressure - own, 0.0)
+        return moment_Nm
 
     def apply(self, superposition_rad: float, rear_rad: float) -> None:
         """Says what was demanded of the actuators in the end; where one does not work, where it is."""

@@ -74,7 +74,7 @@ def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
     asked_Nm, held = np.zeros(4), 0
     for row in rows:
         speeds = memory[WHEEL_SPEEDS : WHEEL_SPEEDS + 4]
-        step_brakes(setup, state, speeds, memory[AX], row[_PEDAL], 0.0, asked_Nm)
+        step_brakes(setup, state, speeds, memory[AX], row[_PEDAL], 0.0, asked_Nm, 0.0)
         held += state.allowed_Pa[0] < state.demand_Pa[0]
         wheels, p = row[_WHEELS:_PEDAL], state.pressure_Pa
         truth = (

@@ -28,6 +28,7 @@ _NUMBERS: Final[dict[str, tuple[str, str] | None]] = {
     "rl_brake_torque_demand_Nm": ("Nm", "brake torque that the controller adds, rear left"),
     "rr_brake_torque_demand_Nm": ("Nm", "brake torque that the controller adds, rear right"),
     "drive_torque_change_Nm": ("Nm", "change of the drive torque that the controller asks for"),
+    "side_difference_Pa": ("Pa", "brake pressure by which the sides may differ, as the controller steers against it"),
 }
 """What a row holds, in the order in which `write_commands` fills it, and what the channel means if there is one."""
 
@@ -44,6 +45,7 @@ COMMAND_CHANNELS: Final = {
 CARRIED_OUT: Final = (
     "steering_wheel_demand_rad", "drive_torque_demand_Nm", "brake_pedal", "parking_brake", "rear_steer_demand_rad",
     "superposition_demand_rad", *COMMANDS[BRAKES : BRAKES + 4], "drive_torque_change_Nm",
+    "side_difference_Pa",
 )  # fmt: skip
 """What reaches the engine; the rest is for the recording."""
 
@@ -60,8 +62,8 @@ def write_commands(row: memoryview, command: DriverCommand, asked: ActuatorComma
     """
     # Taken apart by position: by name it takes twice as long, and this happens every step.
     steering_wheel, drive, pedal, at_limit, _, gear, front, parking = command
-    rear, added, desired, prediction, correction, limited, (fl, fr, rl, rr), change, _ = asked
+    rear, added, desired, prediction, correction, limited, (fl, fr, rl, rr), change, _, sides = asked
     _pack_into(
         row, 0, steering_wheel, drive, pedal, parking, at_limit, gear, front, rear, added, desired, prediction,
-        correction, limited, fl, fr, rl, rr, change,
+        correction, limited, fl, fr, rl, rr, change, sides,
     )  # fmt: skip

@@ -180,7 +180,9 @@ def step(plan_address, tape_address, torques_stand):
         said = carray(f64_pointer(plan.sensor_memory), (plan.sensor_memory_size,))
         wheel_speeds, ax = said[WHEEL_SPEEDS : WHEEL_SPEEDS + _N_WHEELS], said[AX]
     pedal = 0.0 if torques_stand else commands.brake_pedal
-    drive_torque_Nm = step_brakes(setup, state, wheel_speeds, ax, pedal, drive_torque_Nm, brake_torques_Nm)
+    drive_torque_Nm = step_brakes(
+        setup, state, wheel_speeds, ax, pedal, drive_torque_Nm, brake_torques_Nm, commands.side_difference_Pa
+    )
     for wheel in range(_N_WHEELS):
         if not torques_stand:
             # + 0.0: a wheel that is not driven would get -0.0 while the engine brakes.

@@ -113,3 +113,17 @@ def test_missing_solver_is_told_with_how_to_get_it(known, monkeypatch):
     monkeypatch.setitem(sys.modules, "daqp", None)
     with raises(ControllerError, cause=ImportError, value="daqp", allowed="control"):
         solver()
+
+
+def test_sides_may_differ_the_less_the_further_the_car_is_off_and_not_without_an_actuator(known):
+    limits = known.gains.integrated
+    off_radps = 0.25 * limits.side_yaw_rate_radps
+
+    def allowed(yaw_rate_radps: float, **angles: float) -> float:
+        seen = measured(yaw_rate_radps, SPEED_MPS)._replace(**angles)
+        return load_controller("integrated", known).step(steering(0.0), seen).side_difference_Pa
+
+    assert allowed(0.0) == pytest.approx(limits.side_difference_Pa)
+    assert allowed(off_radps) == pytest.approx(allowed(-off_radps)) == pytest.approx(0.75 * allowed(0.0), rel=0.1)
+    assert allowed(2.0 * limits.side_yaw_rate_radps) == 0.0
+    assert allowed(0.0, rear_steer_rad=known.gains.servos.rear_limit_rad) == 0.0

@@ -177,6 +177,7 @@ def test_class_without_step_is_answered(write):
         ("ActuatorCommand(brake_torque_demand_Nm=(1.0, 2.0))", "(1.0, 2.0)", None),
         ("ActuatorCommand(brake_torque_demand_Nm=(0.0, math.nan, 0.0, 0.0))", "(0.0, nan, 0.0, 0.0)", None),
         ("ActuatorCommand(drive_torque_change_Nm=math.inf)", "inf", Range(-1e5, 1e5)),
+        ("ActuatorCommand(side_difference_Pa=-1.0)", "-1.0", Range(0.0, 1e8)),
         ("ActuatorCommand(saturated='no')", "'no'", None),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.controllers import load_controller
 from activesteer.controllers.family_parameters import LqrParameters, ServoParameters
-from activesteer.controllers.lqr import SPEEDS_MPS, STATES, feedback, model, schedule, steady_turn
+from activesteer.controllers.lqr import SPEEDS_MPS, STATES, Lqr, feedback, model, schedule, steady_turn
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.scenario import resolve
 from activesteer.theory.single_track import SingleTrack
@@ -109,3 +109,25 @@ def test_desired_yaw_rate_is_the_cars_own_up_to_what_the_friction_gives(known):
 def test_at_rest_nothing_is_steered(known):
     answer = first(known, steering(0.3), measured(0.0, 0.0))
     assert answer.rear_steer_demand_rad == answer.superposition_demand_rad == 0.0
+
+
+def test_moment_of_the_drivers_brakes_is_held_by_both_axles_without_side_force(known):
+    car, two_track, estimation = known.single_track, known.estimation.two_track, known.estimation
+    rolling = measured(0.0, 25.0)
+    left_Pa, braking = (20e5, 5e5, 0.0, 0.0), steering(0.0)._replace(brake_pedal=1.0)
+
+    def steady(command, pressures_Pa, own_Nm=(0.0, 0.0, 0.0, 0.0)):
+        seen = rolling._replace(brake_pressure_Pa=pressures_Pa)
+        return Lqr(known).turn(command, seen, own_brakes_Nm=own_Nm).steady_rad
+
+    front, rear = steady(braking, left_Pa)
+    per_Pa_N = estimation.brake_torque_per_pressure_NmpPa[0] / estimation.rolling_radius_m[0]
+    moment_Nm = 0.5 * two_track.front_track_m * per_Pa_N * 15e5
+    front_N, rear_N = car.front_stiffness_Nprad * front, car.rear_stiffness_Nprad * rear
+    assert front_N + rear_N == pytest.approx(0.0, abs=1e-9)
+    assert car.cg_to_front_m * front_N - car.cg_to_rear_m * rear_N == pytest.approx(-moment_Nm)
+    assert steady(braking, (5e5, 20e5, 0.0, 0.0)) == pytest.approx((-front, -rear))
+    # Not what it asks for itself, to turn the car.
+    own_Nm = (estimation.brake_torque_per_pressure_NmpPa[0] * 15e5, 0.0, 0.0, 0.0)
+    assert steady(braking, left_Pa, own_Nm) == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert steady(steering(0.0), left_Pa) == (0.0, 0.0)
