@@ -19,9 +19,12 @@ AxleName = Literal["front", "rear", "car"]
 
 FRONT_AND_REAR: Final = ("front", "rear")
 SMALL_TRAVEL_M: Final = 0.015
-"""Slopes over wheel travel are those of the straight line through the points within this of static ride [m]."""
-SMALL_FORCE_N: Final = 1000.0
-SMALL_MOMENT_NM: Final = 100.0
+_SMALL: Final = {
+    "parallel": SMALL_TRAVEL_M, "opposite": SMALL_TRAVEL_M, "lateral": 1000.0, "longitudinal": 1000.0,
+    "aligning": 100.0,
+}  # fmt: skip
+"""First word of a sweep's name -> slopes are those of the straight line through the points within this of static ride:
+travel [m], force [N] or moment [N m]."""
 
 
 class Axle(NamedTuple):
@@ -59,24 +62,34 @@ class Axle(NamedTuple):
         """One of the rig's sweeps."""
         return self.measured.sweeps[name]
 
-    def slope(self, sweep: str, values: Array, within: float, over: Array | None = None) -> Array:
-        """Mean slope around static ride.
+    def slope(self, sweep: str, values: Array, over: Array | None = None) -> Array:
+        """Slope of each wheel around static ride, within 15 mm, 1 kN or 100 N m.
 
         Args:
             sweep: Name of the sweep.
             values: Its values, shape (n, 4).
-            within: Points up to this far from static ride count, in the unit of the sweep.
             over: What to take the slope over, shape (n, 4); what was swept, where not given.
 
         Returns:
             Slopes of the axle's wheels, shape (2,).
         """
         x = self.sweep(sweep).x
-        near = np.abs(x) <= within * (1.0 + 1e-9)
+        near = np.abs(x) <= _SMALL[sweep.split("_", maxsplit=1)[0]] * (1.0 + 1e-9)
         rows = values[near][:, self.wheels]
         base = np.repeat(x[near, None], rows.shape[1], axis=1) if over is None else over[near][:, self.wheels]
         base = base - base.mean(axis=0)
         return np.sum(base * (rows - rows.mean(axis=0)), axis=0) / np.sum(base * base, axis=0)
+
+    def mean_slope(self, sweep: str, quantity: str, axis: int | None = None) -> float:
+        """Mean of both wheels' slopes over what is swept.
+
+        Args:
+            sweep: Name of the sweep.
+            quantity: One of the arrays of a `Sweep`.
+            axis: Which coordinate of a point.
+        """
+        values = getattr(self.sweep(sweep), quantity)
+        return float(self.slope(sweep, values if axis is None else values[..., axis]).mean())
 
 
 Evaluate = Callable[[Axle], float]

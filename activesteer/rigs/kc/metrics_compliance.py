@@ -7,32 +7,29 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.rigs.kc.definitions import SMALL_FORCE_N, SMALL_MOMENT_NM, Axle, metric
-from activesteer.rigs.kc.metrics_kinematics import outer_sign
+from activesteer.rigs.kc.definitions import Axle, metric
+from activesteer.rigs.kc.sweep import INWARDS
 from activesteer.vehicle.guide_model import GUIDE
 
 _TRAIL_M: Final = 0.03
 
 
-def _per_side_force(axle: Axle, values: np.ndarray) -> float:
-    """Slope over a side force in phase that points inwards at the wheel that is read, within 1 kN."""
-    return float(np.mean(outer_sign(axle) * axle.slope("lateral_in_phase", values, SMALL_FORCE_N)))
+def _deg_per_side_force(axle: Axle, angle: str) -> float:
+    """Slope of an angle over a side force in phase that points inwards at the wheel that is read, within 1 kN."""
+    slopes = axle.slope("lateral_in_phase", getattr(axle.sweep("lateral_in_phase"), angle))
+    return 1e3 * math.degrees(float(np.mean(INWARDS[axle.wheels] * slopes)))
 
 
 @metric("mm/kN")
 def lateral_compliance_centre(axle: Axle) -> float:
     """Motion of the wheel centre with a side force at the contact points, in phase, within 1 kN."""
-    return 1e6 * float(
-        axle.slope("lateral_in_phase", axle.sweep("lateral_in_phase").centre_m[..., 1], SMALL_FORCE_N).mean()
-    )
+    return 1e6 * axle.mean_slope("lateral_in_phase", "centre_m", 1)
 
 
 @metric("mm/kN")
 def lateral_compliance_patch(axle: Axle) -> float:
     """Motion of the contact point with a side force there, in phase, within 1 kN."""
-    return 1e6 * float(
-        axle.slope("lateral_in_phase", axle.sweep("lateral_in_phase").contact_m[..., 1], SMALL_FORCE_N).mean()
-    )
+    return 1e6 * axle.mean_slope("lateral_in_phase", "contact_m", 1)
 
 
 @metric("deg/kN")
@@ -41,43 +38,39 @@ def side_force_toe(axle: Axle) -> float:
 
     The force acts at the contact point, towards the middle of the car, on the other wheel the same way.
     """
-    return 1e3 * math.degrees(_per_side_force(axle, axle.sweep("lateral_in_phase").toe_rad))
+    return _deg_per_side_force(axle, "toe_rad")
 
 
 @metric("deg/kN")
 def side_force_toe_with_trail(axle: Axle) -> float:
     """The same with the force 30 mm behind the contact point, about the pneumatic trail of a tyre."""
-    moment = axle.slope("aligning_in_phase", axle.sweep("aligning_in_phase").steer_rad, SMALL_MOMENT_NM).mean()
+    moment = axle.mean_slope("aligning_in_phase", "steer_rad")
     # A force to the right on the left wheel, behind it, turns it to the left: toe-out.
-    return side_force_toe(axle) - 1e3 * _TRAIL_M * math.degrees(float(moment))
+    return side_force_toe(axle) - 1e3 * _TRAIL_M * math.degrees(moment)
 
 
 @metric("deg/kN")
 def side_force_toe_opposed(axle: Axle) -> float:
     """Change of toe angle per side force towards the middle of the car on both wheels, within 1 kN."""
-    return 1e3 * math.degrees(
-        axle.slope("lateral_opposed", axle.sweep("lateral_opposed").toe_rad, SMALL_FORCE_N).mean()
-    )
+    return 1e3 * math.degrees(axle.mean_slope("lateral_opposed", "toe_rad"))
 
 
 @metric("deg/kN")
 def side_force_camber(axle: Axle) -> float:
     """Change of the outer wheel's camber angle per side force, in phase, within 1 kN; positive leans its top out."""
-    return 1e3 * math.degrees(_per_side_force(axle, axle.sweep("lateral_in_phase").camber_rad))
+    return _deg_per_side_force(axle, "camber_rad")
 
 
 @metric("mm/kN")
 def longitudinal_compliance_centre(axle: Axle) -> float:
     """Motion of the wheel centre with a longitudinal force at the wheel centres, within 1 kN."""
-    sweep = axle.sweep("longitudinal_centre")
-    return 1e6 * float(axle.slope("longitudinal_centre", sweep.centre_m[..., 0], SMALL_FORCE_N).mean())
+    return 1e6 * axle.mean_slope("longitudinal_centre", "centre_m", 0)
 
 
 @metric("mm/kN")
 def longitudinal_compliance_braking(axle: Axle) -> float:
     """Motion of the wheel centre with a longitudinal force at the contact points, wheels locked, within 1 kN."""
-    sweep = axle.sweep("longitudinal_patch")
-    return 1e6 * float(axle.slope("longitudinal_patch", sweep.centre_m[..., 0], SMALL_FORCE_N).mean())
+    return 1e6 * axle.mean_slope("longitudinal_patch", "centre_m", 0)
 
 
 @metric("mm")
@@ -90,43 +83,37 @@ def braking_recession(axle: Axle) -> float:
 @metric("deg/kN")
 def braking_toe(axle: Axle) -> float:
     """Change of toe angle per braking force at the contact points, wheels locked, within 1 kN; positive is toe-in."""
-    sweep = axle.sweep("longitudinal_patch")
-    return -1e3 * math.degrees(axle.slope("longitudinal_patch", sweep.toe_rad, SMALL_FORCE_N).mean())
+    return -1e3 * math.degrees(axle.mean_slope("longitudinal_patch", "toe_rad"))
 
 
 @metric("deg/kN")
 def braking_wind_up(axle: Axle) -> float:
     """Rotation of the knuckle per braking force at the contact points, within 1 kN, positive as the wheels roll."""
-    sweep = axle.sweep("longitudinal_patch")
-    return -1e3 * math.degrees(axle.slope("longitudinal_patch", sweep.wind_up_rad, SMALL_FORCE_N).mean())
+    return -1e3 * math.degrees(axle.mean_slope("longitudinal_patch", "wind_up_rad"))
 
 
 @metric("deg/kN")
 def driving_toe(axle: Axle) -> float:
     """Change of toe angle per driving force at the wheel centres, within 1 kN; positive is toe-in."""
-    sweep = axle.sweep("longitudinal_centre")
-    return 1e3 * math.degrees(axle.slope("longitudinal_centre", sweep.toe_rad, SMALL_FORCE_N).mean())
+    return 1e3 * math.degrees(axle.mean_slope("longitudinal_centre", "toe_rad"))
 
 
 @metric("deg/100Nm")
 def aligning_steer(axle: Axle) -> float:
     """Change of steer angle per aligning moment in phase, within 100 N m, positive with the moment."""
-    sweep = axle.sweep("aligning_in_phase")
-    return 100.0 * math.degrees(axle.slope("aligning_in_phase", sweep.steer_rad, SMALL_MOMENT_NM).mean())
+    return 100.0 * math.degrees(axle.mean_slope("aligning_in_phase", "steer_rad"))
 
 
 @metric("deg/100Nm")
 def aligning_toe_opposed(axle: Axle) -> float:
     """Change of toe angle per moment towards toe-in on both wheels, within 100 N m."""
-    sweep = axle.sweep("aligning_opposed")
-    return 100.0 * math.degrees(axle.slope("aligning_opposed", sweep.toe_rad, SMALL_MOMENT_NM).mean())
+    return 100.0 * math.degrees(axle.mean_slope("aligning_opposed", "toe_rad"))
 
 
 @metric("deg/100Nm")
 def aligning_camber(axle: Axle) -> float:
     """Change of camber angle per moment towards toe-in on both wheels, within 100 N m."""
-    sweep = axle.sweep("aligning_opposed")
-    return 100.0 * math.degrees(axle.slope("aligning_opposed", sweep.camber_rad, SMALL_MOMENT_NM).mean())
+    return 100.0 * math.degrees(axle.mean_slope("aligning_opposed", "camber_rad"))
 
 
 def _bushes_Npmm(axle: Axle) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Metrics of the steering system. The docstring of each is its definition."""
+"""Metrics of steering axes and steering system. The docstring of each is its definition."""
 
 from __future__ import annotations
 
@@ -7,9 +7,48 @@ import math
 import numpy as np
 
 from activesteer.rigs.kc.definitions import Axle, metric
-from activesteer.rigs.kc.metrics_kinematics import wheelbase
+from activesteer.rigs.kc.metrics_support import wheelbase
 
 _ON_CENTRE_RAD = math.radians(20.0)
+
+
+@metric("deg")
+def caster(axle: Axle) -> float:
+    """Angle of the steering axis to the vertical in side view, positive with the top to the rear (ISO 8855).
+
+    In front the axis about which the wheel turns with its damper's length fixed; at the rear the steering hinge's.
+    """
+    return math.degrees(np.mean([axis.caster_rad for axis in axle.axes]))
+
+
+@metric("deg")
+def kingpin_inclination(axle: Axle) -> float:
+    """Angle of the steering axis to the vertical in front view, positive with the top inwards (ISO 8855)."""
+    return math.degrees(np.mean([axis.inclination_rad for axis in axle.axes]))
+
+
+@metric("mm")
+def scrub_radius(axle: Axle) -> float:
+    """Steering-axis offset at the ground: positive where the axis meets the road inside the contact (ISO 8855)."""
+    return 1e3 * float(np.mean([axis.scrub_radius_m for axis in axle.axes]))
+
+
+@metric("mm")
+def caster_trail(axle: Axle) -> float:
+    """Castor offset at the ground: positive where the axis meets the road ahead of the contact point (ISO 8855)."""
+    return 1e3 * float(np.mean([axis.trail_m for axis in axle.axes]))
+
+
+@metric("mm")
+def spindle_offset(axle: Axle) -> float:
+    """Steering-axis offset at the wheel centre, positive where the axis passes inside (ISO 8855)."""
+    return 1e3 * float(np.mean([axis.centre_offset_m for axis in axle.axes]))
+
+
+@metric("mm")
+def centre_trail(axle: Axle) -> float:
+    """Castor offset at the wheel centre, positive where the axis passes ahead of it (ISO 8855)."""
+    return 1e3 * float(np.mean([axis.centre_trail_m for axis in axle.axes]))
 
 
 def mean_steer_rad(axle: Axle, sweep: str = "steering_rolling") -> np.ndarray:

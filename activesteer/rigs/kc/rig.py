@@ -12,7 +12,9 @@ import numpy as np
 from activesteer.errors import ModelError
 
 # The metrics enter themselves into the table of definitions, in this order.
-from activesteer.rigs.kc import metrics_kinematics, metrics_compliance, metrics_steering, metrics_modes  # isort: skip  # noqa: F401
+from activesteer.rigs.kc import (  # isort: skip  # noqa: F401
+    metrics_kinematics, metrics_support, metrics_steering, metrics_compliance, metrics_modes,
+)  # fmt: skip
 from activesteer.rigs.kc.programme import measure
 from activesteer.rigs.kc.result import KcResult, evaluated
 from activesteer.rigs.kc.targets import load_targets
