@@ -10,7 +10,6 @@ scalar product of its motion axis (`cdof`, about the centre of mass of the tree)
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 import mujoco
@@ -21,12 +20,11 @@ from activesteer.errors import ModelError
 from activesteer.tyre.kernels.contact import tyre_on_road
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.dry_friction import friction_rate
 from activesteer.vehicle.engine_layout import EngineLayout, engine_layout
+from activesteer.vehicle.native_actuators import brake_rate, drive_rate, dry_friction_rate, servo_rate
 from activesteer.vehicle.native_guide import guides
 from activesteer.vehicle.native_memory import array_at, f64_pointer, records_at, word
 from activesteer.vehicle.native_screws import screw_rate
-from activesteer.vehicle.powertrain import CLUTCH_OPEN, drive_limits
 
 _MARKER: Final = fb.MARKER
 _headers_at: Final = records_at(fb.HEADER)
@@ -193,51 +191,6 @@ def _drag(header, xpos, xmat, com, cvel, cdof, qfrc):
     _apply(qfrc, cdof, chain, fx, fy, 0.0, -pz * fy, pz * fx, px * fy - py * fx)
 
 
-@inlined
-def _drive_rate(block, header, entry, qvel, command, state, timestep_s):
-    """Rate of a wheel's drive torque: a first-order lag, within what the engine can give at the speed of its wheels."""
-    if header.gear == CLUTCH_OPEN:
-        return (command - state) / timestep_s
-    speed = 0.0
-    wheels = _wheels_at(block, header.wheels, header.n_wheels)
-    for index in range(wheels.size):
-        wheel = wheels[index]
-        speed += wheel.drive_fraction * qvel[int(wheel.spin_dof)]
-    low, high = drive_limits(
-        speed,
-        header.gear,
-        header.engine_torque_Nm,
-        header.engine_power_W,
-        header.engine_limit_radps,
-        header.engine_drag_Nm,
-    )
-    torque = state - (command - state) * math.expm1(-timestep_s / entry.lag_s)
-    fraction = entry.drive_fraction
-    if fraction == 0.0:
-        # Not driven: nothing is commanded, and what came past the engine before dies away.
-        return (torque - state) / timestep_s
-    return (min(max(torque, fraction * low), fraction * high) - state) / timestep_s
-
-
-@inlined
-def _brake_rate(entry, qvel, command, state, timestep_s):
-    """Elasto-plastic friction: the pads wind up with the wheel and slip where the torque reaches the demand."""
-    speed = qvel[int(entry.dof)]
-    # The drag of pads, bearings and seals is always there; it is also what keeps a car from creeping at rest.
-    limit = min(max(command, entry.low), entry.high) / entry.stiffness
-    wound = min(max(state + timestep_s * speed, -limit), limit)
-    return (wound - state) / timestep_s
-
-
-@inlined
-def _friction_rate(entry, qvel, ten_velocity, state, timestep_s):
-    """Dry friction of a damper, which the road shakes, or of the rack."""
-    speed = ten_velocity[int(entry.tendon)] if entry.tendon >= 0.0 else qvel[int(entry.dof)]
-    # The free joint of the chassis is the first (`Vehicle` sees to it): its velocity in the world.
-    vibration = entry.vibration * (qvel[0] * qvel[0] + qvel[1] * qvel[1]) ** 0.25
-    return friction_rate(state, speed, vibration, entry.wound_limit, timestep_s)
-
-
 def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0915 - three functions in one
     """Compiles the three callbacks, or loads them from numba's cache.
 
@@ -288,20 +241,19 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0
         state = array_at(data, d_act, int(header.n_activations))[int(entry.act)]
         command = entry.scale * array_at(data, d_ctrl, int(header.n_controls))[actuator] + entry.offset
         if kind == fb.KIND_SERVO:
-            # First-order lag behind the limited command, its rate limited.
-            command = min(max(command, entry.low), entry.high)
-            rate = (command - state) / entry.lag_s
-            return min(max(rate, -entry.rate_limit), entry.rate_limit)
+            return servo_rate(entry, command, state)
         timestep_s = carray(f64_pointer(model + m_timestep), (1,))[0]
         qvel = array_at(data, d_qvel, int(header.n_dofs))
         rate = 0.0
         if kind == fb.KIND_DRIVE:
-            rate = _drive_rate(block, header, entry, qvel, command, state, timestep_s)
+            rate = drive_rate(
+                _wheels_at(block, header.wheels, header.n_wheels), header, entry, qvel, command, state, timestep_s
+            )
         elif kind == fb.KIND_FRICTION:
             ten_velocity = array_at(data, d_ten_velocity, int(header.n_tendons))
-            rate = _friction_rate(entry, qvel, ten_velocity, state, timestep_s)
+            rate = dry_friction_rate(entry, qvel, ten_velocity, state, timestep_s)
         elif kind == fb.KIND_BRAKE:
-            rate = _brake_rate(entry, qvel, command, state, timestep_s)
+            rate = brake_rate(entry, qvel, command, state, timestep_s)
         elif kind >= fb.KIND_LINK:
             rate = screw_rate(
                 block, header, actuators, entry, array_at(data, d_act, int(header.n_activations)),
