@@ -126,11 +126,11 @@ class MpcParameters:
 
     yaw_rate_scale_radps: _Scale = math.radians(1.0)
     """Error of the yaw rate that weighs as much as a sideslip, an angle or a change of their scales [rad/s]."""
-    sideslip_scale_rad: _Scale = math.radians(0.5)
+    sideslip_scale_rad: _Scale = math.radians(0.35)
     """Sideslip angle, likewise [rad]."""
     rear_scale_rad: _Scale = math.radians(2.0)
     """Rear angle away from that of the steady turn, likewise [rad]."""
-    superposition_scale_rad: _Scale = math.radians(4.0)
+    superposition_scale_rad: _Scale = math.radians(2.5)
     """Angle added at the front, likewise [rad]."""
     change_scale_rad: _Scale = math.radians(5.0)
     """Change of an angle from one block to the next, likewise [rad]."""

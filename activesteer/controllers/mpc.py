@@ -123,7 +123,9 @@ class Mpc:
         slopes = [min(_SLOPES, key=lambda known, axle=axle: abs(known - axle.secant)) for axle in axles]
         cuts = [axle.force_rad - slope * axle.slip_angle_rad for axle, slope in zip(axles, slopes, strict=True)]
         grid_mps = max(_SPEED_STEP_MPS * round(speed / _SPEED_STEP_MPS), 2.0 * _SPEED_STEP_MPS)
-        front, rear, _ = (gain * desired for gain in steady_gains(self._car, grid_mps))
+        more = self._slopes.excess_rad(speed * desired, now.friction)
+        gains = steady_gains(self._car, grid_mps)
+        front, rear = (gain * desired + angle for gain, angle in zip(gains, more, strict=False))
         problem = envelope_problem(self._car, p, self._servo_lag_s, self._interval_s, grid_mps, *slopes)
         z = np.array([
             now.yaw_rate_radps, now.sideslip_rad, self._front_rad, self._rear_rad, added, turned,
