@@ -10,6 +10,7 @@ import rerun.blueprint as rrb
 from activesteer.playback import events, plots
 from activesteer.playback.car import body_path, ghost_path
 from activesteer.playback.course import COURSE, MAP, ROAD, map_bounds
+from activesteer.playback.legend import LEGEND, LEGEND_OF_RUNS, height, legend
 from activesteer.playback.runs import CHASSIS, Run
 from activesteer.playback.timeline import TIMELINE
 from activesteer.playback.wheel_angles import plan_view, wedges_path
@@ -17,6 +18,8 @@ from activesteer.playback.wheel_angles import plan_view, wedges_path
 SUMMARY: Final = "summary"
 """Entity of the text."""
 
+_PLOTS: Final = 690.0
+"""Height of a page of plots with its legend, in a window of 1280 x 800 [points]."""
 _SKY: Final = (176, 196, 214)
 _BEHIND: Final = rrb.EyeControls3D(position=(-7.6, 0.0, 3.5), look_target=(-0.4, 0.0, 0.2), eye_up=(0.0, 0.0, 1.0))
 # Left is up in the picture, so the car drives to the right.
@@ -54,19 +57,24 @@ def _page(run: Run, runs: Sequence[Run], page: int) -> rrb.Horizontal:
         rrb.Vertical(
             _chase(run, runs),
             _map(runs),
-            rrb.Horizontal(_above(run, runs), plan_view([run]), _words([run]), column_shares=[4, 3, 4]),
+            rrb.Horizontal(_above(run, runs), plan_view([run]), _words([run]), column_shares=[6, 5.8, 9.2]),
             row_shares=[5, 1.5, 4],
         ),
         rrb.Tabs(
-            rrb.Vertical(*plots.views(plots.MOTION, [run]), name="Motion"),
-            rrb.Vertical(*plots.views(plots.DRIVING, [run]), name="Driving"),
-            rrb.Vertical(*plots.views(plots.BODY, [run]), name="Body"),
-            rrb.Vertical(*plots.views(plots.WHEELS, [run]), name="Wheels"),
-            rrb.Vertical(*plots.views(plots.links(run), [run]), name="Links"),
+            *(_tab(name, shown, run, alone=len(runs) == 1) for name, shown in plots.pages(run).items()),
             active_tab=page,
         ),
         column_shares=[3, 2],
         name=run.label,
+    )
+
+
+def _tab(name: str, shown: Sequence[plots.Plot], run: Run, *, alone: bool) -> rrb.Vertical:
+    views, curves = plots.views(shown, [run]), plots.curves(shown, run, alone=alone)
+    names = legend(f"{LEGEND}/{run.name}/{name}", curves)
+    high = height(curves)
+    return rrb.Vertical(
+        names, *views, row_shares=[high, *([(_PLOTS - high) / max(1, len(views))] * len(views))], name=name
     )
 
 
@@ -81,7 +89,7 @@ def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
             row_shares=[4, 1.3, 4],
         ),
         rrb.Vertical(
-            plots.legend(runs),
+            legend(LEGEND_OF_RUNS, {run.label: run.colour for run in runs}),
             rrb.Tabs(
                 rrb.Vertical(*plots.views(plots.MOTION, runs), name="Motion"),
                 rrb.Vertical(*plots.views(plots.DRIVING, runs), name="Driving"),
@@ -90,7 +98,7 @@ def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
                 rrb.Vertical(*plots.views_by_corner(use, runs), name="Friction utilisation"),
                 active_tab=page,
             ),
-            row_shares=[1, 20],
+            row_shares=[1, 22],
         ),
         column_shares=[3, 2],
         name="Comparison",
@@ -102,7 +110,7 @@ def _chase(run: Run, runs: Sequence[Run]) -> rrb.Spatial3DView:
 
 
 def _above(run: Run, runs: Sequence[Run]) -> rrb.Spatial3DView:
-    return _car_view(run, runs, f"{run.label}, from above", _ABOVE, numbers=False)
+    return _car_view(run, runs, "From above", _ABOVE, numbers=False)
 
 
 def _car_view(run: Run, runs: Sequence[Run], name: str, eye: rrb.EyeControls3D, *, numbers: bool) -> rrb.Spatial3DView:

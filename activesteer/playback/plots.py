@@ -18,8 +18,6 @@ from activesteer.quantities import quantity_of
 
 _MOST_NUMBERS: Final = {1: 8.0, 2: 8.0, 3: 8.0, 4: 5.4}
 """Plots on a page -> multiples of a power of ten that have room beside an axis, in a window of 1280 x 800."""
-LEGEND: Final = "legend"
-"""Entity below which the names of the runs lie."""
 _CORNER_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7")
 _LINK_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00", "#a6a6a6")
 _WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
@@ -153,8 +151,8 @@ def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
         own_colours = alone or plot not in OF_CAR
         for path, lines in _entities(run, plot):
             style = rr.SeriesLines(
-                names=[_legend(run, line, alone=own_colours) for line in lines],
-                colors=[bytes_of(line.colour if line.colour and own_colours else run.colour) for line in lines],
+                names=[_name(run, line, alone=own_colours) for line in lines],
+                colors=[bytes_of(_paint(run, line, alone=own_colours)) for line in lines],
                 widths=[line.width for line in lines],
             )
             stream.log(path, style, static=True)
@@ -168,10 +166,14 @@ def _factor(channel: str) -> float:
     return 1.0 if channel.endswith("_force_N") else quantity_of(channel).factor
 
 
-def _legend(run: Run, line: Series, *, alone: bool) -> str:
+def _name(run: Run, line: Series, *, alone: bool) -> str:
     if not line.name:
         return run.label
     return line.name if alone else f"{run.label}, {line.name}"
+
+
+def _paint(run: Run, line: Series, *, alone: bool) -> str:
+    return line.colour if line.colour and alone else run.colour
 
 
 def _entities(run: Run, plot: Plot) -> list[tuple[str, list[Series]]]:
@@ -187,26 +189,25 @@ def _is_demanded(run: Run, channel: str) -> bool:
     return demand is None or not run.has(demand) or bool(np.any(run.recording[demand]))
 
 
-def legend(runs: Sequence[Run]) -> rrb.Spatial2DView:
-    """The view that names the colours of the runs, which are the same in all plots, and so hides none of them."""
-    return rrb.Spatial2DView(
-        origin=f"/{LEGEND}",
-        name="Curves",
-        titlebar=False,
-        visual_bounds=rrb.VisualBounds2D(x_range=(-0.5, len(runs) - 0.5), y_range=(-0.05, 0.05)),
-    )
+def pages(run: Run) -> dict[str, tuple[Plot, ...]]:
+    """The plots of a run, by the name of the page on which they stand."""
+    return {"Motion": MOTION, "Driving": DRIVING, "Body": BODY, "Wheels": WHEELS, "Links": links(run)}
 
 
-def send_legend(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
-    """Sends a line and a name for each run."""
-    for number, run in enumerate(runs):
-        style = {"colors": [bytes_of(run.colour)], "radii": rr.Radius.ui_points(2.5)}
-        line = np.array([(number - 0.45, 0.0), (number - 0.38, 0.0)])
-        stream.log(f"{LEGEND}/{run.name}/line", rr.LineStrips2D([line], **style), static=True)
-        name = rr.Points2D(
-            [(number, -0.03)], labels=[run.label], show_labels=True, colors=[bytes_of(run.colour)], radii=0.0
-        )
-        stream.log(f"{LEGEND}/{run.name}/name", name, static=True)
+def curves(plots: Sequence[Plot], run: Run, *, alone: bool) -> dict[str, str]:
+    """Names and colours of the lines of a run.
+
+    Args:
+        plots: The plots.
+        run: The run.
+        alone: Whether it is the only run; see `send_plots`.
+    """
+    found = {}
+    for plot in plots:
+        own = alone or plot not in OF_CAR
+        lines = [line for _, lines in _entities(run, plot) for line in lines]
+        found |= {_name(run, line, alone=own): _paint(run, line, alone=own) for line in lines}
+    return found
 
 
 def views(plots: Sequence[Plot], runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
@@ -215,10 +216,8 @@ def views(plots: Sequence[Plot], runs: Sequence[Run]) -> list[rrb.TimeSeriesView
     found = [(plot, [entity for run in runs for entity in _entities(run, plot)]) for plot in plots]
     filled = [(plot, entities) for plot, entities in found if entities]
     for plot, entities in filled:
-        # What several runs have in common, `legend` says.
-        several = len(runs) == 1 and sum(len(lines) for _, lines in entities) > 1
         limits = _range(plot, runs, len(filled))
-        shown.append(_view(plot.title, [f"/{path}" for path, _ in entities], limits, legend=several))
+        shown.append(_view(plot.title, [f"/{path}" for path, _ in entities], limits))
     return shown
 
 
@@ -277,11 +276,7 @@ def views_by_corner(plot: Plot, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]
         }
         if styles:
             head, _, unit = plot.title.rpartition(" [")
-            shown.append(
-                _view(
-                    f"{head}, {line.name} [{unit}", list(styles), _range(plot, runs, len(CORNERS)), styles, legend=False
-                )
-            )
+            shown.append(_view(f"{head}, {line.name} [{unit}", list(styles), _range(plot, runs, len(CORNERS)), styles))
     return shown
 
 
@@ -290,8 +285,6 @@ def _view(
     contents: list[str],
     limits: tuple[float, float],
     styles: dict[Any, rr.SeriesLines] | None = None,
-    *,
-    legend: bool,
 ) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",
@@ -301,6 +294,5 @@ def _view(
         # Zooming or moving one plot moves all.
         axis_y=rrb.ScalarAxis(range=limits),
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-        # At the left: a manoeuvre begins quietly.
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        plot_legend=rrb.PlotLegend(visible=False),
     )

@@ -12,8 +12,9 @@ from activesteer.playback.car import send_car, send_ghost
 from activesteer.playback.course import send_course, send_road, send_track
 from activesteer.playback.events import send_events
 from activesteer.playback.layout import SUMMARY
+from activesteer.playback.legend import LEGEND, LEGEND_OF_RUNS, send_legend
 from activesteer.playback.links import send_links
-from activesteer.playback.plots import send_legend, send_plots
+from activesteer.playback.plots import curves, pages, send_plots
 from activesteer.playback.runs import Run
 from activesteer.playback.showing import Showing
 from activesteer.playback.summary import summary
@@ -59,8 +60,11 @@ def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint,
             if other is not run:
                 send_ghost(stream, run, other)
         send_plots(stream, run, alone=not several)
+        for page, shown in pages(run).items():
+            send_legend(stream, f"{LEGEND}/{run.name}/{page}", curves(shown, run, alone=not several))
         send_events(stream, run)
-    send_legend(stream, runs)
+    if several:
+        send_legend(stream, LEGEND_OF_RUNS, {run.label: run.colour for run in runs})
     text = rr.TextDocument(summary(runs, how.verdict), media_type=rr.MediaType.MARKDOWN)
     stream.log(SUMMARY, text, static=True)
     stream.flush()

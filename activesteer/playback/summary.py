@@ -23,12 +23,12 @@ def summary(runs: Sequence[Run], verdict: Sequence[str] = ()) -> str:
         lines += [*(f"- {_emphasised(line)}" for line in verdict), ""]
     names = list(dict.fromkeys(name for run in runs for name in run.recording.metrics))
     if names:
-        lines += [f"| metric | unit | {' | '.join(run.short for run in runs)} |", "|---" * (2 + len(runs)) + "|"]
+        lines += [f"| metric | {' | '.join(run.short for run in runs)} |", "|---" * (1 + len(runs)) + "|"]
     for name in names:
         words, unit, _ = metric_label(name)
         found = [run.recording.metrics.get(name) for run in runs]
         values = ("" if value is None else metric_number(name, value) for value in found)
-        lines.append(f"| {words} | {unit} | {' | '.join(values)} |")
+        lines.append(f"| {words}{'' if unit == '-' else f' [{unit}]'} | {' | '.join(values)} |")
     lines.append("")
     for run in runs:
         metadata = run.recording.metadata

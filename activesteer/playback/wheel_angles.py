@@ -33,7 +33,7 @@ _EVERY: Final = 2
 """Of the poses, every second one: 50 a second."""
 _ABOVE_ROAD_M: Final = 0.05
 _AHEAD: Final = (245, 245, 245)
-_APART_M: Final = 5.5
+_APART_M: Final = 4.2
 """From the middle of a car in the plan to that of the next [m]."""
 _RAYS: Final = range(1, SLICES + 2, 2)
 """Points of the arc to which the plan has a line from the tip: it can fill no area."""
@@ -72,7 +72,7 @@ def plan_view(runs: Sequence[Run]) -> rrb.Spatial2DView:
         runs: The runs, from left to right.
     """
     found = [footprint_of(run.recording.metadata) or Footprint() for run in runs]
-    front = max(size.front_m for size in found) + 1.5
+    front = max(size.front_m for size in found) + 1.9
     rear = min(size.rear_m for size in found) - 1.2
     at_front, _, at_rear, _ = factors([run.recording for run in runs])
     scale = f"x{at_front}" if at_front == at_rear else f"front x{at_front}, rear x{at_rear}"
@@ -104,7 +104,7 @@ def _send_wedges(
     stream.send_columns(f"{path}/wheel", when, lines.partition(lengths=[corners] * rows))
     ahead = rr.LineStrips3D(placed[0][:, [0, 1]], colors=[_AHEAD], radii=[0.015])
     stream.log(f"{path}/ahead", ahead, static=True)
-    beside = np.column_stack([tips * (1.0, 2.1), np.full(corners, _ABOVE_ROAD_M)])
+    beside = np.column_stack([tips * (1.0, 2.5), np.full(corners, _ABOVE_ROAD_M)])
     style: dict[str, Any] = {"colors": [colour], "radii": [0.02], "show_labels": True}
     stream.log(f"{path}/angle", rr.Points3D.from_fields(positions=beside, **style), static=True)
     stream.send_columns(f"{path}/angle", when, rr.Points3D.columns(labels=texts).partition(lengths=[corners] * rows))
@@ -127,7 +127,9 @@ def _send_plan(
     drawn, path, colour = plan(size, *angles), f"{PLAN}/{run.name}", bytes_of(run.colour)
     rows = len(drawn.wedges)
     body = placed(np.vstack([drawn.body, drawn.body[:1]]))
-    name = rr.Points2D([placed(np.array([0.5 * size.rear_m, 0.0]))], labels=[run.short], colors=[colour], radii=[0.01])
+    name = rr.Points2D(
+        [placed(np.array([-0.5 * size.wheelbase_m, 0.0]))], labels=[run.short], colors=[colour], radii=[0.01]
+    )
     stream.log(f"{path}/body", rr.LineStrips2D([body], colors=[colour], radii=[0.05]), static=True)
     stream.log(f"{path}/name", name, static=True)
     outline = np.concatenate([drawn.wheels, drawn.wheels[..., :1, :]], axis=-2)
@@ -140,7 +142,7 @@ def _send_plan(
         columns = rr.LineStrips2D.columns(strips=flat.reshape(-1, 2, 2))
         stream.send_columns(f"{path}/{part}", when, columns.partition(lengths=[flat.shape[1]] * rows))
     # One number for each axle has room: that of the left wheel.
-    at = placed(wheel_centres(size)[[0, 2]] * (1.0, 0.0) + [(1.75, 0.0), (-1.2, 0.0)])
+    at = placed(wheel_centres(size)[[0, 2]] * (1.0, 0.0) + [(2.3, 0.0), (-1.2, 0.0)])
     label = rr.Points2D.from_fields(positions=at, colors=[colour], radii=[0.01], show_labels=True)
     stream.log(f"{path}/angle", label, static=True)
     shown = [text for row in range(rows) for text in (texts[4 * row], texts[4 * row + 2])]

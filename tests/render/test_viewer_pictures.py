@@ -34,6 +34,7 @@ PLOTS = (
     "Sideslip angle [deg]",
     "Added steer angles, rear thick, front thin [deg]",
 )
+ALONE = "Curves: ars/Motion"
 BESIDE = ("Course [m]", "Summary", *PLOTS)
 """What stands beside the cars on the first page."""
 
@@ -45,7 +46,7 @@ def alone(viewer: Headless, drives: Drives, folder: Path) -> dict[float, Picture
     return _looked_at(
         viewer,
         folder / "alone.rrd",
-        (CARS[1], f"{CARS[1]}, from above", _plan({"ars": drives["ars"]}), *BESIDE),
+        (CARS[1], "From above", _plan({"ars": drives["ars"]}), ALONE, *BESIDE),
         (0.5, AT_S),
     )
 
@@ -54,7 +55,7 @@ def alone(viewer: Headless, drives: Drives, folder: Path) -> dict[float, Picture
 def together(viewer: Headless, drives: Drives, folder: Path) -> Pictures:
     """The page that compares."""
     save(runs_of(drives), folder / "together.rrd", Showing(compare=True))
-    return _looked_at(viewer, folder / "together.rrd", (*CARS, _plan(drives), "Curves", *BESIDE), (AT_S,))[AT_S]
+    return _looked_at(viewer, folder / "together.rrd", (*CARS, _plan(drives), "Curves: runs", *BESIDE), (AT_S,))[AT_S]
 
 
 def _plan(drives: Drives) -> str:
@@ -126,7 +127,7 @@ def test_the_camera_follows_the_car(alone: dict[float, Pictures]) -> None:
 
 
 def test_car_and_tyre_forces_are_seen_from_above_left_is_up(alone: dict[float, Pictures], drives: Drives) -> None:
-    pixels = alone[AT_S][f"{CARS[1]}, from above"].pixels
+    pixels = alone[AT_S]["From above"].pixels
     shell = _shell(pixels)
     # The car, without cones and the driven line, which are of its colour.
     shell &= (shell.mean(axis=1) > 0.2)[:, None] & (shell.mean(axis=0) > 0.15)
@@ -162,6 +163,13 @@ def test_signals_are_plotted_over_the_whole_time(alone: dict[float, Pictures]) -
         line = like(pixels, ARS, 70)
         assert spread(line) > 0.6, name  # the desired yaw rate covers some of it
         assert np.ptp(np.nonzero(line)[0]) > 0.25 * pixels.shape[0], name
+
+
+def test_the_names_of_the_curves_stand_beside_the_plots_in_their_colours(alone: dict[float, Pictures]) -> None:
+    names = alone[AT_S][ALONE].pixels
+    for colour in (ARS, (240, 228, 66)):  # the run, and what is desired
+        assert like(names, colour, 30).sum() > 30, colour
+        assert like(alone[AT_S][PLOTS[0]].pixels, colour, 60).any(axis=0).mean() > 0.2, colour
 
 
 def test_the_summary_is_there(alone: dict[float, Pictures]) -> None:
@@ -208,6 +216,6 @@ def test_the_plots_of_wheels_and_links_are_drawn(viewer: Headless, drives: Drive
         for name, picture in _looked_at(viewer, file, titles, (AT_S,))[AT_S].items():
             assert picture.reports == []
             bright = np.ptp(picture.pixels, axis=-1) > 60
-            assert spread(bright) > 0.6, name  # the legend covers some of it
+            assert spread(bright) > 0.85, name
             hues = {tuple(pixel) for pixel in (picture.pixels[bright] // 64).tolist()}
             assert len(hues) >= 3, name

@@ -16,10 +16,10 @@ def test_scenario_systems_and_metrics_side_by_side() -> None:
     assert lines[0] == "**A circle**"
     assert text.count("A circle") == 1
     assert "- **1 no control**: controller none, vehicle compact, activesteer ?, road.mu = 0.4" in lines
-    assert "| metric | unit | none | ars |" in lines
-    assert "| yaw rate peak | deg/s | 11.459 | 11.459 |" in lines
-    assert "| lag | s | - | - |" in lines  # not defined
-    assert "| only here | s |  | 1.500 |" in lines
+    assert "| metric | none | ars |" in lines
+    assert "| yaw rate peak [deg/s] | 11.459 | 11.459 |" in lines
+    assert "| lag [s] | - | - |" in lines  # not defined
+    assert "| only here [s] |  | 1.500 |" in lines
 
 
 def test_an_incomplete_run_says_so() -> None:
