@@ -53,23 +53,6 @@ def friction_ellipse(
 ):  # fmt: skip
     """What combined slip leaves of both pure forces: an ellipse, divided by the ratio of the shifted slips.
 
-    Args:
-        p: Record of the tyre.
-        fz: Load [N].
-        dfz: Load relative to the nominal one, less 1.
-        d: Rolling direction.
-        kappa: Longitudinal slip.
-        alpha_s: Slip angle alpha*.
-        fx0: Longitudinal force at pure slip [N].
-        fy0: Lateral force at pure slip [N].
-        dx: Peak D_x [N].
-        dy: Peak D_y [N].
-        k_x: Slip stiffness [N].
-        k_y: Cornering stiffness [N/rad].
-        s_hy: Horizontal shift of the lateral force.
-        s_vy: Vertical shift of the lateral force [N].
-        lmux: Longitudinal friction scale.
-
     Returns:
         Factors of the longitudinal and of the lateral force, 0 to 1.
 

@@ -115,17 +115,6 @@ def steady_state(
 ):
     """One evaluation.
 
-    Args:
-        p: Record of the tyre.
-        fz: Load [N].
-        kappa: Longitudinal slip.
-        alpha: Slip angle [rad].
-        gamma: Camber [rad].
-        pressure: Inflation pressure [Pa].
-        vx: Speed along the heading [m/s].
-        mu: Friction of the road relative to that of the file.
-        turn_slip: Yaw rate over speed [1/m], positive to the left; MF 6.x only.
-
     Returns:
         A `SteadyState`.
     """

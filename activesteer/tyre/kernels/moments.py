@@ -59,35 +59,6 @@ def aligning_moment(
 ):  # fmt: skip
     """Aligning moment at combined slip (4.E31 to 4.E49, 4.E71 to 4.E78).
 
-    Args:
-        p: Record of the tyre.
-        fz: Load [N], > 0.
-        dfz: Load relative to the nominal one, less 1.
-        dpi: Pressure relative to the nominal one, less 1.
-        kappa: Longitudinal slip.
-        alpha_s: Slip angle alpha*.
-        gamma_s: Camber gamma*.
-        gamma: Camber [rad].
-        vx: Speed along the wheel's heading [m/s].
-        tan_alpha: Tangent of the slip angle.
-        lmu: Lateral friction scale.
-        d: Rolling direction.
-        k_x: Slip stiffness [N].
-        k_y: Cornering stiffness [N/rad].
-        b_y: Stiffness factor of the lateral force.
-        c_y: Shape factor of the lateral force.
-        s_hy: Horizontal shift of the lateral force.
-        s_vy: Vertical shift of the lateral force [N].
-        fx: Longitudinal force [N].
-        fy: Lateral force [N].
-        fy_trail: Lateral force that acts through the trail [N].
-        z0: Turn slip factor.
-        z2: Turn slip factor.
-        z5: Turn slip factor.
-        z6: Turn slip factor.
-        z7: Turn slip factor.
-        z8: Turn slip factor.
-
     Returns:
         Aligning moment [Nm], pneumatic trail [m], residual moment [Nm].
     """

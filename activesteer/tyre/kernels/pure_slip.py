@@ -61,17 +61,6 @@ def longitudinal_force(
 ):
     """Longitudinal force at pure slip (4.E9 to 4.E18).
 
-    Args:
-        p: Record of the tyre.
-        fz: Load [N], > 0.
-        dfz: Load relative to the nominal one, less 1.
-        dpi: Pressure relative to the nominal one, less 1.
-        kappa: Longitudinal slip.
-        gamma: Camber [rad].
-        lmu: Longitudinal friction scale.
-        d: Rolling direction, 1 forward, -1 backward, between them below walking speed.
-        z1: Turn slip factor.
-
     Returns:
         Force [N], peak friction, slip stiffness [N].
     """
@@ -94,20 +83,6 @@ def lateral_force(
     z0: float, z2: float, z3: float, z4: float,
 ):  # fmt: skip
     """Lateral force at pure side slip (4.E19 to 4.E30).
-
-    Args:
-        p: Record of the tyre.
-        fz: Load [N], > 0.
-        dfz: Load relative to the nominal one, less 1.
-        dpi: Pressure relative to the nominal one, less 1.
-        alpha_s: Slip angle alpha*.
-        gamma_s: Camber gamma*.
-        lmu: Lateral friction scale.
-        d: Rolling direction, 1 forward, -1 backward, between them below walking speed.
-        z0: Turn slip factor.
-        z2: Turn slip factor.
-        z3: Turn slip factor.
-        z4: Turn slip factor.
 
     Returns:
         Force [N], peak friction, cornering stiffness K_yalpha [N/rad], B_y, C_y, S_Hy, S_Vy [N].

@@ -37,23 +37,7 @@ def turn_slip_factors(
     p, fz: float, dfz: float, dpi: float, kappa: float, tan_alpha: float, gamma: float, gamma_s: float,
     pressure: float, vx: float, lmuy: float, g_y: float, turn_slip: float,
 ):  # fmt: skip
-    """The factors zeta 0 to 8.
-
-    Args:
-        p: Record of the tyre.
-        fz: Load [N], > 0.
-        dfz: Load relative to the nominal one, less 1.
-        dpi: Pressure relative to the nominal one, less 1.
-        kappa: Longitudinal slip.
-        tan_alpha: Tangent of the slip angle.
-        gamma: Camber [rad].
-        gamma_s: Camber gamma*.
-        pressure: Inflation pressure [Pa].
-        vx: Speed along the heading [m/s].
-        lmuy: Lateral friction scale.
-        g_y: Weight of the lateral force at combined slip.
-        turn_slip: Yaw rate over speed [1/m], positive to the left.
-    """
+    """The factors zeta 0 to 8."""
     r0 = p.UNLOADED_RADIUS
     fz0 = p.LFZO * p.FNOMIN
     epsilon_g = min(p.PECP1 * (1.0 + p.PECP2 * dfz), 0.99)
