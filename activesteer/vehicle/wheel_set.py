@@ -63,11 +63,6 @@ class WheelSet:
 
     def inertias_kgm2(self) -> list[float]:
         """What each turns with against the rest of the car."""
-        inertias_kgm2 = []
-        unit, product = np.zeros(self._model.nv), np.zeros(self._model.nv)
-        for spin in self.spins:
-            unit[:] = 0.0
-            unit[spin] = 1.0
-            mujoco.mj_mulM(self._model, self._data, product, unit)
-            inertias_kgm2.append(float(product[spin]))
-        return inertias_kgm2
+        mass_matrix = np.zeros((self._model.nv, self._model.nv))
+        mujoco.mj_fullM(self._model, self._data, mass_matrix)
+        return mass_matrix.diagonal()[self.spins].tolist()

@@ -80,7 +80,9 @@ class _Linear:
         self._radius = (data.xpos[self.wheels, 2] - _LIFT_M) / np.sqrt(1.0 - data.xmat[self.wheels, 7] ** 2)
         self._start_m = self.contacts()
         self.stiffness, self.damping = self._differences()
-        self.mass = self._mass()
+        mass = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, mass)
+        self.mass: Array = mass[np.ix_(self.free, self.free)]
 
     def contacts(self) -> Array:
         """Contact points [m], shape (4, 3)."""
@@ -126,15 +128,6 @@ class _Linear:
             damping[:, column] = (sides[1][1] - sides[0][1]) / (2.0 * _DIFFERENCE)
         self._forces()
         return stiffness, damping
-
-    def _mass(self) -> Array:
-        columns = []
-        for dof in self.free:
-            unit, product = np.zeros(self.model.nv), np.zeros(self.model.nv)
-            unit[dof] = 1.0
-            mujoco.mj_mulM(self.model, self.data, product, unit)
-            columns.append(product[self.free])
-        return np.array(columns)
 
     def velocity_map(self, body: int, point_m: Array) -> tuple[Array, Array]:
         """Jacobians (3, free) of a point's velocity and of the body's rotation."""
