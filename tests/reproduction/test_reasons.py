@@ -20,6 +20,7 @@ NARROW_BAND = {
     for system in ("ars", "afs")
     for end, value in (("start", 0.09), ("end", 0.16))
 }
+LIGHT, HEAVY = {"factors.mass": 0.9}, {"factors.mass": 1.1}
 
 
 def claims(maneuver: str, overrides: Mapping[str, Any]) -> dict[str, Claim]:
@@ -57,7 +58,7 @@ def test_it_is_the_prediction_that_takes_the_sideslip_of_the_step_steer() -> Non
     assert (none - half) == pytest.approx(0.5 * (none - whole), rel=0.2)
 
 
-@pytest.mark.parametrize("overrides", [NARROW_BAND, {"factors.mass": 0.9}, {"factors.mass": 1.1}], ids=["narrow band", "light", "heavy"])
+@pytest.mark.parametrize("overrides", [NARROW_BAND, LIGHT, HEAVY], ids=["narrow band", "light", "heavy"])
 def test_tracks_of_the_lane_change_look_alike_once_front_superposition_acts(overrides: dict[str, float]) -> None:
     assert claims("double_lane_change", overrides)["L1"].passed
 
