@@ -51,7 +51,7 @@ def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
     from activesteer.commands.output import log_to_terminal
     from activesteer.errors import ActiveSteerError
 
-    stop.options = options = all_commands().parser().parse_args(arguments)
+    stop.options = options = all_commands().parse(arguments)
     try:
         with log_to_terminal():
             return options.action(options)

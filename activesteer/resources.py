@@ -86,6 +86,11 @@ def list_vehicles() -> list[str]:
     return _names(models_dir() / "vehicles")
 
 
+def list_studies() -> list[str]:
+    """Names of the studies that come with the package, sorted."""
+    return _names(studies_dir())
+
+
 def list_drivers() -> list[str]:
     """Names of the drivers that come with the package, sorted."""
     return _names(models_dir() / "drivers")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import difflib
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.config import parse_value, read_toml
-from activesteer.errors import MAX_SHOWN, ParameterError
+from activesteer.errors import MAX_SHOWN, ParameterError, nearest_names
 from activesteer.resources import DEFAULT_DRIVER
 
 if TYPE_CHECKING:
@@ -52,7 +54,9 @@ class Commands:
         """
         group = self._groups[next(reversed(self._groups))]
         group[name] = help
-        return self._added.add_parser(name, description=description or f"{help[0].upper()}{help[1:]}.")
+        parser = self._added.add_parser(name, description=description or f"{help[0].upper()}{help[1:]}.")
+        parser.set_defaults(parser=parser)
+        return parser
 
     def names(self) -> list[str]:
         """Names of the commands."""
@@ -65,6 +69,36 @@ class Commands:
             lines += [f"{title}:", *(f"  {name:{_NAME_WIDTH}}{words}" for name, words in group.items()), ""]
         self._parser.epilog = "\n".join([*lines, "`activesteer COMMAND --help` tells more of a command."])
         return self._parser
+
+    def parse(self, arguments: Sequence[str] | None = None) -> argparse.Namespace:
+        """What a command line asks for; one that is wrong ends the program with what would be right.
+
+        Args:
+            arguments: Words after the program's name; those of the process where not given.
+        """
+        words = list(sys.argv[1:] if arguments is None else arguments)
+        command = next((word for word in words if not word.startswith("-")), None)
+        if command is not None and command not in self.names():
+            self._parser.error(f"there is no command {command!r}; {nearest_names(command, self.names())}")
+        options, unknown = self.parser().parse_known_args(words)
+        if unknown:
+            parser: argparse.ArgumentParser = options.parser
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}; {self._hint(parser, words, unknown[0])}")
+        return options
+
+    def _hint(self, parser: argparse.ArgumentParser, words: Sequence[str], unknown: str) -> str:
+        """Where an argument belongs, or which one may have been meant."""
+        known = list(parser._option_string_actions)
+        option = unknown.partition("=")[0]
+        if option in known:
+            return f"{option} stands behind the command: activesteer {next(w for w in words if w[0] != '-')} {option}"
+        if close := difflib.get_close_matches(option, known, 1, 0.7):
+            return f"did you mean {close[0]}?"
+        if "=" in unknown and "--set" in known:
+            return f"a parameter is replaced by --set {unknown}"
+        if "--set" in words and not unknown.startswith("-"):
+            return "--set KEY=VALUE has no blanks around its sign"
+        return f"`{parser.prog} --help` lists what there is"
 
 
 def add_vehicle(parser: argparse.ArgumentParser) -> None:
@@ -105,7 +139,7 @@ def add_overrides(parser: argparse.ArgumentParser) -> None:
 
 def add_controller(parser: argparse.ArgumentParser, *, several: bool, default: str = "none") -> None:
     """Adds `-c`; where there may be several, `options.controller` is a list, or None: then `default`, in words."""
-    words = "none, ars, afs, a variant or its file, or my_file.py:MyController?gain=2"
+    words = "none, ars, afs or another of `activesteer list`, a variant's file, or my_file.py:MyController?gain=2"
     parser.add_argument(
         "-c", "--controller", metavar="CONTROLLER",
         action="append" if several else "store", default=None if several else "none",

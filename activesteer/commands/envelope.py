@@ -24,7 +24,7 @@ def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("envelope", help="how fast cars get through lanes or cones, and where who is lost")
     parser.add_argument("maneuver", metavar="MANEUVER", help="a lane change or slalom: a name, or a TOML file")
-    add_controller(parser, several=True)
+    add_controller(parser, several=True, default="none, ars and afs")
     parser.add_argument(
         "--driver", action="append", metavar="DRIVER",
         help="who drives, as for `run`; a map for each (default: that of `run`)",

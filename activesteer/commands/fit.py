@@ -24,7 +24,7 @@ def add_to(commands: Any) -> None:
         "with which the car comes nearest to what was measured.",
     )
     parser.add_argument(
-        "study", type=Path, metavar="STUDY.toml", help="a study with recordings for manoeuvres and a table [fit]"
+        "study", metavar="STUDY", help="a study file with recordings for manoeuvres and a table [fit], or its name"
     )
     add_output(parser, "DIR", "folder for fit.json, fit.html and overrides.toml; none are written without it")
     add_workers(parser)
@@ -47,7 +47,7 @@ def _fit(options: argparse.Namespace) -> int:
     if options.output is not None:
         from activesteer.measured.fit_page import write_fit
 
-        files = write_fit(found, options.study.stem, options.output)
+        files = write_fit(found, Path(options.study).stem, options.output)
     if options.json:
         print_json(found.to_json())
         return 0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from activesteer.commands.arguments import add_recording
-from activesteer.commands.output import print_entry
+from activesteer.commands.arguments import add_json, add_recording
+from activesteer.commands.output import print_entry, print_json
 from activesteer.errors import shown
 from activesteer.files import shown_path
 
@@ -15,6 +15,7 @@ def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("info", help="what a recording holds")
     add_recording(parser)
+    add_json(parser)
     parser.set_defaults(action=_info)
 
 
@@ -26,6 +27,13 @@ def _info(options: argparse.Namespace) -> int:
     recording = Recording.open(options.file, recover=True)
     metadata = recording.metadata
     time_s = recording.time_s
+    if options.json:
+        channels = {each.name: {"unit": each.unit, "meaning": each.meaning} for each in recording.channels}
+        span = {"from_s": float(time_s[0]), "to_s": float(time_s[-1])} if len(time_s) else {}
+        print_json(
+            {"steps": len(time_s), **span, "metadata": metadata, "metrics": recording.metrics, "channels": channels}
+        )
+        return 0
     span = f"{time_s[0]:.3f} to {time_s[-1]:.3f} s, {len(time_s)} steps" if len(time_s) else "no steps"
     print(f"{shown_path(options.file)}: {span}")
     for key in ("maneuver", "vehicle"):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any, Final
 
-from activesteer.commands.arguments import add_figures_folder, add_overrides, add_vehicle, overrides_of
+from activesteer.commands.arguments import add_figures_folder, add_json, add_overrides, add_vehicle, overrides_of
+from activesteer.commands.output import print_json
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder
 
@@ -19,6 +20,7 @@ def add_to(commands: Any) -> None:
     add_vehicle(parser)
     add_overrides(parser)
     parser.add_argument("--speed-kmh", type=float, default=80.0, metavar="V", help="default: 80")
+    add_json(parser)
     add_figures_folder(parser)
     parser.set_defaults(action=_linearise)
 
@@ -28,16 +30,24 @@ def _linearise(options: argparse.Namespace) -> int:
 
     overrides = overrides_of(options)
     car = linear_car(options.vehicle, options.speed_kmh / 3.6, overrides)
-    print(f"{options.vehicle} at {options.speed_kmh:g} km/h")
-    print(eigenvalue_table(car.modes()))
-    if options.output is None:
-        return 0
-    from activesteer.analysis.linear_plots import draw_bode, draw_root_locus
-
-    make_folder(options.output, ParameterError)
-    speeds = [speed / 3.6 for speed in _LOCUS_KMH]
+    modes, figures = car.modes(), []
     label = f"{options.speed_kmh:g} km/h"
-    print(f"figure: {draw_bode({label: car.state_space()}, options.output / 'bode.png')}")
-    systems = [each.state_space() for each in linear_cars(options.vehicle, speeds, overrides)]
-    print(f"figure: {draw_root_locus(systems, speeds, options.output / 'root_locus.png')}")
+    if options.output is not None:
+        from activesteer.analysis.linear_plots import draw_bode, draw_root_locus
+
+        make_folder(options.output, ParameterError)
+        speeds = [speed / 3.6 for speed in _LOCUS_KMH]
+        systems = [each.state_space() for each in linear_cars(options.vehicle, speeds, overrides)]
+        figures = [
+            draw_bode({label: car.state_space()}, options.output / "bode.png"),
+            draw_root_locus(systems, speeds, options.output / "root_locus.png"),
+        ]
+    if options.json:
+        rows = [mode.to_json() for mode in modes]
+        print_json({"speed_mps": car.speed_mps, "modes": rows, "figures": [str(path) for path in figures]})
+        return 0
+    print(f"{options.vehicle} at {label}")
+    print(eigenvalue_table(modes))
+    for path in figures:
+        print(f"figure: {path}")
     return 0

@@ -1,11 +1,14 @@
-"""`activesteer list`: the manoeuvres, controllers, drivers, vehicles and standards that there are."""
+"""`activesteer list`: the manoeuvres, controllers, drivers, vehicles, studies and standards that there are."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, Final
 
-from activesteer.commands.output import print_entry
+from activesteer.commands.arguments import add_json
+from activesteer.commands.output import print_entry, print_json
 
 _WIDTH: Final = 25
 """Of the column of names."""
@@ -13,42 +16,39 @@ _WIDTH: Final = 25
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
-    parser = commands.add_parser("list", help="manoeuvres, controllers, drivers, vehicles, standards")
+    parser = commands.add_parser("list", help="manoeuvres, controllers, drivers, vehicles, studies, standards")
+    add_json(parser)
     parser.set_defaults(action=_list)
 
 
-def _list(_options: argparse.Namespace) -> int:
-    from activesteer.config import read_toml
+def _list(options: argparse.Namespace) -> int:
+    from activesteer import resources
     from activesteer.controllers import BUILT_IN, read_variant
-    from activesteer.resources import (
-        find_driver_file,
-        find_maneuver,
-        list_controller_variants,
-        list_drivers,
-        list_maneuvers,
-        list_vehicles,
-    )
     from activesteer.standards.catalogue import STANDARDS
 
-    print("manoeuvres:")
-    for name in list_maneuvers():
-        title = read_toml(find_maneuver(name))[0].get("title", "")
-        print_entry(f"  {name:{_WIDTH}} ", title, _WIDTH + 3)
-    print("controllers:")
-    for name, made_from in BUILT_IN.items():
-        print_entry(f"  {name:{_WIDTH}} ", (made_from.__doc__ or "").splitlines()[0], _WIDTH + 3)
-    for name in list_controller_variants():
-        print_entry(f"  {name:{_WIDTH}} ", read_variant(name).title, _WIDTH + 3)
-    print_entry(f"  {'my_file.py:MyController':{_WIDTH}} ", "your own: step(self, command, measurement)", _WIDTH + 3)
-    print("drivers:")
-    for name in list_drivers():
-        print_entry(f"  {name:{_WIDTH}} ", read_toml(find_driver_file(name))[0].get("title", ""), _WIDTH + 3)
-    own = "your own: step(self, reference, measurement, motion)"
-    print_entry(f"  {'my_file.py:MyDriver':{_WIDTH}} ", own, _WIDTH + 3)
-    print("vehicles:")
-    for name in list_vehicles():
-        print(f"  {name}")
-    print("standards:")
-    for name, standard in STANDARDS.items():
-        print_entry(f"  {name:{_WIDTH}} ", standard.title, _WIDTH + 3)
+    controllers = {name: (made_from.__doc__ or "").splitlines()[0] for name, made_from in BUILT_IN.items()}
+    controllers |= {name: read_variant(name).title for name in resources.list_controller_variants()}
+    found = {
+        "manoeuvres": _titles(resources.list_maneuvers(), resources.find_maneuver),
+        "controllers": controllers,
+        "drivers": _titles(resources.list_drivers(), resources.find_driver_file),
+        "vehicles": dict.fromkeys(resources.list_vehicles(), ""),
+        "studies": _titles(resources.list_studies(), resources.find_study),
+        "standards": {name: standard.title for name, standard in STANDARDS.items()},
+    }
+    if options.json:
+        print_json(found)
+        return 0
+    found["controllers"]["my_file.py:MyController"] = "your own: step(self, command, measurement)"
+    found["drivers"]["my_file.py:MyDriver"] = "your own: step(self, reference, measurement, motion)"
+    for kind, titles in found.items():
+        print(f"{kind}:")
+        for name, title in titles.items():
+            print_entry(f"  {name:{_WIDTH}} ", title, _WIDTH + 3)
     return 0
+
+
+def _titles(names: Iterable[str], find: Callable[[str], Path]) -> dict[str, str]:
+    from activesteer.config import read_toml
+
+    return {name: read_toml(find(name))[0].get("title", "") for name in names}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from activesteer.commands.arguments import add_controller, add_json, add_overrides, add_vehicle, overrides_of
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import RunCounter
+from activesteer.errors import ParameterError
 
 if TYPE_CHECKING:
     from activesteer.studies.margins import LoopMargins
@@ -49,6 +50,8 @@ def add_to(commands: Any) -> None:
 def _margins(options: argparse.Namespace) -> int:
     found = _found(options)
     rows = [margins.to_json() for margins in found]
+    if not rows:
+        raise ParameterError("none of these controllers answers to a measurement: there is no loop", key="-c")
     if options.json:
         print_json(rows)
         return 0

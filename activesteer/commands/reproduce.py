@@ -34,7 +34,7 @@ def add_to(commands: Any) -> None:
         "15 N runs; with --controllers, what each of these does there",
     )  # fmt: skip
     parser.add_argument(
-        "--controllers", metavar="C,C...",
+        "-c", "--controllers", action="append", metavar="C,C...",
         help="instead: these controllers side by side, with the sensors of production cars, in the five scenarios, a "
         "step at 120 km/h, the severe lane change, braking on split friction and in a turn, a turn across snow",
     )  # fmt: skip
@@ -169,4 +169,4 @@ def _population(options: argparse.Namespace) -> int:
 
 
 def _controllers(options: argparse.Namespace) -> list[str]:
-    return [name.strip() for name in options.controllers.split(",") if name.strip()]
+    return [name.strip() for name in ",".join(options.controllers).split(",") if name.strip()]

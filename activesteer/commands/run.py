@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands.arguments import (
     add_controller,
@@ -23,6 +23,9 @@ from activesteer.files import make_folder
 if TYPE_CHECKING:
     from activesteer.analysis.claims import Scorecard
     from activesteer.plugins import Plugin
+
+_OTHER_FILES: Final = frozenset((".mp4", ".gif", ".rrd", ".csv", ".mat", ".parquet", ".json", ".html", ".png", ".pdf"))
+"""Endings of what other commands write: a folder that is called so is a mistake."""
 
 
 def add_to(commands: Any) -> None:
@@ -116,6 +119,8 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) ->
         if len(controllers) > 1:
             raise ParameterError(f"-o {output}: {len(controllers)} controllers make as many files; give a folder")
         folder, paths = output.parent, [output]
+    elif output.suffix in _OTHER_FILES and not output.is_dir():
+        raise ParameterError(f"-o {output}: a recording ends in .mcap; anything else is a folder", value=output)
     else:
         folder, paths = output, [output / f"{maneuver}-{label}.mcap" for label in labels]
     make_folder(folder, ParameterError)

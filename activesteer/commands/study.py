@@ -16,7 +16,7 @@ def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("study", help="drive many runs over varied parameters; say how far they are")
     parser.add_argument("study", metavar="STUDY_OR_DIR", help="a study file or its name, or the folder of a study")
-    add_output(parser, "DIR", "folder for the results; a study that is there is gone on with")
+    add_output(parser, "DIR", "folder for the results, needed for a new study; one that is there is gone on with")
     add_workers(parser)
     parser.add_argument("--limit", type=int, metavar="N", help="make at most N runs now and leave the rest")
     parser.add_argument("--status", action="store_true", help="only say how far the study in DIR is")
@@ -28,9 +28,12 @@ def add_to(commands: Any) -> None:
 def _study(options: argparse.Namespace) -> int:
     if options.limit is not None and options.limit < 1:
         raise StudyError(f"--limit {options.limit}: at least 1 is needed")
+    from activesteer.studies.study_file import read_study
+
     given = Path(options.study)
     folder = options.output or (given if given.is_dir() else None)
     if folder is None:
+        read_study(options.study)
         raise StudyError(f"-o DIR is needed: where the results of {options.study} go")
     if options.status:
         return _status(folder, as_json=options.json)

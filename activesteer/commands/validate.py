@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from activesteer.commands.arguments import add_json, add_output, add_workers
 from activesteer.commands.output import BAD, painted, print_json
 from activesteer.commands.progress import ProgressBar
+from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.errors import ParameterError
 
 if TYPE_CHECKING:
     from activesteer.validation.reference import ReferenceData
@@ -22,7 +24,11 @@ def add_to(commands: Any) -> None:
         "validate", help="compare a car with another multibody code, or with a measurement on the road"
     )
     parser.add_argument(
-        "name", nargs="?", default="sedan", help="folder in models/reference: sedan, tesla_model_s (default: sedan)"
+        "name",
+        nargs="?",
+        default="sedan",
+        metavar="NAME",
+        help="folder in models/reference: sedan, tesla_model_s (default: sedan)",
     )
     add_output(parser, "DIR", "folder for page, JSON and runs; none are written without it")
     parser.add_argument(
@@ -33,10 +39,11 @@ def add_to(commands: Any) -> None:
         help="also: what the other code's simplifications of the tyre cost, and what the step size costs",
     )  # fmt: skip
     parser.add_argument(
-        "--samples", type=int, default=200, metavar="N",
-        help="of a car that was measured on the road: how often mass, tyre, radius, lateral acceleration are drawn",
+        "--samples", type=int, metavar="N",
+        help="of a car that was measured on the road: how often mass, tyre, radius, lateral acceleration are drawn "
+        "(default: 200)",
     )  # fmt: skip
-    parser.add_argument("--timestep", type=float, default=0.001, metavar="S", help="our step [s] (default: 0.001)")
+    parser.add_argument("--timestep", type=float, metavar="S", help="our step [s] (default: 0.001)")
     add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_validate)
@@ -45,7 +52,12 @@ def add_to(commands: Any) -> None:
 def _validate(options: argparse.Namespace) -> int:
     from activesteer.validation.measured_circle import is_measured
 
-    if is_measured(options.name):
+    measured = is_measured(options.name)
+    for name in ("reference", "study", "timestep") if measured else ("samples",):
+        if getattr(options, name):
+            other = "another code" if measured else "a measurement on the road"
+            raise ParameterError(f"is of a comparison with {other}; {options.name} is none", key=f"--{name}")
+    if measured:
         return _circle(options)
     from activesteer.validation import to_json, validate
     from activesteer.validation.page import write_page
@@ -56,7 +68,7 @@ def _validate(options: argparse.Namespace) -> int:
         result = validate(
             options.name,
             more=options.reference,
-            timestep_s=options.timestep,
+            timestep_s=options.timestep or DEFAULT_TIMESTEP_S,
             jobs=options.jobs,
             scheduler=options.scheduler,
             unknown_runs=options.output is not None,
@@ -91,11 +103,11 @@ def _validate(options: argparse.Namespace) -> int:
 
 def _circle(options: argparse.Namespace) -> int:
     from activesteer.validation.circle_page import write_circle_page
-    from activesteer.validation.measured_circle import validate_circle
+    from activesteer.validation.measured_circle import SAMPLES, validate_circle
 
     with ProgressBar("validate", quiet=options.json) as bar:
         result = validate_circle(
-            options.name, options.samples, options.jobs, scheduler=options.scheduler, progress=bar
+            options.name, options.samples or SAMPLES, options.jobs, scheduler=options.scheduler, progress=bar
         )  # fmt: skip
     if options.json:
         print_json(result.as_table())

@@ -44,6 +44,8 @@ def add_to(commands: Any) -> None:
     keyframe = actions.add_parser("keyframe", help="write the position in which a car stands, after it was edited")
     keyframe.add_argument("vehicle", metavar="PATH", help="vehicle file or its folder")
     keyframe.set_defaults(action=_keyframe)
+    for action in (new, table, check, keyframe):
+        action.set_defaults(parser=action)
 
 
 def _new(options: argparse.Namespace) -> int:

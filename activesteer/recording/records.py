@@ -118,8 +118,8 @@ def opened(path: Path) -> int:
     if stat.S_ISREG(mode):
         return descriptor
     os.close(descriptor)
-    what = "Is a directory" if stat.S_ISDIR(mode) else "it is no file, but a device or a pipe"
-    raise RecordingError(f"cannot read {shown_path(path)}: {what}", value=path)
+    what = "a folder, whose recordings are DIR/*.mcap" if stat.S_ISDIR(mode) else "a device or a pipe"
+    raise RecordingError(f"cannot read {shown_path(path)}: it is {what}", value=path)
 
 
 def read_records(descriptor: int, size: int) -> Records:

@@ -148,9 +148,9 @@ def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequenc
     for key, value in overrides.items():
         part, path = _which_part(key, type(scenario.maneuver))
         if part not in parts and path[0] != "road":
-            allowed = [*parts, "road"]
+            allowed, made = [*parts, "road"], {"maneuver": "manoeuvre"}.get(part, part)
             raise ParameterError(
-                f"is of the {part}, which is made here; keys of {' and '.join(allowed)} can be changed",
+                f"is of the {made}, which is made here; keys of {' and '.join(allowed)} can be changed",
                 key=key, value=value, allowed=allowed, overridden=True,
             )  # fmt: skip
 

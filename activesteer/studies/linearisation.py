@@ -204,7 +204,7 @@ def linear_cars(
 def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, Any] | None) -> LinearCar:
     if not MIN_SPEED_MPS <= speed_mps < math.inf:
         raise ParameterError(
-            f"is {speed_mps:g} m/s; a car can be linearised from {MIN_SPEED_MPS:g} m/s on",
+            f"is {speed_mps:g} m/s; needed are {MIN_SPEED_MPS:g} m/s ({3.6 * MIN_SPEED_MPS:g} km/h) at least",
             key="speed_mps",
             value=speed_mps,
             allowed=Range(MIN_SPEED_MPS),

@@ -26,6 +26,8 @@ from activesteer.studies.workers import in_parallel
 from activesteer.validation.circle_variations import EFFECTS, READINGS
 
 DATA: Final = "measured_circle.json"
+SAMPLES: Final = 200
+"""How often the uncertain values are drawn, unless said otherwise."""
 TOLERANCE_DEG: Final = 5.0
 TOLERANCE_FRACTION: Final = 0.03
 """Tolerance of the steering wheel angle in ISO 19364: 5 deg and 3 % of the measured value."""
@@ -150,7 +152,7 @@ def is_measured(name: str) -> bool:
 
 def validate_circle(
     name: str,
-    samples: int = 200,
+    samples: int = SAMPLES,
     jobs: int | None = None,
     *,
     scheduler: str | None = None,

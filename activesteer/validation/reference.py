@@ -58,8 +58,9 @@ class ReferenceData:
         folder = home / name
         names = [path.parent.name for path in home.glob("*/reference.toml")]
         if name not in names:
+            known = [path.name for path in home.iterdir() if is_folder(path)]  # a measured circle is one too
             raise ParameterError(
-                f"there is no reference named {shown(name)}; {nearest_names(name, names)}", value=name, allowed=names
+                f"there is no reference named {shown(name)}; {nearest_names(name, known)}", value=name, allowed=known
             )
         if more is not None and not is_folder(more):
             raise ParameterError(f"the folder of reference runs {shown_path(more)} does not exist", value=more)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,14 @@ class Mode:
     def damping_ratio(self) -> float:
         """Damping ratio [-]; 1 for a mode that only decays."""
         return -self.eigenvalue_1ps.real / abs(self.eigenvalue_1ps)
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values, without the vectors."""
+        s = self.eigenvalue_1ps
+        return {
+            "name": self.name, "natural_frequency_Hz": self.natural_frequency_Hz, "damping_ratio": self.damping_ratio,
+            "real_1ps": s.real, "imaginary_1ps": s.imag, "participation": self.participation,
+        }  # fmt: skip
 
 
 def find_modes(a: NDArray[np.float64], states: tuple[str, ...], timestep_s: float) -> list[Mode]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer import Recording
+from activesteer.cli import main
 from activesteer.resources import find_vehicle
 
 SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.3")
@@ -45,10 +46,50 @@ def refused(told, *texts: str) -> None:
         (["step_steer", "--set", "steer.start_s=9"], ["steer.start_s: is 9 s, but the run ends at 5 s"]),
         (["step_steer", "-c", "ars", "-c", "ars"], ["-c ars -c ars", "same name"]),
         (["step_steer", "-c", "ars", "-c", "afs", "-o", "a.mcap"], ["-o a.mcap: 2 controllers", "give a folder"]),
+        (["step_steer", "-o", "film.mp4"], ["-o film.mp4", "ends in .mcap"]),
     ],
 )
 def test_wrong_input_is_answered_before_anything_runs(call, tmp_path, words, texts):
     refused(call("run", *words), *texts)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "texts"),
+    [
+        (["rnu", "step_steer"], ["no command 'rnu'", "'run'"]),
+        (["--json", "run", "step_steer"], ["activesteer run --json"]),
+        (["run", "step_steer", "--fualt", "rear:stuck@2"], ["usage: activesteer run", "--fault"]),
+        (["run", "step_steer", "--jobs", "4"], ["usage: activesteer run", "activesteer run --help"]),
+        (["run", "step_steer", "road.mu=0.4"], ["--set road.mu=0.4"]),
+        (["run", "step_steer", "--set", "road.mu", "0.4"], ["KEY=VALUE"]),
+        (["vehicle", "new", "mine", "--tabel", "x.toml"], ["usage: activesteer vehicle new", "--table"]),
+    ],
+)
+def test_a_misplaced_or_misspelt_word_is_answered_with_the_right_one(capsys, words, texts):
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert all(text in said for text in texts)
+
+
+@pytest.mark.parametrize(
+    ("words", "texts"),
+    [
+        (["study", "populaton"], ["'population'"]),
+        (["study", "population"], ["-o DIR is needed"]),
+        (["fit", "population"], ["population.toml: fit"]),
+        (["margins", "-c", "none", "--speed-kmh", "80"], ["-c", "no loop"]),
+        (["reproduce", "-c", "none", "-c", "asr"], ["'asr'", "'ars'"]),
+        (["validate", "sedan", "--samples", "5"], ["--samples", "sedan"]),
+        (["validate", "tesla_model_s", "--timestep", "0.0005"], ["--timestep", "tesla_model_s"]),
+        (["validate", "golf"], ["sedan", "tesla_model_s"]),
+        (["report", "."], ["DIR/*.mcap"]),
+    ],
+)
+def test_an_option_without_effect_or_a_wrong_name_is_answered(call, tmp_path, words, texts):
+    refused(call(*words), *texts)
     assert list(tmp_path.iterdir()) == []
 
 

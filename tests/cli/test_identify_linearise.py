@@ -46,17 +46,19 @@ def test_linearise_tells_the_modes_and_draws(tmp_path, capsys):
 
 
 def test_linearise_takes_other_values_of_the_car(capsys):
-    assert main(["linearise", "--set", "rear_actuator.preset=screw_3deg"]) == 0
-    assert "act_rl_screw" in capsys.readouterr().out
+    assert main(["linearise", "--set", "rear_actuator.preset=screw_3deg", "--json"]) == 0
+    modes = json.loads(capsys.readouterr().out)["modes"]
+    assert any("act_rl_screw" in mode["participation"] for mode in modes)
+    assert all(mode["real_1ps"] < 0.0 < mode["natural_frequency_Hz"] for mode in modes)
 
 
 @pytest.mark.parametrize(
     ("words", "part"),
     [
-        (["linearise", "--set", "speed_kmh=60"], "maneuver"),
+        (["linearise", "--set", "speed_kmh=60"], "manoeuvre"),
         (["linearise", "--set", "driver.preview_s=1"], "driver"),
-        (["driver", "-c", "none", "--set", "settle_s=1"], "maneuver"),
-        (["fault-map", "--jobs", "1", "--speeds-kmh", "60", "--set", "speed_kmh=50"], "maneuver"),
+        (["driver", "-c", "none", "--set", "settle_s=1"], "manoeuvre"),
+        (["fault-map", "--jobs", "1", "--speeds-kmh", "60", "--set", "speed_kmh=50"], "manoeuvre"),
     ],
 )
 def test_what_makes_its_manoeuvre_itself_takes_no_override_of_it(capsys, words, part):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -43,6 +44,9 @@ def test_list_names_everything_that_can_be_run(call):
     for name in (*list_maneuvers(), "none", "ars", "afs", "compact", "my_file.py:MyController"):
         assert f"\n  {name} " in told.out + " " or f"\n  {name}\n" in told.out
     assert "Step steer, 80 km/h, 0.4 g, dry" in told.out
+    table = json.loads(call("list", "--json").out)
+    assert {"population", "tune_ars"} <= set(table["studies"])
+    assert all(f"\n  {name}" in told.out for names in table.values() for name in names)
 
 
 def test_info_tells_what_a_recording_holds(call, file):
@@ -65,6 +69,9 @@ def test_info_tells_what_a_recording_holds(call, file):
         assert channel.name in told.out
         assert channel.meaning in printed
     assert "INCOMPLETE" not in told.out
+    table, opened = json.loads(call("info", file, "--json").out), activesteer.Recording.open(file)
+    assert (table["steps"], table["to_s"], table["metrics"]) == (2500, opened.time_s[-1], opened.metrics)
+    assert list(table["channels"]) == [channel.name for channel in opened.channels]
 
 
 def test_info_of_a_file_cut_short_tells_what_is_left(call, file, tmp_path):

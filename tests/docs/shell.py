@@ -35,7 +35,7 @@ def check(command: Command) -> None:
         if words[0] == "activesteer":
             with contextlib.redirect_stderr(io.StringIO()) as told:
                 try:
-                    all_commands().parser().parse_args(words[1:])
+                    all_commands().parse(words[1:])
                 except SystemExit:
                     raise AssertionError(f"{command.words}\n{told.getvalue()}") from None
         elif words[0] in {"make", "pip"}:

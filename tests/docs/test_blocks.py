@@ -61,7 +61,7 @@ def test_output_is_another(shown: tuple[str, ...]) -> None:
         ("sh\nactivesteer run step_ster", "did you mean"),
         ("sh\nactivesteer run step_steer --speed 3", "unrecognized arguments"),
         ("sh\nactivesteer reproduce --job 3 --now   # slow: minutes", "unrecognized arguments"),
-        ("sh\nactivesteer reply x.mcap   # window: the viewer", "invalid choice"),
+        ("sh\nactivesteer reply x.mcap   # window: the viewer", "there is no command"),
         ("sh\nmake cake", "targets"),
         ("sh\npip install '.[cake]'", "no such extra"),
         ("sh\nrm -r x", "not run"),
