@@ -17,6 +17,27 @@ Values = NDArray[np.float64]
 _MF52 = 52
 
 
+class _Column:
+    """A column of a table of `TyreForces`, by the name of the attribute, in the shape of the inputs."""
+
+    def __init__(self, table: str, columns: tuple[str, ...]) -> None:
+        self._table, self._columns = table, columns
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._index = self._columns.index(name)
+
+    def __get__(self, forces: TyreForces, owner: type | None = None) -> Values:
+        return getattr(forces, self._table)[:, self._index].reshape(forces.shape)
+
+
+def _force() -> _Column:
+    return _Column("_forces", FORCE_COLUMNS)
+
+
+def _roll() -> _Column:
+    return _Column("_rolling", ROLLING_COLUMNS)
+
+
 @dataclass(frozen=True)
 class TyreForces:
     """Forces and moments in ISO-W axes at the contact point, and what they came from.
@@ -31,13 +52,44 @@ class TyreForces:
     _flags: NDArray[np.int64] = field(repr=False)
     shape: tuple[int, ...]
 
-    def _force(self, name: str) -> Values:
-        """One column of the forces, in the shape of the inputs."""
-        return self._forces[:, FORCE_COLUMNS.index(name)].reshape(self.shape)
-
-    def _roll(self, name: str) -> Values:
-        """One column of the rolling quantities, in the shape of the inputs."""
-        return self._rolling[:, ROLLING_COLUMNS.index(name)].reshape(self.shape)
+    fx_N = _force()
+    """Longitudinal force [N], positive drives."""
+    fy_N = _force()
+    """Lateral force [N], negative for a positive slip angle."""
+    mx_Nm = _force()
+    """Overturning moment [Nm]."""
+    my_Nm = _force()
+    """Rolling resistance moment [Nm], negative rolling forward."""
+    mz_Nm = _force()
+    """Aligning moment [Nm]."""
+    friction_x = _force()
+    """Peak longitudinal friction mu_x."""
+    friction_y = _force()
+    """Peak lateral friction mu_y."""
+    trail_m = _force()
+    """Pneumatic trail [m]."""
+    residual_moment_Nm = _force()
+    """Residual part of the aligning moment [Nm]."""
+    slip_stiffness_N = _force()
+    """Slope of the longitudinal force over slip at zero slip [N]."""
+    cornering_stiffness_Nprad = _force()
+    """Slope of the lateral force over slip angle at zero slip [N/rad], negative."""
+    relaxation_length_x_m = _roll()
+    """Relaxation length of longitudinal slip [m]."""
+    relaxation_length_y_m = _roll()
+    """Relaxation length of lateral slip [m]."""
+    effective_radius_m = _roll()
+    """Effective rolling radius [m]."""
+    loaded_radius_m = _roll()
+    """Distance from wheel centre to road [m]."""
+    deflection_m = _roll()
+    """Vertical deflection [m]."""
+    spin_radps = _roll()
+    """Rotational speed of the wheel that belongs to the slip [rad/s]."""
+    contact_length_m = _roll()
+    """Length of the contact patch [m]."""
+    contact_width_m = _roll()
+    """Width of the contact patch [m]."""
 
     @cached_property
     def _rolling(self) -> Values:
@@ -45,101 +97,6 @@ class TyreForces:
         rolling = np.empty((len(self._inputs), len(ROLLING_COLUMNS)))
         rolling_rows(self._tyre, self._inputs, self._forces, rolling)
         return rolling
-
-    @property
-    def fx_N(self) -> Values:
-        """Longitudinal force [N], positive drives."""
-        return self._force("fx_N")
-
-    @property
-    def fy_N(self) -> Values:
-        """Lateral force [N], negative for a positive slip angle."""
-        return self._force("fy_N")
-
-    @property
-    def mx_Nm(self) -> Values:
-        """Overturning moment [Nm]."""
-        return self._force("mx_Nm")
-
-    @property
-    def my_Nm(self) -> Values:
-        """Rolling resistance moment [Nm], negative rolling forward."""
-        return self._force("my_Nm")
-
-    @property
-    def mz_Nm(self) -> Values:
-        """Aligning moment [Nm]."""
-        return self._force("mz_Nm")
-
-    @property
-    def friction_x(self) -> Values:
-        """Peak longitudinal friction mu_x."""
-        return self._force("friction_x")
-
-    @property
-    def friction_y(self) -> Values:
-        """Peak lateral friction mu_y."""
-        return self._force("friction_y")
-
-    @property
-    def trail_m(self) -> Values:
-        """Pneumatic trail [m]."""
-        return self._force("trail_m")
-
-    @property
-    def residual_moment_Nm(self) -> Values:
-        """Residual part of the aligning moment [Nm]."""
-        return self._force("residual_moment_Nm")
-
-    @property
-    def slip_stiffness_N(self) -> Values:
-        """Slope of the longitudinal force over slip at zero slip [N]."""
-        return self._force("slip_stiffness_N")
-
-    @property
-    def cornering_stiffness_Nprad(self) -> Values:
-        """Slope of the lateral force over slip angle at zero slip [N/rad], negative."""
-        return self._force("cornering_stiffness_Nprad")
-
-    @property
-    def relaxation_length_x_m(self) -> Values:
-        """Relaxation length of longitudinal slip [m]."""
-        return self._roll("relaxation_length_x_m")
-
-    @property
-    def relaxation_length_y_m(self) -> Values:
-        """Relaxation length of lateral slip [m]."""
-        return self._roll("relaxation_length_y_m")
-
-    @property
-    def effective_radius_m(self) -> Values:
-        """Effective rolling radius [m]."""
-        return self._roll("effective_radius_m")
-
-    @property
-    def loaded_radius_m(self) -> Values:
-        """Distance from wheel centre to road [m]."""
-        return self._roll("loaded_radius_m")
-
-    @property
-    def deflection_m(self) -> Values:
-        """Vertical deflection [m]."""
-        return self._roll("deflection_m")
-
-    @property
-    def spin_radps(self) -> Values:
-        """Rotational speed of the wheel that belongs to the slip [rad/s]."""
-        return self._roll("spin_radps")
-
-    @property
-    def contact_length_m(self) -> Values:
-        """Length of the contact patch [m]."""
-        return self._roll("contact_length_m")
-
-    @property
-    def contact_width_m(self) -> Values:
-        """Width of the contact patch [m]."""
-        return self._roll("contact_width_m")
 
     @property
     def limits(self) -> NDArray[np.int64]:
