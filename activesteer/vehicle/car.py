@@ -18,7 +18,6 @@ from activesteer.road.road import Road
 from activesteer.sensors import SensorBlock
 from activesteer.sensors.block import speed_radii
 from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion
-from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_step
@@ -39,8 +38,6 @@ from activesteer.vehicle.recorded_arrays import RecordedArrays
 from activesteer.vehicle.step_plan import read_through, record_from, step_plan
 from activesteer.vehicle.wheel_set import WheelSet
 
-_CALIBRATED_AT_MPS: Final = 20.0
-"""Speed at which the rolling radii are taken that turn wheel speeds into the speed of the car [m/s]."""
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
@@ -95,7 +92,7 @@ class Vehicle:
             self.channels = ChannelMap(self.model, parameters)
             self._bind()
             self._place()
-            radii_m = self._effective_radii(tyres)
+            radii_m = self._wheels.effective_radii_m(tyres)
             inertias_kgm2, fractions = self._wheels.inertias_kgm2(), parameters.powertrain.wheel_fractions
             self._brake_setup[:] = brake_setup(parameters.brakes, timestep_s, radii_m, fractions, inertias_kgm2)
             reset(self._brake_state, self._brake_setup, 0.0)
@@ -153,15 +150,6 @@ class Vehicle:
         if self._sensors is not None:
             self._sensors.reset(self.truth()[0])
         return self.measure()
-
-    def _effective_radii(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
-        """Rolling radii under the loads of standing still, as measured when the sensors are fitted [m]."""
-        loads_N = fb.wheel_outputs(self.data, len(CORNERS))["fz_N"]
-        axles = (tyres[0], tyres[0], tyres[1], tyres[1])
-        return [
-            float(MagicFormula(tyre).evaluate(load_N, 0.0, 0.0, vx_mps=_CALIBRATED_AT_MPS).effective_radius_m)
-            for tyre, load_N in zip(axles, loads_N, strict=True)
-        ]
 
     @property
     def wheel_radius_m(self) -> float:

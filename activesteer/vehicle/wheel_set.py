@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import mujoco
 import numpy as np
 
 from activesteer.conventions import CORNERS, Array
 from activesteer.signals import WheelTorques
+from activesteer.tyre.evaluation import MagicFormula
+from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.named_parts import find
 from activesteer.vehicle.parameters import Powertrain
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.vehicle.step_plan import Wheels
+
+_CALIBRATED_AT_MPS: Final = 20.0
+"""Speed at which the rolling radii are taken that turn wheel speeds into the speed of the car [m/s]."""
 
 
 class WheelSet:
@@ -60,6 +68,18 @@ class WheelSet:
     def heights_m(self) -> Array:
         """Heights of the wheels' centres, shape (4,) [m]: what they roll on, roughly."""
         return self._data.xpos[self._bodies, 2]
+
+    def effective_radii_m(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
+        """Rolling radii under the present loads, those of standing still where the sensors are fitted.
+
+        Args:
+            tyres: Tyres of the front and of the rear axle.
+        """
+        loads_N = fb.wheel_outputs(self._data, len(CORNERS))["fz_N"]
+        return [
+            float(MagicFormula(tyre).evaluate(load_N, 0.0, 0.0, vx_mps=_CALIBRATED_AT_MPS).effective_radius_m)
+            for tyre, load_N in zip((tyres[0], tyres[0], tyres[1], tyres[1]), loads_N, strict=True)
+        ]
 
     def inertias_kgm2(self) -> list[float]:
         """What each turns with against the rest of the car."""
