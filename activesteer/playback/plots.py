@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -80,8 +81,8 @@ MOTION: Final = (
     ),
 )
 """Plots of the car as a whole."""
-DRIVING: Final = (_of_car("steering_wheel_rad"), _of_car("path_distance_m"), _of_car("speed_mps"))
-"""Plots of what the driver does, and how well he keeps to the path."""
+DRIVING: Final = (_of_car("steering_wheel_rad"), _of_car("speed_mps"))
+"""Plots of what the driver does."""
 BODY: Final = (
     Plot(
         quantity_of("ay_mps2").title,
@@ -120,21 +121,26 @@ WHEELS: Final = (
 
 def links(run: Run) -> tuple[Plot, ...]:
     """Plots of the axial forces of the links and springs, one for each corner, from the channels that there are."""
-    plots = []
-    for corner in CORNERS:
-        names = [
-            channel.name
+    named = {
+        corner: [
+            channel.name[3:]
             for channel in run.recording.channels
             if channel.name.startswith(f"{corner}_") and channel.name.endswith("_force_N") and channel.group == "links"
         ]
-        if not names:
-            continue
+        for corner in CORNERS
+    }
+    # What all corners have, such as a spring, has the same colour in all of them.
+    everywhere = [name for name in named[CORNERS[0]] if all(name in names for names in named.values())]
+    plots = []
+    for corner, names in named.items():
+        order = [*everywhere, *(name for name in names if name not in everywhere)]
         series = (
-            Series(name, name[3:].removesuffix("_force_N").replace("_", " "), _LINK_COLOURS[index % len(_LINK_COLOURS)])
-            for index, name in enumerate(names)
+            Series(f"{corner}_{name}", name.removesuffix("_force_N").replace("_", " "), colour)
+            for name, colour in zip(order, cycle(_LINK_COLOURS), strict=False)
         )
-        title = f"Link forces {_WORDS[corner]}, tension positive [N]"
-        plots.append(Plot(title, tuple(series), f"{corner}_link_forces_N"))
+        if names:
+            title = f"Link forces {_WORDS[corner]}, tension positive [N]"
+            plots.append(Plot(title, tuple(series), f"{corner}_link_forces_N"))
     return tuple(plots)
 
 
