@@ -94,10 +94,12 @@ superposition's motor has such a record too: its travel is an angle [rad], and i
 
 GUIDE: Final = _record(
     "qpos", "dof", "side", "rack", "rack_dof", "travel_table", "rack_table", ("stiffness", 25), ("damping", 25),
-    ("square", 2), ("hardening", 10), ("travel_slope", 5), ("rack_slope", 5),
+    ("held_stiffness", 25), ("held_damping", 25), ("square", 2), ("hardening", 10), ("travel_slope", 5),
+    ("rack_slope", 5),
 )  # fmt: skip
 """One for each wheel that curves guide (`native_guide`): addresses, sign of its side, where among `curves` its tables
-begin; stiffness and damping, row by row, what hardens beside them, slopes of the curves in the design position."""
+begin; stiffness and damping, row by row, and the part of them that the engine's tendons hold; what hardens beside them,
+slopes of the curves in the design position."""
 
 CURVE_TABLE: Final = _record("start_m", "per_m", "intervals", "count")
 """Head of a table of curves; behind it the curves as cubics on even intervals."""

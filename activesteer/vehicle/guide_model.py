@@ -22,11 +22,14 @@ JOINTS: Final = ("x", "y", "z", "toe", "camber", "caster")
 exactly, since they turn about z first, then about x, then about y."""
 GUIDE: Final = "_guide"
 """End of the names of the tendons that hold a guided wheel: CORNER_NUMBER_guide."""
+_HELD: Final = 0.05
+"""Square of natural frequency times step from which on the engine holds a mode by a tendon: 36 Hz at 1 ms. Each costs
+time, and up to there the native forces beside them, which are explicit, are stable and as accurate."""
 _INTERVALS: Final = 32
 
 
 def fit_guides(spec: mujoco.MjSpec, curves: Curves) -> None:
-    """Gives each guided wheel its five tendons: the natural modes of its knuckle on the stiffness about the curves.
+    """Gives each guided wheel its tendons: the fast ones of its knuckle's natural modes on the stiffness of the curves.
 
     Args:
         spec: The model; changed.
@@ -38,26 +41,20 @@ def fit_guides(spec: mujoco.MjSpec, curves: Curves) -> None:
     corners = [corner for corner in CORNERS if curves.axle(corner) is not None]
     if not corners:
         return
-    from scipy.linalg import eigh  # noqa: PLC0415 - slow to import, and only axles of curves need it
-
     model = spec.compile()
     for corner in corners:
         axle = curves.axle(corner)
         assert axle is not None
-        _joints(model, corner)
-        mass = _unsprung_mass(model, corner)
-        squares, modes = eigh(axle.stiffness_matrix(), mass)
-        by_travel, by_rack = _slopes(axle)
-        side = _side(corner)
-        for number, (square, along) in enumerate(zip(squares, (mass @ modes).T, strict=True)):
+        squares, along = _modes(model, corner, axle)
+        rows = along @ _strains(model, corner, axle)
+        # How fast it is with all else free to move, the light rack above all.
+        fast = squares * np.sum((rows @ _mobility(model)) * rows, axis=1) * model.opt.timestep**2
+        for number in np.flatnonzero(fast >= _HELD):
             tendon = spec.add_tendon(name=f"{corner}_{number}{GUIDE}", springlength=[0.0, 0.0])
-            tendon.stiffness = [float(square), 0.0, 0.0]
-            tendon.damping = [2.0 * axle.damping_ratio * float(np.sqrt(square)), 0.0, 0.0]
-            for name, mirror, arm in zip(COORDINATES, _mirror(side), along, strict=True):
-                tendon.wrap_joint(f"{corner}_{name}", float(mirror * arm))
-            tendon.wrap_joint(f"{corner}_z", -float(along @ by_travel))
-            if axle.is_steered:
-                tendon.wrap_joint("rack", -side * float(along @ by_rack))
+            tendon.stiffness = [float(squares[number]), 0.0, 0.0]
+            tendon.damping = [_damping(axle, squares[number]), 0.0, 0.0]
+            for dof in np.flatnonzero(rows[number]):
+                tendon.wrap_joint(model.joint(int(model.dof_jntid[dof])).name, float(rows[number, dof]))
 
 
 def guide_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDArray[Any]], list[NDArray[np.float64]]]:
@@ -140,13 +137,19 @@ def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[
     if axle.is_steered:
         joint = find(model, mujoco.mjtObj.mjOBJ_JOINT, "rack")
         rack, rack_dof = float(model.jnt_qposadr[joint]), float(model.jnt_dofadr[joint])
-    stiffness, damping = np.zeros((5, 5)), np.zeros((5, 5))
-    for number in range(len(COORDINATES)):
-        tendon = find(model, mujoco.mjtObj.mjOBJ_TENDON, f"{corner}_{number}{GUIDE}")
-        arms = tendon_arms(model, f"{corner}_{number}{GUIDE}")
-        along = _mirror(side) * [arms[f"{corner}_{name}"] for name in COORDINATES]
-        stiffness += model.tendon_stiffness[tendon] * np.outer(along, along)
-        damping += model.tendon_damping[tendon] * np.outer(along, along)
+    held, held_damping, damping = np.zeros((5, 5)), np.zeros((5, 5)), np.zeros((5, 5))
+    for number, (square, along) in enumerate(zip(*_modes(model, corner, axle), strict=True)):
+        arms = tendon_arms(model, name := f"{corner}_{number}{GUIDE}")
+        if not arms:
+            damping += _damping(axle, square) * np.outer(along, along)
+            continue
+        tendon = find(model, mujoco.mjtObj.mjOBJ_TENDON, name)
+        row = _mirror(side) * [arms[f"{corner}_{name}"] for name in COORDINATES]
+        held += model.tendon_stiffness[tendon] * np.outer(row, row)
+        held_damping += model.tendon_damping[tendon] * np.outer(row, row)
+    # The engine's step is implicit in its tendons, which is a damping of step times stiffness along them. Where a curve
+    # is no longer as steep as in the design position, the difference would brake the wheel's travel: it is taken along.
+    held_damping += model.opt.timestep * held
     by_travel, by_rack = _slopes(axle)
     return fb.filled(
         fb.GUIDE,
@@ -157,11 +160,10 @@ def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[
         rack_dof=rack_dof,
         travel_table=tables[0],
         rack_table=tables[1],
-        stiffness=stiffness.ravel(),
-        # The engine's step is implicit in its tendons, which is a damping of step times stiffness along them. Where a
-        # curve is no longer as steep as in the design position, the difference would brake the wheel's travel: it is
-        # taken along.
-        damping=(damping + model.opt.timestep * stiffness).ravel(),
+        stiffness=axle.stiffness_matrix().ravel(),
+        damping=(damping + held_damping).ravel(),
+        held_stiffness=held.ravel(),
+        held_damping=held_damping.ravel(),
         square=axle.hardening_square,
         hardening=np.ravel(axle.hardening),
         travel_slope=by_travel,
@@ -169,14 +171,45 @@ def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[
     )
 
 
-def _unsprung_mass(model: mujoco.MjModel, corner: str) -> NDArray[np.float64]:
-    """Inertia that a fast motion of the five guided coordinates meets, all else free to move; left wheel, shape (5, 5).
+def _damping(axle: AxleCurves, square: float) -> float:
+    """Of a mode of unit inertia and the square of its frequency [1/s, 1/s2]."""
+    return 2.0 * axle.damping_ratio * float(np.sqrt(square))
 
-    A wheel that turns on its bearing takes no part in the rotation of its knuckle in side view.
-    """
-    dofs = [int(model.jnt_dofadr[model.joint(f"{corner}_{name}").id]) for name in COORDINATES]
+
+def _mobility(model: mujoco.MjModel) -> NDArray[np.float64]:
+    """Inverse of the inertia of all degrees of freedom in the design position, shape (nv, nv)."""
     data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     mujoco.mj_forward(model, data)
     mujoco.mj_fullM(model, data, full)
+    return np.asarray(np.linalg.inv(full), dtype=np.float64)
+
+
+def _strains(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> NDArray[np.float64]:
+    """Deflections from the curves, as the left wheel sees them, per degree of freedom, shape (5, nv)."""
+    rows, side = np.zeros((len(COORDINATES), model.nv)), _side(corner)
+    _, first = _joints(model, corner)
+    by_travel, by_rack = _slopes(axle)
+    rows[:, [first + JOINTS.index(name) for name in COORDINATES]] = np.diag(_mirror(side))
+    rows[:, first + JOINTS.index("z")] = -by_travel
+    if axle.is_steered:
+        rows[:, model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "rack")]] = -side * by_rack
+    return rows
+
+
+def _modes(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Squares of the frequencies of a knuckle on the stiffness about the curves, and what each mode is of a deflection.
+
+    The inertia is what a fast motion of the five coordinates meets, the rest free to move. A wheel that turns on its
+    bearing takes no part in the rotation of its knuckle in side view.
+
+    Returns:
+        Squares, shape (5,), rising [1/s2]; one row for each mode, shape (5, 5), the left wheel's.
+    """
+    from scipy.linalg import eigh  # noqa: PLC0415 - slow to import, and only axles of curves need it
+
+    _, first = _joints(model, corner)
+    dofs = [first + JOINTS.index(name) for name in COORDINATES]
     mirror = _mirror(_side(corner))
-    return np.linalg.inv(np.linalg.inv(full)[np.ix_(dofs, dofs)]) * np.outer(mirror, mirror)
+    mass = np.linalg.inv(_mobility(model)[np.ix_(dofs, dofs)]) * np.outer(mirror, mirror)
+    squares, modes = eigh(axle.stiffness_matrix(), mass)
+    return squares, (mass @ modes).T

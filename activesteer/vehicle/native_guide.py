@@ -5,9 +5,9 @@ rack s, and t = a . e along each spring that hardens, the energy is U = e'Ke/2 +
 the load over z. Its slopes are the forces: Q_q = -dU/de, and by the chain rule Q_z = dU/de f'(z), Q_s = dU/de g'(s): no
 work is lost or won, whatever the curves.
 
-The engine is implicit in what tendons carry, and therefore has five in each corner for K, with the slopes that the
-curves have in the design position (`guide_model`). What stands here is the difference: the forces above less those of
-these tendons.
+The engine is implicit in what tendons carry, and therefore has some in each corner for the stiff part of K, with the
+slopes that the curves have in the design position (`guide_model`). What stands here is the difference: the forces above
+less those of these tendons.
 """
 
 from __future__ import annotations
@@ -112,17 +112,18 @@ def guides(block, header, qpos, qvel, qfrc):
             record, travel, tc, rack, rc, 4, side * qpos[p + 3], side * qvel[d + 3], moved, on_travel, on_rack
         )
         k, c, h = record.stiffness, record.damping, record.hardening
+        kh, ch = record.held_stiffness, record.held_damping
         f1 = _hardened(record, 0, e0, e1, e2, e3, e4)
         f2 = _hardened(record, 1, e0, e1, e2, e3, e4)
-        w0 = _row(k, 0, l0, l1, l2, l3, l4) + _row(c, 0, m0, m1, m2, m3, m4)
+        w0 = _row(kh, 0, l0, l1, l2, l3, l4) + _row(ch, 0, m0, m1, m2, m3, m4)
         u0 = _row(k, 0, e0, e1, e2, e3, e4) + _row(c, 0, r0, r1, r2, r3, r4) + h[0] * f1 + h[5] * f2
-        w1 = _row(k, 5, l0, l1, l2, l3, l4) + _row(c, 5, m0, m1, m2, m3, m4)
+        w1 = _row(kh, 5, l0, l1, l2, l3, l4) + _row(ch, 5, m0, m1, m2, m3, m4)
         u1 = _row(k, 5, e0, e1, e2, e3, e4) + _row(c, 5, r0, r1, r2, r3, r4) + h[1] * f1 + h[6] * f2
-        w2 = _row(k, 10, l0, l1, l2, l3, l4) + _row(c, 10, m0, m1, m2, m3, m4)
+        w2 = _row(kh, 10, l0, l1, l2, l3, l4) + _row(ch, 10, m0, m1, m2, m3, m4)
         u2 = _row(k, 10, e0, e1, e2, e3, e4) + _row(c, 10, r0, r1, r2, r3, r4) + h[2] * f1 + h[7] * f2
-        w3 = _row(k, 15, l0, l1, l2, l3, l4) + _row(c, 15, m0, m1, m2, m3, m4)
+        w3 = _row(kh, 15, l0, l1, l2, l3, l4) + _row(ch, 15, m0, m1, m2, m3, m4)
         u3 = _row(k, 15, e0, e1, e2, e3, e4) + _row(c, 15, r0, r1, r2, r3, r4) + h[3] * f1 + h[8] * f2
-        w4 = _row(k, 20, l0, l1, l2, l3, l4) + _row(c, 20, m0, m1, m2, m3, m4)
+        w4 = _row(kh, 20, l0, l1, l2, l3, l4) + _row(ch, 20, m0, m1, m2, m3, m4)
         u4 = _row(k, 20, e0, e1, e2, e3, e4) + _row(c, 20, r0, r1, r2, r3, r4) + h[4] * f1 + h[9] * f2
         load, _ = _curve(travel, tc, 5, on_travel)
         zs, ss = record.travel_slope, record.rack_slope
