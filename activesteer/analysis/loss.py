@@ -59,7 +59,7 @@ def kept(metrics: Mapping[str, float]) -> Iterator[str]:
     """What a run with these metrics kept to, in words; nothing where there is nothing to keep to."""
     if metrics.get(IN_LANES) == 1.0:
         yield "stays in the lanes"
-    if metrics.get(CONES_MISSED) == 0.0:
+    if metrics.get(CONES_MISSED) == 0.0 and not metrics.get(CONES_HIT):
         yield "passes all cones"
     if metrics.get(CONES_HIT) == 0.0:
         yield "hits no cone"

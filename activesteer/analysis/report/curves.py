@@ -150,7 +150,8 @@ def time_grid(times_s: Sequence[Array]) -> Array:
 def _panel(panel: Panel, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
     series = []
     for number, run in enumerate(runs):
-        for line, signal in enumerate(panel.signals):
+        alone = True
+        for signal in panel.signals:
             try:
                 values = signal(run.recording)
             except RecordingError:
@@ -158,7 +159,9 @@ def _panel(panel: Panel, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
                 continue
             if values is not None:
                 sampled = _reduced(run.recording.time_s, values * panel.quantity.factor, grid)
-                series.append({"run": number, "dotted": line > 0, "values": _rounded(sampled)})
+                # What a run has alone is its own line; dotted is what stands beside it.
+                series.append({"run": number, "dotted": not alone, "values": _rounded(sampled)})
+                alone = False
     note = panel.note if any(item["dotted"] for item in series) else ""
     shown = panel.quantity
     return {"title": panel.title, "unit": shown.unit.name, "note": note, "min_span": shown.min_span, "series": series}

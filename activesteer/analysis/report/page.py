@@ -26,6 +26,7 @@ from activesteer.analysis.report.tables import (
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
 from activesteer.pages import render
+from activesteer.quantities import typeset
 from activesteer.recording import Recording
 
 TITLE: Final = "activesteer report"
@@ -119,6 +120,7 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
         by_share=everything.by_share(),
         population=everything.population,
         number_lines=number_lines,
+        typeset=typeset,
         percent=percent,
         names=[f"{group.name} {run.name}" if several else run.name for group in groups for run in group.runs],
         vehicle=rows(every, "vehicle"),

@@ -89,7 +89,8 @@ def number(name: str, value: float) -> str:
 def difference_text(name: str, value: float, first: float) -> Cell:
     """By how much the value of a metric [SI] differs from that of the first run.
 
-    In percent too, where that value is more than a driver or a sensor would miss.
+    In percent too, where that value is more than a driver or a sensor would miss; not of a negative one, of which more
+    is less.
     """
     if not (math.isfinite(value) and math.isfinite(first)):
         return Cell("\N{EN DASH}")
@@ -101,9 +102,9 @@ def difference_text(name: str, value: float, first: float) -> Cell:
         return Cell("0")
     text = f"{'+' if difference > 0.0 else ''}{_decimal(difference)}"
     nearly_nothing = max(noticeable(name) * unit_factor, 0.01)
-    if unit == "%" or abs(first) * unit_factor <= nearly_nothing:
+    if unit == "%" or first * unit_factor <= nearly_nothing:
         return Cell(text)
-    if not 0.005 <= abs(share := (value - first) / abs(first)) < 10.0:
+    if not 0.005 <= abs(share := (value - first) / first) < 10.0:
         return Cell(text)
     return Cell(text, typeset(f"{share * 100.0:+.0f}\N{NO-BREAK SPACE}%"))
 
