@@ -74,6 +74,15 @@ def go_on(simulation: ClosedLoop, steps: int) -> NDArray[np.float64]:
     return recorder.result()[1]
 
 
+def assert_goes_on_from_its_state(simulation: ClosedLoop, steps: int, other: ClosedLoop | None = None) -> None:
+    """What follows a saved state follows it again, in the same simulation or in another one, to the last bit."""
+    state = simulation.save_state()
+    uninterrupted = go_on(simulation, steps)
+    restored = simulation if other is None else other
+    restored.restore_state(state)
+    np.testing.assert_array_equal(go_on(restored, steps), uninterrupted)
+
+
 def car(maneuver: str = "standstill") -> Vehicle:
     """The car in static ride."""
     scenario = resolve(maneuver)

@@ -8,7 +8,14 @@ import pytest
 
 import activesteer
 from activesteer.simulation.closed_loop import ClosedLoop
-from tests.physics.runs import STEP_DEG, go_on, in_the_corner, step_steer, step_steer_scenario
+from tests.physics.runs import (
+    STEP_DEG,
+    assert_goes_on_from_its_state,
+    go_on,
+    in_the_corner,
+    step_steer,
+    step_steer_scenario,
+)
 
 SYSTEMS = ("none", "ars", "afs")
 DERIVED = ("qacc", "sensordata", "qfrc_passive", "qfrc_actuator", "act_dot", "userdata", "actuator_force")
@@ -43,21 +50,12 @@ def test_a_call_in_between_does_not_change_the_run() -> None:
 
 @pytest.mark.parametrize("controller", SYSTEMS)
 def test_a_restored_state_continues_bit_identically(controller: str) -> None:
-    simulation = in_the_corner(controller)
-    state = simulation.save_state()
-    uninterrupted = go_on(simulation, 1500)
-    simulation.restore_state(state)
-    np.testing.assert_array_equal(go_on(simulation, 1500), uninterrupted)
+    assert_goes_on_from_its_state(in_the_corner(controller), 1500)
 
 
 @pytest.mark.parametrize("controller", SYSTEMS)
 def test_a_state_restored_into_another_simulation_continues_bit_identically(controller: str) -> None:
-    simulation = in_the_corner(controller)
-    state = simulation.save_state()
-    uninterrupted = go_on(simulation, 1500)
-    other = ClosedLoop(step_steer_scenario(), controller)
-    other.restore_state(state)
-    np.testing.assert_array_equal(go_on(other, 1500), uninterrupted)
+    assert_goes_on_from_its_state(in_the_corner(controller), 1500, ClosedLoop(step_steer_scenario(), controller))
 
 
 def test_saving_does_not_disturb_the_run() -> None:

@@ -13,7 +13,7 @@ from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
 from activesteer.simulation.closed_loop import ClosedLoop
-from tests.physics.runs import STEP_DEG, go_on, step_steer
+from tests.physics.runs import STEP_DEG, assert_goes_on_from_its_state, step_steer
 from tests.raising import raises
 
 PRODUCTION = {"steer.steering_wheel_deg": STEP_DEG, "sensors.preset": "production"}
@@ -89,10 +89,7 @@ def test_a_seed_decides_everything(production: Recording) -> None:
 def test_a_restored_state_continues_bit_identically() -> None:
     simulation = ClosedLoop(resolve("step_steer", overrides=PRODUCTION), "afs")
     simulation.advance(903)
-    state = simulation.save_state()
-    uninterrupted = go_on(simulation, 300)
-    simulation.restore_state(state)
-    np.testing.assert_array_equal(go_on(simulation, 300), uninterrupted)
+    assert_goes_on_from_its_state(simulation, 300)
 
 
 def test_sensors_without_chance_treat_left_and_right_alike() -> None:

@@ -15,7 +15,7 @@ from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.control_unit import ControlUnit
-from tests.physics.runs import STEP_DEG, go_on
+from tests.physics.runs import STEP_DEG, assert_goes_on_from_its_state
 from tests.raising import raises
 
 SENSED = Measurement(0.0, 20.0, 0.1, 2.0, 0.0, 0.32, 0.0, 0.0, (60.0, 60.0, 60.0, 60.0))
@@ -107,10 +107,7 @@ def test_state_is_restored_bit_identically() -> None:
     overrides = STEP | {"controllers.interval_s": 0.005, "controllers.bus_delay_s": 0.003}
     simulation = ClosedLoop(resolve("step_steer", overrides=overrides), "ars")
     simulation.advance(903)
-    state = simulation.save_state()
-    uninterrupted = go_on(simulation, 300)
-    simulation.restore_state(state)
-    np.testing.assert_array_equal(go_on(simulation, 300), uninterrupted)
+    assert_goes_on_from_its_state(simulation, 300)
 
 
 def test_a_slower_controller_behind_a_bus_still_steers_but_later() -> None:
