@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from activesteer.conventions import Array
 from activesteer.driver import is_driver_file
-from activesteer.errors import ActiveSteerError, StudyError
+from activesteer.errors import ActiveSteerError
 from activesteer.measured.fit_data import measured_of, noise_of
 from activesteer.measured.fit_file import FitTable, read_fit
 from activesteer.measured.fit_result import Compared, Fit, Parameter, notes_of
@@ -26,9 +26,10 @@ from activesteer.simulation.runner import run_scenario
 from activesteer.studies.factor_values import FactorValues, label_of
 from activesteer.studies.factors import Factor
 from activesteer.studies.plan import Plan
-from activesteer.studies.run_task import Settings, prepare_worker
+from activesteer.studies.run_settings import Settings, prepare
 from activesteer.studies.study_file import StudyFile
-from activesteer.studies.workers import TaskQueue, Workers, workers_for
+from activesteer.studies.task_queue import TaskQueue
+from activesteer.studies.workers import Workers, workers_for
 
 _SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1ps2": 8.0}
 """Unless the study says otherwise the recorded speed is held to 0.1 %; a driver's gains leave 0.3 %, which would be
@@ -76,8 +77,7 @@ def fit(
     """
     problem = _Problem(*read_fit(study_file))
     with workers_for(jobs, scheduler=scheduler) as workers:
-        if reason := workers.everywhere(prepare_worker, problem.settings):
-            raise StudyError(reason)
+        prepare(workers, problem.settings)
         found = search(problem.answers_by(workers, progress or (lambda _: None)), problem.start, problem.check)
     return problem.result(found)
 

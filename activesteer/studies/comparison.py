@@ -26,7 +26,7 @@ from activesteer.scenario import FileOrTable, resolve
 from activesteer.studies.comparison_targets import Target, short, targets, targets_text
 from activesteer.studies.envelope import LINES, entry_speed
 from activesteer.studies.reproduction import Progress, drive
-from activesteer.studies.workers import in_parallel
+from activesteer.studies.task_queue import in_parallel
 
 CASES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     **{name: (name, {}) for name in SCENARIOS},

@@ -29,8 +29,8 @@ from activesteer.studies.comparison_shares import ComparisonPopulation, Effect, 
 from activesteer.studies.comparison_targets import NONE, REFERENCES, asked
 from activesteer.studies.factor_values import label_of
 from activesteer.studies.population import STEERING_EFFORT, effects, population_study
+from activesteer.studies.row_table import IDENTITY, OUTCOME
 from activesteer.studies.run_identity import versions
-from activesteer.studies.store import IDENTITY, OUTCOME
 from activesteer.studies.study import StudyProgress, study
 from activesteer.studies.study_file import StudyFile, read_study
 

@@ -21,8 +21,8 @@ _SAME: Final = ("distributed", "dask", "cloudpickle", "msgpack")
 class DaskCluster:
     """A cluster, reached by its client.
 
-    Workers may come and go. One thread of a worker does a task at a time (see `workers`), so a worker is best started
-    with one thread.
+    Workers may come and go. One thread of a worker does a task at a time (see `task_queue`), so a worker is best
+    started with one thread.
 
     Attributes:
         in_flight: How many tasks the cluster should have at a time.

@@ -24,7 +24,7 @@ from activesteer.simulation.runner import run_scenario
 from activesteer.studies.plan import label_of
 from activesteer.studies.run_task import Status
 from activesteer.studies.study import study
-from activesteer.studies.workers import in_parallel
+from activesteer.studies.task_queue import in_parallel
 
 RANGE_KMH: Final = (40.0, 160.0)
 """Where the entry speed is looked for [km/h]."""

@@ -27,7 +27,8 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
 from activesteer.studies.fault_figures import FIGURES
 from activesteer.studies.fault_situations import LANE_M, PRESETS, SITUATIONS, path_of
-from activesteer.studies.workers import Workers, in_parallel
+from activesteer.studies.task_queue import in_parallel
+from activesteer.studies.workers import Workers
 
 OFFSET_AT_S: Final = 1.0
 """How long after the beginning of a fault the lateral offset is taken [s]."""

@@ -16,7 +16,7 @@ from activesteer.scenario import Scenario, describe, resolve
 from activesteer.studies.design import Samples
 from activesteer.studies.factor_values import FactorValues, label_of
 from activesteer.studies.run_identity import digest
-from activesteer.studies.run_task import Request, Settings, present_inputs
+from activesteer.studies.run_settings import Request, Settings, present_inputs
 from activesteer.studies.study_file import StudyFile
 
 _LABELS: Final = ("name", "title")

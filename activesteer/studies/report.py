@@ -20,9 +20,10 @@ from activesteer.pages import render
 from activesteer.quantities import metric_label
 from activesteer.studies.column_units import unit_of
 from activesteer.studies.factor_values import FactorValues, label_of
+from activesteer.studies.row_table import IDENTITY, OUTCOME
 from activesteer.studies.run_task import CURVE
 from activesteer.studies.sensitivity import MAX_SAMPLES, indices
-from activesteer.studies.store import IDENTITY, OUTCOME, Store
+from activesteer.studies.store import Store
 from activesteer.studies.study_file import StudyFile, read_study
 
 _SHOWN_ROWS: Final = 3000

@@ -19,7 +19,8 @@ from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.workers import TaskQueue, in_parallel, workers_for
+from activesteer.studies.task_queue import TaskQueue, in_parallel
+from activesteer.studies.workers import workers_for
 
 Progress = Callable[[str, int, int], None]
 """Called with what was finished, how many runs are, and how many there are in all."""

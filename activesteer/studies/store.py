@@ -24,9 +24,9 @@ import pyarrow.parquet as pq
 
 from activesteer.errors import StudyError
 from activesteer.files import make_folder, reading, replacing, write_text, writing
-from activesteer.studies.column_units import unit_of
+from activesteer.studies.row_table import batched, fitted, joined_schema, table_of
 from activesteer.studies.run_identity import versions
-from activesteer.studies.run_task import CURVE, Row
+from activesteer.studies.run_task import Row
 
 try:
     import fcntl
@@ -35,13 +35,6 @@ except ImportError:  # there is none on Windows
 
 RESULTS: Final = "results.parquet"
 _ROW_GROUP: Final = 65536
-IDENTITY: Final = ("run", "run_id", "sample", "maneuver", "vehicle", "controller")
-"""Columns that say which run a row is of; the factors follow them."""
-OUTCOME: Final = ("status", "error")
-"""Columns behind the factors; the metrics follow them."""
-_TYPES: Final = {"run": pa.int64(), "sample": pa.int64()} | dict.fromkeys(
-    ("run_id", "maneuver", "vehicle", "controller", "status", "error"), pa.string()
-)
 
 
 class Progress(NamedTuple):
@@ -126,7 +119,7 @@ class Store:
         """
         name = f"{rows[0]['run']:09d}-{rows[-1]['run']:09d}.parquet"
         with replacing(self._parts / name, StudyError) as path:
-            pq.write_table(self._table(rows), path)
+            pq.write_table(table_of(rows, self._factors), path)
 
     def join(self) -> Path:
         """Makes one file of all parts, in the order of the runs; the parts are deleted.
@@ -142,7 +135,7 @@ class Store:
             paths = self._paths()
             schema = self._joined_schema(paths)
             with replacing(target, StudyError) as path, pq.ParquetWriter(path, schema) as writer:
-                for batch in _batched((_fitted(table, schema) for table in _tables(paths)), _ROW_GROUP):
+                for batch in batched((fitted(table, schema) for table in _tables(paths)), _ROW_GROUP):
                     writer.write_table(batch, row_group_size=_ROW_GROUP)
         shutil.rmtree(self._parts, ignore_errors=True)
         return target
@@ -157,7 +150,7 @@ class Store:
             return next(_tables([self.folder / RESULTS]))
         paths = self._paths()
         schema = self._joined_schema(paths)
-        return pa.concat_tables([schema.empty_table(), *(_fitted(table, schema) for table in _tables(paths))])
+        return pa.concat_tables([schema.empty_table(), *(fitted(table, schema) for table in _tables(paths))])
 
     def progress(self) -> Progress:
         """How far the study is.
@@ -185,33 +178,8 @@ class Store:
     def _paths(self) -> list[Path]:
         return sorted(self._parts.glob("[0-9]*.parquet"))
 
-    def _table(self, rows: Sequence[Row]) -> pa.Table:
-        names = dict.fromkeys([*IDENTITY, *self._factors, *OUTCOME, *(name for row in rows for name in row)])
-        columns = {}
-        for name in names:
-            values = [row.get(name) for row in rows]
-            if name in _TYPES:
-                columns[name] = pa.array(values, _TYPES[name])
-            elif name in self._factors:
-                columns[name] = _factor_column(values)
-            elif name.startswith(CURVE):
-                columns[name] = pa.array(values, pa.list_(pa.float32()))
-            else:
-                columns[name] = pa.array(values, pa.float64(), from_pandas=False)
-        fields = [pa.field(name, column.type, metadata={"unit": unit_of(name)}) for name, column in columns.items()]
-        return pa.Table.from_arrays(list(columns.values()), schema=pa.schema(fields))
-
     def _joined_schema(self, paths: Iterable[Path]) -> pa.Schema:
-        """The columns of all parts; a factor that is whole numbers in one and not in another becomes a float."""
-        fields: dict[str, pa.Field] = {}
-        for path in paths:
-            with _refusing(path):
-                for field in pq.read_schema(path):
-                    known = fields.get(field.name)
-                    fields[field.name] = field if known is None else known.with_type(_common(known.type, field.type))
-        if not fields:
-            return self._table([]).schema
-        return pa.schema(list(fields.values()))
+        return joined_schema(list(_schemas(paths)) or [table_of([], self._factors).schema])
 
 
 def read_environment(folder: Path) -> dict[str, Any]:
@@ -246,35 +214,11 @@ def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) ->
     raise StudyError(f"{folder} holds another study{why}; use a new folder, or delete this one", value=folder)
 
 
-def _factor_column(values: Sequence[Any]) -> pa.Array:
-    """Numbers, texts or truth values; anything else as JSON."""
-    try:
-        numbers = any(isinstance(value, float) for value in values)
-        plain = [float(value) if numbers and value is not None else value for value in values]
-        if not any(isinstance(value, (list, dict)) for value in plain):
-            return pa.array(plain)
-    except (TypeError, ValueError, pa.ArrowInvalid, pa.ArrowTypeError):
-        pass
-    return pa.array([None if value is None else json.dumps(value) for value in values], pa.string())
-
-
-def _common(a: pa.DataType, b: pa.DataType) -> pa.DataType:
-    if a == b or pa.types.is_null(b):
-        return a
-    if pa.types.is_null(a):
-        return b
-    both_numbers = all(pa.types.is_integer(kind) or pa.types.is_floating(kind) for kind in (a, b))
-    return pa.float64() if both_numbers else pa.string()
-
-
-def _fitted(table: pa.Table, schema: pa.Schema) -> pa.Table:
-    """The table with the columns of the schema; those that it lacks are empty."""
-    present = set(table.column_names)
-    columns = [
-        table[field.name].cast(field.type) if field.name in present else pa.nulls(len(table), field.type)
-        for field in schema
-    ]
-    return pa.Table.from_arrays(columns, schema=schema)
+def _schemas(paths: Iterable[Path]) -> Iterator[pa.Schema]:
+    for path in paths:
+        with _refusing(path):
+            schema = pq.read_schema(path)
+        yield schema
 
 
 def _tables(paths: Iterable[Path], columns: list[str] | None = None) -> Iterator[pa.Table]:
@@ -291,21 +235,6 @@ def _refusing(path: Path) -> Iterator[None]:
             yield
     except pa.ArrowException as reason:
         raise StudyError(f"cannot read {path}: {reason}", value=path) from reason
-
-
-def _batched(tables: Iterable[pa.Table], rows: int) -> Iterator[pa.Table]:
-    """The same rows in tables of equal length, so that the file does not depend on how the work was divided."""
-    waiting: list[pa.Table] = []
-    count = 0
-    for table in tables:
-        waiting.append(table)
-        count += len(table)
-        while count >= rows:
-            joined = pa.concat_tables(waiting).combine_chunks()
-            yield joined.slice(0, rows)
-            waiting, count = [joined.slice(rows)], count - rows
-    if count:
-        yield pa.concat_tables(waiting).combine_chunks()
 
 
 @contextlib.contextmanager

@@ -9,13 +9,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from activesteer.errors import StudyError
 from activesteer.scenario import FileOrTable
 from activesteer.studies.plan import Plan, task_size
-from activesteer.studies.run_task import Request, Status, drive, failed_row, prepare_worker
+from activesteer.studies.run_settings import Request, prepare
+from activesteer.studies.run_task import Status, drive, failed_row
 from activesteer.studies.store import Store
 from activesteer.studies.study_file import StudyFile, read_study
-from activesteer.studies.workers import TaskQueue, WorkerDied, Workers, workers_for
+from activesteer.studies.task_queue import TaskQueue, WorkerDied
+from activesteer.studies.workers import Workers, workers_for
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -95,8 +96,7 @@ def study(
         if missing:
             workers = workers or stack.enter_context(workers_for(jobs, client=client, scheduler=scheduler))
             # What would go wrong in every run is found out before the first of them.
-            if problem := workers.everywhere(prepare_worker, plan.settings):
-                raise StudyError(problem)
+            prepare(workers, plan.settings)
             _drive_all(plan, store, workers, missing, limit, progress)
         if not store.missing(len(plan)):
             store.join()

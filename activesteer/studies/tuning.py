@@ -17,9 +17,11 @@ from activesteer.scenario import FileOrTable
 from activesteer.studies.factor_values import label_of
 from activesteer.studies.factors import Factor
 from activesteer.studies.plan import Plan
-from activesteer.studies.run_task import Request, Row, Status, drive, prepare_worker
+from activesteer.studies.run_settings import Request, prepare
+from activesteer.studies.run_task import Row, Status, drive
 from activesteer.studies.study_file import StudyFile, read_study
-from activesteer.studies.workers import TaskQueue, workers_for
+from activesteer.studies.task_queue import TaskQueue
+from activesteer.studies.workers import workers_for
 
 _JOURNAL: Final = "tune.journal"
 _VIOLATION: Final = "violation"
@@ -164,8 +166,7 @@ def tune(
     begun = len(made.trials)
     made.sampler = optuna.samplers.TPESampler(seed=study.seed + begun, constant_liar=True)
     with workers_for(jobs, client=client, scheduler=scheduler) as workers:
-        if problem := workers.everywhere(prepare_worker, plan.settings):
-            raise StudyError(problem)
+        prepare(workers, plan.settings)
 
         def tasks() -> Any:
             for _ in range(wanted - begun):

@@ -21,7 +21,8 @@ from activesteer import simulate, study
 from activesteer.errors import StudyError
 from activesteer.measured.fitting import fit
 from activesteer.studies.fault_map import fault_map
-from activesteer.studies.workers import TaskQueue, Workers, in_parallel, workers_for
+from activesteer.studies.task_queue import TaskQueue, in_parallel
+from activesteer.studies.workers import Workers, workers_for
 from tests.raising import raises
 from tests.unit.studies.short import RATIO, short_study, write_controller
 
