@@ -210,6 +210,13 @@ def add_pace(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_speeds(parser: argparse.ArgumentParser, default: str) -> None:
+    """Adds `--speed-kmh` of a command that computes something at several speeds; `default` says in words at which."""
+    parser.add_argument(
+        "--speed-kmh", type=float, action="append", metavar="V", help=f"may be repeated (default: {default})"
+    )
+
+
 def add_cutaway(parser: argparse.ArgumentParser) -> None:
     """Adds `--cutaway`, which shows what the body hides."""
     parser.add_argument("--cutaway", action="store_true", help="see the suspension through the body")

@@ -10,6 +10,7 @@ from activesteer.commands.arguments import (
     add_figures_folder,
     add_json,
     add_overrides,
+    add_speeds,
     add_vehicle,
     overrides_of,
 )
@@ -47,9 +48,7 @@ def add_to(commands: Any) -> None:
     add_vehicle(parser)
     add_controller(parser, several=True, default="none, ars and afs")
     add_overrides(parser)
-    parser.add_argument(
-        "--speed-kmh", type=float, action="append", metavar="V", help="may be repeated (default: 60, 80 ... 140)"
-    )
+    add_speeds(parser, "60, 80 ... 140")
     add_json(parser)
     add_figures_folder(parser)
     parser.set_defaults(action=_driver)

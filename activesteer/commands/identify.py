@@ -7,13 +7,15 @@ import datetime
 import sys
 from typing import Any
 
-from activesteer.commands.arguments import add_json, add_vehicle
+from activesteer.commands.arguments import add_json, add_overrides, add_vehicle, overrides_of
+from activesteer.errors import ParameterError
 
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("identify", help="understeer, limits and single-track model of a vehicle (ISO 4138)")
     add_vehicle(parser)
+    add_overrides(parser)
     parser.add_argument(
         "--write", action="store_true", help="also write the result to the table [single_track] of the vehicle file"
     )
@@ -29,11 +31,13 @@ def _identify(options: argparse.Namespace) -> int:
         if not options.json:
             print(f"{test} ...", file=sys.stderr)
 
-    file = find_vehicle(options.vehicle)
+    file, overrides = find_vehicle(options.vehicle), overrides_of(options)
     if options.write:
+        if overrides:
+            raise ParameterError("belongs to the car of the file alone, without --set and --overrides", key="--write")
         check_own(file)
         options.output = file
-    result = identify(options.vehicle, progress=progress)
+    result = identify(options.vehicle, overrides, progress)
     if options.json:
         print(result.to_json())
     else:

@@ -5,7 +5,14 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.commands.arguments import add_controller, add_json, add_overrides, add_vehicle, overrides_of
+from activesteer.commands.arguments import (
+    add_controller,
+    add_json,
+    add_overrides,
+    add_speeds,
+    add_vehicle,
+    overrides_of,
+)
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import RunCounter
 from activesteer.errors import ParameterError
@@ -36,9 +43,7 @@ def add_to(commands: Any) -> None:
     add_vehicle(parser)
     add_controller(parser, several=True, default="ars and afs")
     add_overrides(parser)
-    parser.add_argument(
-        "--speed-kmh", type=float, action="append", metavar="V", help="may be repeated (default: 60, 80 ... 160)"
-    )
+    add_speeds(parser, "60, 80 ... 160")
     parser.add_argument(
         "--study", metavar="STUDY", help="the smallest over the samples of a study, by its file or name: its factors "
         "on the car, its design and overrides; controllers know the car without its factors",

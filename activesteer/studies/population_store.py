@@ -34,13 +34,12 @@ _EVERY: Final = 2
 _KEPT: Final = ("sample", "maneuver", "controller", "status")
 
 
-def store_population(found: Population, study_folder: Path, target: Path | None = None) -> list[Path]:
-    """Keeps a population.
+def store_population(found: Population, study_folder: Path) -> list[Path]:
+    """Keeps a population with the package.
 
     Args:
         found: What came of it.
         study_folder: The folder of its study, finished.
-        target: Where it goes; the package's place where not given.
 
     Returns:
         The files written.
@@ -51,7 +50,7 @@ def store_population(found: Population, study_folder: Path, target: Path | None 
     results = study_folder / RESULTS
     if not results.is_file():
         raise StudyError(f"{study_folder} holds no finished study; go on with it")
-    folder = make_folder(studies_dir() / STUDY if target is None else target, StudyError)
+    folder = make_folder(studies_dir() / STUDY, StudyError)
     table = pq.read_table(results)
     about = {b"vehicle": found.vehicle.encode()}
     paths = [write_text(folder / SUMMARY, json.dumps(found.to_json(), indent=1) + "\n", StudyError)]

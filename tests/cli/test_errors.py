@@ -86,6 +86,7 @@ def test_a_misplaced_or_misspelt_word_is_answered_with_the_right_one(capsys, wor
         (["validate", "tesla_model_s", "--timestep", "0.0005"], ["--timestep", "tesla_model_s"]),
         (["validate", "golf"], ["sedan", "tesla_model_s"]),
         (["report", "."], ["DIR/*.mcap"]),
+        (["identify", "--write", "--vehicle", str(find_vehicle("compact")), "--set", "factors.mass=1.1"], ["--write"]),
     ],
 )
 def test_an_option_without_effect_or_a_wrong_name_is_answered(call, tmp_path, words, texts):

@@ -57,6 +57,7 @@ def test_linearise_takes_other_values_of_the_car(capsys):
     [
         (["linearise", "--set", "speed_kmh=60"], "manoeuvre"),
         (["linearise", "--set", "driver.preview_s=1"], "driver"),
+        (["identify", "--set", "duration_s=50"], "manoeuvre"),
         (["driver", "-c", "none", "--set", "settle_s=1"], "manoeuvre"),
         (["fault-map", "--jobs", "1", "--speeds-kmh", "60", "--set", "speed_kmh=50"], "manoeuvre"),
     ],
