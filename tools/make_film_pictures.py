@@ -19,7 +19,7 @@ from activesteer.video import Film, Settings
 
 PICTURES: Final = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 STILL, ANIMATION = PICTURES / "film_rear_steering.webp", PICTURES / "film_three_systems.webp"
-LAYOUT_SIZE: Final = (1080, 400)
+LAYOUT_SIZE: Final = (960, 400)
 RATE_HZ: Final = 10.0
 FROM_S, TO_S = -0.2, 4.0
 """Of the animation, from the begin of steering [s]."""

@@ -40,7 +40,7 @@ def end_card(
         for number, part in enumerate(_wrapped(words, lambda part: text.getlength(part) <= room))
     ]
     height = min(round(2.0 * margin + 1.6 * line + line * len(rows)), size[1])
-    card = Image.new("RGBA", (round(size[0] - 2.0 * margin), height), _SHADE)
+    card = Image.new("RGBA", (max(round(size[0] - 2.0 * margin), 1), height), _SHADE)
     write(card, (margin, margin + 0.5 * line), title, WHITE, large)
     pen = ImageDraw.Draw(card)
     for number, (words, colour) in enumerate(rows):

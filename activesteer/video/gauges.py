@@ -15,7 +15,7 @@ from activesteer.drawing.colours import bytes_of
 from activesteer.quantities import quantity_of
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint, footprint_of
-from activesteer.video.lettering import GREY, PANEL, WHITE, font, text_scale, write
+from activesteer.video.lettering import GREY, LEGIBLE, PANEL, WHITE, font, text_scale, write
 
 _YELLOW: Final = (255, 205, 70, 255)
 _BODY: Final = (70, 76, 86, 255)
@@ -43,9 +43,9 @@ _SIDE: Final = 3
 
 READINGS: Final = tuple(
     quantity_of(channel)
-    for channel in ("speed_mps", "steering_wheel_rad", "sideslip_rad", "rear_steer_rad", "superposition_rad")
+    for channel in ("speed_mps", "sideslip_rad", "steering_wheel_rad", "rear_steer_rad", "superposition_rad")
 )
-"""What is written out."""
+"""What is written out; in a narrow picture only the first ones."""
 _ADDED: Final = ("rear_steer_rad", "superposition_rad")
 _WIDEST: Final = {"speed_mps": "188.8", "steering_wheel_rad": "-188", "sideslip_rad": "-18.8"}
 
@@ -101,11 +101,13 @@ class Gauges:
             if reading.channel not in _ADDED or any(_used(recording, reading.channel) for recording in recordings)
         ]
         area, scale = size[0] * size[1], text_scale(size)
-        while self._fit(scale) > _ROWS_SHARE * area and scale > _SMALLEST:
+        while self._fit(scale) > _ROWS_SHARE * area and scale > LEGIBLE:
             scale *= 0.95
-        while len(self._readings) > 1 and self._columns[-1] > size[0]:
+        while len(self._readings) > 1 and (self._columns[-1] > size[0] or self._fit(scale) > _ROWS_SHARE * area):
             self._readings.pop()
             self._columns = self._places()
+        while self._fit(scale) > _ROWS_SHARE * area and scale > _SMALLEST:
+            scale *= 0.95
         left = LARGEST_SHARE * area - self._fit(scale)
         height = min(_TALLEST_PLAN * size[1], math.sqrt(max(left, 0.0) / max(1, len(dials)) / _PLAN_ASPECT))
         self._plan = int(_PLAN_ASPECT * height), int(height)
@@ -220,7 +222,7 @@ class Gauges:
         for row, wheel, x in ((0.02, 0, 0.0), (0.97, 2, -size.wheelbase_m)):
             mean = wheel_angles.words(float(np.mean(angles[wheel : wheel + 2])))
             write(shrunk, (width / 2, row * height), mean, WHITE, self._small, "mt" if row < 0.5 else "mb")
-            beside = width - 0.2 * _GAP * self._scale, at(np.array([(x, 0.0)]))[0][1] / _SIDE
+            beside = width - 0.6 * _GAP * self._scale, at(np.array([(x, 0.0)]))[0][1] / _SIDE
             write(shrunk, beside, f"x{self._factors[wheel]}" if mean else "", GREY, self._small, "rm")
         return shrunk
 

@@ -36,20 +36,23 @@ class Labels:
         Args:
             pixels: The picture, shape (height, width, 3); it stays as it is.
             scene: What it shows, with the camera.
-            labels: The labels; one behind the camera is left out.
+            labels: The labels; one whose place is not in the picture is left out.
         """
         if not labels:
             return pixels
         picture = Image.fromarray(np.ascontiguousarray(pixels))
         for label in labels:
             at, outside = (pixel_of(scene, place, self._size) for place in (label.place_m, label.outside_m))
-            if not label.text or at is None or outside is None:
+            if not label.text or at is None or outside is None or not self._has(at):
                 continue
             right, down = outside[0] - at[0], outside[1] - at[1]
             sideways = abs(right) >= abs(down)
             anchor = ("l" if right > 0 else "r") + "m" if sideways else "m" + ("t" if down > 0 else "b")
             self._write(picture, at, label.text, anchor)
         return np.asarray(picture)
+
+    def _has(self, at: tuple[float, float]) -> bool:
+        return 0.0 <= at[0] < self._size[0] and 0.0 <= at[1] < self._size[1]
 
     def _write(self, picture: Image.Image, at: tuple[float, float], text: str, anchor: str) -> None:
         pad = 3.0 * self._scale
@@ -59,6 +62,8 @@ class Labels:
         write(panel, (pad, height / 2), text, WHITE, self._font)
         left = at[0] - {"l": 0.0, "m": 0.5, "r": 1.0}[anchor[0]] * width
         top = at[1] - {"t": 0.0, "m": 0.5, "b": 1.0}[anchor[1]] * height
+        # What an edge would cut is moved to where all of it is seen.
+        left, top = min(max(left, 0.0), self._size[0] - width), min(max(top, 0.0), self._size[1] - height)
         picture.paste(panel, (round(left), round(top)), panel)
 
 

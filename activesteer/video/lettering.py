@@ -16,14 +16,18 @@ PANEL: Final = (16, 18, 22, 190)
 WHITE: Final = (245, 246, 248, 255)
 GREY: Final = (176, 181, 189, 255)
 
+LEGIBLE: Final = 0.85
+"""The smallest scale with which texts are read: letters of 8 pixels."""
+
 
 def text_scale(size: tuple[int, int]) -> float:
-    """By how much what is laid out for a picture of 640 x 480 is enlarged, so that it fits in width and height.
+    """By how much what is laid out for a picture of 640 x 480 is enlarged: never so little that nobody could read it.
 
     Args:
         size: Width and height of the pictures [pixels].
     """
-    return min(size[0] / 640.0, size[1] / 480.0)
+    high = size[1] / 480.0
+    return max(min(high, math.sqrt(size[0] / 640.0 * high)), LEGIBLE)
 
 
 def write(

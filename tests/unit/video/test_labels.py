@@ -4,7 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.video.labels import pixel_of
+from activesteer.video.labels import Labels, pixel_of
+from activesteer.video.markings import Label
 
 SIZE = (640, 480)
 
@@ -35,3 +36,15 @@ def test_places_are_found_in_the_picture(scene):
 
 def test_what_is_behind_the_camera_is_nowhere(scene):
     assert pixel_of(scene, np.array([0.0, 0.0, 11.0]), SIZE) is None
+
+
+def test_a_label_at_an_edge_is_seen_whole_and_one_of_a_place_beyond_it_is_not_written(scene):
+    def written(x_m: float) -> np.ndarray:
+        label = Label("2.0 deg left, x10", np.array([x_m, 0.0, 0.0]), np.array([x_m + 1.0, 0.0, 0.0]))
+        grey = np.full((SIZE[1], SIZE[0], 3), 128, np.uint8)
+        return np.argwhere((Labels(SIZE).draw(grey, scene, [label]) != grey).any(axis=2))
+
+    inside, edge = written(0.0), written(5.4)
+    assert edge[:, 1].max() == SIZE[0] - 1
+    assert np.ptp(edge[:, 1]) == np.ptp(inside[:, 1])
+    assert len(written(6.0)) == 0
