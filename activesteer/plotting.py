@@ -14,6 +14,7 @@ from activesteer.errors import ActiveSteerError, ParameterError, not_installed
 from activesteer.files import make_folder, replacing, shown_path
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 T = TypeVar("T")
@@ -37,6 +38,27 @@ def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
     if title:
         figure.suptitle(title, fontsize="medium")
     return figure
+
+
+def plain_axis(axis: Axes) -> None:
+    """A grid, and no frame above and on the right: what all axes of ours have."""
+    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def zero_line(draw: Callable[..., object]) -> None:
+    """The line through zero, by `axhline` or `axvline` of an axis."""
+    draw(0.0, color="#999999", linewidth=0.7, zorder=0.5)
+
+
+def page_axis(axis: Axes, title: str, x_label: str) -> None:
+    """An axis of a page: small words, and a legend where curves have names."""
+    plain_axis(axis)
+    axis.set_title(title, fontsize="small")
+    axis.set_xlabel(x_label, fontsize="small")
+    axis.tick_params(labelsize="small")
+    if axis.get_legend_handles_labels()[1]:
+        axis.legend(frameon=False, fontsize="x-small")
 
 
 def as_svg(figure: Figure) -> Markup:

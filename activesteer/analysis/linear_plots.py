@@ -15,7 +15,7 @@ from activesteer.analysis.frequency_response import OUTPUTS, frequency_response
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS, run_looks
 from activesteer.errors import ParameterError
-from activesteer.plotting import new_figure, save
+from activesteer.plotting import new_figure, plain_axis, save
 from activesteer.quantities import quantity_of
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def draw_bode(
         axes[row, 0].set_ylabel(f"{quantity_of(output).short}\n[{_GAIN_UNITS[output]}]")
         axes[row, 1].set_ylabel("phase [deg]")
     for axis in axes.flat:
-        _grid(axis)
+        plain_axis(axis)
     for axis in axes[-1]:
         axis.set_xlabel("frequency [Hz]")
         axis.set_xlim(*BODE_RANGE_Hz)
@@ -156,7 +156,7 @@ def driver_loops_figure(
     damping.set_ylabel("damping [-]\nlines linear, dots runs")
     damping.set_xlabel("speed [km/h]")
     for axis in axes:
-        _grid(axis)
+        plain_axis(axis)
     figure.align_ylabels(axes)
     return figure
 
@@ -205,8 +205,3 @@ def draw_root_locus(
     axis.set_ylim(bottom=-1.0)
     axis.spines[["top", "right"]].set_visible(False)
     return save(figure, Path(path))
-
-
-def _grid(axis: Axes) -> None:
-    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
-    axis.spines[["top", "right"]].set_visible(False)

@@ -12,7 +12,7 @@ from activesteer.errors import StudyError
 from activesteer.files import json_text, make_folder, write_text
 from activesteer.measured.fit_result import Compared, Fit, rests_on
 from activesteer.pages import render
-from activesteer.plotting import as_svg, new_figure
+from activesteer.plotting import as_svg, new_figure, page_axis
 from activesteer.quantities import quantity_of
 
 if TYPE_CHECKING:
@@ -76,12 +76,6 @@ def draw(compared: list[Compared]) -> Figure:
         right.axhspan(-2.0 * noise, 2.0 * noise, color="#cfe0ee", lw=0.0, label="2 standard deviations of the noise")
         right.plot(each.time_s, noise * each.before, "--", color="#888888", lw=0.8)
         right.plot(each.time_s, noise * each.after, color=RUN_COLOURS[2], lw=0.8)
-        right.set_title(f"Simulated less measured [{shown.unit.name}]", fontsize="small")
-        left.set_title(shown.title, fontsize="small")
-        for axis in (left, right):
-            axis.set_xlabel("time of the recording [s]", fontsize="small")
-            axis.tick_params(labelsize="small")
-            axis.grid(visible=True, color="#dddddd", linewidth=0.6)
-            axis.spines[["top", "right"]].set_visible(False)
-            axis.legend(frameon=False, fontsize="x-small")
+        for axis, title in ((left, shown.title), (right, f"Simulated less measured [{shown.unit.name}]")):
+            page_axis(axis, title, "time of the recording [s]")
     return figure

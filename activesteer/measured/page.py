@@ -10,11 +10,10 @@ from activesteer.errors import ParameterError
 from activesteer.files import write_text
 from activesteer.measured.comparison import STANDARDS, Compared, Comparison, assumptions, words
 from activesteer.pages import render
-from activesteer.plotting import as_svg, new_figure
+from activesteer.plotting import as_svg, new_figure, page_axis
 from activesteer.quantities import quantity_of
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -79,15 +78,5 @@ def draw(found: Compared, standard: str, runs: int) -> Figure:
     if outside.any():
         right.plot(x[outside], factor * found.residual[order][outside], ".", color="#b3261e", ms=3, label="outside")
     for axis, title in ((left, shown.title), (right, f"Measured less simulated [{shown.unit.name}]")):
-        _finish(axis, title, "lateral acceleration [m/s²]" if across else "time of the simulation [s]")
+        page_axis(axis, title, "lateral acceleration [m/s²]" if across else "time of the simulation [s]")
     return figure
-
-
-def _finish(axis: Axes, title: str, x_label: str) -> None:
-    axis.set_title(title, fontsize="small")
-    axis.set_xlabel(x_label, fontsize="small")
-    axis.tick_params(labelsize="small")
-    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
-    axis.spines[["top", "right"]].set_visible(False)
-    if axis.get_legend_handles_labels()[1]:
-        axis.legend(frameon=False, fontsize="x-small")

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from activesteer.conventions import RUN_COLOURS
-from activesteer.plotting import new_figure
+from activesteer.plotting import new_figure, page_axis
 from activesteer.standards.page_parts import Panel, Picture
 
 if TYPE_CHECKING:
@@ -74,11 +74,5 @@ def _fill(axis: Axes, panel: Panel) -> None:
     if panel.names:
         axis.set_yticks(range(len(panel.names)), panel.names)
         axis.invert_yaxis()
-    axis.set_title(panel.title, fontsize="small")
-    axis.set_xlabel(panel.x_label, fontsize="small")
     axis.set_ylabel(panel.y_label, fontsize="small")
-    axis.tick_params(labelsize="small")
-    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
-    axis.spines[["top", "right"]].set_visible(False)
-    if axis.get_legend_handles_labels()[1]:
-        axis.legend(frameon=False, fontsize="x-small")
+    page_axis(axis, panel.title, panel.x_label)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from activesteer.plotting import new_figure, save_all
+from activesteer.plotting import new_figure, plain_axis, save_all, zero_line
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 
@@ -66,10 +66,9 @@ def _new_figure(params: TyreParameters, title: str, width_in: float, height_in: 
 def _style(axis: Axes, x: str, y: str) -> None:
     axis.set_xlabel(x)
     axis.set_ylabel(y)
-    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
-    axis.axhline(0.0, color="#999999", linewidth=0.7, zorder=0.5)
-    axis.axvline(0.0, color="#999999", linewidth=0.7, zorder=0.5)
-    axis.spines[["top", "right"]].set_visible(False)
+    plain_axis(axis)
+    zero_line(axis.axhline)
+    zero_line(axis.axvline)
     axis.margins(x=0.0)
 
 

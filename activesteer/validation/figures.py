@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from activesteer.plotting import new_figure
+from activesteer.plotting import new_figure, plain_axis
 from activesteer.quantities import quantity_of
 from activesteer.validation.kinematics import Curves
 from activesteer.validation.our_runs import QUANTITIES, RMS_TOLERANCE, traces
@@ -27,11 +27,6 @@ _CROSS: Final = (("rack", "ay"), ("ay", "r"), ("ay", "roll"), ("ay", "beta"))
 _AXIS_NAMES: Final = _SHOWN | {"rack": ("rack [mm] (- steers left)", 1e3)}
 
 
-def _style(axis: Axes) -> None:
-    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
-    axis.spines[["top", "right"]].set_visible(False)
-
-
 def run_figure(run: str, ours: Table, reference: Table | None) -> Figure:
     """A run over time: yaw rate, lateral acceleration, roll, sideslip; with the reference's corridor, if any."""
     figure = new_figure(9.0, 5.2, run)
@@ -46,7 +41,7 @@ def run_figure(run: str, ours: Table, reference: Table | None) -> Figure:
             axis.plot(trace.time_s, factor * trace.reference, color=_THEIRS, lw=2.6, label="reference")
         axis.plot(ours["t"], factor * ours[quantity.column], color=_OURS, lw=1.2, ls=(0, (4, 2)), label="ours")
         axis.set_ylabel(label)
-        _style(axis)
+        plain_axis(axis)
     for axis in axes[1]:
         axis.set_xlabel("time [s]")
     _legend(figure, axes[0, 0])
@@ -68,7 +63,7 @@ def cross_figure(run: str, ours: Table, reference: Table | None) -> Figure:
             axis.plot(u, v, color=_THEIRS, lw=2.6, label="reference")
         axis.plot(x_factor * ours[x], y_factor * ours[y], color=_OURS, lw=1.2, ls=(0, (4, 2)), label="ours")
         axis.set(xlabel=x_label, ylabel=y_label)
-        _style(axis)
+        plain_axis(axis)
     _legend(figure, axes[0, 0])
     return figure
 
@@ -87,7 +82,7 @@ def sweep_figure(curves: list[Curves]) -> Figure:
         below.plot(curve.x, curve.ours - curve.reference, color=_OURS, lw=1.0)
         below.set_xlabel(curve.x_label, fontsize="small")
         for axis in (above, below):
-            _style(axis)
+            plain_axis(axis)
             axis.tick_params(labelsize="small")
     _legend(figure, axes[0, 0])
     return figure

@@ -17,6 +17,7 @@ from activesteer.analysis.claims.sine_with_dwell import LOST_SIDESLIP_RAD
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RunLook, run_looks
 from activesteer.errors import ParameterError
+from activesteer.plotting import plain_axis
 from activesteer.quantities import Quantity, quantity_of
 
 if TYPE_CHECKING:
@@ -146,9 +147,8 @@ def plain(axis: Axes, title: str = "") -> None:
     """Grid, spines and size of text of every axis here."""
     if title:
         axis.set_ylabel(title)
-    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
+    plain_axis(axis)
     axis.set_axisbelow(True)
-    axis.spines[["top", "right"]].set_visible(False)
     axis.tick_params(labelsize=TEXT_PT, length=2.5, pad=2.0)
     for label in (axis.xaxis.label, axis.yaxis.label):
         label.set_fontsize(TEXT_PT)

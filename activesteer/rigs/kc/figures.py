@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from activesteer.conventions import Array
-from activesteer.plotting import new_figure, save_all
+from activesteer.plotting import new_figure, plain_axis, save_all, zero_line
 from activesteer.rigs.kc.definitions import Axle
 from activesteer.rigs.kc.metrics_kinematics import roll_angle_rad
 from activesteer.rigs.kc.metrics_steering import mean_steer_rad, ratio_curve
@@ -90,12 +90,11 @@ def _new_figure(result: KcResult, title: str, width_in: float, height_in: float)
 
 
 def _style(axis: Axes) -> None:
-    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
+    plain_axis(axis)
     low, high = axis.get_ylim()
     if low < 0.0 < high:
-        axis.axhline(0.0, color="#999999", linewidth=0.7, zorder=0.5)
-    axis.axvline(0.0, color="#999999", linewidth=0.7, zorder=0.5)
-    axis.spines[["top", "right"]].set_visible(False)
+        zero_line(axis.axhline)
+    zero_line(axis.axvline)
     axis.margins(x=0.0)
 
 
