@@ -115,9 +115,8 @@ def add_scenario(parser: argparse.ArgumentParser) -> None:
         "maneuver", metavar="MANEUVER",
         help="a name from `activesteer list`, a TOML file, or a recording, whose steering, speed and brake are driven",
     )  # fmt: skip
-    add_vehicle(parser)
+    add_car(parser)
     add_driver(parser)
-    add_overrides(parser)
     parser.add_argument(
         "--fault", action="append", default=[], dest="faults", metavar="PART:KIND[=SIZE]@START[-END]",
         help="let an actuator or a sensor fail, as rear:stuck@2.0 or yaw_rate_sensor:offset=2degps@1-3; "
@@ -125,8 +124,9 @@ def add_scenario(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def add_overrides(parser: argparse.ArgumentParser) -> None:
-    """Adds `--set` and `--overrides`, which `overrides_of` reads."""
+def add_car(parser: argparse.ArgumentParser) -> None:
+    """Adds `--vehicle`, and `--set` and `--overrides`, which `overrides_of` reads."""
+    add_vehicle(parser)
     parser.add_argument(
         "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
         help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
@@ -147,11 +147,15 @@ def add_controller(parser: argparse.ArgumentParser, *, several: bool, default: s
     )  # fmt: skip
 
 
-def add_driver(parser: argparse.ArgumentParser, default: str = "") -> None:
-    """Adds `--driver`; where the default depends on something, it is None, and `default` says it in words."""
+def add_driver(parser: argparse.ArgumentParser, default: str = "", *, several: bool = False) -> None:
+    """Adds `--driver`; where the default depends on something, it is None, and `default` says it in words.
+
+    Where there may be several, `options.driver` is a list, or None.
+    """
+    words = f"novice, typical, expert, a driver file, or my_file.py:MyDriver{'; may be repeated' if several else ''}"
     parser.add_argument(
-        "--driver", default=None if default else DEFAULT_DRIVER, metavar="DRIVER",
-        help=f"novice, typical, expert, a driver file, or my_file.py:MyDriver (default: {default or DEFAULT_DRIVER})",
+        "--driver", action="append" if several else "store", default=None if default or several else DEFAULT_DRIVER,
+        metavar="DRIVER", help=f"{words} (default: {default or DEFAULT_DRIVER})",
     )  # fmt: skip
 
 

@@ -6,12 +6,11 @@ import argparse
 from typing import Any
 
 from activesteer.commands.arguments import (
+    add_car,
     add_controller,
     add_figures_folder,
     add_json,
-    add_overrides,
     add_speeds,
-    add_vehicle,
     overrides_of,
 )
 from activesteer.commands.output import print_json
@@ -45,9 +44,8 @@ def add_to(commands: Any) -> None:
         "name", nargs="?", default=DEFAULT_DRIVER, metavar="NAME",
         help="novice, typical, expert, or a driver file (default: typical)",
     )  # fmt: skip
-    add_vehicle(parser)
+    add_car(parser)
     add_controller(parser, several=True, default="none, ars and afs")
-    add_overrides(parser)
     add_speeds(parser, "60, 80 ... 140")
     add_json(parser)
     add_figures_folder(parser)

@@ -6,11 +6,11 @@ import argparse
 from typing import Any
 
 from activesteer.commands.arguments import (
+    add_car,
     add_controller,
+    add_driver,
     add_figures_folder,
     add_json,
-    add_overrides,
-    add_vehicle,
     add_workers,
     overrides_of,
 )
@@ -25,12 +25,8 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser("envelope", help="how fast cars get through lanes or cones, and where who is lost")
     parser.add_argument("maneuver", metavar="MANEUVER", help="a lane change or slalom: a name, or a TOML file")
     add_controller(parser, several=True, default="none, ars and afs")
-    parser.add_argument(
-        "--driver", action="append", metavar="DRIVER",
-        help="who drives, as for `run`; a map for each (default: that of `run`)",
-    )  # fmt: skip
-    add_vehicle(parser)
-    add_overrides(parser)
+    add_driver(parser, several=True)
+    add_car(parser)
     parser.add_argument("--speeds-kmh", metavar="V,V", help="speeds of the map (default: the manoeuvre's +-30)")
     parser.add_argument("--lines-m", metavar="D,D", help="lane.margin_m or cones.offset_m of the map")
     add_figures_folder(parser)

@@ -8,12 +8,11 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from activesteer.commands.arguments import (
+    add_car,
     add_controller,
     add_driver,
     add_figures_folder,
     add_json,
-    add_overrides,
-    add_vehicle,
     add_workers,
     overrides_of,
     pairs,
@@ -35,8 +34,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser("fault-map", help="what faults do to the car, and how long they may last")
     add_controller(parser, several=False)
     add_driver(parser)
-    add_vehicle(parser)
-    add_overrides(parser)
+    add_car(parser)
     parser.add_argument(
         "--fault", action="append", default=[], dest="faults", metavar="PART:KIND[=SIZE]",
         help="a fault, as rear:stuck or rear:offset=1deg (default: those of the controller's actuators)",

@@ -7,15 +7,14 @@ import datetime
 import sys
 from typing import Any
 
-from activesteer.commands.arguments import add_json, add_overrides, add_vehicle, overrides_of
+from activesteer.commands.arguments import add_car, add_json, overrides_of
 from activesteer.errors import ParameterError
 
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("identify", help="understeer, limits and single-track model of a vehicle (ISO 4138)")
-    add_vehicle(parser)
-    add_overrides(parser)
+    add_car(parser)
     parser.add_argument(
         "--write", action="store_true", help="also write the result to the table [single_track] of the vehicle file"
     )

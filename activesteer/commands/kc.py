@@ -6,20 +6,13 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from activesteer.commands.arguments import (
-    add_figures_folder,
-    add_json,
-    add_overrides,
-    add_vehicle,
-    overrides_of,
-)
+from activesteer.commands.arguments import add_car, add_figures_folder, add_json, overrides_of
 
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("kc", help="kinematics and compliance of the suspensions, as on a rig")
-    add_vehicle(parser)
-    add_overrides(parser)
+    add_car(parser)
     add_figures_folder(parser)
     parser.add_argument(
         "--tables",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any, Final
 
-from activesteer.commands.arguments import add_figures_folder, add_json, add_overrides, add_vehicle, overrides_of
+from activesteer.commands.arguments import add_car, add_figures_folder, add_json, overrides_of
 from activesteer.commands.output import print_json
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder
@@ -17,8 +17,7 @@ _LOCUS_KMH: Final = (40.0, 60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("linearise", help="modes of the full car at a speed, Bode plots and root locus")
-    add_vehicle(parser)
-    add_overrides(parser)
+    add_car(parser)
     parser.add_argument("--speed-kmh", type=float, default=80.0, metavar="V", help="default: 80")
     add_json(parser)
     add_figures_folder(parser)

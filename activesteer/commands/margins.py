@@ -5,14 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.commands.arguments import (
-    add_controller,
-    add_json,
-    add_overrides,
-    add_speeds,
-    add_vehicle,
-    overrides_of,
-)
+from activesteer.commands.arguments import add_car, add_controller, add_json, add_speeds, overrides_of
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import RunCounter
 from activesteer.errors import ParameterError
@@ -40,9 +33,8 @@ def add_to(commands: Any) -> None:
         description="Margins of the loop of controller, control unit, actuators, linearised car and sensors, opened at "
         "the rear actuator and at the superposition. Sensors are ideal unless --set sensors.preset=production.",
     )
-    add_vehicle(parser)
+    add_car(parser)
     add_controller(parser, several=True, default="ars and afs")
-    add_overrides(parser)
     add_speeds(parser, "60, 80 ... 160")
     parser.add_argument(
         "--study", metavar="STUDY", help="the smallest over the samples of a study, by its file or name: its factors "

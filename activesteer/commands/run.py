@@ -8,13 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.commands.arguments import (
-    add_controller,
-    add_json,
-    add_output,
-    add_scenario,
-    scenario_of,
-)
+from activesteer.commands.arguments import add_controller, add_json, add_output, add_scenario, scenario_of
 from activesteer.commands.output import BAD, GOOD, coloured, painted, print_json
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError, shown

@@ -6,12 +6,11 @@ import argparse
 from typing import Any
 
 from activesteer.commands.arguments import (
+    add_car,
     add_controller,
     add_driver,
     add_json,
     add_output,
-    add_overrides,
-    add_vehicle,
     add_workers,
     overrides_of,
 )
@@ -26,9 +25,8 @@ def add_to(commands: Any) -> None:
         "standard", metavar="STANDARD", nargs="?", default="", help="its name; without one, those there are"
     )
     add_controller(parser, several=True)
-    add_vehicle(parser)
+    add_car(parser)
     add_driver(parser, default="whom the standard asks for")
-    add_overrides(parser)
     add_output(parser, "DIR", "folder for page, JSON and runs, which is gone on with; none are written without it")
     add_workers(parser)
     add_json(parser)
