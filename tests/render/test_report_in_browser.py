@@ -294,6 +294,15 @@ def test_phone_shows_everything_within_its_width(open_page):
         assert 300.0 < box["width"] <= 390.0 - box["x"]
 
 
+def test_no_number_of_the_first_screen_is_without_a_name_on_a_phone(open_page):
+    page = open_page(**PHONE)
+    names = page.locator(".headline:not(:empty), .results td.number").evaluate_all(
+        "parts => parts.map(part => getComputedStyle(part, '::before').content)"
+    )
+    assert names
+    assert all(re.match(r'attr|"\w', name) for name in names), names
+
+
 def test_fingers_read_values_and_zoom(open_page):
     page = open_page(**PHONE)
     yaw_rate, other = plot(page, "Yaw rate"), plot(page, "Sideslip angle")
@@ -350,3 +359,16 @@ def test_printed_plots_fit_the_paper(open_page):
     box = plot(page, "Yaw rate").locator(".uplot").bounding_box()
     assert box
     assert box["width"] > 400.0  # as before
+
+
+def test_names_of_printed_runs_end_before_their_results(open_page):
+    page = open_page(viewport={"width": 600, "height": 850})  # paper less wide than A4
+    page.emulate_media(media="print")
+    overlaps = page.locator(".contents .run:has(.swatch), .results tbody th").evaluate_all("""cells => {
+      const range = document.createRange();
+      return cells.filter((cell) => {
+        range.selectNodeContents(cell);
+        return range.getBoundingClientRect().right > cell.getBoundingClientRect().right + 0.5;
+      }).map((cell) => cell.textContent);
+    }""")
+    assert overlaps == []
