@@ -16,7 +16,7 @@ def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser(
         "compare",
-        help="measured runs beside a simulated one: time shift, residuals, verdict",
+        help="measured runs beside a simulated one: shift, residuals, verdict",
         description="Finds the time shift, and says which share of the measurement lies in the tolerance corridor "
         "around the simulation. The status is 1 where a quantity does not.",
     )

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser(
-        "validate", help="compare a car with another multibody code, or with a measurement on the road"
+        "validate", help="a car beside another multibody code or a measured one"
     )
     parser.add_argument(
         "name",
