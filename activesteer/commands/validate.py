@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
-    parser = commands.add_parser(
-        "validate", help="a car beside another multibody code or a measured one"
-    )
+    parser = commands.add_parser("validate", help="a car beside another multibody code or a measured one")
     parser.add_argument(
         "name",
         nargs="?",
