@@ -6,13 +6,10 @@ import math
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import RecordingError
-
-Array = NDArray[np.float64]
 
 STANDSTILL_MPS: Final = 0.1
 """Below this the car stands [m/s]."""

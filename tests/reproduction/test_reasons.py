@@ -1,4 +1,4 @@
-"""The reasons for which claims do not come out: without the reason they would, or the car does what it says."""
+"""Reasons that the guides give, of claims that fail, faults and brakes: without a reason it would be otherwise."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import pytest
 from activesteer import simulate
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim
 from activesteer.analysis.claims.noticeable import STEER_RAD
+from activesteer.conventions import CORNERS
+from activesteer.studies.fault_map import fault_map
 
 pytestmark = pytest.mark.slow
 
@@ -94,3 +96,27 @@ def test_the_tesla_is_kept_by_its_grip_and_not_by_its_understeer() -> None:
     slippery = left("tesla_model_s", "factors.tyre_friction", 0.85)
     assert moved["yaw_rate_after_1750ms_share"] < 0.2 < slippery["yaw_rate_after_1750ms_share"]
     assert math.degrees(moved["sideslip_peak_abs_rad"]) < 20.0 < math.degrees(slippery["sideslip_peak_abs_rad"])
+
+
+@pytest.mark.parametrize(("controller", "low", "high"), [("ars", 0.0, 0.5), ("ars_tuned", 5.0, 90.0)])
+def test_feedback_without_a_band_drives_a_reversed_actuator_away_straight_ahead(controller, low, high) -> None:
+    found = fault_map(
+        controller, overrides={"sensors.preset": "production"}, faults=["rear:reversed"], speeds_kmh=[100],
+        situations=["straight"], jobs=1,
+    )  # fmt: skip
+    assert low <= math.degrees(found.rows[0]["yaw_rate_change_radps"]) <= high
+
+
+def test_on_split_friction_the_left_rear_wheel_leaves_most_of_what_the_sedan_could_have() -> None:
+    """Not the brakes, and not what the front wheel with grip is let off by for the driver."""
+    limits = {"brakes.front_torque_Nm": 2600.0, "brakes.antilock.side_difference_rise_Paps": 8e6}
+    nominal, *others = (
+        simulate("split_mu_braking", vehicle="sedan", overrides=overrides)
+        for overrides in ({}, *({key: value} for key, value in limits.items()))
+    )
+    efficiency = nominal.metrics["braking_efficiency"]
+    assert all(other.metrics["braking_efficiency"] < efficiency + 0.02 for other in others)
+    fast = (nominal.time_s > 1.0) & (nominal["speed_mps"] > 3.0)
+    used = {corner: np.mean(nominal[f"{corner}_friction_utilisation"][fast]) for corner in CORNERS}
+    assert used["rl"] < 0.5
+    assert min(value for corner, value in used.items() if corner != "rl") > 0.8
