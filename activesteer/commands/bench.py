@@ -22,18 +22,20 @@ def add_to(commands: Any) -> None:
     what.add_argument("--tyre", action="store_true", help="what a tyre's evaluation costs instead")
     what.add_argument("--maneuvers", action="store_true", help="the paper's scenarios instead, and their key metrics")
     add_json(parser)
-    parser.add_argument("--rounds", type=int, default=5, metavar="N", help="the best of N counts (default: 5)")
+    parser.add_argument("--rounds", type=int, metavar="N", help="the best of N counts (default: 5)")
     parser.set_defaults(action=_bench)
 
 
 def _bench(options: argparse.Namespace) -> int:
     from activesteer.studies.benchmark import bench, bench_tyre
 
-    if options.rounds < 1:
+    if options.rounds is not None and options.rounds < 1:
         raise ParameterError(f"--rounds {options.rounds}: at least 1 is needed")
+    if options.maneuvers and options.rounds:
+        raise ParameterError("has no effect with --maneuvers: each is driven once", key="--rounds")
     if options.maneuvers:
         return _maneuvers(as_json=options.json)
-    results = bench_tyre(options.rounds) if options.tyre else bench(options.rounds)
+    results = (bench_tyre if options.tyre else bench)(options.rounds or 5)
     if options.json:
         print_json(results)
         return 0

@@ -35,6 +35,8 @@ def _figures(options: argparse.Namespace) -> int:
     from activesteer.studies.reproduction import recordings_in, reproduce
 
     if options.recordings is not None:
+        if options.jobs is not None:
+            raise ParameterError("has no effect with --recordings: nothing is driven", key="--jobs")
         recordings = recordings_in(options.recordings)
     else:
         with ProgressBar("runs", quiet=False) as bar:

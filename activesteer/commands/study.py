@@ -18,9 +18,10 @@ def add_to(commands: Any) -> None:
     parser.add_argument("study", metavar="STUDY_OR_DIR", help="a study file or its name, or the folder of a study")
     add_output(parser, "DIR", "folder for the results, needed for a new study; one that is there is gone on with")
     add_workers(parser)
-    parser.add_argument("--limit", type=int, metavar="N", help="make at most N runs now and leave the rest")
-    parser.add_argument("--status", action="store_true", help="only say how far the study in DIR is")
-    parser.add_argument("--report", action="store_true", help="only write DIR/report.html, of the runs that are done")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--limit", type=int, metavar="N", help="make at most N runs now and leave the rest")
+    what.add_argument("--status", action="store_true", help="only say how far the study in DIR is")
+    what.add_argument("--report", action="store_true", help="only write DIR/report.html, of the runs that are done")
     add_json(parser)
     parser.set_defaults(action=_study)
 

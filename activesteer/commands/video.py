@@ -27,9 +27,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--camera", default="chase", choices=("chase", "top", "wheel"), help="where it is taken from (default: chase)"
     )
-    parser.add_argument(
-        "--corner", default=CORNERS[0], choices=CORNERS, help="the wheel that the camera `wheel` looks at (default: fl)"
-    )
+    parser.add_argument("--corner", choices=CORNERS, help="the wheel that the camera `wheel` looks at (default: fl)")
     parser.add_argument(
         "--compare", type=Path, action="append", default=[], metavar="OTHER.mcap",
         help="also show the car of another recording; may be repeated",
@@ -63,13 +61,15 @@ def _video(options: argparse.Namespace) -> int:
     for number, other in enumerate(files):
         if other.resolve() in [file.resolve() for file in files[:number]]:
             raise ParameterError(f"--compare {other}: it is the same file, so there is nothing to compare")
+    if options.corner and options.camera != "wheel":
+        raise ParameterError("belongs to --camera wheel", key="--corner", value=options.corner)
     if options.layout == "side-by-side" and not options.compare:
         raise ParameterError("--layout side-by-side needs --compare OTHER.mcap: there is one car")
     recordings = [Recording.open(file, recover=True) for file in files]
     output = options.output if options.output is not None else options.file.with_suffix(".mp4")
     rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0
     settings = Settings(
-        options.camera, options.corner, options.size, rate, options.speed, options.layout, options.cutaway
+        options.camera, options.corner or CORNERS[0], options.size, rate, options.speed, options.layout, options.cutaway
     )
     named = dict(zip(run_names(files, recordings), recordings, strict=True))
     started = time.monotonic()

@@ -153,11 +153,15 @@ def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str |
         The workers.
 
     Raises:
-        ParameterError: fewer than one job.
+        ParameterError: fewer than one job, or jobs beside a scheduler.
         StudyError: there is no such scheduler, it has no workers, or `distributed` is not installed.
     """
     if jobs is not None and jobs < 1:
         raise ParameterError("at least 1 is needed", key=f"--jobs {jobs}", value=jobs, allowed=Range(1))
+    if jobs is not None and scheduler is not None:
+        raise ParameterError(
+            "has no effect with --scheduler, whose workers do all of it", key=f"--jobs {jobs}", value=jobs
+        )
     with contextlib.ExitStack() as stack:
         if client is None and scheduler is not None:
             client = stack.enter_context(dask_cluster.connected(scheduler))

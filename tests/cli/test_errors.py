@@ -86,6 +86,10 @@ def test_a_misplaced_or_misspelt_word_is_answered_with_the_right_one(capsys, wor
         (["validate", "tesla_model_s", "--timestep", "0.0005"], ["--timestep", "tesla_model_s"]),
         (["validate", "golf"], ["sedan", "tesla_model_s"]),
         (["report", "."], ["DIR/*.mcap"]),
+        (["figures", "out", "--recordings", "runs", "--jobs", "2"], ["--jobs", "--recordings"]),
+        (["bench", "--maneuvers", "--rounds", "2"], ["--rounds", "--maneuvers"]),
+        (["test", "iso4138", "--jobs", "2", "--scheduler", "tcp://nowhere:1"], ["--jobs 2", "--scheduler"]),
+        (["video", "run.mcap", "--corner", "rl"], ["--corner", "--camera wheel"]),
         (["identify", "--write", "--vehicle", str(find_vehicle("compact")), "--set", "factors.mass=1.1"], ["--write"]),
     ],
 )
