@@ -35,7 +35,7 @@ def _info(options: argparse.Namespace) -> int:
         )
         return 0
     span = f"{time_s[0]:.3f} to {time_s[-1]:.3f} s, {len(time_s)} steps" if len(time_s) else "no steps"
-    print_entry(f"{shown_path(options.file)}: ", span)
+    print(f"{shown_path(options.file)}: {span}")
     for key in ("maneuver", "vehicle"):
         table = metadata.get(key, {})
         print_entry(f"{key}: ", f"{table.get('name', '?')} {table.get('title', '')}")
