@@ -15,7 +15,6 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
@@ -23,6 +22,7 @@ from activesteer.analysis.claims.noticeable import SIDESLIP_RAD
 from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.sine_with_dwell import INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import Array
 
 LOST_SIDESLIP_RAD: Final = math.radians(20.0)
 """Beyond this sideslip angle a car is lost [rad]."""
@@ -148,7 +148,7 @@ def _opposite(trio: Trio) -> Claim:
     )
 
 
-def _added_angles(ars: RecordingLike, afs: RecordingLike) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _added_angles(ars: RecordingLike, afs: RecordingLike) -> tuple[Array, Array, float]:
     """Demanded rear and superposed angle over the time since the beginning of steer, and its step [s]."""
     times = sine_with_dwell.steering(ars)
     later_s = sine_with_dwell.steering(afs).begin_s - times.begin_s

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from activesteer.analysis.figures import style, time_panels
 from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, Curve
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import RUN_COLOURS, RUN_DASHES, RunLook
+from activesteer.conventions import RUN_COLOURS, RUN_DASHES, Array, RunLook
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure, save
 from activesteer.quantities import quantity_of
@@ -80,7 +79,7 @@ def step_steer_figure(recordings: Mapping[str, RecordingLike], path: str | os.Pa
 def figure_2(
     recording: RecordingLike,
     path: str | os.PathLike[str],
-    models: Mapping[str, Mapping[str, NDArray[np.float64]]] | None = None,
+    models: Mapping[str, Mapping[str, Array]] | None = None,
 ) -> Path:
     """Draw yaw rate and roll angle after a step of the steering, in the form of the paper's figure 2, and save it.
 
