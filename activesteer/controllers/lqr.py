@@ -38,6 +38,7 @@ zero sideslip: M. Abe, Vehicle Handling Dynamics, 2009, chapter 8.
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import lru_cache
 from operator import mul
@@ -104,7 +105,7 @@ class Lqr:
         self._car, self._interval_s = setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         self._curves = AxleSlopes(setup)
-        self._schedules: dict[tuple[bool, bool], tuple[tuple[float, ...], ...]] = {}
+        self._schedules: dict[tuple[bool, bool], list[list[tuple[float, float]]]] = {}
         self._front_rad = self._rear_rad = 0.0
         self._before = 0.0, 0.0
         known, (front, rear) = setup.estimation, brake_levers(setup)
@@ -228,13 +229,14 @@ class Lqr:
 
     def _gains(self, works: tuple[bool, bool], speed_mps: float) -> list[float]:
         """The row of the schedule at a speed."""
-        if (rows := self._schedules.get(works)) is None:
+        if (lines := self._schedules.get(works)) is None:
             rows = schedule(self._car, self._parameters, self._servos.lag_s, self._interval_s, works)
-            self._schedules[works] = rows
-        place = min(max(speed_mps / SPEED_STEP_MPS - 1.0, 0.0), len(rows) - 1.000001)
+            lines = [[(a, b - a) for a, b in zip(*ends, strict=True)] for ends in itertools.pairwise(rows)]
+            self._schedules[works] = lines
+        place = min(max(speed_mps / SPEED_STEP_MPS - 1.0, 0.0), len(lines) - 1e-6)
         index = int(place)
         part = place - index
-        return [a + part * (b - a) for a, b in zip(rows[index], rows[index + 1], strict=True)]
+        return [start + part * rise for start, rise in lines[index]]
 
 
 @lru_cache(maxsize=64)

@@ -8,7 +8,7 @@ import os
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +18,7 @@ import numpy as np
 
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS
 from activesteer.scenario import Scenario, resolve
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.recorder import Recorder
@@ -35,6 +36,9 @@ _CONTROLLER: Final = "ars"
 """The most costly of the built-in controllers."""
 _FAMILY: Final = {"estimator_lqr_us": "lqr", "integrated_us": "integrated", "mpc_us": "mpc"}
 """What controllers with an estimator cost, and which they are; all but the first need a solver that is an extra."""
+_GIVEN: Final = "given_"
+"""What the stages are called in which the commands of such a controller are given: a car whose actuators move costs the
+engine more than one whose actuators rest."""
 _RUNS_PER_PROCESS: Final = 4
 
 
@@ -54,8 +58,8 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
         (the step steer written as MCAP), `sedan_step_us` (the second car, in memory), `production_step_us` (the step
         steer in memory with the sensors of production cars); `sensors_and_brakes_us` (their share of a step: sensors,
         brakes and the working anti-lock system, see `chassis_benchmark`); `estimator_lqr_us`, `integrated_us`, `mpc_us`
-        (what these controllers, each with its estimator, add to a step of the same step steer without control; the last
-        two where their solver is installed); the ratios of the closed loops to
+        (what these controllers, each with its estimator, add to a step of the same step steer in which their commands
+        are given again; the last two where their solver is installed); the ratios of the closed loops to
         `bare_step_us`, and to the engine alone on the same drive; real-time factors; `threads_2_speedup` (how much
         faster two simulations come to their ends in two threads of one process than one after the other);
         `step_steers_per_min` (whole runs, building the car included, by as many processes as there are processors); and
@@ -79,15 +83,15 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
             "production_step_us": lambda: _closed_loop(sensed),
             "sensors_and_brakes_us": stop.step_us,
             "two_threads_step_us": lambda: _in_threads(scenario, 2),
-            "without_control_us": lambda: _closed_loop(sensed, "none"),
         }
         solver = importlib.util.find_spec("daqp") is not None
         family = {name: system for name, system in _FAMILY.items() if solver or system == "lqr"}
         for name, system in family.items():
+            asked = _asked(sensed, system)
             stages[name] = lambda system=system: _closed_loop(sensed, system)
+            stages[_GIVEN + name] = lambda system=system, asked=asked: _closed_loop(sensed, system, _Given(asked))
         best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
-    without_us = best.pop("without_control_us")
-    best |= {name: best[name] - without_us for name in family}
+    best |= {name: best[name] - best.pop(_GIVEN + name) for name in family}
     step_us = 1e6 * driven.vehicle.timestep_s
     for stage in ("closed_loop", "path_following", "with_file"):
         engine = "path_engine" if stage == "path_following" else "engine"
@@ -192,12 +196,31 @@ def _repeat(step: Callable[..., object], model: mujoco.MjModel, data: mujoco.MjD
         step(model, data)
 
 
-def _closed_loop(scenario: Scenario, controller: str = _CONTROLLER) -> float:
+def _asked(scenario: Scenario, controller: str) -> list[ActuatorCommand]:
+    """What a controller asks for in each step, without its estimates."""
+    simulation, asked = ClosedLoop(scenario, controller), []
+    for _ in range(simulation.steps):
+        simulation.advance(1)
+        asked.append(simulation.commands[1]._replace(estimate=None))
+    return asked
+
+
+class _Given:
+    """Asks for what was asked for."""
+
+    def __init__(self, asked: Sequence[ActuatorCommand]) -> None:
+        self._next = iter(asked).__next__
+
+    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
+        return self._next()
+
+
+def _closed_loop(scenario: Scenario, controller: str = _CONTROLLER, given: _Given | None = None) -> float:
     simulation = ClosedLoop(scenario, controller)
     recorder = Recorder(simulation.vehicle, simulation.steps)
 
     def run() -> None:
-        simulation.run(recorder)
+        simulation.advance(simulation.steps, recorder, controller=given)
         recorder.flush()
 
     return _per_step_us(run, simulation.steps)
