@@ -25,7 +25,7 @@ _NEAR: Final = {
     "aligning_moment_opposed": 100.0,
 }
 """Range about zero within which a slope counts [m, N, N m]."""
-_HINT: Final = f"; {NAMES_FILE} turns the sign of a channel"
+_HINT: Final = f" ({NAMES_FILE} turns the sign of a channel)"
 _MUST_RISE: Final = (
     ("parallel_travel", "load", "the wheel load falls in bump: is travel positive in bump?"),
     ("steering", "-toe", "the left wheel turns to the right as the rack steers left: signs of rack and toe?"),

@@ -12,6 +12,7 @@ curve that is laid through them. `names.toml` says what a laboratory calls the c
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,9 +22,9 @@ from typing import Any, Final
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
-from activesteer.config import read_toml
+from activesteer.config import Source, read_toml
 from activesteer.conventions import Array
-from activesteer.errors import ParameterError, nearest_names
+from activesteer.errors import ParameterError, nearest_names, shown
 from activesteer.files import is_file, is_folder, read_csv
 from activesteer.rigs.kc.tables import CHANNELS, OF_THE_AXLE, TESTS, UNITS
 
@@ -33,6 +34,13 @@ _MOST_INTERVALS: Final = 16
 """Of the smoothing spline: over +-80 mm of travel one for each 10 mm."""
 NAMES_FILE: Final = "names.toml"
 _LEAST_POINTS: Final = 5
+_GREATEST: Final = {
+    "travel": 0.3, "rack": 0.3, "force": 5e4, "moment": 5e3, "steering_wheel": 40.0, "toe": 1.2, "camber": 0.8,
+    "caster": 0.8, "load": 1e5,
+}  # fmt: skip
+"""What no car reaches on a rig, SI units: beyond it the unit of a column is another one."""
+_GREATEST_WAY_M: Final = 10.0
+"""The same of all other channels, which may count from any origin."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,7 @@ def read_kc(folder: Path, axles: list[str]) -> KcTables:
     if not is_folder(folder):
         raise ParameterError(f"there is no folder {folder}")
     names, signs = _translation(folder)
+    _check_files(folder)
     tests: dict[str, dict[str, Samples]] = {axle: {} for axle in axles}
     pinion = None
     for axle, found in tests.items():
@@ -123,14 +132,25 @@ def read_kc(folder: Path, axles: list[str]) -> KcTables:
     return KcTables(tests, pinion)
 
 
+def _check_files(folder: Path) -> None:
+    """A test whose name is misspelt would have no effect."""
+    known = [f"{axle}_{name}" for axle in ("front", "rear") for name in TESTS]
+    for path in sorted(folder.iterdir()):
+        if path.suffix in (".csv", ".toml") and path.stem.startswith(("front_", "rear_")) and path.stem not in known:
+            raise ParameterError(f"no test is named so; {nearest_names(path.stem, known)}", file=path.name)
+
+
 def _translation(folder: Path) -> tuple[dict[str, str], dict[str, float]]:
     file = folder / NAMES_FILE
     if not is_file(file):
         return {}, {}
     raw, source = read_toml(file)
-    for key in raw:
-        if key not in ("names", "signs"):
+    for key, table in raw.items():
+        if key not in ("names", "signs") or not isinstance(table, dict):
             raise source.fail((key,), f"there is no such table; {nearest_names(key, ('names', 'signs'))}")
+    for name, channel in raw.get("names", {}).items():
+        if not isinstance(channel, str):
+            raise source.fail(("names", name), f"{shown(channel)} is no channel with its unit, as 'left_toe [deg]'")
     signs: dict[str, float] = {}
     for channel, sign in raw.get("signs", {}).items():
         if channel not in CHANNELS:
@@ -150,8 +170,15 @@ def _columns(file: Path, names: Mapping[str, str], signs: Mapping[str, float]) -
             raise ParameterError(f"two columns are {channel}", file=file.name, key=head)
         bare = channel.removeprefix("left_").removeprefix("right_")
         columns[channel] = factor * signs.get(bare, 1.0) * values
+        greatest, reached = _GREATEST.get(bare, _GREATEST_WAY_M), float(np.abs(columns[channel]).max(initial=0.0))
+        if reached > greatest:
+            raise ParameterError(
+                f"reaches {reached:.3g} {CHANNELS[bare][0]}, and {greatest:g} at most are possible: is its unit right?",
+                file=file.name,
+                key=head,
+            )
     lengths = {len(values) for values in columns.values()}
-    if len(lengths) > 1 or min(lengths) < _LEAST_POINTS:
+    if len(lengths) != 1 or min(lengths) < _LEAST_POINTS:
         raise ParameterError(
             f"columns of {_LEAST_POINTS} rows or more, all of the same length, are needed", file=file.name
         )
@@ -161,28 +188,41 @@ def _columns(file: Path, names: Mapping[str, str], signs: Mapping[str, float]) -
 def _raw_columns(file: Path) -> dict[str, Array]:
     if file.suffix == ".toml":
         table, source = read_toml(file)
-        return {key: _numbers(file, key, value, source.name) for key, value in table.items()}
+        return {key: _numbers(key, value, source) for key, value in table.items()}
     rows = read_csv(file, ParameterError)
     heads = rows[0].cells if rows else []
+    for head in heads:
+        if head and heads.count(head) > 1:
+            raise ParameterError("two columns have this name", file=file.name, line=rows[0].line, key=head)
     for row in rows[1:]:
         if len(row.cells) != len(heads):
             raise ParameterError(
                 f"has {len(row.cells)} cells, the first row {len(heads)}", file=file.name, line=row.line
             )
     return {
-        head: _numbers(file, head, [row.cells[index] for row in rows[1:]], file.name)
+        head: np.array([_number(row.cells[index], file, head, row.line) for row in rows[1:]])
         for index, head in enumerate(heads)
         if head
     }
 
 
-def _numbers(file: Path, head: str, values: Any, name: str) -> Array:
+def _number(cell: str, file: Path, head: str, line: int) -> float:
+    try:
+        number = float(cell)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ParameterError(f"{shown(cell)} is no finite number", file=file.name, line=line, key=head)
+    return number
+
+
+def _numbers(head: str, values: Any, source: Source) -> Array:
     try:
         numbers = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as reason:
-        raise ParameterError("holds something that is no number", file=name, key=head) from reason
+        raise source.fail((head,), "holds something that is no number") from reason
     if numbers.ndim != 1 or not np.isfinite(numbers).all():
-        raise ParameterError("holds something that is no finite number", file=file.name, key=head)
+        raise source.fail((head,), "is no list of finite numbers")
     return numbers
 
 

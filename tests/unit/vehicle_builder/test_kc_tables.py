@@ -68,6 +68,42 @@ def test_a_column_without_unit_or_side_is_an_error(tmp_path: Path) -> None:
         axle(tmp_path, **{"left_caster": TRAVEL_MM})
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "fields"),
+    [
+        ("rear_parallel_travel.csv", "", {"file": "rear_parallel_travel.csv"}),
+        ("rear_parallel_travel.csv", "# nothing\n", {"file": "rear_parallel_travel.csv"}),
+        (
+            "rear_side_force.csv",
+            "force [N],left_toe [deg],left_toe [deg]\n1,2,3\n",
+            {"key": "left_toe [deg]", "line": 1},
+        ),
+        ("rear_side_force.csv", "force [N],left_toe [deg]\n1,0\n2,NaN\n", {"key": "left_toe [deg]", "line": 3}),
+        ("rear_side_force.csv", "force [N],left_toe [deg]\n1,0\n2,off\n", {"key": "left_toe [deg]", "line": 3}),
+        ("rear_side_force.csv", "force [kN],left_toe [deg]\n-3000,0\n3000,0\n", {"key": "force [kN]"}),
+        ("rear_side_force.csv", "force [N],left_toe [deg]\n-3000,1e30\n3000,0\n", {"key": "left_toe [deg]"}),
+        ("rear_sideforce.csv", "", {"file": "rear_sideforce.csv"}),
+        ("names.toml", "names = 3\n", {"key": "names"}),
+        ("names.toml", "[names]\nZ_L = 3\n", {"key": "names.Z_L"}),
+    ],
+)
+def test_a_damaged_table_is_an_error_that_says_where(
+    tmp_path: Path, name: str, text: str, fields: dict[str, object]
+) -> None:
+    axle(tmp_path)
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    with raises(ParameterError, **fields):
+        read_kc(tmp_path, ["rear"])
+
+
+def test_semicolons_and_decimal_commas_are_read(tmp_path: Path) -> None:
+    wanted = axle(tmp_path).tests["rear"]["parallel_travel"]
+    file = tmp_path / "rear_parallel_travel.csv"
+    file.write_text(file.read_text(encoding="utf-8").replace(",", ";").replace(".", ","), encoding="utf-8")
+    read = read_kc(tmp_path, ["rear"]).tests["rear"]["parallel_travel"]
+    np.testing.assert_array_equal([read.x, *read.channels.values()], [wanted.x, *wanted.channels.values()])
+
+
 def test_what_goes_against_the_force_is_an_error() -> None:
     force = np.linspace(-3000.0, 3000.0, 13)
     with raises(ParameterError, key="toe"):
