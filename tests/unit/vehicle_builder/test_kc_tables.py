@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,7 +89,7 @@ def test_a_column_without_unit_or_side_is_an_error(tmp_path: Path) -> None:
     ],
 )
 def test_a_damaged_table_is_an_error_that_says_where(
-    tmp_path: Path, name: str, text: str, fields: dict[str, object]
+    tmp_path: Path, name: str, text: str, fields: dict[str, Any]
 ) -> None:
     axle(tmp_path)
     (tmp_path / name).write_text(text, encoding="utf-8")
