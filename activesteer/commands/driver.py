@@ -13,7 +13,7 @@ from activesteer.commands.arguments import (
     add_speeds,
     overrides_of,
 )
-from activesteer.commands.output import print_json
+from activesteer.commands.output import print_json, print_table
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder
 from activesteer.resources import DEFAULT_DRIVER
@@ -69,7 +69,7 @@ def _driver(options: argparse.Namespace) -> int:
         print_json(rows)
     else:
         print(f"{options.name} in {options.vehicle}")
-        print(_table(rows))
+        print_table(rows, _COLUMNS)
     if options.output is not None:
         from activesteer.analysis.linear_plots import driver_loops_figure
         from activesteer.plotting import save
@@ -80,15 +80,3 @@ def _driver(options: argparse.Namespace) -> int:
         if not options.json:
             print(f"figure: {path}")
     return 0
-
-
-def _table(rows: list[dict[str, Any]]) -> str:
-    lines = [" ".join(f"{head:>{_width(head)}}" for head in _COLUMNS.values())]
-    for row in rows:
-        cells = ((row[key], _width(head)) for key, head in _COLUMNS.items())
-        lines.append(" ".join(f"{cell:>{w}}" if isinstance(cell, str) else f"{cell:{w}.3g}" for cell, w in cells))
-    return "\n".join(lines)
-
-
-def _width(head: str) -> int:
-    return max(10, len(head))

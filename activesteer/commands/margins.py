@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands.arguments import add_car, add_controller, add_json, add_speeds, overrides_of
-from activesteer.commands.output import print_json
+from activesteer.commands.output import print_json, print_table
 from activesteer.commands.progress import RunCounter
 from activesteer.errors import ParameterError
 
@@ -52,10 +52,7 @@ def _margins(options: argparse.Namespace) -> int:
     if options.json:
         print_json(rows)
         return 0
-    print(" ".join(f"{head:>14}" for head in _COLUMNS.values()))
-    for row in rows:
-        values = (row[key] for key in _COLUMNS)
-        print(" ".join(f"{value:>14}" if isinstance(value, str) else f"{value:14.3g}" for value in values))
+    print_table(rows, _COLUMNS)
     if options.study:
         least = min(rows, key=lambda row: row["disk_margin"])
         changed = ", ".join(f"{key} = {value:.3g}" for key, value in least["factors"].items())

@@ -7,7 +7,7 @@ import os
 import re
 import sys
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Final
 
@@ -22,6 +22,21 @@ _COLOURS: Final = {"passed": GOOD, "FAILED": BAD, "not reproduced": _KNOWN}
 _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
 _COLUMNS: Final = 80
+
+
+def print_table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
+    """Prints rows below their heads, numbers with three digits.
+
+    Args:
+        rows: Key -> text or number.
+        columns: Key -> head.
+    """
+    texts = {key: [row[key] for row in rows if isinstance(row[key], str)] for key in columns}
+    widths = {key: max(10, len(head), *map(len, texts[key])) for key, head in columns.items()}
+    print(" ".join(f"{head:>{widths[key]}}" for key, head in columns.items()))
+    for row in rows:
+        cells = ((row[key], width) for key, width in widths.items())
+        print(" ".join(f"{cell:>{w}}" if isinstance(cell, str) else f"{cell:{w}.3g}" for cell, w in cells))
 
 
 def print_json(value: Any) -> None:
