@@ -160,7 +160,7 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
         raise RecordingError(
             f"the sine with dwell is not completed: the steering wheel still stands at "
             f"{math.degrees(abs(float(angle[-1]))):.3g} deg when the run ends",
-            value=float(angle[-1]),
+            value=abs(float(angle[-1])),
         )
     end = start + int(below[0])
     fraction = (angle[end - 1] - THRESHOLD_RAD) / (angle[end - 1] - angle[end])

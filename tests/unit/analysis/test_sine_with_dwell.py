@@ -149,7 +149,7 @@ def changed(steering_wheel) -> SyntheticRun:
         (lambda angle: 0.01 * angle, 0.025),  # the largest
         (np.abs, 2.5),  # to one side only
         (lambda angle: angle + 1.0, 1.0),  # turned in the first sample
-        (lambda angle: np.where(np.arange(len(angle)) > 1900, angle[1900], angle), -2.5),  # not completed
+        (lambda angle: np.where(np.arange(len(angle)) > 1900, angle[1900], angle), 2.5),  # not completed
     ],
 )
 def test_what_is_no_sine_with_dwell_is_refused(change, angle_rad):
