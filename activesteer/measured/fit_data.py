@@ -95,8 +95,8 @@ def measured_of(
     for channel, each in values.items():
         if np.count_nonzero(np.isfinite(each)) < _FEWEST:
             raise RecordingError(
-                f"{channel} has {np.count_nonzero(np.isfinite(each))} samples to compare, and {_FEWEST} are needed; it "
-                f"is recorded from {time_s[0]:g} to {time_s[-1]:g} s, and compared from fit.from_s to fit.until_s",
-                file=f"{name}.mcap",
-            )
+                f"has {np.count_nonzero(np.isfinite(each))} samples to compare, and {_FEWEST} are needed; it is "
+                f"recorded from {time_s[0]:g} to {time_s[-1]:g} s, and compared from fit.from_s to fit.until_s",
+                file=f"{name}.mcap", key=channel,
+            )  # fmt: skip
     return Measured(name, begin_s, time_s[inside] - begin_s, values)

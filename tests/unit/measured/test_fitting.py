@@ -83,30 +83,29 @@ def test_a_parameter_at_the_end_of_a_range_that_is_too_narrow_is_said(folder):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "key"),
     [
-        ({"fit": {"noise": {}}}, "fit.noise: is empty"),
-        ({"fit": {"noise": {"yaw_rate_dgps": 0.2}}}, "fit.noise.yaw_rate_dgps: there is no such channel; did you mean"),
-        ({"fit": {"noise": {"roll_deg": 0.2}}}, "fit.noise.roll_deg: a has no such channel"),
-        ({"fit": {"noise": {"ay_mps2": 0.0}}}, "fit.noise.ay_mps2: 0.0 is out of range"),
-        ({"fit": {"noise": {"yaw_rate_degps": 1, "yaw_rate_radps": 1}}}, "yaw_rate_radps: is given twice"),
-        ({"fit": {**STUDY["fit"], "from_s": 1.5}}, "has 9 samples to compare, and 20 are needed"),
-        ({"fit": {**STUDY["fit"], "start": {"factors.yaw_inertia": 3.0}}}, "3 is out of its range; that is 0.6 to 1.6"),
-        ({"fit": {**STUDY["fit"], "start": {"mass": 1.0}}}, "fit.start.mass: is no factor; factors are"),
-        ({"factors": {}}, "factors: a fit needs factors"),
-        ({"factors": {"factors.mass": {"grid": [0.9, 1.1]}}}, "a fit needs a range"),
+        ({"fit": {"noise": {}}}, "fit.noise"),
+        ({"fit": {"noise": {"yaw_rate_dgps": 0.2}}}, "fit.noise.yaw_rate_dgps"),
+        ({"fit": {"noise": {"roll_deg": 0.2}}}, "fit.noise.roll_deg"),
+        ({"fit": {"noise": {"ay_mps2": 0.0}}}, "fit.noise.ay_mps2"),
+        ({"fit": {"noise": {"yaw_rate_degps": 1, "yaw_rate_radps": 1}}}, "fit.noise.yaw_rate_radps"),
+        ({"fit": {**STUDY["fit"], "from_s": 1.5}}, "yaw_rate_radps"),
+        ({"fit": {**STUDY["fit"], "start": {"factors.yaw_inertia": 3.0}}}, "fit.start.factors.yaw_inertia"),
+        ({"fit": {**STUDY["fit"], "start": {"mass": 1.0}}}, "fit.start.mass"),
+        ({"factors": {}}, "factors"),
+        ({"factors": {"factors.mass": {"grid": [0.9, 1.1]}}}, "factors.factors.mass.grid"),
         ({"factors": {"factors.mas": {"uniform": [0.9, 1.1]}}}, "factors.mas"),
-        ({"factors": {"driver.preview_s": {"uniform": [0.9, 1.1]}}}, "changes nothing in any of the study's runs"),
-        ({"controllers": ["none", "ars"]}, "controllers: a fit has one of them, not 2"),
-        ({"maneuvers": ["step_steer"]}, "'step_steer' is no recording"),
-        ({"maneuvers": ["b.mcap"]}, "b.mcap"),
+        ({"factors": {"driver.preview_s": {"uniform": [0.9, 1.1]}}}, "factors.driver.preview_s"),
+        ({"controllers": ["none", "ars"]}, "controllers"),
+        ({"maneuvers": ["step_steer"]}, "maneuvers"),
+        ({"maneuvers": ["b.mcap"]}, None),  # a file that is not there
     ],
 )
-def test_what_is_wrong_is_said_before_anything_is_driven(folder, change, said):
+def test_what_is_wrong_is_said_before_anything_is_driven(folder, change, key):
     driven = []
-    with pytest.raises(ActiveSteerError) as caught:
+    with raises(ActiveSteerError, key=key):
         fit({**STUDY, **change}, jobs=1, progress=driven.append)
-    assert said in str(caught.value)
     assert driven == []
 
 
