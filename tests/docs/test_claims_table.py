@@ -13,5 +13,5 @@ def test_table_is_as_the_tool_writes_it():
 
 
 def test_every_statement_is_in_the_table_once():
-    for number in STATEMENTS:
-        assert TEXT.count(f"| {number} | ") == 1
+    for number, statement in STATEMENTS.items():
+        assert TEXT.count(f"| {number} | {statement.text} |") == 1
