@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import numpy as np
@@ -17,6 +16,7 @@ from activesteer.vehicle_builder.design import Axle, Car, Link, Log, Solid
 from activesteer.vehicle_builder.kc_fit import MeasuredAxle, measured_axle
 from activesteer.vehicle_builder.kc_tables import KcTables
 from activesteer.vehicle_builder.levers import mount
+from activesteer.vehicle_builder.steering_geometry import rack_limit_m, rack_sign
 from activesteer.vehicle_builder.table import UNITS, AxleTable, CarTable, LinkTable
 
 DEFAULT_TYRE: Final = "compact_205_55R16.tir"
@@ -93,9 +93,9 @@ def complete(
         rear,
         log.take("width_m", table.width_m, round(float(track) + 0.27, 2), "greatest track + 0.27 m", "m"),
         log.take("steering.rack_mass_kg", steering.rack_mass_kg, 3.0, "rack bar and half of the tie rods", "kg"),
-        log.take("steering.rack_limit_m", steering.rack_limit_m, _rack_limit(front), "36 deg of steer angle", "m"),
+        log.take("steering.rack_limit_m", steering.rack_limit_m, rack_limit_m(front), "36 deg of steer angle", "m"),
         log.take("steering.rack_friction_N", steering.rack_friction_N, 150.0, "the compact's, electric assist", "N"),
-        _rack_sign(front),
+        rack_sign(front),
         column_Npm,
         kingpin_m,
         log.angle("rear_steering.limit_deg", table.rear_steering.limit_rad, 3.0, "the compact's"),
@@ -281,57 +281,6 @@ def _anti_roll_bar(
     if table.anti_roll_bar_Npm is None and measured is not None and measured.anti_roll_bar_Npm is not None:
         return measured.anti_roll_bar_Npm
     return log.take(f"{axle}.anti_roll_bar_Npm", table.anti_roll_bar_Npm, 0.0, "no anti-roll bar", "N/m")
-
-
-def _steering_axis(front: Axle) -> tuple[Array, Array]:
-    """Lower and upper point of the front wheels' steering axis, without elasticity."""
-    upper = front.points["strut_top" if front.kind.strut else "uca_outer"]
-    return front.points["lca_outer"], upper
-
-
-def _rack_sign(front: Axle) -> float:
-    """Sign of the rack's y when the left wheel steers left; that of tie rods behind the axle where there are none."""
-    if front.kind.guided:
-        return -1.0
-    return math.copysign(1.0, _rack_per_steer(_steering_axis(front), *_tie_rod(front)))
-
-
-def _tie_rod(front: Axle) -> tuple[Array, Array]:
-    return front.points["tie_rod_inner"], front.points["tie_rod_outer"]
-
-
-def _rack_per_steer(axis: tuple[Array, Array], inner: Array, outer: Array) -> float:
-    """Rack travel to the left per steer angle of the left wheel [m/rad], rigid links."""
-    along = (axis[1] - axis[0]) / np.linalg.norm(axis[1] - axis[0])
-    rod = outer - inner
-    if abs(rod[1]) < 1e-3:
-        raise ParameterError(
-            "the tie rod does not run across the car: tie_rod_inner and tie_rod_outer have the same y", key="front"
-        )
-    moved = np.cross(along, outer - axis[0])
-    per_steer = float(rod @ moved / rod[1])
-    if abs(per_steer) < 0.02:
-        raise ParameterError(
-            f"the tie rod passes the steering axis at {1e3 * abs(per_steer):.0f} mm: it cannot steer the wheel; "
-            "tie_rod_outer has to lie ahead of or behind the line through the upper and the lower joint",
-            key="front",
-        )
-    return per_steer
-
-
-def rack_per_steer_m(front: Axle) -> float:
-    """Rack travel per steer angle around straight ahead, positive [m/rad], rigid links."""
-    if front.measured is not None:
-        rack, steer = front.measured.curves.rack_m, front.measured.curves.rack_steer_rad
-        near = np.argsort(np.abs(rack))[:5]
-        return 1.0 / float(np.polyfit(np.array(rack)[near], np.array(steer)[near], 1)[0])
-    return abs(_rack_per_steer(_steering_axis(front), *_tie_rod(front)))
-
-
-def _rack_limit(front: Axle) -> float:
-    if front.measured is not None:
-        return min(-front.measured.curves.rack_m[0], front.measured.curves.rack_m[-1])
-    return round(0.92 * rack_per_steer_m(front) * math.sin(math.radians(36.0)), 4)
 
 
 def _kingpin(table: CarTable, centre: Array, log: Log) -> tuple[Array, Array]:

@@ -8,8 +8,9 @@ from string import Template
 
 import numpy as np
 
-from activesteer.vehicle_builder import mjcf_axles as axles
+from activesteer.vehicle_builder import mjcf_tendons as tendons
 from activesteer.vehicle_builder.design import Car
+from activesteer.vehicle_builder.mjcf_axles import axle_file
 from activesteer.vehicle_builder.numbers import num, sig, vec
 from activesteer.vehicle_builder.trimmed import Trimmed
 
@@ -39,11 +40,11 @@ def mjcf_files(car: Car, trimmed: Trimmed) -> dict[str, str]:
     """
     return {
         f"{car.name}.xml": _main(car, trimmed),
-        "front_axle.xml": axles.axle_file(car, car.front, trimmed),
-        "rear_axle.xml": axles.axle_file(car, car.rear, trimmed),
+        "front_axle.xml": axle_file(car, car.front, trimmed),
+        "rear_axle.xml": axle_file(car, car.rear, trimmed),
         "steering.xml": _steering(car),
         "scene.xml": _fill("scene.xml", name=car.name, middle=num(-0.42 * car.wheelbase_m, 2),
-                           viewer_springs=axles.viewer_springs(car)),
+                           viewer_springs=tendons.viewer_springs(car)),
         "keyframes.xml": _NO_KEYFRAMES,
     }  # fmt: skip
 
@@ -78,9 +79,9 @@ def _main(car: Car, trimmed: Trimmed) -> str:
         rack_words=f"tie rods {'behind' if car.rack_sign < 0.0 else 'ahead of'} the steering axis",
         rack_sign=num(car.rack_sign),
         rack_limit=num(car.rack_limit_m),
-        link_classes=axles.link_classes(car),
-        spring_classes=axles.spring_classes(car, trimmed),
-        damper_classes=axles.damper_classes(car, trimmed),
+        link_classes=tendons.link_classes(car),
+        spring_classes=tendons.spring_classes(car, trimmed),
+        damper_classes=tendons.damper_classes(car, trimmed),
         chassis_words=(
             "What is left of the whole car's mass and inertia when all other bodies are taken away."
             if car.table.mass.total_kg is not None
@@ -92,13 +93,13 @@ def _main(car: Car, trimmed: Trimmed) -> str:
         front_height=num(front.wheel_centre_m[2]),
         cg=vec((trimmed.cg_m[0], 0.0, trimmed.cg_m[1]), 4),
         shell=_shell(car),
-        link_tendons=axles.link_tendons(car),
-        spring_tendons=axles.part_tendons(car, "spring"),
-        damper_tendons=axles.part_tendons(car, "damper"),
+        link_tendons=tendons.link_tendons(car),
+        spring_tendons=tendons.part_tendons(car, "spring"),
+        damper_tendons=tendons.part_tendons(car, "damper"),
         front_bar=sig(front.anti_roll_bar_Npm),
         rear_bar=sig(car.rear.anti_roll_bar_Npm),
         front_travel="jounce" if front.kind.strut else "z",
-        front_bar_on_rack=axles.rack_joint(front, -2.0),
+        front_bar_on_rack=tendons.rack_joint(front, -2.0),
         pinion=num(trimmed.pinion_radius_m, 7),
         column_stiffness=sig(car.column_stiffness_Npm),
         column_damping=sig(round(1.2 * math.sqrt(car.column_stiffness_Npm * mass), -2)),

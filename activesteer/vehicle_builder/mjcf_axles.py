@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.vehicle_builder.completion import rack_per_steer_m
 from activesteer.vehicle_builder.design import Axle, Car, Solid
 from activesteer.vehicle_builder.levers import Mount
-from activesteer.vehicle_builder.numbers import num, sig, vec
+from activesteer.vehicle_builder.numbers import num, vec
 from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
 
 _ON_RACK = "tie_rod"
@@ -19,16 +18,6 @@ _GUIDED = """  <!-- {words} guide the {axle} axle, a fragment of the chassis bod
        the other joints follow the curves of the vehicle file and give way about them. Vehicle coordinates: origin on
        the road below the front axle, x forward, y left, z up, design position. Sites of springs and dampers are only
        drawn. -->"""
-
-
-_VIEWER_GUIDES = (
-    ("x", "5e5", "3e3"),
-    ("y", "5e6", "1e4"),
-    ("toe", "5e4", "200"),
-    ("camber", "1e5", "500"),
-    ("caster", "2e4", "200"),
-)
-"""Joint, stiffness and damping of a guide in the scene."""
 
 
 def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
@@ -195,150 +184,3 @@ def _wheel(axle: Axle, trimmed: TrimmedAxle, side: float, indent: str) -> list[s
         f'{inside}<geom class="valve"/>',
         f"{indent}</body>",
     ]
-
-
-def link_classes(car: Car) -> str:
-    """Default classes of the links, one per link and axle."""
-    lines = []
-    for axle in car.axles:
-        for link in axle.links:
-            stiffness = sig(link.stiffness_Npm)
-            if link.hardening_Npm3:
-                stiffness += f" 0 {sig(link.hardening_Npm3)}"
-            colour = ' width="0.009" rgba="0.85 0.3 0.2 1"' if link.name in ("tie_rod", "toe_link") else ""
-            lines += [
-                f"      <!-- {axle.name}: {link.remark}. -->",
-                f'      <default class="{class_of(axle, link.name)}"><tendon stiffness="{stiffness}" '
-                f'damping="{sig(link.damping_Nspm)}"{colour}/></default>',
-            ]
-    return "\n".join(lines) + "\n"
-
-
-def class_of(axle: Axle, link: str) -> str:
-    """Class of a link: front and rear may have links of the same name."""
-    return f"{axle.name}_{link}"
-
-
-def link_tendons(car: Car) -> str:
-    """The links of all corners."""
-    lines = []
-    for axle in car.axles:
-        for side in (1.0, -1.0):
-            corner = corner_name(axle, side)
-            for link in axle.links:
-                name = f"{corner}_{link.name}"
-                lines.append(
-                    f'    <spatial name="{name}" class="{class_of(axle, link.name)}">'
-                    f'<site site="{name}_inner"/><site site="{name}_outer"/></spatial>'
-                )
-    return "\n".join(lines)
-
-
-def part_tendons(car: Car, part: str) -> str:
-    """Springs or dampers of all corners."""
-    lines = []
-    reported = set()
-    for axle in car.axles:
-        mount = axle.spring if part == "spring" else axle.damper
-        if mount.lever == 1.0 or mount.start_m is None:
-            continue
-        divisor = 1.0 / mount.lever
-        reported.add(axle.name)
-        lines += [
-            f"    <!-- {axle.name}: the {part} stands on {mount.carrier}, which has no body: the",
-            f"         pulley ({num(divisor)}) is its lever, from *_{part}_lever on it has the {part}'s length.",
-            f"         Both follow from *_{part}_inner and *_{part}_outer, which only draw it: docs/own_car.md. -->",
-        ]
-    for axle in car.axles:
-        mount = axle.spring if part == "spring" else axle.damper
-        for side in (1.0, -1.0):
-            corner = corner_name(axle, side)
-            start = f'    <{{}} name="{corner}_{part}" class="{axle.name}_{part}">'
-            if mount.start_m is None:
-                travel = "jounce" if axle.kind.strut else "z"
-                coef = num(-mount.lever)
-                lifted = rack_joint(axle, side * mount.lever)
-                lines.append(
-                    start.format("fixed") + f'<joint joint="{corner}_{travel}" coef="{coef}"/>{lifted}</fixed>'
-                )
-            elif mount.lever == 1.0:
-                sites = f'<site site="{corner}_{part}_inner"/><site site="{corner}_{part}_outer"/>'
-                lines.append(start.format("spatial") + f"{sites}</spatial>")
-            else:
-                link = next(link.name for link in axle.links if link.outer == mount.outer)
-                sites = f'<site site="{corner}_{part}_lever"/><site site="{corner}_{link}_outer"/>'
-                pulley = f'<pulley divisor="{num(1.0 / mount.lever)}"/>'
-                lines.append(start.format("spatial") + f"{pulley}{sites}</spatial>")
-    return "\n".join(lines)
-
-
-def rack_joint(axle: Axle, lever: float) -> str:
-    """What makes a spring of a guided axle longer as the rack raises its wheel without it."""
-    lift = 0.0 if axle.measured is None else axle.measured.rack_lift
-    return f'<joint joint="rack" coef="{num(lever * lift)}"/>' if lift else ""
-
-
-def viewer_springs(car: Car) -> str:
-    """For the scene: springs that have no shape of their own, or stand on an arm."""
-    lines = []
-    for axle in car.axles:
-        if axle.spring.start_m is None or axle.spring.lever != 1.0:
-            if not lines:
-                lines.append("    <!-- Without force: springs whose tendons have no shape, or another one. -->")
-            for side in (1.0, -1.0):
-                corner = corner_name(axle, side)
-                lines.append(
-                    f'    <spatial name="{corner}_viewer_spring" class="coil"><site site="{corner}_spring_inner"/>'
-                    f'<site site="{corner}_spring_outer"/></spatial>'
-                )
-    return "\n".join([*lines, *_viewer_guides(car)]) + ("\n" if lines else "")
-
-
-def _viewer_guides(car: Car) -> list[str]:
-    """What holds the wheels of axles of curves where their native forces are missing: straight guides, steered."""
-    lines = []
-    for axle in car.axles:
-        if axle.measured is None:
-            continue
-        lines.append("    <!-- Stand in for the curves that guide the wheels. -->")
-        for side in (1.0, -1.0):
-            corner = corner_name(axle, side)
-            for joint, stiffness, damping in _VIEWER_GUIDES:
-                rack = ""
-                if joint == "toe" and axle.name == "front":
-                    rack = f'<joint joint="rack" coef="{num(-1.0 / rack_per_steer_m(axle))}"/>'
-                lines.append(
-                    f'    <fixed name="{corner}_viewer_{joint}" stiffness="{stiffness}" damping="{damping}" '
-                    f'springlength="0"><joint joint="{corner}_{joint}" coef="1"/>{rack}</fixed>'
-                )
-    return lines
-
-
-def spring_classes(car: Car, trimmed: Trimmed) -> str:
-    """Default classes of the springs."""
-    lines = []
-    for axle in car.axles:
-        found = trimmed.axle(axle.name)
-        squeezed = found.spring_force_N / found.spring_rate_Npm
-        length = axle.spring.length_m + squeezed
-        hidden = ' group="3"' if axle.spring.start_m is not None and axle.spring.lever != 1.0 else ""
-        lines.append(
-            f'      <default class="{axle.name}_spring"><tendon stiffness="{sig(found.spring_rate_Npm)}" '
-            f'springlength="{num(length)}"{hidden}/></default>'
-        )
-    return "\n".join(lines) + "\n"
-
-
-def damper_classes(car: Car, trimmed: Trimmed) -> str:
-    """Default classes of the dampers."""
-    lines = []
-    for axle in car.axles:
-        found, length = trimmed.axle(axle.name), axle.damper.length_m
-        ends = f"{num(length - found.bump_stop_m)} {num(length + found.rebound_stop_m)}"
-        stiffness = " ".join(sig(value) for value in found.stop_stiffness)
-        hidden = ' group="3"' if axle.damper.start_m is not None and axle.damper.lever != 1.0 else ""
-        lines.append(
-            f'      <default class="{axle.name}_damper"><tendon springlength="{ends}" stiffness="{stiffness}"{hidden}/>'
-            "</default>"
-        )
-    return "\n".join(lines) + "\n"

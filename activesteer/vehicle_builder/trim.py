@@ -25,11 +25,11 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.mass_properties import mass_properties
 from activesteer.vehicle.parameters import Friction
-from activesteer.vehicle_builder.completion import rack_per_steer_m
 from activesteer.vehicle_builder.curve_match import NEAR_ENOUGH, match_steering, match_travel
 from activesteer.vehicle_builder.design import Axle, Car, Log
 from activesteer.vehicle_builder.masses import chassis_of
 from activesteer.vehicle_builder.motion import corner_motion
+from activesteer.vehicle_builder.steering_geometry import rack_per_steer_m
 from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
 
 Write = Callable[[Trimmed], Path]
