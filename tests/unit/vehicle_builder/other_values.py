@@ -19,7 +19,12 @@ _WHOLE: Final = {"curves": other_curves()}
 
 
 def all_changed(cls: type, given: Any) -> Any:
-    """A dataclass of which no field, down to the last table, is as it was.
+    """A dataclass of which no field, down to the last table, is as it was; arguments as of `other_values`."""
+    return cls(**other_values(cls, given))
+
+
+def other_values(cls: type, given: Any) -> dict[str, Any]:
+    """Another value for each field, which need not go together.
 
     Args:
         cls: The dataclass.
@@ -33,7 +38,7 @@ def all_changed(cls: type, given: Any) -> Any:
         for field in dataclasses.fields(cls)
     }
     assert all(value != getattr(given, name, None) for name, value in values.items())
-    return cls(**values)
+    return values
 
 
 def _other(hint: Any, value: Any) -> Any:

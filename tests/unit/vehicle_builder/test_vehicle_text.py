@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,18 +19,18 @@ from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle.rear_actuator import RearActuator
 from activesteer.vehicle_builder import new_vehicle
 from tests.raising import raises
-from tests.unit.vehicle_builder.other_values import all_changed
+from tests.unit.vehicle_builder.other_values import all_changed, other_values
 from tests.unit.vehicle_builder.tables import COMPACT
 
 
 @pytest.fixture(scope="module")
-def changed() -> VehicleConfig:
-    return all_changed(VehicleConfig, load_car("compact").config)
+def changed() -> dict[str, Any]:
+    return other_values(VehicleConfig, load_car("compact").config)
 
 
 @pytest.mark.parametrize("table", [field.name for field in dataclasses.fields(VehicleConfig)])
-def test_every_table_that_is_written_is_read_back_equal(changed: VehicleConfig, table: str) -> None:
-    config = dataclasses.replace(load_car("compact").config, **{table: getattr(changed, table)})
+def test_every_table_that_is_written_is_read_back_equal(changed: dict[str, Any], table: str) -> None:
+    config = dataclasses.replace(load_car("compact").config, **{table: changed[table]})
     text = toml_text(to_table(config, defaults=False))
     assert build(VehicleConfig, tomllib.loads(text), Source("written")) == config
 
