@@ -6,7 +6,7 @@ import importlib
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -84,14 +84,14 @@ def check(path: Path, size: tuple[int, int]) -> None:
         ffmpeg()
 
 
-def encoder(path: Path, size: tuple[int, int], rate_hz: float, samples: Sequence[Pixels]) -> Encoder:
+def encoder(path: Path, size: tuple[int, int], rate_hz: float, samples: Iterable[Pixels]) -> Encoder:
     """What writes a file of this name.
 
     Args:
         path: The file; one that exists is replaced.
         size: Width and height [pixels].
         rate_hz: Pictures a second [1/s].
-        samples: Pictures from all over the video, of which the colours of a GIF are chosen.
+        samples: Pictures from all over the video, of which the colours of a GIF are chosen; nothing else asks for them.
     """
     if path.suffix.lower() == ".gif":
         return _Gif(path, rate_hz, samples)
@@ -161,11 +161,11 @@ class _Mp4:
 
 
 class _Gif:
-    def __init__(self, path: Path, rate_hz: float, samples: Sequence[Pixels]) -> None:
+    def __init__(self, path: Path, rate_hz: float, samples: Iterable[Pixels]) -> None:
         self._path, self._part = path, path.with_name(f".{path.name}.part")
         self._duration_ms = round(1000.0 / rate_hz)
         # One palette for all pictures: with one for each, the colours of what stands still would flicker.
-        mosaic = Image.fromarray(np.concatenate([np.asarray(sample) for sample in samples]))
+        mosaic = Image.fromarray(np.concatenate(list(samples)))
         self._palette = mosaic.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
         self._pictures: list[Image.Image] = []
 

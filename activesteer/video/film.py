@@ -259,7 +259,7 @@ def make_film(
     rate = frame_rate(path, settings.rate_hz)
     with Film(recordings, settings, verdict) as film:
         times = film.times(rate)
-        samples = [film.picture(float(time)) for time in times[:: max(1, len(times) // _SAMPLES)]]
+        samples = film.pictures(times[:: max(1, len(times) // _SAMPLES)])
         with encoder(path, settings.size, rate, samples) as file:
             for number, pixels in enumerate(film.pictures(times), start=1):
                 file.write(pixels)
