@@ -95,7 +95,9 @@ class HeldCar:
                 their design lengths; `locked`: the same with the lengths of the dampers fixed, as for turning the
                 wheels about their steering axes.
         """
-        self.model = model = vehicle.model if springs == "in" else copy.copy(vehicle.model)
+        self.model = model = copy.copy(vehicle.model)
+        # What the rig asks for is within its torque, but a step of the search may not be, and has no stiffness there.
+        model.actuator_forcelimited[model.actuator("superposition").id] = False
         self.data = data = mujoco.MjData(model)
         self._wheels = [model.body(f"{corner}_wheel").id for corner in CORNERS]
         self._bind(vehicle)
