@@ -18,6 +18,8 @@ from activesteer.recording import Primitive, ScenePart
 from activesteer.resources import models_dir
 from activesteer.road.footprint import Footprint
 
+CHASSIS: Final = "chassis"
+"""Body that carries the shell, and that cameras follow."""
 SEE_THROUGH: Final = 0.5
 """Solids of a model with less opacity are the shell of its body."""
 _SALOON_FROM_M: Final = 2.72
@@ -75,7 +77,7 @@ def dressed(parts: Sequence[ScenePart], size: Footprint | None) -> tuple[tuple[S
     if size is None:
         return tuple(parts), ()
     solids = [part for part in parts if isinstance(part, Primitive)]
-    shell = [solid for solid in solids if solid.body == "chassis" and solid.rgba[3] < SEE_THROUGH]
+    shell = [solid for solid in solids if solid.body == CHASSIS and solid.rgba[3] < SEE_THROUGH]
     panels = list(_body(size)) if shell else []
     hidden = {id(solid) for solid in shell}
     for body in dict.fromkeys(solid.body for solid in solids if solid.body.endswith("_wheel")):
@@ -93,7 +95,7 @@ def _body(size: Footprint) -> tuple[Panel, ...]:
         points = vertices * (1.0, size.width_m / width_m, 1.0)
         # Only what is between the axles becomes longer.
         points[:, 0] -= np.clip(-points[:, 0] / wheelbase_m, 0.0, 1.0) * (size.wheelbase_m - wheelbase_m)
-        panels.append(Panel("chassis", part, points, normals, faces, _COLOURS.get(part)))
+        panels.append(Panel(CHASSIS, part, points, normals, faces, _COLOURS.get(part)))
     return tuple(panels)
 
 

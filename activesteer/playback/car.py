@@ -9,18 +9,16 @@ import numpy as np
 import rerun as rr
 
 from activesteer.conventions import Array, yaw_of
-from activesteer.drawing.bodywork import SEE_THROUGH, Panel, dressed
+from activesteer.drawing.bodywork import CHASSIS, SEE_THROUGH, Panel, dressed
 from activesteer.drawing.colours import bytes_of
+from activesteer.drawing.ghosts import share_seen
 from activesteer.playback.geometry import about_vertical, xyzw
-from activesteer.playback.runs import CHASSIS, Run
+from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.footprint import footprint_of
 
 _GHOST_OPACITY: Final = 0.4
-_HIDDEN_M, _SEEN_M = 0.2, 1.0
-"""A ghost fades from one distance to the other, and nearer to the car it is not seen: two surfaces in one place would
-show through each other in patches [m]."""
 _GHOST_EVERY: Final = 5
 """Of the poses, every fifth one: the opacity changes slowly."""
 _CUTAWAY_OPACITY: Final = 0.25
@@ -75,8 +73,7 @@ def send_ghost(stream: rr.RecordingStream, run: Run, beside: Run) -> None:
     """
     poses = run.recording.poses
     time_s = poses.time_s[run.poses][::_GHOST_EVERY]
-    opacity = _GHOST_OPACITY * np.clip((_apart(run, beside, time_s) - _HIDDEN_M) / (_SEEN_M - _HIDDEN_M), 0.0, 1.0)
-    alpha = np.rint(255.0 * opacity).astype(np.uint32)
+    alpha = np.rint(255.0 * _GHOST_OPACITY * share_seen(_apart(run, beside, time_s))).astype(np.uint32)
     _, panels = dressed(run.recording.scene, footprint_of(run.recording.metadata))
     for panel in panels:
         if panel.shell and panel.body in poses.names:

@@ -9,9 +9,10 @@ import numpy as np
 import rerun as rr
 
 from activesteer.conventions import Array, yaw_of
+from activesteer.drawing.bodywork import CHASSIS
 from activesteer.drawing.colours import bytes_of
 from activesteer.playback.geometry import rotated
-from activesteer.playback.runs import CHASSIS, Run
+from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, course_of
 from activesteer.road.footprint import Footprint, footprint_of

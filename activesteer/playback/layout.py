@@ -7,11 +7,12 @@ from typing import Final
 
 import rerun.blueprint as rrb
 
+from activesteer.drawing.bodywork import CHASSIS
 from activesteer.playback import events, plots
 from activesteer.playback.car import body_path, ghost_path
 from activesteer.playback.course import COURSE, MAP, ROAD, map_bounds
 from activesteer.playback.legend import LEGEND, LEGEND_OF_RUNS, height, legend
-from activesteer.playback.runs import CHASSIS, Run
+from activesteer.playback.runs import Run
 from activesteer.playback.timeline import TIMELINE
 from activesteer.playback.wheel_angles import plan_view, wedges_path
 

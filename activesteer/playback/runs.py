@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import run_looks
+from activesteer.drawing.bodywork import CHASSIS
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
 
 PLOT_RATE_HZ: Final = 100.0
 """Most samples of a signal that are shown in a second; a screen cannot show more of a run."""
-
-CHASSIS: Final = "chassis"
-"""Body that the camera follows."""
 
 
 class Run(NamedTuple):

@@ -13,8 +13,9 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import Array, yaw_of
-from activesteer.drawing.bodywork import SEE_THROUGH, Panel, dressed
+from activesteer.drawing.bodywork import CHASSIS, SEE_THROUGH, Panel, dressed
 from activesteer.drawing.colours import shares_of
+from activesteer.drawing.ghosts import share_seen
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.course import Course
@@ -23,17 +24,10 @@ from activesteer.road.road import Road
 from activesteer.video.road import add_areas, add_course, add_road
 from activesteer.video.sky import SKY, add_sky
 
-CHASSIS: Final = "chassis"
-"""Body that cameras follow."""
-
 _PAINT: Final = (0.23, 0.46, 0.72)
 """Of a car to which no colour is given."""
 _GHOST_OPACITY: Final = 0.35
 """Opacity of a solid of a ghost, relative to that of the same solid of a car."""
-_HIDDEN_M: Final = 0.2
-_SEEN_M: Final = 1.0
-"""A ghost that is nearer than this to another car is fainter, and nearer than the one before it is not drawn [m]: two
-surfaces in one place would show through each other in patches."""
 _GLASS: Final = (0.1, 0.13, 0.17)
 _GLASS_OPACITY: Final = 0.85
 _SHADOW_OPACITY: Final = 0.62
@@ -160,7 +154,7 @@ class RenderScene:
         chassis = [self.data.mocap_pos[mocap[index]] for mocap, index in zip(self._mocap, self._chassis, strict=True)]
         for ghost, geoms, tendons in self._ghosts:
             apart = min(float(np.linalg.norm(chassis[ghost] - chassis[other])) for other in range(ghost))
-            share = min(max((apart - _HIDDEN_M) / (_SEEN_M - _HIDDEN_M), 0.0), 1.0)
+            share = share_seen(apart)
             self.model.geom_rgba[geoms, 3] = share * self._opacity[0][geoms]
             self.model.tendon_rgba[tendons, 3] = share * self._opacity[1][tendons]
         self.data.mocap_pos[self._sky, :2] = chassis[0][:2]

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 
 from activesteer.conventions import Array, yaw_of
+from activesteer.drawing.bodywork import CHASSIS
 from activesteer.errors import PlaybackError
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint, footprint_of
-from activesteer.video.render_scene import CHASSIS
 
 _STEADY_S: Final = 0.35
 """Standard deviation of the window over which the direction of the camera is averaged [s]: it follows the car through
