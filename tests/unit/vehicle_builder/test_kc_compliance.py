@@ -1,0 +1,34 @@
+"""The elastic part of an axle of curves, from tests of compliance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from activesteer.conventions import Array
+from activesteer.vehicle.axle_curves import COORDINATES
+from activesteer.vehicle_builder.kc_compliance import Load, fitted
+
+INERTIA = np.diag([35.0, 35.0, 0.9, 0.26, 0.4])
+"""Of a wheel with hub and knuckle [kg, kg m2]."""
+
+
+def test_what_no_test_moves_is_stiff_but_not_faster_than_a_step_can_tell() -> None:
+    """Rigid but for 0.1 mm/kN of side force: that stays, and the wheel swings at 320 Hz at most."""
+    force = np.linspace(-4000.0, 4000.0, 17)
+    moved: dict[str, Array | None] = {name: np.zeros(17) for name in COORDINATES}
+    pushed = Load(
+        "side_force", np.array([0.0, 1.0, 0.3, 0.0, 0.0]), force, moved | {"y": 1e-7 * force}, np.zeros((5, 5))
+    )
+    turned = [
+        Load(name, np.eye(5)[COORDINATES.index(name)], 0.1 * force, moved, np.zeros((5, 5)))
+        for name in ("caster", "toe")
+    ]
+    elastic = fitted([pushed, *turned])
+    matrix = np.zeros((5, 5))
+    matrix[np.triu_indices(5)] = elastic.stiffness
+    stiffness = matrix + np.triu(matrix, 1).T
+    frequencies_Hz = np.sqrt(eigh(stiffness, INERTIA, eigvals_only=True)) / (2.0 * np.pi)
+    assert 250.0 < frequencies_Hz.max() < 330.0
+    assert np.linalg.solve(stiffness, pushed.direction)[1] == pytest.approx(1e-7, rel=0.05)
