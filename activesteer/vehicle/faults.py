@@ -92,6 +92,8 @@ class Faults:
         """Puts into the model what acts from a step on, and takes out what does not."""
         for acting in self._acting:
             acting.release()
+            if step == acting.ends:
+                acting.recover()
         active = [acting for acting in self._acting if acting.begins <= step < acting.ends]
         for acting in active:
             acting.engage()
@@ -155,6 +157,7 @@ class _ActuatorFault:
         )
         self._screw = vehicle.actuators.screw(self._index)
         self._healthy_screw = tuple(part.copy() for part in self._screw)
+        self._data = vehicle.data
         self._ctrl = vehicle.data.ctrl
         ratio = vehicle.parameters.steering.ratio if ACTUATORS[fault.part].by_ratio else 1.0
         self._offset = fault.size * ratio
@@ -196,6 +199,12 @@ class _ActuatorFault:
         for part, healthy in zip(self._screw, self._healthy_screw, strict=True):
             part[:] = healthy
 
+    def recover(self) -> None:
+        """A servo that was afloat begins where it is, and comes back to its demand with its own lag and rate."""
+        if self.fault.kind == "float" and not self._screw:
+            angle = self._data.qpos[self._model.jnt_qposadr[self._model.actuator_trnid[self._index, 0]]]
+            self._data.act[self._model.actuator_actadr[self._index]] = angle
+
     def before_step(self) -> None:
         """Gives the actuator the demand of a while ago."""
         if self._record["scale"] == 0.0:
@@ -223,6 +232,9 @@ class _SensorFault:
 
     def engage(self) -> None:
         """Nothing: a sensor's fault changes nothing in the car."""
+
+    def recover(self) -> None:
+        """Nothing, when it ends."""
 
     def release(self) -> None:
         """Nothing, likewise."""

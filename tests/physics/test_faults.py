@@ -102,6 +102,19 @@ def test_a_floating_rear_wheel_gives_way_to_its_forces() -> None:
     assert failed["rear_steer_rad"][-1] < 0.0 < failed["ay_mps2"][ROW]
 
 
+def test_a_servo_comes_back_from_floating_at_its_own_rate() -> None:
+    # The sedan's superposition is as good as rigid: with a servo that went on without its part it would strike.
+    start_s, end_s = 0.95, 1.1
+    fault = {"fault": [fault_table(f"superposition:float@{start_s}-{end_s}")]}
+    back = activesteer.simulate("step_steer", vehicle="sedan", overrides=STEP | fault)
+    angle, rows = back["superposition_rad"], slice(round(1e3 * end_s), None)
+    rate_radps = np.gradient(angle, 1e-3)
+    assert abs(angle[rows][0]) > np.radians(1.0)
+    assert abs(angle[-1]) < np.radians(0.01)
+    assert np.abs(rate_radps[rows][5:]).max() == pytest.approx(np.radians(28.8), rel=0.05)
+    assert np.abs(back["ay_mps2"]).max() < 9.0
+
+
 SLOW: dict[str, Any] = {"speed_kmh": 20.0, "steer.steering_wheel_deg": 5.0}
 """The wheels' forces are small, and with them the give of the servos."""
 
