@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from activesteer.conventions import run_looks
+from activesteer.conventions import Array, run_looks
 from activesteer.errors import StudyError
 from activesteer.files import write_text
 from activesteer.pages import render
@@ -33,7 +33,6 @@ _EXTREMES: Final = 5
 _MAX_INDICES: Final = 400
 """Sets of indices that are computed: each takes some hundredths of a second."""
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 Group = tuple[str, str]
 """Manoeuvre and vehicle."""

@@ -58,7 +58,7 @@ class ReferenceData:
         folder = home / name
         names = [path.parent.name for path in home.glob("*/reference.toml")]
         if name not in names:
-            known = [path.name for path in home.iterdir() if is_folder(path)]  # a measured circle is one too
+            known = sorted(path.name for path in home.iterdir() if is_folder(path))  # a measured circle is one too
             raise ParameterError(
                 f"there is no reference named {shown(name)}; {nearest_names(name, known)}", value=name, allowed=known
             )
