@@ -11,7 +11,7 @@ from typing import Any
 
 from activesteer.errors import ParameterError
 from activesteer.files import file_word, json_text, make_folder, write_text
-from activesteer.scenario import FileOrTable
+from activesteer.scenario import FileOrTable, check_parts, resolve
 from activesteer.standards.catalogue import standard_of
 from activesteer.standards.proving_ground import ProvingGround
 from activesteer.standards.standard import Findings, NoResult, Standard
@@ -78,7 +78,7 @@ def examine(
         name: Name of the standard, one of `catalogue.STANDARDS`.
         controllers: Names or files of controllers, each of which is a test of its own.
         vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value.
+        overrides: Dotted key -> value, of the car, of who drives, or of the road: the standard says what is driven.
         driver: Who drives, as for `simulate`; whom the standard asks for where not given.
         output: Folder for the runs, which can be gone on with; they are not kept where not given.
         jobs: Number of processes; that of the processors where not given.
@@ -94,6 +94,7 @@ def examine(
     standard = standard_of(name)
     driver = standard.driver if driver is None else driver
     given = dict(overrides or {})
+    check_parts(given, resolve("straight_line", vehicle, given, driver), ("vehicle", "driver"))
     found = {}
     with workers_for(jobs, scheduler=scheduler) as workers:
         for controller in controllers:

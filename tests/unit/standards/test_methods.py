@@ -37,6 +37,11 @@ def no_verdict(result: Examination) -> Findings:
     return found
 
 
+def test_what_the_standard_says_is_not_changed():
+    with raises(ParameterError, key="speed_kmh", allowed=["vehicle", "driver", "road"]):
+        examine("iso4138", overrides={"speed_kmh": 50.0})
+
+
 def test_every_standard_says_what_it_is():
     for name, standard in STANDARDS.items():
         assert standard_of(name) is standard
