@@ -55,7 +55,7 @@ class Case(NamedTuple):
         if "speed" not in table:
             table["speed_kmh"] = 3.6 * speed_mps if table["kind"] in (*COURSES, "straight_braking") else self.speed_kmh
         if table["kind"] in COURSES:
-            table["duration_s"] = min(60.0, COURSES[table["kind"]] / speed_mps + 4.0)
+            table["duration_s"] = COURSES[table["kind"]] / speed_mps + 4.0
         elif table["kind"] in ("open_loop", "slowly_increasing_steer", "constant_radius", "random_steer"):
             table["duration_s"] = 6.0
             if "circle" in table:
