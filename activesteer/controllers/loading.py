@@ -48,8 +48,6 @@ _MAX_ANGLE_RAD: Final = 1.0
 
 _MAX_TORQUE_NM: Final = 1e5
 """No brake gives so much, and no engine has so much to be taken back [N m]."""
-
-
 _MAX_PRESSURE_PA: Final = 1e8
 """No brake gets so much [Pa]."""
 

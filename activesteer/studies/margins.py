@@ -275,7 +275,7 @@ def margins_of_cars(
         ActiveSteerError: an input is wrong.
     """
     plugins = [find_controller(given) for given in controllers]
-    answers: dict[tuple[int, float, ControllerSetup], Callable[[Array], Response]] = {}
+    answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}
     for overrides in cars:
         found: list[LoopMargins] = []
         for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides):
@@ -283,7 +283,7 @@ def margins_of_cars(
             for number, plugin in enumerate(plugins):
                 unit_s = interval_s(plugin, scenario.car.config.controllers, car.timestep_s)
                 setup = _fully_active(scenario.controller_setup(unit_s))
-                key = number, car.speed_mps, setup
+                key = number, car.speed_mps, setup, scenario.car.config.sensors
                 if key not in answers:
                     answers[key] = _answer(controllers[number], plugin.label, scenario, setup, plugin.make(setup))
                 returned = round_trip(car, answers[key], scenario, unit_s, FREQUENCIES_RADPS)
