@@ -75,11 +75,17 @@ class StopSignals:
         if self._raised or self.finished:
             self.end()
         self._raised = True
+        self._hush()
         raise KeyboardInterrupt
+
+    def _hush(self) -> None:
+        """From now on nobody prints a traceback: native code that is being imported or called back, a thread."""
+        sys.unraisablehook = threading.excepthook = lambda _: None
+        sys.excepthook = lambda *_: None
 
     def _end_in_time(self, signals: int) -> None:
         self.number = os.read(signals, 1)[0]
-        sys.unraisablehook = threading.excepthook = lambda _: None
+        self._hush()
         if "multiprocessing" in sys.modules:
             import multiprocessing
 
