@@ -25,9 +25,11 @@ def add_to(commands: Any) -> None:
 
 
 def _linearise(options: argparse.Namespace) -> int:
+    from activesteer.scenario import check_gains
     from activesteer.studies.linearisation import eigenvalue_table, linear_car, linear_cars
 
     overrides = overrides_of(options)
+    check_gains(overrides, ())
     car = linear_car(options.vehicle, options.speed_kmh / 3.6, overrides)
     modes, figures = car.modes(), []
     label = f"{options.speed_kmh:g} km/h"

@@ -38,7 +38,7 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.analysis.tables import comparison
     from activesteer.controllers import find_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
-    from activesteer.scenario import describe
+    from activesteer.scenario import check_gains, describe
     from activesteer.simulation.preparation import prepared
     from activesteer.simulation.runner import run_scenario
 
@@ -47,6 +47,7 @@ def _run(options: argparse.Namespace) -> int:
     # What is wrong with the last controller or the plot is said before the first run, not after it.
     for controller in controllers:
         controller.make(scenario.controller_setup(DEFAULT_TIMESTEP_S))
+    check_gains(scenario.overrides, controllers)
     paths = _output_paths(options.output, scenario.maneuver.name, controllers)
     scenario = prepared(scenario)
     if not options.replace:

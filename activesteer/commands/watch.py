@@ -34,12 +34,14 @@ def add_to(commands: Any) -> None:
 
 
 def _watch(options: argparse.Namespace) -> int:
+    from activesteer.scenario import check_gains
     from activesteer.simulation.preparation import prepared
 
     if not 0.01 <= options.speed <= 100.0:
         raise ParameterError(f"--speed: is {options.speed:g}, must be 0.01 to 100")
     # What is wrong with the manoeuvre is said wherever one is; only then is a window needed.
     scenario = scenario_of(options)
+    check_gains(scenario.overrides, [options.controller])
     check_display()
     _show(prepared(scenario), options.controller, options.speed, cutaway=options.cutaway)
     return 0

@@ -7,6 +7,7 @@ from activesteer.controllers.loading import (
     Controller,
     find_controller,
     is_variant,
+    keys_read,
     load_controller,
     system_of,
 )
@@ -29,6 +30,7 @@ __all__ = [
     "SingleTrackParameters",
     "find_controller",
     "is_variant",
+    "keys_read",
     "load_controller",
     "read_variant",
     "system_of",

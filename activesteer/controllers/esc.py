@@ -33,6 +33,7 @@ class Esc:
     """Yaw moments by the brakes."""
 
     interval_s = 0.005
+    reads = ("esc", "estimator")
 
     def __init__(
         self,

@@ -12,6 +12,8 @@ from activesteer.theory.single_track import SingleTrack
 class FrontSuperposition:
     """Active front steering (AFS): the corrector of the rear system with the opposite sign, and no prediction."""
 
+    reads = ("afs", "desired_yaw_rate")
+
     def __init__(self, desired: DesiredYawRate, parameters: FrontSuperpositionParameters, timestep_s: float) -> None:
         """Makes the controller of one run.
 

@@ -56,6 +56,7 @@ class Integrated:
     """State feedback, and allocation of its corrections to steering and brakes."""
 
     interval_s = 0.005
+    reads = (*Lqr.reads, "integrated")
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Makes the controller of one run.

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Final, Protocol
 
 from activesteer.config import Range
 from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.observer import Observer
-from activesteer.controllers.parameters import ControllerSetup
+from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
 from activesteer.controllers.variant import read_variant
 from activesteer.errors import ControllerError, shown
@@ -41,7 +41,10 @@ class Controller(Protocol):
 
 
 BUILT_IN: Final = {"none": NoControl, "observer": Observer, "ars": RearSteer, "afs": FrontSuperposition}
-"""Name -> class; variants of them are data, see `variant`."""
+"""Name -> class, which says as `reads` what keys of the table [controllers] it reads; variants are data: `variant`."""
+
+_UNIT_READS: Final = frozenset(("interval_s", "bus_delay_s"))
+"""Keys of the table [controllers] that decide when a command is made and when it arrives."""
 
 _MAX_ANGLE_RAD: Final = 1.0
 """No road wheel is steered further by a controller; more is taken for a mistake, such as degrees [rad]."""
@@ -120,6 +123,18 @@ def is_variant(given: Any) -> bool:
 def system_of(given: str) -> str:
     """The system that a controller is or is a variant of; a user's own code is its own."""
     return read_variant(given).system if is_variant(given) else given
+
+
+def keys_read(given: Any) -> frozenset[str]:
+    """Keys of the table [controllers] that a controller and its control unit read; a user's own code may read all.
+
+    Args:
+        given: See `find_controller`.
+    """
+    plugin = find_controller(given)
+    if not plugin.ours:
+        return frozenset(field.name for field in fields(ControllerParameters))
+    return frozenset(plugin.origin.reads) | (frozenset() if plugin.origin is NoControl else _UNIT_READS)
 
 
 def load_controller(given: Any, setup: ControllerSetup) -> Controller:

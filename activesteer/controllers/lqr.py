@@ -92,6 +92,7 @@ class Lqr:
     """Rear steering and front superposition by one state feedback."""
 
     interval_s = 0.005
+    reads = ("lqr", "servos", "estimator")
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Makes the controller of one run.

@@ -80,6 +80,7 @@ class Mpc:
     """Front superposition and rear steering within an envelope."""
 
     interval_s = 0.01
+    reads = ("mpc", "servos", "estimator")
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Makes the controller of one run.

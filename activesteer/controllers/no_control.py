@@ -11,6 +11,8 @@ from activesteer.theory.single_track import SingleTrack
 class NoControl:
     """No additional steer angles."""
 
+    reads = ("desired_yaw_rate",)
+
     def __init__(self, desired: DesiredYawRate) -> None:
         """Takes the reference model."""
         self._desired = desired

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 class Observer:
     """No additional steer angles; speed, sideslip, yaw rate and friction as an estimator sees them."""
 
+    reads = ("estimator",)
+
     def __init__(self, estimator: Estimator) -> None:
         """Takes the estimator."""
         self._estimator = estimator

@@ -51,6 +51,8 @@ class RearSteer:
     The lag and the rate limit that follow are the actuator's, in the vehicle.
     """
 
+    reads = ("ars", "desired_yaw_rate")
+
     def __init__(
         self,
         desired: DesiredYawRate,

@@ -24,6 +24,7 @@ class SideslipRearSteer:
     """The paper's rear steering less a share of the sideslip angle."""
 
     interval_s = 0.005
+    reads = (*RearSteer.reads, "ars_sideslip", "estimator")
 
     def __init__(self, paper: RearSteer, estimator: Estimator, sideslip_gain: float, limit_rad: float) -> None:
         """Makes the controller of one run.

@@ -75,6 +75,11 @@ class Variant:
         """Time between two calls that the system asks for [s]."""
         return getattr(_SYSTEMS[self.system], "interval_s", None)
 
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Keys of the table [controllers] that the system reads."""
+        return _SYSTEMS[self.system].reads
+
     def from_vehicle(self, setup: ControllerSetup) -> Any:
         """Makes the controller for a car; raises as `gains_in` does."""
         return _SYSTEMS[self.system].from_vehicle(replace(setup, gains=self.gains_in(setup)))

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, Final
 
-from activesteer.config import check_overruled, field_in_unit, field_path, key_hint, key_paths, leaf_keys, to_table
-from activesteer.controllers import ControllerParameters, ControllerSetup
+from activesteer.config import check_overruled, field_in_unit, key_hint, key_paths, leaf_keys, to_table
+from activesteer.controllers import ControllerSetup
 from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, nearest_names
 from activesteer.maneuver import Maneuver, build_maneuver, filled_from_csv, maneuver_class
@@ -17,6 +17,7 @@ from activesteer.resources import DEFAULT_DRIVER, find_maneuver
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
 from activesteer.scenario.driver import ChosenDriver, driver_with
 from activesteer.scenario.estimation import estimator_setup
+from activesteer.scenario.gains import gain_paths
 from activesteer.scenario.overrides import Override, applied, plain
 from activesteer.scenario.recorded_inputs import is_recording, led, recorded_inputs
 from activesteer.vehicle.powertrain import Drive
@@ -42,14 +43,9 @@ class Scenario:
 
     def controller_setup(self, timestep_s: float) -> ControllerSetup:
         """What controllers may know."""
-        car, replaced = self.car.config, set()
-        for key in self.overrides:
-            first, *rest = key.removeprefix("vehicle.").split(".")
-            if first == "controllers":
-                replaced |= {".".join(field_path(ControllerParameters, rest))}
+        car, replaced = self.car.config, frozenset(map(".".join, gain_paths(self.overrides).values()))
         return ControllerSetup(
-            car.single_track, car.controllers, car.steering.ratio, timestep_s, frozenset(replaced),
-            estimator_setup(self.car),
+            car.single_track, car.controllers, car.steering.ratio, timestep_s, replaced, estimator_setup(self.car)
         )  # fmt: skip
 
     def driver_setup(

@@ -29,7 +29,7 @@ from activesteer.driver import DriverParameters
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains, steering_gains
 from activesteer.errors import DriverError
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, resolve
+from activesteer.scenario import FileOrTable, check_gains, resolve
 from activesteer.studies.discrete_time_map import OUTPUTS
 from activesteer.studies.linearisation import LinearCar, linear_cars
 from activesteer.studies.small_step import DURATION_S, STEP_M, damping_of, small_step
@@ -255,6 +255,7 @@ def driver_loops(
         ActiveSteerError: an input is wrong.
     """
     scenario = resolve("straight_line", vehicle, overrides, driver)
+    check_gains(overrides or {}, controllers)
     if not scenario.driver.plugin.ours:
         raise DriverError(f"{scenario.driver.plugin.name} is code; only a driver file has a linear form", value=driver)
     setup, who = scenario.controller_setup(DEFAULT_TIMESTEP_S), scenario.driver.parameters

@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 
 from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, StudyError
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, resolve
+from activesteer.scenario import FileOrTable, check_gains, resolve
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.plan import label_of
 from activesteer.studies.run_task import Status
@@ -211,6 +211,7 @@ def envelope(
     """
     given = dict(overrides or {})
     scenario = resolve(maneuver, vehicle, given, drivers[0])
+    check_gains(given, controllers)
     kind = scenario.maneuver.kind
     if kind not in LINES:
         raise ParameterError(

@@ -21,7 +21,7 @@ from activesteer.conventions import Array
 from activesteer.errors import ParameterError, SimulationDiverged, nearest_names
 from activesteer.faults import Fault, fault_table
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, check_parts, resolve
+from activesteer.scenario import FileOrTable, check_gains, check_parts, resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Reference
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
@@ -123,6 +123,7 @@ def fault_map(
     """
     limits = Limits() if limits is None else limits
     chosen = {text: _fault(text) for text in faults or usual_faults(str(controller))}
+    check_gains(overrides or {}, [controller])
     for name in situations:
         if name not in SITUATIONS:
             known = nearest_names(name, SITUATIONS)

@@ -24,7 +24,7 @@ from activesteer.controllers import SingleTrackParameters
 from activesteer.errors import RecordingError
 from activesteer.files import json_text
 from activesteer.quantities import metric_label
-from activesteer.scenario import FileOrTable, check_parts, resolve
+from activesteer.scenario import FileOrTable, check_gains, check_parts, resolve
 from activesteer.scenario.vehicle_file import write_values
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.single_track_search import (
@@ -113,6 +113,7 @@ def identify(
     }
     scenarios[RADIUS_TEST] = resolve("constant_radius", vehicle, overrides)
     check_parts(overrides or {}, scenarios[RADIUS_TEST], ("vehicle",))
+    check_gains(overrides or {}, ())
     body = body_of(scenarios[RADIUS_TEST].car)
     tests = {}
     for name, scenario in scenarios.items():

@@ -35,7 +35,7 @@ from activesteer.controllers import Controller, ControllerSetup, find_controller
 from activesteer.controllers.linear_form import has_linear_form, linear_controller
 from activesteer.controllers.response import SIGNALS, pulse_responses, response_of
 from activesteer.conventions import GRAVITY_MPS2, Array
-from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.sensor_kinds import Sensor
 from activesteer.signals import Measurement
 from activesteer.simulation.closed_loop import ClosedLoop
@@ -248,6 +248,7 @@ def loop_margins(
         ControllerError: a controller has no linear form.
         ActiveSteerError: an input is wrong.
     """
+    check_gains(overrides or {}, controllers)
     return next(margins_of_cars(controllers, vehicle, speeds_kmh, [overrides or {}]))
 
 

@@ -10,9 +10,9 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.claims import SYSTEMS
-from activesteer.controllers import load_controller, system_of
-from activesteer.errors import ActiveSteerError, nearest_names, shown
-from activesteer.scenario import Scenario, describe, resolve
+from activesteer.controllers import keys_read, load_controller
+from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
+from activesteer.scenario import Scenario, check_gains, describe, resolve
 from activesteer.studies.design import Samples
 from activesteer.studies.factor_values import FactorValues, label_of
 from activesteer.studies.run_identity import digest
@@ -154,6 +154,10 @@ def _check(study: StudyFile, samples: Sequence[Samples], factor_values: FactorVa
             changed = {leaf for other in described for leaf in _differing(described[0], other)}
             if any(_is_read(leaf, base, study.controllers) for leaf in changed):
                 effective.add(key)
+    try:
+        check_gains(study.overrides, study.controllers)
+    except ParameterError as reason:
+        raise study.source.placed(("overrides",), reason) from reason
     for key in study.keys:
         if key not in effective:
             place = ("design", "cases", key) if study.case_list else ("factors", key)
@@ -246,10 +250,9 @@ def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
         return True
     if first in _LABELS:
         return False
-    others = [system_of(name) for name in controllers if name != "none"]
-    own = any(":" in name for name in controllers)  # a user's controller may look at everything
+    others = [name for name in controllers if name != "none"]
     if part == "vehicle" and first == "controllers":
-        return own or rest[0] in others or (rest[0] == "desired_yaw_rate" and bool(others))
+        return any(rest[0] in keys_read(name) for name in others)
     if part == "vehicle" and first == "single_track" and rest[0] != "mass_kg":  # which the speed hold knows too
         return bool(others) or follows_path or scenario.maneuver.settling_reference().curvature_demand_1pm is not None
     if part == "driver":

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from activesteer.scenario import FileOrTable
+from activesteer.scenario import FileOrTable, check_gains
 from activesteer.studies.margins import SPEEDS_KMH, LoopMargins, margins_of_cars, straight_on, weakest
 from activesteer.studies.plan import Plan
 from activesteer.studies.study import StudyProgress
@@ -53,6 +53,7 @@ def worst_margins(
         overrides=given.overrides | changed, factors=tuple(each for each in given.factors if not each.maneuvers),
         claims=False, curves=(),
     )  # fmt: skip
+    check_gains(changed, controllers)
     plan = Plan(study)
     requests = plan.requests(range(0, len(plan), len(study.controllers)))
     every: list[list[LoopMargins]] = []

@@ -137,11 +137,20 @@ def test_paper_is_not_judged_by_what_it_did_not_drive(call):
     ],
 )
 def test_set_takes_values_as_toml_does(call, text, key, value):
-    assert call("run", "straight_line", *SHORT, "--set", text, "-o", "run.mcap").status == 0
+    assert call("run", "straight_line", "-c", "ars", *SHORT, "--set", text, "-o", "run.mcap").status == 0
     found = Recording.open("run.mcap").metadata
     for part in key:
         found = found[part]
     assert found == (pytest.approx(value) if isinstance(value, float) else value)
+
+
+def test_setting_of_a_controller_needs_one_that_reads_it(call, tmp_path):
+    words = ("run", "straight_line", *SHORT, "--set", "controllers.ars.limit_deg=2", "-o", "out", "-c", "none")
+    told = call(*words)
+    assert told.status == 1
+    assert "override controllers.ars.limit_deg: has no effect: none reads controllers.desired_yaw_rate;" in told.err
+    assert not list((tmp_path / "out").glob("*"))
+    assert call(*words, "-c", "ars").status == 0
 
 
 def test_value_given_twice_is_refused(call, tmp_path):

@@ -18,7 +18,7 @@ from activesteer.rigs.kc import (  # isort: skip  # noqa: F401
 from activesteer.rigs.kc.programme import measure
 from activesteer.rigs.kc.result import KcResult, evaluated
 from activesteer.rigs.kc.targets import load_targets
-from activesteer.scenario import FileOrTable, load_car
+from activesteer.scenario import FileOrTable, check_gains, load_car
 from activesteer.vehicle.parameters import Friction
 
 
@@ -49,6 +49,7 @@ def kinematics_compliance(
         True
     """
     car = load_car(vehicle, overrides)
+    check_gains(overrides or {}, ())
     bands = load_targets(car.name, targets)
     # Dry friction pushes as far one way as the other: without it the rig finds the mean of both directions of a sweep.
     # The same of the play of screws, whose two ends it would find by chance.

@@ -92,6 +92,8 @@ def test_a_wrong_factor_is_told_with_its_line(tmp_path):
         {"factors": {"controllers.ars.limit_deg": {"grid": [2.0, 3.0]}}},
         {"factors": {"controllers.afs.limit_deg": {"grid": [2.0, 3.0]}}, "controllers": ["none", "ars"]},
         {"factors": {"controllers.desired_yaw_rate.delay_s": {"grid": [0.05, 0.06]}}},
+        {"factors": {"controllers.servos.lag_s": {"grid": [0.02, 0.03]}}, "controllers": ["none", "esc"]},
+        {"overrides": {"controllers.afs.limit_deg": 2.0}, "controllers": ["none", "ars"]},
         {"factors": {"single_track.yaw_inertia_kgm2": {"grid": [2000.0, 2100.0]}}},
         {"factors": {"driver.preview_s": {"grid": [1.0, 1.5]}}},
         {"factors": {"maneuver.title": {"grid": ["a", "b"]}}},
@@ -107,6 +109,9 @@ def test_keys_are_checked_before_anything_runs(change, monkeypatch):
 def test_a_key_that_one_of_the_runs_reads_is_taken():
     for change in (
         {"factors": {"controllers.ars.limit_deg": {"grid": [2.0, 3.0]}}, "controllers": ["none", "ars"]},
+        {"factors": {"controllers.servos.lag_s": {"grid": [0.02, 0.03]}}, "controllers": ["none", "mpc"]},
+        {"factors": {"controllers.bus_delay_s": {"grid": [0.0, 0.01]}}, "controllers": ["afs"]},
+        {"overrides": {"controllers.afs.limit_deg": 2.0}, "controllers": ["ars", "afs"]},
         {"factors": {"driver.preview_s": {"grid": [1.0, 1.5]}}, "maneuvers": ["step_steer", "slalom"]},
         {"factors": {"driver.speed_gain_1ps": {"grid": [2.0, 3.0]}}},
     ):

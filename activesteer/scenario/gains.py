@@ -1,0 +1,60 @@
+"""Overrides of the table [controllers]: which they are, and whether a controller that drives reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any, Final
+
+from activesteer.config import field_path
+from activesteer.controllers import BUILT_IN, ControllerParameters, find_controller, keys_read
+from activesteer.errors import ParameterError
+from activesteer.resources import list_controller_variants
+
+_KEYS: Final = frozenset(field.name for field in fields(ControllerParameters))
+
+
+def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Overrides of the table [controllers]: key -> the names of the fields that lead to what it replaces."""
+    split = {key: key.removeprefix("vehicle.").split(".") for key in overrides}
+    return {
+        key: field_path(ControllerParameters, rest) for key, (first, *rest) in split.items() if first == "controllers"
+    }
+
+
+def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> dict[str, frozenset[str]]:
+    """Overrides that none of these controllers reads: key -> what of the table [controllers] it replaces.
+
+    Args:
+        overrides: Dotted key -> value, as for `resolve`.
+        controllers: Those that drive, as for `simulate`.
+    """
+    read = frozenset[str]().union(*map(keys_read, controllers))
+    replaced = {
+        key: _KEYS.intersection(path[:1] or (value if isinstance(value := overrides[key], Mapping) else ()))
+        for key, path in gain_paths(overrides).items()
+    }
+    return {key: names for key, names in replaced.items() if names and not names & read}
+
+
+def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> None:
+    """Every override of the table [controllers] is read by one of the controllers that drive.
+
+    Args:
+        overrides: Dotted key -> value, as for `resolve`.
+        controllers: Those that drive, as for `simulate`; none where nothing is controlled.
+
+    Raises:
+        ParameterError: one is not; what is allowed are the keys that they read.
+    """
+    for key, names in unread_gains(overrides, controllers).items():
+        readers = [name for name in (*BUILT_IN, *list_controller_variants()) if names & keys_read(name)]
+        driving = " and ".join(find_controller(given).label for given in controllers)
+        allowed = [f"controllers.{name}" for name in sorted(frozenset[str]().union(*map(keys_read, controllers)))]
+        verb = "reads" if len(controllers) == 1 else "read"
+        here = f"{driving} {verb} {', '.join(allowed)}" if controllers else "no controller drives here"
+        given = ", ".join(f"controllers.{name}" for name in sorted(names))
+        raise ParameterError(
+            f"has no effect: {here}; {given} is for {', '.join(readers)}",
+            key=key, value=overrides[key], allowed=allowed, overridden=True,
+        )  # fmt: skip

@@ -1,0 +1,67 @@
+"""What of the table [controllers] each controller reads, and settings that none of those that drive would read."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+import pytest
+
+from activesteer.controllers import BUILT_IN, ControllerParameters, find_controller, keys_read
+from activesteer.controllers.variant import Variant
+from activesteer.errors import ParameterError
+from activesteer.resources import list_controller_variants
+from activesteer.scenario import check_gains, resolve, unread_gains
+from tests.raising import raises
+
+LIMIT = {"controllers.ars.limit_deg": 2.0}
+
+
+class Asked:
+    """Gains that note which of them are looked at."""
+
+    def __init__(self, gains: ControllerParameters) -> None:
+        self.gains, self.names = gains, set()
+
+    def __getattr__(self, name: str) -> Any:
+        self.names.add(name)
+        return getattr(self.gains, name)
+
+
+@pytest.mark.parametrize("name", [*BUILT_IN, *list_controller_variants()])
+def test_controller_says_what_it_reads(name, monkeypatch):
+    setup = resolve("straight_line").controller_setup(0.01)
+    asked = Asked(setup.gains)
+    monkeypatch.setattr(Variant, "gains_in", lambda _, setup: setup.gains)
+    find_controller(name).make(replace(setup, gains=asked))  # pyright: ignore[reportArgumentType]
+    assert asked.names == keys_read(name) - {"interval_s", "bus_delay_s"}
+
+
+def test_code_of_a_users_own_may_read_everything(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text("class Mine:\n    def step(self, command, measurement): ...\n")
+    assert keys_read(f"{path}:Mine") == {field.name for field in fields(ControllerParameters)}
+
+
+def test_one_of_the_controllers_must_read_a_setting():
+    for controllers in (["ars"], ["none", "ars"], ["ars_sideslip"], ["none", "ars_tuned"]):
+        check_gains(LIMIT, controllers)
+    for controllers in ([], ["none"], ["afs", "lqr"], ["integrated"]):
+        with raises(ParameterError, key="controllers.ars.limit_deg", value=2.0):
+            check_gains(LIMIT, controllers)
+
+
+def test_shared_settings_are_those_of_each_that_shares_them():
+    shared = {"controllers.servos.lag_s": 0.03, "vehicle.controllers.bus_delay_s": 0.01, "controllers.lqr": {}}
+    assert not unread_gains(shared, ["integrated"])
+    assert list(unread_gains(shared, ["mpc"])) == ["controllers.lqr"]
+    assert list(unread_gains(shared, ["none"])) == list(shared)
+
+
+def test_whole_table_counts_by_what_it_holds():
+    assert not unread_gains({"controllers": {"afs": {}}}, ["afs"])
+    assert unread_gains({"controllers": {"afs": {}}}, ["ars"])
+
+
+def test_settings_of_other_parts_are_no_matter_of_controllers():
+    check_gains({"road.mu": 0.5, "driver.preview_s": 1.0, "factors.mass": 1.1}, ["none"])
