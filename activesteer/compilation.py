@@ -87,6 +87,8 @@ def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[C
 def compiled_call(result: types.Type, *arguments: types.Type) -> Callable[[Callable[..., Any]], Any]:
     """Decorator: the function as native code of one signature, compiled now; while it runs, other threads may.
 
+    It is called from Python alone, with arguments by position, and does not look for their types first.
+
     Args:
         result: Type that it returns.
         arguments: Types of its arguments; what it is called with is converted.
@@ -94,11 +96,10 @@ def compiled_call(result: types.Type, *arguments: types.Type) -> Callable[[Calla
 
     def decorate(function: Callable[..., Any]) -> Any:
         dispatcher: Any = njit(error_model="numpy", nogil=True)(function)
-        if hasattr(dispatcher, "enable_caching"):
-            dispatcher._cache = _cache_of(function)
-            dispatcher.compile(result(*arguments))
-            dispatcher.disable_compile()
-        return dispatcher
+        if not hasattr(dispatcher, "enable_caching"):
+            return dispatcher
+        dispatcher._cache = _cache_of(function)
+        return dispatcher.compile(result(*arguments))
 
     return decorate
 

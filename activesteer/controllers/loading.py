@@ -69,7 +69,8 @@ class _ControllerKind(Kind):
         if command.estimate is not None and not isinstance(command.estimate, Estimate):
             problem = f"{said} estimate = {shown(command.estimate)}; an activesteer.Estimate is needed"
             raise self.fail(name, problem, command.estimate, Estimate)
-        return command
+        # A list or an array is as good, but the native step takes a tuple.
+        return command if isinstance(torques, tuple) else command._replace(brake_torque_demand_Nm=tuple(torques))
 
 
 def _are_torques(torques: Any) -> bool:

@@ -24,7 +24,6 @@ from activesteer.vehicle import native_step
 from activesteer.vehicle.actuator_records import ActuatorRecords
 from activesteer.vehicle.channels import ChannelMap
 from activesteer.vehicle.chassis_heading import YAW_DOF, turn_chassis_back
-from activesteer.vehicle.command_row import write_commands
 from activesteer.vehicle.divergence import raise_if_diverged
 from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.estimate_row import write_estimate
@@ -87,7 +86,6 @@ class Vehicle:
             self._brake_row = self._brake_state.view(np.float64)
             measured = np.empty(0) if self._sensors is None else self._sensors.outputs
             self.rows = RecordedArrays(self.model, self.data, measured, self._brake_row)
-            self._command_memory = self.rows.commands.data
             self._estimate_memory: memoryview | None = None
             self.channels = ChannelMap(self.model, parameters)
             self._bind()
@@ -189,7 +187,6 @@ class Vehicle:
         Raises:
             SimulationDiverged: the engine warns, or something recorded is not finite or beyond all reason.
         """
-        write_commands(self._command_memory, command, asked)
         if self._estimate_memory is not None:
             write_estimate(self._estimate_memory, asked.estimate)
         torques = command.wheel_torques
@@ -200,7 +197,9 @@ class Vehicle:
             self._wheels.engage(gear)
         if torques is not None:
             self._wheels.apply(torques)
-        sane, measurement, motion = native_step.step(self._plan_address, tape_address, torques is not None)
+        sane, measurement, motion = native_step.step(
+            self._plan_address, command, asked, tape_address, torques is not None
+        )
         if not sane:
             self.check()
         return sensed(measurement, motion)

@@ -22,7 +22,13 @@ from activesteer.sensors.signal_chain import CHAIN
 from activesteer.signals import Measurement, Motion
 from activesteer.vehicle.channels.raw_rows import ENGINE_ARRAYS
 from activesteer.vehicle.chassis_heading import YAW_DOF
-from activesteer.vehicle.command_row import BRAKES, COMMAND_ROW
+from activesteer.vehicle.command_row import (
+    ACTUATOR_COMMAND,
+    BRAKES,
+    COMMAND_ROW,
+    DRIVER_COMMAND,
+    write_commands,
+)
 from activesteer.vehicle.native_memory import f64_pointer, pointer_to
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.vehicle.step_plan import N_SOURCES, N_WARNINGS, STEP_PLAN, TAPE
@@ -147,12 +153,14 @@ def sense(plan_address):
     return _sense(carray(_plan_pointer(plan_address), (1,))[0])
 
 
-@compiled_call(_SENSED, types.intp, types.intp, types.boolean)
-def step(plan_address, tape_address, torques_stand):
+@compiled_call(_SENSED, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND, types.intp, types.boolean)
+def step(plan_address, command, asked, tape_address, torques_stand):
     """Carries out the commands, makes one step of the engine and reads everything.
 
     Args:
-        plan_address: Address of a `STEP_PLAN`; the commands stand where the source behind the engine's arrays is.
+        plan_address: Address of a `STEP_PLAN`; the commands are kept where the source behind the engine's arrays is.
+        command: A `DriverCommand`.
+        asked: An `ActuatorCommand`.
         tape_address: Address of a `TAPE` that the step is recorded on, unless something is wrong with it; 0 for none.
         torques_stand: Whether drive and brakes have their inputs already; what driver and controller want of the drive,
             and the pedal, then do not count.
@@ -162,6 +170,7 @@ def step(plan_address, tape_address, torques_stand):
     """
     plan = carray(_plan_pointer(plan_address), (1,))[0]
     commands_address = plan.sources[_ENGINE_ARRAYS]
+    write_commands(commands_address, command, asked)
     commands = carray(_command_pointer(commands_address), (1,))[0]
     brake_torques_Nm = carray(f64_pointer(commands_address), (BRAKES + _N_WHEELS,))[BRAKES:]
     ctrl = f64_pointer(plan.ctrl)

@@ -8,7 +8,7 @@ import numpy as np
 from activesteer.conventions import Array
 from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle.channels.raw_rows import ENGINE_ARRAYS, RawRows
-from activesteer.vehicle.command_row import COMMANDS, write_commands
+from activesteer.vehicle.command_row import COMMANDS, write_commands_at
 
 
 def engine_arrays(data: mujoco.MjData) -> dict[str, Array]:
@@ -59,7 +59,7 @@ class RecordedArrays:
         now, commands = mujoco.MjData(self._model), np.empty_like(self.commands)
         mujoco.mj_copyData(now, self._model, self._data)
         mujoco.mj_forward(self._model, now)
-        write_commands(commands.data, command, asked)
+        write_commands_at(commands.ctypes.data, command, asked)
         return RawRows(*(array[np.newaxis] for array in self._of(now, commands)))
 
     def _of(self, data: mujoco.MjData, commands: Array) -> RawRows:

@@ -218,7 +218,9 @@ def test_error_in_a_step_is_answered_with_file_and_class(returning, expression, 
     ],
 )
 def test_numbers_of_all_kinds_are_taken(returning, expression):
-    assert isinstance(returning(expression).step(steering(0.0), measured(0.0)), ActuatorCommand)
+    command = returning(expression).step(steering(0.0), measured(0.0))
+    assert isinstance(command, ActuatorCommand)
+    assert isinstance(command.brake_torque_demand_Nm, tuple), "which is what the native step takes"
 
 
 def test_good_command_passes_the_check():
