@@ -14,7 +14,7 @@ import re
 import secrets
 import stat
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -24,6 +24,7 @@ MAX_TEXT_BYTES: Final = 2_000_000
 """Longest text file that is read as an input, unless said otherwise; those of the package have some 20 kB."""
 MAX_CSV_BYTES: Final = 10_000_000
 """Longest CSV; an hour of samples every 10 ms has 8 MB."""
+_passing: Final[set[Path]] = set()
 _DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
@@ -67,12 +68,32 @@ def replacing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> It
             yield target
             return
         part = target.with_name(f".{target.stem[:40]}-{secrets.token_hex(4)}.part{target.suffix}")
-        try:
+        with passing(part):
             yield part
             if target.exists():
                 part.chmod(target.stat().st_mode & 0o777)
             part.replace(target)
-        finally:
+
+
+@contextmanager
+def passing(part: Path) -> Iterator[None]:
+    """Stands around what writes a file that is moved to its place in the end: where it still is then, it is deleted.
+
+    Args:
+        part: The file; `delete_passing` deletes it too.
+    """
+    _passing.add(part)
+    try:
+        yield
+    finally:
+        part.unlink(missing_ok=True)
+        _passing.discard(part)
+
+
+def delete_passing() -> None:
+    """Deletes the files of `passing` that are being written, for an end of the process that does not unwind it."""
+    for part in tuple(_passing):
+        with suppress(OSError):
             part.unlink(missing_ok=True)
 
 

@@ -116,6 +116,8 @@ class StopSignals:
                 saved = "what was saved cannot be told"
             name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
             line = f"activesteer: stopped by {name}; {saved}{getattr(self.options, 'how_to_go_on', '')}"
+            if "activesteer.files" in sys.modules:
+                sys.modules["activesteer.files"].delete_passing()
             if not self._watching:
                 print(line, file=sys.stderr)
                 return 128 + number

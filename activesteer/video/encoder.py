@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Protocol, Self
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from activesteer.errors import ParameterError, PlaybackError, not_installed
-from activesteer.files import writing
+from activesteer.files import passing, writing
 
 Pixels = NDArray[np.uint8]
 
@@ -123,12 +123,14 @@ class _Mp4:
         ]  # fmt: skip
 
     def __enter__(self) -> Self:
-        self._log = tempfile.TemporaryFile()
-        try:
-            self._process: Any = subprocess.Popen(self._command, stdin=subprocess.PIPE, stderr=self._log)
-        except OSError as reason:
-            self._log.close()
-            raise PlaybackError(f"{self._command[0]} does not start: {reason.strerror or reason}") from None
+        with ExitStack() as stack:
+            self._log = stack.enter_context(tempfile.TemporaryFile())
+            stack.enter_context(passing(self._part))
+            try:
+                self._process: Any = subprocess.Popen(self._command, stdin=subprocess.PIPE, stderr=self._log)
+            except OSError as reason:
+                raise PlaybackError(f"{self._command[0]} does not start: {reason.strerror or reason}") from None
+            self._leaving = stack.pop_all()
         return self
 
     def write(self, pixels: Pixels) -> None:
@@ -144,15 +146,12 @@ class _Mp4:
         with suppress(OSError):
             self._process.stdin.close()
         status = self._process.wait()
-        try:
+        with self._leaving:
             if kind is None and status != 0:
                 raise self._failure()
             if kind is None:
                 with writing(self._path, PlaybackError):
                     self._part.replace(self._path)
-        finally:
-            self._log.close()
-            self._part.unlink(missing_ok=True)
 
     def _failure(self) -> PlaybackError:
         self._log.seek(0)
@@ -170,8 +169,11 @@ class _Gif:
         self._pictures: list[Image.Image] = []
 
     def __enter__(self) -> Self:
-        with writing(self._path, PlaybackError):
-            self._part.open("wb").close()
+        with ExitStack() as stack:
+            stack.enter_context(passing(self._part))
+            with writing(self._path, PlaybackError):
+                self._part.open("wb").close()
+            self._leaving = stack.pop_all()
         return self
 
     def write(self, pixels: Pixels) -> None:
@@ -179,7 +181,7 @@ class _Gif:
         self._pictures.append(picture.quantize(palette=self._palette, dither=Image.Dither.NONE))
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        try:
+        with self._leaving:
             if kind is None and self._pictures:
                 first, *others = self._pictures
                 with writing(self._path, PlaybackError):
@@ -188,5 +190,3 @@ class _Gif:
                         optimize=False,
                     )  # fmt: skip
                     self._part.replace(self._path)
-        finally:
-            self._part.unlink(missing_ok=True)

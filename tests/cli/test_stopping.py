@@ -54,13 +54,21 @@ def test_signal_ends_every_command_at_any_moment(tmp_path, words, number, after_
     stopped(tmp_path, words, number, after_s)
 
 
-@pytest.mark.parametrize("swallowed", ["while True:\n    pass", "import time\ntime.sleep(60.0)"])
-def test_command_that_does_not_listen_is_ended(tmp_path, controller, swallowed):
+@pytest.mark.parametrize("swallowed", ["while True: pass", "time.sleep(60.0)"])
+def test_command_that_does_not_listen_is_ended_and_leaves_no_half_file(tmp_path, controller, swallowed):
     """A user's own code may catch everything, or be busy elsewhere."""
-    loop = f"while True:\n    with contextlib.suppress(BaseException):\n        {swallowed}"
-    body = f"import contextlib\nopen('busy', 'w').close()\n{loop}"
-    body = body.replace("\n    pass", "\n            pass").replace("\ntime.", "\n        time.")
+    body = f"""
+        import contextlib, time
+        from activesteer.errors import ParameterError
+        from activesteer.files import replacing
+        with replacing("half.png", ParameterError) as part:
+            part.write_text("half")
+            open("busy", "w").close()
+            while True:
+                with contextlib.suppress(BaseException):
+                    {swallowed}"""
     stopped(tmp_path, ("run", "slalom", "-c", controller(body)), signal.SIGINT, tmp_path / "busy")
+    assert not [name for name in os.listdir(tmp_path) if "half" in name]
 
 
 def stopped(folder: Path, words: tuple[str, ...], number: signal.Signals, when: float | Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from activesteer.errors import ParameterError, PlaybackError
-from activesteer.files import make_folder, reading, replacing, shown_path, write_text, writing
+from activesteer.files import delete_passing, make_folder, reading, replacing, shown_path, write_text, writing
 from tests.raising import raises
 
 
@@ -38,6 +38,17 @@ def test_what_fails_halfway_leaves_what_was_there(tmp_path: Path) -> None:
         fail(KeyboardInterrupt())
     assert path.read_text() == "before"
     assert os.listdir(tmp_path) == ["page.html"]
+
+
+def test_half_files_can_be_deleted_from_elsewhere(tmp_path: Path) -> None:
+    path = tmp_path / "page.html"
+    path.write_text("before")
+    with raises(ParameterError, cause=FileNotFoundError, value=path), replacing(path, ParameterError) as part:
+        part.write_text("half")
+        delete_passing()
+        assert os.listdir(tmp_path) == ["page.html"]
+    delete_passing()
+    assert path.read_text() == "before"
 
 
 def test_link_stays_a_link_and_its_file_is_replaced(tmp_path: Path) -> None:
