@@ -1,15 +1,28 @@
 """The messages that the blocks hand to each other, once every step. Immutable; SI units; signs of `conventions`.
 
 They are named tuples because they are made every millisecond: a frozen dataclass costs several times as much to build.
+Where even the call of the class is too slow, `made` makes them.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeVar, cast
 
 if TYPE_CHECKING:
     from activesteer.road.path import Path
+
+_Message = TypeVar("_Message", bound=tuple[Any, ...])
+
+
+class _Make(Protocol):
+    def __call__(self, kind: type[_Message], members: Iterable[Any], /) -> _Message: ...
+
+
+made: Final = cast(_Make, tuple.__new__)
+"""`made(Motion, (x_m, y_m, ...))` is a message of these members, all of them, in half the time of `Motion(x_m, ...)`:
+for what is made every step."""
 
 
 class Channel(NamedTuple):

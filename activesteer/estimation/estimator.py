@@ -10,7 +10,7 @@ from activesteer.estimation.advance import advance
 from activesteer.estimation.parameters import EstimatorParameters
 from activesteer.estimation.records import MEMORY, SAID, known_of
 from activesteer.estimation.setup import EstimatorSetup
-from activesteer.signals import Estimate, Measurement
+from activesteer.signals import Estimate, Measurement, made
 
 _pack_into = struct.Struct(f"{len(SAID)}d").pack_into
 
@@ -61,7 +61,7 @@ class Estimator:
         _, _, yaw_rate, ay, ax, steering_wheel, rear, superposition, spins, pressures = measurement
         _pack_into(self._row, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
         advance(self._known, self._tyres, self._memory, self._said, self._line)
-        return tuple.__new__(Estimate, self._estimate.tolist())
+        return made(Estimate, self._estimate.tolist())
 
     def __deepcopy__(self, memo: dict[int, object]) -> Estimator:
         other = object.__new__(Estimator)

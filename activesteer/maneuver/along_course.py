@@ -72,7 +72,7 @@ class AlongCourse(Maneuver):
 
     def settling_reference(self) -> Reference:
         """Straight ahead at the speed of the manoeuvre: the path begins where the recording does."""
-        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
+        return self.at_speed(0.0)
 
 
 def known_width(vehicle_width_m: float | None) -> float:

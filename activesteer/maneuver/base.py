@@ -12,7 +12,7 @@ from activesteer.errors import ManeuverError
 from activesteer.faults import Fault
 from activesteer.road.course import Course
 from activesteer.road.road import Road
-from activesteer.signals import Reference
+from activesteer.signals import Reference, made
 
 Speed = Annotated[float, Range(-20.0, 100.0)]
 
@@ -76,6 +76,10 @@ class Maneuver(ABC):
     def settling_reference(self) -> Reference:
         """What is asked of the driver while the car settles before the recording."""
         return self.reference(0.0)
+
+    def at_speed(self, steering_wheel_rad: float, hold_speed: bool = True) -> Reference:
+        """A steering wheel angle [rad], left positive, while the drive holds the speed of the manoeuvre, or none."""
+        return made(Reference, (steering_wheel_rad, self.speed_mps, 0.0, hold_speed, None, None, None, None, 0.0))
 
 
 @dataclass(frozen=True)

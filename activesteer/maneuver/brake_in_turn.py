@@ -113,4 +113,4 @@ class BrakeInTurn(Maneuver):
 
     def settling_reference(self) -> Reference:
         """Straight ahead at the speed of the manoeuvre."""
-        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
+        return self.at_speed(0.0)

@@ -16,7 +16,7 @@ from activesteer.maneuver.open_loop_tables import (
     WheelTorqueTable,
     check_table,
 )
-from activesteer.signals import Reference, WheelTorques
+from activesteer.signals import Reference, WheelTorques, made
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,7 @@ class OpenLoop(Maneuver):
         parking = self.parking_brake
         applied = 0.0 if parking is None else _interpolate(time_s, parking.time_s, parking.applied)
         drives = self.drive == "hold_speed" and pedal == 0.0 and applied == 0.0
-        return Reference(angle, speed, pedal, drives, None, rack, parking_brake=applied)
+        return made(Reference, (angle, speed, pedal, drives, None, rack, None, None, applied))
 
     def settling_reference(self) -> Reference:
         """As at the start, but without torques of the wheels: the car is to roll at its speed; see the base class."""

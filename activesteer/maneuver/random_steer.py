@@ -84,8 +84,8 @@ class RandomSteer(Maneuver):
         index = min(int(place), len(self._angles_rad) - 2)
         before, after = self._angles_rad[index], self._angles_rad[index + 1]
         angle = before + (after - before) * (place - index)
-        return Reference(angle, self.speed_mps, 0.0, hold_speed=True)
+        return self.at_speed(angle)
 
     def settling_reference(self) -> Reference:
         """Straight ahead; see the base class."""
-        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
+        return self.at_speed(0.0)

@@ -75,4 +75,4 @@ class SineSweep(Maneuver):
             to_edge = min(t, sweep.length_s - t)
             if to_edge < sweep.fade_s:
                 angle *= 0.5 - 0.5 * math.cos(math.pi * to_edge / sweep.fade_s)
-        return Reference(angle, self.speed_mps, 0.0, hold_speed=True)
+        return self.at_speed(angle)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, ClassVar, Final
 
 from activesteer.config import Range
@@ -106,16 +107,24 @@ class SineWithDwell(Maneuver):
 
     def reference(self, time_s: float) -> Reference:
         """Steering wheel angle of the sine; see the base class."""
-        steer = self.steer
-        period, t = 1.0 / steer.frequency_Hz, time_s - steer.start_s
-        angle = 0.0
-        if 0.0 < t < period + steer.dwell_s:
-            # Time stands still for the sine while it dwells.
-            phase = min(t, max(0.75 * period, t - steer.dwell_s))
-            amplitude = SIDES[steer.direction] * (steer.steering_wheel_rad or 0.0)
-            angle = amplitude * math.sin(2.0 * math.pi * phase / period)
-        return Reference(angle, self.speed_mps, 0.0, hold_speed=self.drive == "hold_speed" or t < 0.0)
+        steer, (before, after) = self.steer, self._ends
+        t = time_s - steer.start_s
+        if t < 0.0:
+            return before
+        period = 1.0 / steer.frequency_Hz
+        if t == 0.0 or t >= period + steer.dwell_s:
+            return after
+        # Time stands still for the sine while it dwells.
+        peak, resumed = 0.75 * period, t - steer.dwell_s
+        phase = t if t < peak else peak if resumed < peak else resumed
+        amplitude = SIDES[steer.direction] * (steer.steering_wheel_rad or 0.0)
+        return self.at_speed(amplitude * math.sin(2.0 * math.pi * phase / period), after.hold_speed)
+
+    @cached_property
+    def _ends(self) -> tuple[Reference, Reference]:
+        """Before the sine and after it."""
+        return self.at_speed(0.0), self.at_speed(0.0, self.drive == "hold_speed")
 
     def settling_reference(self) -> Reference:
         """Straight ahead at the speed of the manoeuvre."""
-        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
+        return self.at_speed(0.0)

@@ -53,7 +53,7 @@ class SlowlyIncreasingSteer(Maneuver):
         """Steering wheel angle of the ramp; see the base class."""
         ramp = self.steer
         turned = min(max(time_s - ramp.start_s, 0.0) * abs(ramp.rate_radps), ramp.end_rad)
-        return Reference(math.copysign(turned, ramp.rate_radps), self.speed_mps, 0.0, hold_speed=True)
+        return self.at_speed(math.copysign(turned, ramp.rate_radps))
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, ClassVar, Final
 
 from activesteer.config import Range
@@ -61,14 +62,22 @@ class StepSteer(Maneuver):
 
     def reference(self, time_s: float) -> Reference:
         """Steering wheel angle of the ramp; see the base class."""
-        step = self.steer
+        step, (before, after) = self.steer, self._ends
+        turned = (time_s - step.start_s) * step.rate_radps
+        if turned <= 0.0:
+            return before
         amplitude = step.steering_wheel_rad or 0.0
-        turned = min(max(time_s - step.start_s, 0.0) * step.rate_radps, abs(amplitude))
-        return Reference(math.copysign(turned, amplitude), self.speed_mps, 0.0, hold_speed=True)
+        return after if turned >= abs(amplitude) else self.at_speed(math.copysign(turned, amplitude))
+
+    @cached_property
+    def _ends(self) -> tuple[Reference, Reference]:
+        """Before the ramp and after it."""
+        amplitude = self.steer.steering_wheel_rad or 0.0
+        return self.at_speed(math.copysign(0.0, amplitude)), self.at_speed(amplitude)
 
     def settling_reference(self) -> Reference:
         """Straight ahead at the speed of the manoeuvre."""
-        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
+        return self.at_speed(0.0)
 
     @property
     def search(self) -> SteadyTurn | None:

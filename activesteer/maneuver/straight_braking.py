@@ -67,4 +67,4 @@ class StraightBraking(Maneuver):
 
     def settling_reference(self) -> Reference:
         """Straight ahead at the speed of the manoeuvre."""
-        return Reference(0.0, self.speed_mps, 0.0, hold_speed=True)
+        return self.at_speed(0.0)

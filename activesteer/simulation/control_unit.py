@@ -11,7 +11,7 @@ from activesteer.controllers import Controller, ControllerParameters, Controller
 from activesteer.errors import ParameterError
 from activesteer.plugins import Plugin
 from activesteer.scenario import Scenario
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, made
 from activesteer.vehicle import Vehicle
 
 _STEERING_WHEEL: Final = DriverCommand._fields.index("steering_wheel_demand_rad")
@@ -80,7 +80,7 @@ class ControlUnit:
         seen: list[Any] = [*command]
         seen[_STEERING_WHEEL] = angle = measurement.steering_wheel_rad
         seen[_FRONT_STEER] = angle / self._steering_ratio
-        return tuple.__new__(DriverCommand, seen)
+        return made(DriverCommand, seen)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> ControlUnit:
         # The truth is the car's, which is no part of it.

@@ -19,7 +19,7 @@ from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS
 from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.sensors.signal_chain import CHAIN
-from activesteer.signals import Measurement, Motion
+from activesteer.signals import Measurement, Motion, made
 from activesteer.vehicle.channels.raw_rows import ENGINE_ARRAYS
 from activesteer.vehicle.chassis_heading import YAW_DOF
 from activesteer.vehicle.command_row import (
@@ -227,5 +227,4 @@ def replay(plan_address, inputs):
 
 def sensed(measurement: tuple[Any, ...], motion: tuple[float, ...]) -> tuple[Measurement, Motion]:
     """Measurement and motion from what `sense` and `step` return behind the first member."""
-    # Made without the class's own `__new__`, which costs as much as the engine's sensors: this happens every step.
-    return tuple.__new__(Measurement, measurement), tuple.__new__(Motion, motion)
+    return made(Measurement, measurement), made(Motion, motion)
