@@ -98,6 +98,59 @@ class Quantity(NamedTuple):
         return text.lstrip("-") if float(text) == 0.0 else text
 
 
+_AS_WRITTEN: Final = {
+    "_radpmps2": "rad/(m/s2)", "_mps2prad": "(m/s2)/rad", "_radprad": "rad/rad", "_Nspm": "N s/m", "_kgm2": "kg m2",
+    "_Npm": "N/m", "_Npmm": "N/mm", "_radps": "rad/s", "_degps": "deg/s", "_mps2": "m/s2", "_srad": "s rad",
+    "_1ps": "1/s", "_mps": "m/s", "_kmh": "km/h", "_Nm": "N m", "_Hz": "Hz", "_kg": "kg", "_rad": "rad", "_deg": "deg",
+    "_mm": "mm", "_Pa": "Pa", "_m": "m", "_s": "s", "_N": "N", "_g": "g",
+}  # fmt: skip
+"""Ending of a key or a column -> the unit that its values are written in."""
+
+
+def unit_of(name: str) -> str:
+    """The unit that a name ends in.
+
+    Args:
+        name: Name of a metric, or dotted key of a parameter.
+
+    Returns:
+        The unit; empty for a pure number and for what is none.
+    """
+    return next((unit for ending, unit in _AS_WRITTEN.items() if name.endswith(ending)), "")
+
+
+_FILES: Final = frozenset({"maneuver", "vehicle", "controllers", "overrides"})
+"""Tables that say only where a parameter stands."""
+_PARAMETER_WORDS: Final = {
+    "mu": "friction coefficient", "cg": "centre of gravity", "ars": "ARS", "afs": "AFS", "lqr": "LQR", "esc": "ESC",
+    "mpc": "MPC",
+}  # fmt: skip
+
+
+def parameter_label(key: str) -> tuple[str, str]:
+    """What a parameter is called, by the words of its key and of the tables that it is in.
+
+    Args:
+        key: Dotted key, as `controllers.ars.corrector.proportional_gain_s`.
+
+    Returns:
+        Its name in words, as `ARS corrector: proportional gain`, and the unit of its values; empty for a pure number
+        and for what is none.
+    """
+    *tables, name = key.removesuffix(next((end for end in _AS_WRITTEN if key.endswith(end)), "")).split(".")
+    within, what = (
+        " ".join(_PARAMETER_WORDS.get(word, word) for part in parts for word in part.split("_"))
+        for parts in ([table for table in tables if table not in _FILES], [name])
+    )
+    return f"{within}: {what}" if within else what, unit_of(key)
+
+
+def parameter_title(key: str) -> str:
+    """Name and unit of a parameter in one text, as `ARS corrector: proportional gain [s]`."""
+    words, unit = parameter_label(key)
+    return f"{words} [{unit}]" if unit else words
+
+
 def display_unit(name: str) -> DisplayUnit:
     """The unit that a value is shown in.
 

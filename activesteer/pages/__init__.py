@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
-from activesteer.quantities import typeset
+from activesteer.quantities import parameter_title, typeset
 from activesteer.version import __version__
 
 
@@ -37,7 +37,7 @@ def _environment() -> Environment:
     environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "separators": (",", ":"), "allow_nan": False}
     environment.globals |= {"version": __version__, "asset": _asset}
     environment.globals |= {"run_colours": RUN_COLOURS, "run_colours_on_dark": RUN_COLOURS_ON_DARK}
-    environment.filters["typeset"] = typeset
+    environment.filters |= {"typeset": typeset, "label": parameter_title}
     return environment
 
 

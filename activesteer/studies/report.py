@@ -17,8 +17,7 @@ from activesteer.conventions import Array, run_looks
 from activesteer.errors import StudyError
 from activesteer.files import write_text
 from activesteer.pages import render
-from activesteer.quantities import metric_label
-from activesteer.studies.column_units import unit_of
+from activesteer.quantities import metric_label, parameter_label
 from activesteer.studies.factor_values import FactorValues, label_of
 from activesteer.studies.row_table import IDENTITY, OUTCOME
 from activesteer.studies.run_task import CURVE
@@ -80,7 +79,7 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
         "places": [run_looks(who["controller"][0])[name].place for name in who["controller"][0]],
         "groups": [f"{who['maneuver'][0][m]}, {who['vehicle'][0][v]}" for m, v in groups],
         "metrics": [{"name": name, "label": metric_label(name)[0], "unit": metric_label(name)[1]} for name in values],
-        "factors": [_factor(key, table[key]) for key in study.keys],
+        "factors": [_factor(study, key, table[key]) for key in study.keys],
         "rows": {
             "group": [groups.index(pair) for pair in zip(
                 who["maneuver"][1][shown].tolist(), who["vehicle"][1][shown].tolist(), strict=True)],
@@ -108,12 +107,19 @@ def _shown_rows(table: pa.Table) -> Places:
     return np.flatnonzero(samples % every == 0)
 
 
-def _factor(key: str, column: pa.ChunkedArray) -> dict[str, Any]:
+_RELATIVE: Final = {"times": ", relative", "plus": ", change"}
+"""What is said of values that are relative to the files, by `Factor.nominal`."""
+
+
+def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, Any]:
     numeric = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
     levels = column.drop_null().unique().to_pylist()
     few = len(levels) <= _BINS
     ordered = (sorted(levels) if numeric else [str(level) for level in levels]) if few or not numeric else []
-    return {"key": key, "unit": unit_of(key), "numeric": numeric, "levels": ordered}
+    relative = next((factor.nominal for factor in study.factors if factor.key == key), "")
+    words, unit = parameter_label(key)
+    told = {"label": f"{words}{_RELATIVE.get(relative, '')}", "unit": "" if relative == "times" else unit}
+    return {"key": key, **told, "numeric": numeric, "levels": ordered}
 
 
 def _of_group(

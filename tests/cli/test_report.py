@@ -11,7 +11,7 @@ def test_report_is_made_of_files_and_says_where_it_is(call, tmp_path):
     assert (told.status, told.out, told.err) == (0, "report: report.html\n", "")
     page = (tmp_path / "report.html").read_text()
     assert "2 runs of 1 manoeuvre" in page
-    assert "duration_s = 0.5" in page  # what was changed
+    assert "duration 0.5 s (duration_s)" in page  # what was changed
     again = call("report", "runs/straight_line-none.mcap", "-o", "one.html")
     assert again.out == "report: one.html\n"
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from activesteer.quantities import display_unit, metric_label, quantity_of
+from activesteer.quantities import display_unit, metric_label, parameter_title, quantity_of
 
 
 @pytest.mark.parametrize(
@@ -58,3 +58,17 @@ def test_the_unit_of_a_quantity_is_the_one_of_its_metrics():
 )
 def test_values_are_written_with_the_digits_of_their_quantity(channel, value, text):
     assert quantity_of(channel).value_text(value) == text
+
+
+@pytest.mark.parametrize(
+    ("key", "title"),
+    [
+        ("maneuver.speed_kmh", "speed [km/h]"),
+        ("road.mu", "road: friction coefficient"),
+        ("vehicle.controllers.ars.corrector.deadband_end_degps", "ARS corrector: deadband end [deg/s]"),
+        ("load.cg_height_change_m", "load: centre of gravity height change [m]"),
+        ("sensors.preset", "sensors: preset"),
+    ],
+)
+def test_parameters_are_called_by_the_words_of_their_keys(key, title):
+    assert parameter_title(key) == title

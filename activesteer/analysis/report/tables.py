@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from activesteer.analysis.claims.noticeable import noticeable
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict
 from activesteer.analysis.report.groups import Group, Run, entry
-from activesteer.quantities import is_count, metric_label, metric_number, typeset
+from activesteer.quantities import is_count, metric_label, metric_number, parameter_label, typeset
 
 
 class Cell(NamedTuple):
@@ -54,9 +54,14 @@ def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
 
 
 def changed_parameters(run: Run) -> str:
-    """The parameters that the user replaced, with their values; empty where there are none."""
+    """The parameters that the user replaced, with their values and keys; empty where there are none."""
     changed: Any = run.recording.metadata.get("overrides")
-    return ", ".join(f"{key} = {value}" for key, value in changed.items()) if isinstance(changed, Mapping) else ""
+    return ", ".join(_told(*one) for one in changed.items()) if isinstance(changed, Mapping) else ""
+
+
+def _told(key: str, value: Any) -> str:
+    words, unit = parameter_label(key)
+    return f"{words} {value} {unit}".rstrip() + f" ({key})"
 
 
 def metric_titles(group: Group) -> list[str]:

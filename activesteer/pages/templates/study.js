@@ -77,8 +77,11 @@ function histogram(parent, metric, found, width, height) {
   });
 }
 
+const factorTitle = (factor) => withUnit(factor.label, factor.unit);
+const textWidth = (text) => 6.2 * text.length;
+
 function factorAxis(factor) {
-  const label = withUnit(factor.key, factor.unit);
+  const label = factorTitle(factor);
   if (!factor.numeric) return { axis: { label, levels: factor.levels }, value: (v) => factor.levels.indexOf(String(v)) };
   return { axis: { label, range: range(data.rows.factors[factor.key]) }, value: (v) => v };
 }
@@ -102,7 +105,7 @@ function scatter(parent, factor, points, label) {
 function heat(parent, metric, found, keyed) {
   const all = found.heat.maps.flat(2).filter((v) => v !== null), low = Math.min(...all), high = Math.max(...all);
   found.heat.maps.forEach((map, c) => {
-    const axes = found.heat.keys.map((key, i) => ({ label: withUnit(key, keyed[key].unit), levels: found.heat.levels[i] }));
+    const axes = found.heat.keys.map((key, i) => ({ label: factorTitle(keyed[key]), levels: found.heat.levels[i] }));
     const box = html(parent, "div");
     html(box, "div", `${data.controllers[c]}: ${metricAxis(metric)}, mean`);
     const f = frame(box, 400, 300, axes[0], axes[1]);
@@ -117,10 +120,11 @@ function heat(parent, metric, found, keyed) {
 
 function bars(parent, controller, found, metric, [bottom, top]) {
   const names = [...new Set(found.map((index) => index[1]))], factors = [...new Set(found.map((index) => index[0]))];
+  const labelled = factors.map((key) => factorTitle(data.factors.find((factor) => factor.key === key)));
   const box = html(parent, "div");
   html(box, "div", data.controllers[controller]);
   const label = names[0] === "mu*" ? withUnit("mu*", metric.unit) : `${names.join(" (light), ")}${names.length > 1 ? " (dark)" : ""} [-]`;
-  const f = frame(box, Math.max(300, 90 + 130 * factors.length), 240, { label: "factor", levels: factors }, { label, range: [bottom * 1.05, top * 1.05 || 1] });
+  const f = frame(box, Math.max(300, 90 + Math.max(130, ...labelled.map(textWidth)) * factors.length), 240, { label: "factor", levels: labelled }, { label, range: [bottom * 1.05, top * 1.05 || 1] });
   element(f.svg, "line", { x1: f.sx(-0.5), x2: f.sx(factors.length - 0.5), y1: f.sy(0), y2: f.sy(0), stroke: "#888" });
   for (const [factor, name, value, confidence, spread] of found) {
     const n = names.indexOf(name), width = 0.6 / names.length, x = factors.indexOf(factor) - 0.3 + n * width;
@@ -135,9 +139,11 @@ function parallel(parent, metric, rows) {
   const axes = data.factors.map((factor) => { const { axis, value } = factorAxis(factor); return { ...axis, of: (i) => value(data.rows.factors[factor.key][i]) }; });
   const values = data.rows.metrics[metric.name];
   axes.push({ label: metricAxis(metric), range: range(rows.map((i) => values[i])), of: (i) => values[i] });
-  const width = Math.max(420, 190 * (axes.length - 1) + 160), height = 320, top = 30, bottom = 20;
+  const step = Math.max(190, ...axes.map((axis) => textWidth(axis.label)));
+  const margin = 0.5 * Math.max(160, ...axes.map((axis) => textWidth(axis.label)));
+  const width = Math.max(420, step * (axes.length - 1) + 2 * margin), height = 320, top = 30, bottom = 20;
   const svg = element(parent, "svg", { width, height, role: "img", "aria-label": "parallel coordinates" });
-  const x = (n) => 80 + (n * (width - 160)) / Math.max(axes.length - 1, 1);
+  const x = (n) => margin + (n * (width - 2 * margin)) / Math.max(axes.length - 1, 1);
   const y = (axis, v) => { const [low, high] = axis.levels ? [-0.5, axis.levels.length - 0.5] : axis.range; return height - bottom - ((v - low) / (high - low)) * (height - top - bottom); };
   for (const i of rows.slice(0, 600)) {
     const points = axes.map((axis, n) => [x(n), axis.of(i)]);

@@ -181,7 +181,7 @@ def test_page_says_at_its_top_what_was_lost_and_what_was_driven_otherwise():
     top = Page(report_page(runs, date(2026, 1, 2))).words.partition("Metrics")[0]
     assert "2026-01-02" in top
     assert "lost at 57 deg of sideslip" in top
-    assert "maneuver.speed_kmh = 95" in top
+    assert "speed 95 km/h (maneuver.speed_kmh)" in top
     assert top.count("keeps the car") == 2
 
 
@@ -379,7 +379,7 @@ def test_run_that_did_not_end_properly_is_marked():
     run = recording_of(step_steer(), complete=False, error="SimulationDiverged: too much", overrides={"road.mu": 0.4})
     words = Page(report_page({"a.mcap": run})).words
     assert "Incomplete: a.mcap: SimulationDiverged: too much" in words
-    assert "road.mu = 0.4" in words
+    assert "road: friction coefficient 0.4 (road.mu)" in words
 
 
 def test_wrong_input_is_answered(tmp_path: Path):

@@ -131,3 +131,10 @@ def test_a_metric_that_hardly_varies_has_a_histogram_that_can_be_drawn(page):
     for group in data["by_group"]:
         for found in group.values():
             assert np.all(np.diff(found["histogram"]["edges"]) > 0.0)
+
+
+def test_factors_are_described_and_their_keys_can_be_read(page):
+    text, found, _ = page
+    factors = {factor["key"]: (factor["label"], factor["unit"]) for factor in found["factors"]}
+    assert factors["speed_kmh"] == ("speed", "km/h")
+    assert all(f"<code>{key}</code>" in text for key in factors)
