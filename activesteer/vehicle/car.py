@@ -27,6 +27,7 @@ from activesteer.vehicle.chassis_heading import YAW_DOF, turn_chassis_back
 from activesteer.vehicle.divergence import raise_if_diverged
 from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.estimate_row import write_estimate
+from activesteer.vehicle.implicit_plan import drop_metric, implicit_plan
 from activesteer.vehicle.loading import load_model
 from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.native_forces import install_native_forces
@@ -108,7 +109,10 @@ class Vehicle:
         self._wheels = WheelSet(model, data, self.parameters.powertrain)
         self.actuators = ActuatorRecords(model)
         ratio, brakes = self.parameters.steering.ratio, (self._brake_setup, self._brake_state)
-        self._plan = step_plan(model, data, self.rows.live(), self._wheels.torques, ratio, self._sensors, brakes)
+        self._implicit = implicit_plan(model, data)
+        self._plan = step_plan(
+            model, data, self._implicit.plan, self.rows.live(), self._wheels.torques, ratio, self._sensors, brakes
+        )
         self._plan_address = self._plan.ctypes.data
         self._forces = fb.header_of(model)
         self._hands = model.actuator("steering_wheel").id
@@ -145,6 +149,7 @@ class Vehicle:
         data.time = time_s
         reset(self._brake_state, self._brake_setup, speed_mps)
         mujoco.mj_forward(self.model, data)
+        drop_metric(self.model, data)
         if self._sensors is not None:
             self._sensors.reset(self.truth()[0])
         return self.measure()
@@ -172,6 +177,7 @@ class Vehicle:
         data.time = 0.0
         self._forces["areas_felt"] = 1.0
         mujoco.mj_forward(self.model, data)
+        drop_metric(self.model, data)
 
     def step(self, command: DriverCommand, asked: ActuatorCommand, tape_address: int = 0) -> tuple[Measurement, Motion]:
         """Applies the commands and advances the engine by one step.

@@ -91,6 +91,8 @@ def _compile(
         spec.option.gravity = [-GRAVITY_MPS2 * math.sin(angle), 0.0, -GRAVITY_MPS2 * math.cos(angle)]
         # A state that is not finite must end the run; the engine would start again from its reference position.
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        # What is implicit is so by `integrator`; what the native step then integrates is not to be damped again.
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
         spec.nuserdata = len(CORNERS) * (fb.USERDATA_PER_WHEEL + 1) + 1
         if parameters.rear_actuator.is_screw:
             fit_screws(spec, parameters.rear_actuator.resolved())

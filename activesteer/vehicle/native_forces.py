@@ -276,6 +276,12 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0
     return passive, actuator_rate, screw_sensors
 
 
+@compiled_callback(types.double)
+def _no_clock():
+    """For a clock that the engine reads some twenty times a step, to add up what nobody looks at."""
+    return 0.0
+
+
 _installed: list[Any] = []
 """The callbacks as the engine sees them; kept for the life of the process, since the engine holds bare pointers."""
 
@@ -304,6 +310,8 @@ def install_native_forces() -> None:
     for (_, present, install), ours in zip(slots, _installed, strict=True):
         if present is None:
             install(ours)
+    if mujoco.get_mjcb_time() is None:
+        mujoco.set_mjcb_time(_no_clock.ctypes)
 
 
 def remove_native_forces() -> None:
@@ -314,3 +322,5 @@ def remove_native_forces() -> None:
         mujoco.set_mjcb_act_dyn(None)
     if any(mujoco.get_mjcb_sensor() is ours for ours in _installed):
         mujoco.set_mjcb_sensor(None)
+    if mujoco.get_mjcb_time() is _no_clock.ctypes:
+        mujoco.set_mjcb_time(None)

@@ -9,9 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from llvmlite import ir
 from numba import carray, from_dtype, types
-from numba.extending import intrinsic
 
 from activesteer.brakes.control_unit import step_brakes
 from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE
@@ -29,6 +27,7 @@ from activesteer.vehicle.command_row import (
     DRIVER_COMMAND,
     write_commands,
 )
+from activesteer.vehicle.native_implicit import advance, implicit_plan_pointer
 from activesteer.vehicle.native_memory import f64_pointer, pointer_to
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.vehicle.step_plan import N_SOURCES, N_WARNINGS, STEP_PLAN, TAPE
@@ -50,20 +49,6 @@ _setup_pointer: Final = pointer_to(from_dtype(BRAKE_SETUP))
 _state_pointer: Final = pointer_to(from_dtype(BRAKE_STATE))
 _bits_pointer: Final = pointer_to(types.int64)
 _counter_pointer: Final = pointer_to(types.int32)
-
-
-@intrinsic
-def _call(_typing_context, function, model, data):
-    """Calls a C function at an address with two pointers."""
-    signature = types.void(types.intp, types.intp, types.intp)
-
-    def generate(context, builder: ir.IRBuilder, _signature, arguments):
-        address, *pointers = arguments
-        kind = ir.FunctionType(ir.VoidType(), [pointer.type for pointer in pointers])
-        builder.call(builder.inttoptr(address, kind.as_pointer()), pointers)
-        return context.get_dummy_value()
-
-    return signature, generate
 
 
 @inlined
@@ -198,7 +183,7 @@ def step(plan_address, command, asked, tape_address, torques_stand):
             ctrl[plan.drives[wheel]] = plan.drive_fractions[wheel] * drive_torque_Nm + 0.0
             ctrl[plan.brakes[wheel]] = commands.parking_brake * setup.parking_torque_Nm[wheel]
         ctrl[plan.brakes[wheel]] += setup.torque_per_pressure_NmpPa[wheel] * state.pressure_Pa[wheel]
-    _call(plan.mj_step, plan.model, plan.data)  # pyright: ignore[reportCallIssue] - numba adds the context
+    advance(carray(implicit_plan_pointer(plan.implicit), (1,))[0])
     sane, truth, motion = _sense(plan)
     if tape_address != 0 and sane:
         _record(plan, carray(_tape_pointer(tape_address), (1,))[0])
@@ -218,11 +203,12 @@ def replay(plan_address, inputs):
         inputs: Inputs of all actuators, shape (steps, number of actuators).
     """
     plan = carray(_plan_pointer(plan_address), (1,))[0]
+    implicit = carray(implicit_plan_pointer(plan.implicit), (1,))[0]
     ctrl = f64_pointer(plan.ctrl)
     for step in range(len(inputs)):
         for actuator in range(inputs.shape[1]):
             ctrl[actuator] = inputs[step, actuator]
-        _call(plan.mj_step, plan.model, plan.data)  # pyright: ignore[reportCallIssue] - numba adds the context
+        advance(implicit)
 
 
 def sensed(measurement: tuple[Any, ...], motion: tuple[float, ...]) -> tuple[Measurement, Motion]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
-from mujoco import _functions
 from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS
@@ -47,7 +45,7 @@ _SENSORS: Final = {
 }  # fmt: skip
 """The same of sensors; their first place in `sensordata` counts."""
 _ADDRESSES: Final = (
-    "mj_step", "model", "data", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata", "positions", "quaternions",
+    "implicit", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata", "positions", "quaternions",
     "n_bodies", "brake_setup", "brake_state",
 )  # fmt: skip
 STEP_PLAN: Final = np.dtype(
@@ -79,6 +77,7 @@ behind it, how many rows were taken, after how many the bodies' poses are taken 
 def step_plan(
     model: mujoco.MjModel,
     data: mujoco.MjData,
+    implicit: NDArray[Any],
     recorded: RawRows,
     wheels: Wheels,
     ratio: float,
@@ -90,6 +89,7 @@ def step_plan(
     Args:
         model: The car.
         data: Its state; both must outlive the plan.
+        implicit: `IMPLICIT_PLAN` of the car, shape (1,); must outlive the plan.
         recorded: The arrays that a row is copied from.
         wheels: How torques come to the wheels.
         ratio: Overall steering ratio.
@@ -104,9 +104,7 @@ def step_plan(
     """
     plan = np.zeros(1, STEP_PLAN)
     values: Mapping[str, int] = {
-        "mj_step": ctypes.cast(ctypes.CDLL(_functions.__file__).mj_step, ctypes.c_void_p).value or 0,
-        "model": model._address,
-        "data": data._address,
+        "implicit": implicit.ctypes.data,
         "time": data._address + engine_layout().d_time,
         "warnings": data.warning.number.ctypes.data,
         "qvel": data.qvel.ctypes.data,
