@@ -59,9 +59,8 @@ IMPLICIT_PLAN: Final = np.dtype(
             ("direct", np.intp),
             *((name, np.intp) for name in _WORDS),
             *((name, np.intp) for name in ("n_mass_elements", "n_forces", "factor", "n_factor", "right_side")),
-            *((name, np.intp) for name in ("sensed_body", "first_dof", "n_dofs")),
+            *((name, np.intp) for name in ("gravity", "sensed_body", "first_dof", "n_dofs")),
             ("timestep_s", np.float64),
-            ("gravity_mps2", np.float64, (3,)),
         ],
     )
 )
@@ -113,8 +112,7 @@ def implicit_plan(model: mujoco.MjModel, data: mujoco.MjData) -> ImplicitPlan:
         plan[name], plan[f"n_{name}"] = table.ctypes.data, table.size
     factor, right_side = np.zeros(size), np.zeros(model.nv)
     plan["factor"], plan["n_factor"], plan["right_side"] = factor.ctypes.data, size, right_side.ctypes.data
-    plan["direct"] = 1
-    plan["gravity_mps2"] = model.opt.gravity
+    plan["direct"], plan["gravity"] = 1, model.opt.gravity.ctypes.data
     if body := _sensed_body(model):
         plan["sensed_body"], plan["first_dof"], plan["n_dofs"] = body, model.body_dofadr[body], model.body_dofnum[body]
     return ImplicitPlan(plan, (*memory, factor, right_side))

@@ -174,9 +174,9 @@ def _accelerate(plan):
         _engine(plan.mj_rnePostConstraint, plan)
         return
     felt, axes, turning = f64_pointer(plan.cacc), f64_pointer(plan.cdof), f64_pointer(plan.cdof_dot)
-    speed, acceleration = f64_pointer(plan.qvel), f64_pointer(plan.qacc)
+    speed, acceleration, gravity = f64_pointer(plan.qvel), f64_pointer(plan.qacc), f64_pointer(plan.gravity)
     for part in range(6):
-        value = 0.0 if part < 3 else -plan.gravity_mps2[part - 3]
+        value = 0.0 if part < 3 else -gravity[part - 3]
         for dof in range(plan.first_dof, plan.first_dof + plan.n_dofs):
             value += turning[6 * dof + part] * speed[dof] + axes[6 * dof + part] * acceleration[dof]
         felt[6 * plan.sensed_body + part] = value

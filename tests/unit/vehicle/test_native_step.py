@@ -26,19 +26,6 @@ def _rolling() -> Vehicle:
     return vehicle
 
 
-def test_a_step_is_the_engine_s_own() -> None:
-    ours, bare = _rolling(), _rolling()
-    for vehicle in (ours, bare):
-        vehicle.step(COMMAND, STEER)
-    for _ in range(20):
-        ours.step(COMMAND, STEER)
-    for _ in range(20):
-        mujoco.mj_step(bare.model, bare.data)
-    assert bare.data.time == ours.data.time
-    for name in ("qpos", "qvel", "act", "sensordata", "userdata"):
-        assert getattr(bare.data, name).tobytes() == getattr(ours.data, name).tobytes(), name
-
-
 def test_a_row_is_a_copy_of_the_engine_s_arrays() -> None:
     vehicle = _rolling()
     rows, bodies = vehicle.rows.empty(3), vehicle.model.nbody - 1

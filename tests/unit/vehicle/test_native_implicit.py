@@ -1,0 +1,176 @@
+"""The step with directly found accelerations is the engine's step, but for the error that its iteration leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import mujoco
+import numpy as np
+import pytest
+
+from activesteer.scenario import load_car
+from activesteer.signals import ActuatorCommand, DriverCommand
+from activesteer.vehicle import Vehicle
+from activesteer.vehicle.implicit_plan import implicit_plan, knows
+from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
+from tests.unit.vehicle.cars import dof, standing, tilted_and_moving
+
+CARS = ("compact", "sedan", "tesla_model_s")
+STATE = ("qpos", "qvel", "act", "qacc", "sensordata", "actuator_force")
+TIGHT = 1e-14
+"""Tolerance at which the engine's own solution is as good as it gets."""
+
+
+def _pair(name: str, *, prepare: Callable[[Vehicle], None] = lambda _: None, speed_mps: float = 25.0) -> list[Vehicle]:
+    pair = [load_car(name).on() for _ in range(2)]
+    for vehicle in pair:
+        vehicle.model.opt.tolerance = TIGHT
+        vehicle.start(speed_mps)
+        vehicle.step(DriverCommand(), ActuatorCommand())  # engages the gear
+        prepare(vehicle)
+    return pair
+
+
+def _drive(ours: Vehicle, engine: Vehicle, steps: int, steer_rad: float = 1.0) -> None:
+    """Weaves with one by our step, and with the other by the engine's with the same inputs."""
+    for step in range(steps):
+        angle_rad = steer_rad * np.sin(2.0 * np.pi * 0.01 * step)
+        ours.step(DriverCommand(angle_rad, 200.0, 0.2), ActuatorCommand(0.02 * angle_rad, 0.01))
+        engine.data.ctrl[:] = ours.data.ctrl
+        mujoco.mj_step(engine.model, engine.data)
+
+
+def _differences(ours: Vehicle, engine: Vehicle) -> dict[str, float]:
+    """Of each array the largest difference, as a share of what its numbers reach."""
+    found = {}
+    for name in STATE:
+        here, there = getattr(ours.data, name), getattr(engine.data, name)
+        found[name] = float(np.abs(here - there).max() / max(np.abs(there).max(), 1.0))
+    return found
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_a_weaving_car_goes_where_the_engine_takes_it(name: str) -> None:
+    """With the third-order stops, rubber that stiffens, dry friction, and servos: everything that the cars have."""
+    ours, engine = _pair(name)
+    assert knows(ours.model)
+    _drive(ours, engine, 150)
+    assert abs(ours.data.qvel[5]) > 0.02, "it turns"
+    differences = _differences(ours, engine)
+    assert max(differences.values()) < 1e-8, differences
+
+
+def test_the_engine_s_iteration_converges_to_what_we_find() -> None:
+    """So the tolerance of its solver is what parts them, and nothing else."""
+    errors = []
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        ours, engine = _pair("sedan")
+        engine.model.opt.tolerance = tolerance
+        _drive(ours, engine, 60)
+        errors.append(_differences(ours, engine)["qvel"])
+    assert errors[0] > 5.0 * errors[1] > 25.0 * errors[2]
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_any_pose_gives_the_engine_s_accelerations(name: str) -> None:
+    def thrown(vehicle: Vehicle) -> None:
+        tilted_and_moving(vehicle, np.random.default_rng(5))
+
+    ours, engine = _pair(name, prepare=thrown)
+    _drive(ours, engine, 1)
+    differences = _differences(ours, engine)
+    assert np.abs(ours.data.qacc).max() > 100.0
+    assert max(differences.values()) < 1e-9, differences
+
+
+@pytest.mark.parametrize("held_Nm", [2.0, 0.05])
+def test_hands_that_give_way_are_no_spring(held_Nm: float) -> None:
+    ours, engine = _pair("compact", prepare=lambda vehicle: vehicle.limit_hands(held_Nm))
+    _drive(ours, engine, 40)
+    hands = ours.model.actuator("steering_wheel").id
+    assert abs(ours.data.actuator_force[hands]) == pytest.approx(ours.model.actuator_forcerange[hands, 1])
+    assert max(_differences(ours, engine).values()) < 1e-8
+
+
+def test_at_a_stop_of_the_rack_the_engine_steps() -> None:
+    """Bit for bit what it does; and off the stop again, ours goes on."""
+    ours, engine = _pair("compact", speed_mps=2.0)
+    joint = ours.model.joint("rack").id
+    place = ours.model.jnt_qposadr[joint]
+    for vehicle in (ours, engine):
+        vehicle.data.qpos[place] = vehicle.model.jnt_range[joint, 1] + 1e-4
+        vehicle.data.qvel[dof(vehicle, "rack")] = 0.05
+    _drive(ours, engine, 1)
+    for name in STATE:
+        assert getattr(ours.data, name).tobytes() == getattr(engine.data, name).tobytes(), name
+    assert engine.data.nefc == 1
+    _drive(ours, engine, 100, steer_rad=0.0)
+    assert engine.data.nefc == 0
+    assert ours.data.qpos[place] < ours.model.jnt_range[joint, 1]
+    assert max(_differences(ours, engine).values()) < 1e-8
+
+
+def test_a_push_acts_as_in_the_engine() -> None:
+    def pushed(vehicle: Vehicle) -> None:
+        vehicle.data.xfrc_applied[vehicle.model.body("chassis").id, 1] = 3000.0
+
+    ours, engine = _pair("compact", prepare=pushed)
+    _drive(ours, engine, 20, steer_rad=0.0)
+    assert ours.data.qvel[1] == pytest.approx(20e-3 * 3000.0 / sum(ours.model.body_mass), rel=0.2)
+    assert ours.data.qpos.tobytes() == engine.data.qpos.tobytes()
+
+
+def test_what_changes_in_the_model_counts_at_once() -> None:
+    def stiffer(vehicle: Vehicle) -> None:
+        vehicle.model.tendon_stiffness[:] *= 1.5
+        vehicle.model.dof_damping[:] += 0.5
+
+    ours, engine = _pair("compact", prepare=stiffer)
+    _drive(ours, engine, 50)
+    assert max(_differences(ours, engine).values()) < 1e-8
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda model: model.jnt_stiffness.__setitem__(3, 10.0),
+        lambda model: model.dof_frictionloss.__setitem__(8, 10.0),
+        lambda model: model.tendon_limited.__setitem__(0, 1),
+        lambda model: setattr(model.opt, "viscosity", 0.1),
+        lambda model: setattr(model.opt, "integrator", int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)),
+        lambda model: setattr(model.opt, "solver", int(mujoco.mjtSolver.mjSOL_PGS)),
+        lambda model: setattr(model.opt, "enableflags", int(mujoco.mjtEnableBit.mjENBL_ENERGY)),
+        lambda model: setattr(model.opt, "disableflags", int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)),
+    ],
+    ids=["spring of a joint", "friction", "limit of a tendon", "air", "integrator", "solver", "energy", "contacts"],
+)  # fmt: skip
+def test_what_it_does_not_know_it_leaves_to_the_engine(change: Callable[[mujoco.MjModel], None]) -> None:
+    vehicle = standing()
+    change(vehicle.model)
+    assert not knows(vehicle.model)
+    assert implicit_plan(vehicle.model, vehicle.data).plan["direct"] == 0
+
+
+def test_the_factor_of_a_car_is_hardly_larger_than_its_mass_matrix() -> None:
+    """That is why it is worth its while; without an order that fits, all degrees of freedom would meet."""
+    for name in CARS:
+        vehicle = load_car(name).on()
+        entries = implicit_plan(vehicle.model, vehicle.data).plan["n_factor"][0]
+        assert entries < 1.2 * vehicle.model.nC
+
+
+@pytest.fixture
+def _clock_as_before() -> Iterator[None]:
+    yield
+    mujoco.set_mjcb_time(None)
+    install_native_forces()
+
+
+@pytest.mark.usefixtures("_clock_as_before")
+def test_a_clock_of_somebody_else_goes_on() -> None:
+    remove_native_forces()
+    assert mujoco.get_mjcb_time() is None
+    ticks = []
+    mujoco.set_mjcb_time(lambda: float(ticks.append(0) or len(ticks)))
+    _drive(*_pair("compact"), 1)
+    assert ticks
