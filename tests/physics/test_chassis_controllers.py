@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import activesteer
@@ -58,12 +59,18 @@ def test_braking_in_a_turn_does_not_make_the_estimator_steer_the_car_in():
 
 
 def test_steering_against_the_brakes_on_split_friction_shortens_the_way_without_leaving_the_line():
-    esc, integrated = (
-        activesteer.simulate("split_mu_braking", name, overrides=PRODUCTION) for name in ("esc", "integrated")
-    )
+    """In the mean of some seeds: with anti-lock brakes a way depends on the noise of the sensors by half a metre."""
+    ways_m = np.empty((4, 2))
+    for seed, way_m in enumerate(ways_m, start=1):
+        esc, integrated = (
+            activesteer.simulate("split_mu_braking", name, overrides=PRODUCTION | {"sensors.seed": seed})
+            for name in ("esc", "integrated")
+        )
+        way_m[:] = esc.metrics["stopping_distance_m"], integrated.metrics["stopping_distance_m"]
+        assert integrated.metrics["lateral_deviation_max_m"] <= esc.metrics["lateral_deviation_max_m"]
+        later = (integrated.time_s > 1.0) & (integrated["speed_mps"] > 5.0)
+        assert integrated["rl_brake_pressure_Pa"][later].mean() > 1.3 * integrated["rr_brake_pressure_Pa"][later].mean()
+        assert not esc["side_difference_Pa"].any()
+    without_m, with_m = ways_m.mean(0)
     # As cars with such systems do against those with an anti-lock system alone: 6 % and more.
-    assert integrated.metrics["stopping_distance_m"] < 0.94 * esc.metrics["stopping_distance_m"]
-    assert integrated.metrics["lateral_deviation_max_m"] <= esc.metrics["lateral_deviation_max_m"]
-    later = (integrated.time_s > 1.0) & (integrated["speed_mps"] > 5.0)
-    assert integrated["rl_brake_pressure_Pa"][later].mean() > 1.3 * integrated["rr_brake_pressure_Pa"][later].mean()
-    assert not esc["side_difference_Pa"].any()
+    assert with_m < 0.94 * without_m
