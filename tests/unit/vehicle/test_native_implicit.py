@@ -21,13 +21,16 @@ TIGHT = 1e-14
 """Tolerance at which the engine's own solution is as good as it gets."""
 
 
-def _pair(name: str, *, prepare: Callable[[Vehicle], None] = lambda _: None, speed_mps: float = 25.0) -> tuple[Vehicle, Vehicle]:
+def _pair(
+    name: str, *, prepare: Callable[[Vehicle], None] | None = None, speed_mps: float = 25.0
+) -> tuple[Vehicle, Vehicle]:
     pair = load_car(name).on(), load_car(name).on()
     for vehicle in pair:
         vehicle.model.opt.tolerance = TIGHT
         vehicle.start(speed_mps)
         vehicle.step(DriverCommand(), ActuatorCommand())  # engages the gear
-        prepare(vehicle)
+        if prepare is not None:
+            prepare(vehicle)
     return pair
 
 
