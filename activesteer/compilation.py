@@ -84,18 +84,21 @@ def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[C
     return decorate
 
 
-def compiled_call(result: types.Type, *arguments: types.Type) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator: the function as native code of one signature, compiled now; while it runs, other threads may.
+def compiled_call(
+    result: types.Type, *arguments: types.Type, others_run: bool = True
+) -> Callable[[Callable[..., Any]], Any]:
+    """Decorator: the function as native code of one signature, compiled now.
 
     It is called from Python alone, with arguments by position, and does not look for their types first.
 
     Args:
         result: Type that it returns.
         arguments: Types of its arguments; what it is called with is converted.
+        others_run: Whether other threads may run in the meantime; to let them costs more than a small function.
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher: Any = njit(error_model="numpy", nogil=True)(function)
+        dispatcher: Any = njit(error_model="numpy", nogil=others_run)(function)
         if not hasattr(dispatcher, "enable_caching"):
             return dispatcher
         dispatcher._cache = _cache_of(function)

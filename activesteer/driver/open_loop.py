@@ -5,7 +5,7 @@ from __future__ import annotations
 from activesteer.driver.base import DriverSetup
 from activesteer.driver.speed_hold import SpeedHold
 from activesteer.errors import ManeuverError
-from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+from activesteer.signals import DriverCommand, Measurement, Motion, Reference, made
 
 
 class OpenLoopDriver:
@@ -83,13 +83,14 @@ class OpenLoopDriver:
         elif angle < -self.steering_wheel_limit_rad:
             angle, saturated = -self.steering_wheel_limit_rad, True
         if reference.hold_speed:
-            torque = self.speed_hold.step(reference.speed_demand_mps, measurement)
-            saturated = saturated or self.speed_hold.saturated
-            gear = 1 if reference.speed_demand_mps >= 0.0 else -1
+            speed_mps, hold = reference.speed_demand_mps, self.speed_hold
+            torque = hold.step(speed_mps, measurement)
+            saturated = saturated or hold.saturated
+            gear = 1 if speed_mps >= 0.0 else -1
         else:
             self.speed_hold.reset()
             torque, gear = 0.0, 0
-        return DriverCommand(
+        return made(DriverCommand, (
             angle, torque, reference.brake_pedal, saturated, reference.wheel_torques, gear,
             angle / self.steering_ratio, reference.parking_brake,
-        )  # fmt: skip
+        ))  # fmt: skip

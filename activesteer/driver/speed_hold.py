@@ -63,9 +63,20 @@ class SpeedHold:
         if wanted_mps == 0.0 and abs(speed) < _STANDSTILL_MPS:
             self.reset()
             return 0.0
+        gear = 1 if wanted_mps >= 0.0 else -1
         error = wanted_mps - speed
         torque = self._gain_Nmspm * error + self._integral_Nm
-        low, high = self._limits(speed, measurement.wheel_speed_radps, torque, 1 if wanted_mps >= 0.0 else -1)
+        engine_radps = self._drive.speed_radps(measurement.wheel_speed_radps)
+        low, high = self._drive.limits_Nm(engine_radps, gear)
+        overspeed = gear * (engine_radps * self._wheel_radius_m - speed)
+        spins = overspeed > self._spin_mps + self._spin_slip * abs(speed)
+        if spins or self._pedal < 1.0:
+            most, asked = (high, torque) if gear > 0 else (-low, -torque)
+            self._move_foot(asked / most if most > 0.0 else 1.0, back=spins)
+            if gear > 0:
+                high *= self._pedal
+            else:
+                low *= self._pedal
         if torque > high:
             self.saturated = True
             return high
@@ -76,28 +87,13 @@ class SpeedHold:
         self._integral_Nm += self._integral_gain_Nmpm * error * self._timestep_s
         return torque
 
-    def _limits(
-        self,
-        speed_mps: float,
-        wheel_speeds_radps: tuple[float, float, float, float],
-        torque_Nm: float,
-        gear: int,
-    ) -> tuple[float, float]:
-        """Least and greatest torque that the foot asks for, as far as the wheels do not spin [N m]."""
-        engine_radps = self._drive.speed_radps(wheel_speeds_radps)
-        low, high = self._drive.limits_Nm(engine_radps, gear)
-        overspeed = engine_radps * self._wheel_radius_m - speed_mps
-        if gear < 0:
-            overspeed, most, asked = -overspeed, -low, -torque_Nm
-        else:
-            most, asked = high, torque_Nm
-        if overspeed > self._spin_mps + self._spin_slip * abs(speed_mps):
+    def _move_foot(self, asked: float, *, back: bool) -> None:
+        """Takes the foot back from a pedal position that is asked for, or lets it return to the floor."""
+        if back:
             # The foot comes back from where it is, not from the floor.
-            pedal = min(self._pedal, asked / most) if most > 0.0 else self._pedal
-            self._pedal = self._keep * max(pedal, 0.0)
-        elif self._pedal < 1.0:
+            self._pedal = self._keep * max(min(self._pedal, asked), 0.0)
+        else:
             self._pedal = min(1.0, self._pedal + self._return)
-        return (self._pedal * low, high) if gear < 0 else (low, self._pedal * high)
 
     def reset(self) -> None:
         """Forgets the trim, as when the driver takes his foot off."""

@@ -18,7 +18,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from activesteer.compilation import compiled
+from numba import types
+
+from activesteer.compilation import compiled, compiled_call
 from activesteer.vehicle.parameters import Powertrain
 
 CLUTCH_OPEN: Final = 0
@@ -61,6 +63,14 @@ def drive_limits(
     return -high, -low
 
 
+@compiled_call(
+    types.UniTuple(types.float64, 2), types.float64, types.intp, types.UniTuple(types.float64, 4), others_run=False
+)
+def _limits_Nm(speed_radps, gear, numbers):
+    """`drive_limits`, called from Python."""
+    return drive_limits(speed_radps, gear, *numbers)
+
+
 class Drive:
     """The drive as its driver knows it: what it can give at the speed that the wheels have."""
 
@@ -91,4 +101,4 @@ class Drive:
             speed_radps: Mean speed of the driven wheels [rad/s].
             gear: 1 forward, -1 reverse.
         """
-        return drive_limits(speed_radps, gear, *self._limits)
+        return _limits_Nm(speed_radps, gear, self._limits)
