@@ -220,3 +220,13 @@ class ActuatorCommand(NamedTuple):
     drive_torque_change_Nm: float = 0.0
     estimate: Estimate | None = None
     side_difference_Pa: float = 0.0
+
+
+def steering(
+    rear_rad: float, front_rad: float, desired_radps: float, prediction_rad: float, correction_rad: float, limited: bool
+) -> ActuatorCommand:
+    """An `ActuatorCommand` of its first six members, by which a controller steers and does nothing else."""
+    return made(
+        ActuatorCommand,
+        (rear_rad, front_rad, desired_radps, prediction_rad, correction_rad, limited, NO_BRAKES, 0.0, None, 0.0),
+    )

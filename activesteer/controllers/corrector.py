@@ -71,7 +71,7 @@ class Corrector:
             timestep_s: Time between two steps [s].
         """
         p = parameters
-        self._deadband_radps = p.deadband_start_radps, p.deadband_end_radps
+        self._deadband_start_radps, self._deadband_end_radps = p.deadband_start_radps, p.deadband_end_radps
         self._proportional_gain_s = p.proportional_gain_s
         self._integral_fraction = p.integral_gain * timestep_s
         self._derivative_fraction_s = p.derivative_gain_s2 / timestep_s
@@ -90,7 +90,7 @@ class Corrector:
         Returns:
             Angle [rad].
         """
-        activity = tolerance(error_radps, *self._deadband_radps)
+        activity = tolerance(error_radps, self._deadband_start_radps, self._deadband_end_radps)
         angle = self._proportional_gain_s * error_radps
         if self._integral_fraction:
             if saturated * error_radps <= 0.0:

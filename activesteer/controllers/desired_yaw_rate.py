@@ -26,7 +26,7 @@ class DesiredYawRate:
             parameters: Limit and delay.
             timestep_s: Time between two steps [s].
         """
-        self._gain = single_track.yaw_rate_gain
+        self._single_track = single_track
         self._limit_mps2 = parameters.max_lateral_acceleration_mps2
         self._share = 1.0 - math.exp(-timestep_s / parameters.delay_s)
         self._state_radps = 0.0
@@ -41,7 +41,7 @@ class DesiredYawRate:
         Returns:
             Desired yaw rate [rad/s], left positive.
         """
-        wanted = self._gain(speed_mps) * front_steer_rad
+        wanted = self._single_track.yaw_rate_gain(speed_mps) * front_steer_rad
         limit = self._limit_mps2 / (speed_mps if speed_mps > MIN_SPEED_MPS else MIN_SPEED_MPS)
         if wanted > limit:
             wanted = limit

@@ -5,7 +5,7 @@ from __future__ import annotations
 from activesteer.controllers.corrector import Corrector, decide
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
 from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack
 
 
@@ -43,17 +43,19 @@ class FrontSuperposition:
         Returns:
             The angle to add at the front wheels.
         """
-        desired = self._desired.step(command.front_steer_demand_rad, measurement.speed_mps)
-        if measurement.speed_mps < MIN_SPEED_MPS:
+        speed = measurement.speed_mps
+        desired = self._desired.step(command.front_steer_demand_rad, speed)
+        if speed < MIN_SPEED_MPS:
             self._corrector.reset()
             self._saturated = 0
-            return ActuatorCommand(yaw_rate_desired_radps=desired)
+            return steering(0.0, 0.0, desired, 0.0, 0.0, False)
         yaw_rate = measurement.yaw_rate_radps
         feedback = self._corrector.step(desired - yaw_rate, self._saturated)
         angle = correction = decide(yaw_rate, feedback).front * abs(feedback)
-        self._saturated = 0
-        if angle > self._limit_rad:
-            angle, self._saturated = self._limit_rad, 1
-        elif angle < -self._limit_rad:
-            angle, self._saturated = -self._limit_rad, -1
-        return ActuatorCommand(0.0, angle, desired, 0.0, correction, self._saturated != 0)
+        limit, saturated = self._limit_rad, 0
+        if angle > limit:
+            angle, saturated = limit, 1
+        elif angle < -limit:
+            angle, saturated = -limit, -1
+        self._saturated = saturated
+        return steering(0.0, angle, desired, 0.0, correction, saturated != 0)

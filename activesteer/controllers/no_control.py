@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from activesteer.controllers.desired_yaw_rate import DesiredYawRate
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack
 
 
@@ -26,4 +26,4 @@ class NoControl:
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """No angles; the desired yaw rate for the recording."""
         desired = self._desired.step(command.front_steer_demand_rad, measurement.speed_mps)
-        return ActuatorCommand(yaw_rate_desired_radps=desired)
+        return steering(0.0, 0.0, desired, 0.0, 0.0, False)

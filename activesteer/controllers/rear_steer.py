@@ -7,7 +7,7 @@ import math
 from activesteer.controllers.corrector import Corrector, decide
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
 from activesteer.controllers.parameters import ControllerSetup, RearSteerParameters
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack
 
 
@@ -24,7 +24,7 @@ class RearPrediction:
             single_track: The model that gives the coefficients.
             timestep_s: Time between two steps [s].
         """
-        self._coefficients = single_track.rear_prediction
+        self._single_track = single_track
         self._timestep_s = timestep_s
         self._state_rad = 0.0
 
@@ -38,7 +38,7 @@ class RearPrediction:
         Returns:
             Rear angle [rad], left positive.
         """
-        gain, lead_s, lag_s = self._coefficients(speed_mps)
+        gain, lead_s, lag_s = self._single_track.rear_prediction(speed_mps)
         difference = front_steer_rad - self._state_rad
         angle = gain * self._state_rad + lead_s / lag_s * difference
         self._state_rad += (1.0 - math.exp(-self._timestep_s / lag_s)) * difference
@@ -96,21 +96,22 @@ class RearSteer:
         Returns:
             The rear angle demanded, with its parts.
         """
-        speed = measurement.speed_mps
-        desired = self._desired.step(command.front_steer_demand_rad, speed)
+        front_steer, speed = command.front_steer_demand_rad, measurement.speed_mps
+        desired = self._desired.step(front_steer, speed)
         if speed < MIN_SPEED_MPS:
             self._corrector.reset()
             self._saturated = 0
-            return ActuatorCommand(yaw_rate_desired_radps=desired)
+            return steering(0.0, 0.0, desired, 0.0, 0.0, False)
         yaw_rate = measurement.yaw_rate_radps
-        prediction = self._prediction_gain * self._prediction.step(command.front_steer_demand_rad, speed)
+        prediction = self._prediction_gain * self._prediction.step(front_steer, speed)
         # The rear wheels turn against the corrector's angle, and so does their limit.
         feedback = self._corrector.step(desired - yaw_rate, -self._saturated)
         correction = decide(yaw_rate, feedback).rear * abs(feedback)
         angle = prediction + correction
-        self._saturated = 0
-        if angle > self._limit_rad:
-            angle, self._saturated = self._limit_rad, 1
-        elif angle < -self._limit_rad:
-            angle, self._saturated = -self._limit_rad, -1
-        return ActuatorCommand(angle, 0.0, desired, prediction, correction, self._saturated != 0)
+        limit, saturated = self._limit_rad, 0
+        if angle > limit:
+            angle, saturated = limit, 1
+        elif angle < -limit:
+            angle, saturated = -limit, -1
+        self._saturated = saturated
+        return steering(angle, 0.0, desired, prediction, correction, saturated != 0)
