@@ -86,7 +86,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _paint(name: str, value: float, first: float, text: str) -> str:
     """What is better than in the first run in green, what is worse in red."""
-    from activesteer.analysis.report.results import Change, worth
+    from activesteer.analysis.report.worth import Change, worth
 
     colour = {Change.BETTER: GOOD, Change.WORSE: BAD}.get(worth(name, value, first))
     return text if colour is None else painted(text, colour)

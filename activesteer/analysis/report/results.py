@@ -3,32 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from enum import StrEnum
+from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from activesteer.analysis.claims.noticeable import noticeable
 from activesteer.analysis.claims.path_following import CONES_HIT
 from activesteer.analysis.claims.slalom import CONES_MISSED
 from activesteer.analysis.claims.slippery import OVERSTEP
 from activesteer.analysis.loss import SIDESLIP_PEAKS, kept, losses
 from activesteer.analysis.report.groups import Group, Run
 from activesteer.analysis.report.tables import difference_text, number
+from activesteer.analysis.report.worth import BETTER, Better, Change, is_near, worth
 from activesteer.quantities import metric_label
 
 MAX_FIGURES: Final = 6
 """More key figures than this are no longer read at a glance."""
-
-
-class Change(StrEnum):
-    """What a difference to the first run is worth."""
-
-    BETTER = "better"
-    WORSE = "worse"
-    SAME = "same"
-    """Neither a driver nor a sensor in a test car could tell it."""
-    OTHER = "other"
-    """A difference, and no better or worse for it."""
 
 
 class KeyFigure(NamedTuple):
@@ -37,13 +25,10 @@ class KeyFigure(NamedTuple):
     Attributes:
         title: Its name.
         metrics: Names of metrics; the first that a run has is it.
-        size: What of a value is the better the less it is [SI]; its magnitude is shown where that counts. None where
-            neither less nor more is better.
     """
 
     title: str
     metrics: tuple[str, ...]
-    size: Callable[[float], float] | None = abs
 
 
 class Figure(NamedTuple):
@@ -79,16 +64,16 @@ class Result(NamedTuple):
 KEY_FIGURES: Final = (
     KeyFigure("Cones hit", (CONES_HIT,)),
     KeyFigure("Cones missed", (CONES_MISSED,)),
-    KeyFigure("Beyond the lane", (OVERSTEP,), float),
+    KeyFigure("Beyond the lane", (OVERSTEP,)),
     KeyFigure("Stopping distance", ("stopping_distance_m",)),
     KeyFigure("Peak sideslip", SIDESLIP_PEAKS),
-    KeyFigure("Settled yaw rate", ("yaw_rate_steady_state_radps",), None),
-    KeyFigure("Yaw rate overshoot", ("yaw_rate_overshoot",), float),
+    KeyFigure("Settled yaw rate", ("yaw_rate_steady_state_radps",)),
+    KeyFigure("Yaw rate overshoot", ("yaw_rate_overshoot",)),
     KeyFigure("Yaw rate response time", ("yaw_rate_response_time_s",)),
     KeyFigure("Yaw rate left at 1.75 s", ("yaw_rate_after_1750ms_share",)),
     KeyFigure("Yaw rate error at 1 s", ("yaw_rate_deviation_after_1000ms_radps",)),
-    KeyFigure("Peak yaw rate", ("yaw_rate_peak_abs_radps", "yaw_rate_peak_radps"), None),
-    KeyFigure("Mean deceleration", ("mean_deceleration_mps2",), float.__neg__),
+    KeyFigure("Peak yaw rate", ("yaw_rate_peak_abs_radps", "yaw_rate_peak_radps")),
+    KeyFigure("Mean deceleration", ("mean_deceleration_mps2",)),
     KeyFigure("Off the path", ("track_deviation_max_m",)),
     KeyFigure("Steering effort, rms rate", ("steering_wheel_rate_rms_radps",)),
 )
@@ -113,7 +98,7 @@ def results(group: Group) -> list[Result]:
     for place, run in enumerate(group.runs):
         metrics = run.recording.metrics
         well = tuple(kept(metrics)) or (("keeps the car",) if any(lost) and not lost[place] else ())
-        figures = [_figure(figure, name, metrics, first if place else None) for figure, name in chosen]
+        figures = [_figure(name, metrics, first if place else None) for _, name in chosen]
         found.append(Result(run, lost[place], well, tuple(figures)))
     return found
 
@@ -131,36 +116,14 @@ def _chosen(group: Group) -> Iterator[tuple[KeyFigure, str]]:
     yield from list(having)[:MAX_FIGURES]
 
 
-def worth(metric: str, value: float, first: float) -> Change:
-    """What the difference of a metric to that of the first run is worth; OTHER where it is no key figure.
-
-    Args:
-        metric: Its name.
-        value: Its value [SI].
-        first: That of the first run [SI].
-    """
-    figure = next((figure for figure in KEY_FIGURES if metric in figure.metrics), None)
-    if figure is None or figure.size is None or not math.isfinite(value - first):
-        return Change.OTHER
-    size, before = figure.size(value), figure.size(first)
-    if _near(metric, size, before):
-        return Change.SAME
-    return Change.BETTER if size < before else Change.WORSE
-
-
-def _figure(figure: KeyFigure, name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> Figure:
-    sizes = abs if figure.size is abs else float
+def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> Figure:
+    sizes = abs if BETTER.get(name) is Better.SMALLER else float
     value = sizes(metrics.get(name, math.nan))
     text = number(name, value)
     before = math.nan if first is None else sizes(first.get(name, math.nan))
     if not math.isfinite(value - before):
         return Figure(text)
     difference = difference_text(name, value, before)
-    if _near(name, value, before):
+    if is_near(name, value, before):
         return Figure(text, difference.text, Change.SAME)
     return Figure(text, difference.percent or difference.text, worth(name, value, before))
-
-
-def _near(metric: str, value: float, first: float) -> bool:
-    """Whether neither a driver nor a sensor could tell two values [SI] apart."""
-    return abs(value - first) <= noticeable(metric) or difference_text(metric, value, first).text == "0"

@@ -16,8 +16,9 @@ from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
 from activesteer.analysis.report.groups import MAX_RUNS, Group, groups_of
 from activesteer.analysis.report.judgement import judge
 from activesteer.analysis.report.parameter_table import rows
-from activesteer.analysis.report.results import Change, Result, results
+from activesteer.analysis.report.results import Result, results
 from activesteer.analysis.report.tables import difference_text, number
+from activesteer.analysis.report.worth import Change
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 
+import numpy as np
 import pytest
 
 from activesteer.cli import main
@@ -13,6 +14,7 @@ from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.studies import comparison
 from activesteer.studies.comparison import CASES, SHOWN, Comparison, Row, compare
+from activesteer.studies.comparison_figure import comparison_figure
 from tests.raising import raises
 
 
@@ -66,6 +68,17 @@ def test_targets_are_for_those_beyond_the_paper_and_bounds_are_kept_as_they_are_
     assert passed["lqr"] == [True, False, False]  # as large as without control is not below, and as fast not faster
     assert passed["mpc"] == [False, True, True]
     assert "FAILED  slalom: track amplitude 2.2 m, asked for < 2.2 m of none" in made.to_text()
+
+
+def test_colours_say_what_is_better_whatever_the_direction_of_the_metric():
+    better, worse, same = (
+        made_up(none=(0.1, 2.2, 14.0), lqr=numbers)
+        for numbers in ((0.05, 2.0, 15.0), (0.2, 2.5, 13.0), (0.1, 2.2001, 14.0))
+    )
+    for made, sign in ((better, 1.0), (worse, -1.0), (same, 0.0)):
+        shades = np.asarray(comparison_figure(made).axes[0].images[0].get_array())
+        assert (shades[:, 0] == 0.0).all()
+        assert (np.sign(shades[:, 1]) == sign).all()
 
 
 def test_a_run_without_the_metric_fails_its_target():

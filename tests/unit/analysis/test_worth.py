@@ -1,0 +1,40 @@
+"""What the difference of two values of a metric is worth."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from activesteer.analysis.report.results import KEY_FIGURES
+from activesteer.analysis.report.worth import BETTER, Change, cost, worth
+from activesteer.studies.comparison import SHOWN
+
+
+@pytest.mark.parametrize(
+    ("metric", "value", "first", "change"),
+    [
+        ("sideslip_peak_rad", -0.1, 0.2, Change.BETTER),
+        ("sideslip_peak_rad", -0.2, 0.1, Change.WORSE),
+        ("lane_overstep_m", -0.3, 0.2, Change.BETTER),
+        ("lane_overstep_m", 0.3, -0.4, Change.WORSE),
+        ("entry_speed_mps", 15.0, 14.0, Change.BETTER),
+        ("mean_deceleration_mps2", 7.0, 9.0, Change.WORSE),
+        ("ay_response_time_s", 0.1, 0.2, Change.BETTER),
+        ("stopping_distance_m", 50.0, 50.0, Change.SAME),
+        ("yaw_rate_peak_abs_radps", 1.0, 2.0, Change.OTHER),
+        ("sideslip_peak_rad", math.nan, 0.1, Change.OTHER),
+    ],
+)
+def test_each_metric_is_better_in_its_own_direction(metric, value, first, change):
+    assert worth(metric, value, first) is change
+
+
+def test_what_is_judged_exists():
+    shown = {metric for metrics in SHOWN.values() for metric in metrics}
+    assert {*shown, *(name for figure in KEY_FIGURES for name in figure.metrics)} >= BETTER.keys()
+
+
+def test_cost_is_less_for_the_better_value():
+    for metric in BETTER:
+        assert worth(metric, *sorted((-3.0, 1.0), key=lambda value: cost(metric, value))) is Change.BETTER
