@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -188,13 +189,25 @@ def steering_gains(
         parameters: The driver.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
     """
+    car, steered = (tuple(matrix.ravel().tolist()) for matrix in model(speed_mps))
+    return _steering_gains(speed_mps, car, steered, parameters, steering_ratio)
+
+
+@lru_cache(maxsize=64)
+def _steering_gains(
+    speed_mps: float,
+    car: tuple[float, ...],
+    steered: tuple[float, ...],
+    parameters: DriverParameters,
+    steering_ratio: float,
+) -> SteeringGains:
+    """`steering_gains`, kept from one run to the next; the matrices of the car row by row."""
     from scipy.linalg import expm, solve_discrete_are  # noqa: PLC0415 - slow to import, and only this driver needs it
 
     # States: yaw rate, sideslip angle, heading, lateral position, steering wheel angle; then the decision, held.
-    car, steered = model(speed_mps)
     system = np.zeros((6, 6))
-    system[:2, :2] = car
-    system[:2, 4] = steered[:, 0] / steering_ratio
+    system[:2, :2] = np.reshape(car, (2, 2))
+    system[:2, 4] = np.reshape(steered, (2, -1))[:, 0] / steering_ratio
     system[2, 0] = 1.0
     system[3, 1:3] = speed_mps
     lag_s = max(parameters.neuromuscular_lag_s, _LEAST_LAG_S)
