@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from activesteer.errors import RecordingError, SimulationDiverged
 from activesteer.recording import McapWriter, Poses
 from activesteer.signals import ActuatorCommand, DriverCommand
-from activesteer.vehicle import TAPE, Vehicle
+from activesteer.vehicle import MAX_VALUE, TAPE, RawRows, Vehicle
 
 BLOCK_INTERVAL_S: Final = 0.5
 """How much of a run is turned into channels and written at once [s].
@@ -23,8 +23,8 @@ MEMORY_BLOCK_INTERVAL_S: Final = 2.0
 """The same where nothing is written [s]: longer, because every block begins with cold caches, some 0.2 ms."""
 POSE_INTERVAL_S: Final = 0.01
 """Time between two recorded poses of all bodies [s]."""
-MAX_VALUE: Final = float(np.finfo(np.float32).max)
-"""Most that a recorded value may be: files keep most channels to 32 bit."""
+_TAPE_ROWS: Final = 125
+"""How many rows the vehicle records until they are taken: so few that they are still in the processor's caches then."""
 
 
 @dataclass
@@ -85,15 +85,17 @@ class Recorder:
         capacity = steps if keep else min(self._block_rows, steps)
         self._yaw_column = [channel.name for channel in self.channels].index("yaw_rad")
         self._yaw_rad = 0.0
-        self._raw = vehicle.rows.empty(self._block_rows)
+        self._raw = vehicle.rows.empty(min(_TAPE_ROWS, self._block_rows))
+        self._inputs = vehicle.channels.inputs(self._block_rows)
         self._pose_every = max(1, round(POSE_INTERVAL_S / vehicle.timestep_s))
         bodies = len(vehicle.body_names)
         self._kept = _Kept.empty(capacity, self._poses_before(capacity) + 1, len(self.channels), bodies)
         self._tape = np.zeros(1, TAPE)
         self._tape["row_bytes"], self._tape["pose_every"] = self._raw.sensordata.strides[0], self._pose_every
-        self.tape_address = self._tape.ctypes.data
-        # Rows that are channels already, and the first one in memory.
-        self._flushed = self._first = 0
+        self.tape_address, self._tape_start = self._tape.ctypes.data, self._raw.sensordata.ctypes.data
+        # Rows that were taken from the tape, those that are channels already, and the first one in memory.
+        self._taken = self._flushed = self._first = 0
+        self._usable = True
         self._rewind()
 
     @property
@@ -102,7 +104,7 @@ class Recorder:
         return int(self._tape["rows"][0])
 
     def blocks(self, steps: range) -> Iterator[range]:
-        """The steps, divided where a block is full; it is flushed then.
+        """The steps, divided where the tape is full, and flushed where a block is.
 
         Args:
             steps: Steps that the vehicle is going to record.
@@ -114,15 +116,35 @@ class Recorder:
             steps = steps[len(part) :]
             if self.rows - self._flushed == self._block_rows:
                 self.flush()
+            elif not self._tape["room"][0]:
+                self._take()
 
     def _rewind(self) -> None:
-        """Lets the next row go to the start of the block, and poses behind those that are kept."""
-        tape, kept, here = self._tape, self._kept, self._flushed - self._first
-        pose = self._poses_before(self._flushed) - self._poses_before(self._first)
-        tape["room"] = min(self._block_rows, len(kept.values) - here)
-        tape["row"] = self._raw.sensordata.ctypes.data
+        """Lets the next row go to the start of the tape, and poses behind those that are kept."""
+        tape, kept = self._tape, self._kept
+        pose = self._poses_before(self._taken) - self._poses_before(self._first)
         tape["position"] = kept.positions_m.ctypes.data + pose * kept.positions_m.strides[0]
         tape["quaternion"] = kept.quaternions.ctypes.data + pose * kept.quaternions.strides[0]
+        self._clear_tape()
+
+    def _clear_tape(self) -> None:
+        full = min(self._flushed + self._block_rows, self._first + len(self._kept.values))
+        self._tape["room"] = min(len(self._raw.sensordata), full - self._taken)
+        self._tape["row"] = self._tape_start
+
+    def _take(self) -> None:
+        """Takes the rows from the tape."""
+        taken, last = self._taken, self.rows
+        if taken < last:
+            values = self._kept.values[taken - self._first : last - self._first]
+            inputs = self._inputs[taken - self._flushed : last - self._flushed]
+            self._usable &= self._vehicle.channels.take(self._on_tape(last - taken), values, inputs)
+            self._taken = last
+            self._clear_tape()
+
+    def _on_tape(self, count: int) -> RawRows:
+        raw = self._raw
+        return raw if count == len(raw.sensordata) else type(raw)(*(array[:count] for array in raw))
 
     def flush(self, *, checked: bool = True) -> None:
         """Turns the rows since the last flush into channels, and writes them.
@@ -133,12 +155,12 @@ class Recorder:
         Raises:
             SimulationDiverged: a channel or a pose is not finite, or larger than a file can hold.
         """
+        self._take()
         first, last = self._flushed, self.rows
-        count = last - first
-        if count == 0:
+        if first == last:
             return
         values = self._kept.values[first - self._first : last - self._first]
-        self._evaluate(count, values)
+        self._usable &= self._vehicle.channels.compute(self._inputs[: last - first], values, self._yaw_rad)
         self._yaw_rad = float(values[-1, self._yaw_column])
         poses = self._poses_between(first, last)
         self._flushed = last
@@ -147,8 +169,9 @@ class Recorder:
         if not self.keeps_all:
             self._first = last
         self._rewind()
-        if checked:
-            self._check(first, values, poses)
+        usable, self._usable = self._usable and bool(np.isfinite(poses.positions_m).all()), True
+        if checked and not usable:
+            raise self._complaint(first, values, poses)
 
     def result(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Poses]:
         """Times, values and poses of all rows that are kept; see `flush`."""
@@ -164,13 +187,16 @@ class Recorder:
             command: What the driver last did.
             asked: What the controller last asked for.
         """
-        # Into the place of the next row, which is free.
-        row = self.rows - self._flushed
+        self._take()
         for raw, now in zip(self._raw, self._vehicle.rows.present(command, asked), strict=True):
-            raw[row] = now[0]
-        values = np.empty((row + 1, len(self.channels)))
-        self._evaluate(row + 1, values)
-        return {channel.name: float(value) for channel, value in zip(self.channels, values[-1], strict=True)}
+            raw[0] = now[0]
+        # Behind the rows of the block, which its yaw angle continues from.
+        row = self.rows - self._flushed
+        values = np.empty((row + 1, len(self.channels)), order="F")
+        channels, inputs = self._vehicle.channels, self._inputs
+        channels.take(self._on_tape(1), values[row:], inputs[row : row + 1])
+        channels.compute(inputs[: row + 1], values, self._yaw_rad)
+        return {channel.name: float(value) for channel, value in zip(self.channels, values[row], strict=True)}
 
     def save_state(self) -> RecordedRows:
         """What was recorded so far, which stays as it is whatever is recorded afterwards."""
@@ -189,19 +215,13 @@ class Recorder:
         if state.kept is not self._kept or state.kept.referred_rows > state.rows:
             self._kept = state.kept.copied(state.rows, self._poses_before(state.rows))
             self._kept.referred_rows = state.rows
-        self._tape["rows"] = self._flushed = state.rows
+        self._tape["rows"] = self._taken = self._flushed = state.rows
+        self._usable = True
         self._yaw_rad = state.yaw_rad
         self._rewind()
 
-    def _evaluate(self, count: int, values: NDArray[np.float64]) -> None:
-        """Channels of the first raw rows."""
-        rows = type(self._raw)(*(raw[:count] for raw in self._raw))
-        self._vehicle.channels.evaluate(rows, values, self._yaw_rad)
-
-    def _check(self, first: int, values: NDArray[np.float64], poses: Poses) -> None:
-        # NaN compares as false, and is what `max` and `min` return where there is one.
-        if values.max() <= MAX_VALUE and values.min() >= -MAX_VALUE and np.isfinite(poses.positions_m).all():
-            return
+    def _complaint(self, first: int, values: NDArray[np.float64], poses: Poses) -> SimulationDiverged:
+        """What is wrong in a block."""
         wrong = ~(np.abs(values) <= MAX_VALUE)
         if wrong.any():
             row = int(np.argmax(wrong.any(axis=1)))
@@ -212,7 +232,7 @@ class Recorder:
             pose, body = np.argwhere(~np.isfinite(poses.positions_m).all(axis=2))[0]
             name, time_s = poses.names[body], poses.time_s[pose]
             problem = f"the position of {name} is not finite"
-        raise SimulationDiverged(f"{problem} at {time_s:.3f} s", value=name)
+        return SimulationDiverged(f"{problem} at {time_s:.3f} s", value=name)
 
     def _times(self, first: int, last: int) -> NDArray[np.float64]:
         return np.asarray(np.arange(first, last) * self._timestep_s, dtype=np.float64)

@@ -105,7 +105,5 @@ class DiscreteTimeMap:
             following[row] = self(x, u)
             for block, live in zip(rows, self.vehicle.rows.live(), strict=True):
                 block[row] = live
-        outputs = np.empty((2 * count, len(self.vehicle.channels.channels)))
-        self.vehicle.channels.evaluate(rows, outputs)
-        outputs = outputs[:, self._columns]
+        outputs = self.vehicle.channels.evaluate(rows)[:, self._columns]
         return tuple((part[:count] - part[count:]).T / (2.0 * _DIFFERENCE) for part in (following, outputs))  # type: ignore[return-value]

@@ -71,8 +71,7 @@ def _rolling(vehicle: Vehicle, speed_mps: float) -> dict[str, float]:
     rows = vehicle.rows.empty(1)
     for row, live in zip(rows, vehicle.rows.live(), strict=True):
         row[0] = live
-    values = np.empty((1, len(vehicle.channels.channels)))
-    vehicle.channels.evaluate(rows, values)
+    values = vehicle.channels.evaluate(rows)
     channel = {entry.name: float(values[0, index]) for index, entry in enumerate(vehicle.channels.channels)}
     chassis = model.body("chassis").id
     rotation = data.xmat[chassis].reshape(3, 3)

@@ -1,9 +1,9 @@
 """The car in MuJoCo: MJCF and parameters in, commands in, measurements and raw rows out."""
 
 from activesteer.vehicle.car import Vehicle
-from activesteer.vehicle.channels import ChannelMap, RawRows
+from activesteer.vehicle.channels import MAX_VALUE, ChannelMap, RawRows
 from activesteer.vehicle.divergence import engine_warnings_held
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.step_plan import TAPE
 
-__all__ = ["TAPE", "ChannelMap", "RawRows", "Vehicle", "VehicleParameters", "engine_warnings_held"]
+__all__ = ["MAX_VALUE", "TAPE", "ChannelMap", "RawRows", "Vehicle", "VehicleParameters", "engine_warnings_held"]

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from activesteer.vehicle.channels.native_channels import Actuator
-from activesteer.vehicle.channels.raw_rows import Column, Signal, signal
-from activesteer.vehicle.named_parts import is_there, sensor_columns
+from activesteer.vehicle.channels.raw_rows import Actuator, Column, Signal, sensor, signal
+from activesteer.vehicle.named_parts import is_there
 from activesteer.vehicle.superposition_actuator import MOTOR, NAME
 from activesteer.vehicle.toe_link_screws import SCREW
 
@@ -50,13 +49,13 @@ def motor_signals(model: mujoco.MjModel) -> Iterator[Signal]:
     ):  # fmt: skip
         if not _has_motor(model, name):
             continue
-        torque = sensor_columns(model, name + MOTOR).start
+        torque, limited = sensor(model, name + MOTOR)[:2]
         flag = "saturated" if name == NAME else "steer_saturated"
         for what, unit, meaning, values in (
             *([] if name == NAME else [("screw_m", "m", "travel of the screw", _state(model, name + SCREW))]),
             ("motor_speed_radps", "rad/s", "speed of the motor", _state(model, name + MOTOR)),
-            ("motor_torque_Nm", "Nm", "torque of the motor", Column("sensordata", torque)),
-            (flag, "", "1 at a limit of angle, speed, torque or supply of the motor", Column("sensordata", torque + 1)),
+            ("motor_torque_Nm", "Nm", "torque of the motor", torque),
+            (flag, "", "1 at a limit of angle, speed, torque or supply of the motor", limited),
         ):
             yield signal("vehicle", f"{name}_{what}", unit, f"{meaning} {words}", values)
 

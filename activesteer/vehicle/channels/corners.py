@@ -11,8 +11,7 @@ import numpy as np
 from activesteer.brakes.records import PER_WHEEL, PLACES
 from activesteer.conventions import CORNERS, Array
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.channels.raw_rows import Column, Signal, Values, signal
-from activesteer.vehicle.named_parts import sensor_columns
+from activesteer.vehicle.channels.raw_rows import Column, Computed, Signal, Values, sensor, signal
 
 _WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 _TYRE: Final = (
@@ -63,9 +62,9 @@ def corner_signals(model: mujoco.MjModel) -> Iterator[Signal]:
 
         for field, name, unit, meaning in _TYRE:
             yield of(name, unit, meaning, Column("userdata", fb.output_slot(index, field)))
-        height = sensor_columns(model, f"{corner}_wheel_position").start + 2
-        axis = sensor_columns(model, f"{corner}_wheel_axis")
-        speed = Column("sensordata", sensor_columns(model, f"{corner}_wheel_speed").start)
+        *_, height = sensor(model, f"{corner}_wheel_position")
+        axis = sensor(model, f"{corner}_wheel_axis")
+        (speed,) = sensor(model, f"{corner}_wheel_speed")
         damper = Column("userdata", len(CORNERS) * fb.USERDATA_PER_WHEEL + index)
         travel, steer, camber = _against_chassis(height, _design_height(model, at_rest, corner), axis)
         yield of("wheel_speed_radps", "rad/s", "rotational speed", speed)
@@ -86,17 +85,17 @@ def brake_signals() -> Iterator[Signal]:
             yield signal(group, name, unit, meaning, Column("brakes", first))
 
 
-def toe(axis: Array) -> Array:
-    """Steer angle of a wheel from its spin axis in chassis axes, shape (n, 3)."""
-    return np.arctan2(-axis[:, 0], axis[:, 1])
+def toe(forward: Array, left: Array) -> Array:
+    """Steer angle of a wheel [rad] from two parts of its spin axis, in chassis axes."""
+    return np.arctan2(-forward, left)
 
 
-def _against_chassis(height: int, design_m: float, axis: slice) -> tuple[Values, Values, Values]:
+def _against_chassis(height: Column, design_m: float, axis: tuple[Column, ...]) -> tuple[Values, Values, Values]:
     """Travel, steer angle and camber from the sensors of a wheel's height and of its spin axis."""
     return (
-        lambda rows: rows.sensordata[:, height] - design_m,
-        lambda rows: toe(rows.sensordata[:, axis]),
-        lambda rows: np.arcsin(rows.sensordata[:, axis.start + 2]),
+        Computed(lambda height_m: height_m - design_m, (height,)),
+        Computed(toe, axis[:2]),
+        Computed(np.arcsin, axis[2:]),
     )
 
 

@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.vehicle.channels.native_channels import AxialForce
-from activesteer.vehicle.channels.raw_rows import RawRows, Signal, Values, signal
+from activesteer.vehicle.channels.raw_rows import AxialForce, Column, Computed, Signal, Values, signal
 from activesteer.vehicle.guide_model import GUIDE
 
 
@@ -39,11 +38,10 @@ def _force(model: mujoco.MjModel, tendon: int) -> Values:
     screws = np.flatnonzero(along & (model.actuator_trnid[:, 0] == tendon) & (model.actuator_gainprm[:, 0] > 0.0))
     if not screws.size:
         return law
-    actuator = int(screws[0])
 
-    def force(rows: RawRows) -> Array:
-        stretch = rows.ten_length[:, tendon] - law.low_m
-        passive = law.stiffness_Npm * stretch + law.damping_Nspm * rows.ten_velocity[:, tendon]
-        return passive - rows.actuator_force[:, actuator]
+    def force(length_m: Array, velocity_mps: Array, added_N: Array) -> Array:
+        passive = law.stiffness_Npm * (length_m - law.low_m) + law.damping_Nspm * velocity_mps
+        return passive - added_N
 
-    return force
+    places = (("ten_length", tendon), ("ten_velocity", tendon), ("actuator_force", int(screws[0])))
+    return Computed(force, tuple(Column(*place) for place in places))

@@ -1,50 +1,22 @@
 """Channels from the engine's raw rows in compiled code: what is copied, and the forces of links and springs.
 
-Both go through the rows a few at a time: raw rows lie one behind the other, and so do channels; what the processor has
+All go through the rows a few at a time: raw rows lie one behind the other, and so do channels; what the processor has
 to fetch for one of them is then used before it goes.
 """
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple, get_type_hints
+from typing import Final, get_type_hints
 
 import numpy as np
 from numba import from_dtype, types
 
-from activesteer.compilation import compiled_call
+from activesteer.compilation import compiled_call, inlined
+from activesteer.vehicle.channels.raw_rows import Actuator, AxialForce, RawRows
+from activesteer.vehicle.native_memory import f64_pointer
 
 _ROWS_AT_ONCE: Final = 8
 """As many float64 as a cache line holds."""
-
-
-class AxialForce(NamedTuple):
-    """The law of a tendon with a stiffness of its own, tension positive."""
-
-    tendon: int
-    stiffness_Npm: float
-    """First coefficient of the polynomial in the elongation; so the next two [N/m2], [N/m3]."""
-    second_Npm2: float
-    third_Npm3: float
-    damping_Nspm: float
-    low_m: float
-    """Length below which it is compressed, and above the next one stretched; between them it is slack."""
-    high_m: float
-
-
-class Actuator(NamedTuple):
-    """The limits of an actuator that follows a command with a lag."""
-
-    control: int
-    """Its place among the commands and the forces."""
-    activation: int
-    """Its place among the activations."""
-    lag_s: float
-    rate_radps: float
-    low_rad: float
-    high_rad: float
-    low_Nm: float
-    """Its forces; without limits, those of a float."""
-    high_Nm: float
 
 
 def record_of(law: type[AxialForce | Actuator]) -> np.dtype:
@@ -53,69 +25,123 @@ def record_of(law: type[AxialForce | Actuator]) -> np.dtype:
 
 
 _ARRAY: Final = types.Array(types.float64, 2, "A")
+_ROWS: Final = types.UniTuple(_ARRAY, len(RawRows._fields))
 _PLACES: Final = types.Array(types.intp, 1, "C")
-_FORCES, _ACTUATORS = (types.Array(from_dtype(record_of(law)), 1, "C") for law in (AxialForce, Actuator))
+_COPIES: Final = types.UniTuple(_PLACES, 3)
+_FORCES, _ACTUATORS = (
+    types.Tuple([types.Array(from_dtype(record_of(law)), 1, "C"), _PLACES]) for law in (AxialForce, Actuator)
+)
+_LENGTH, _VELOCITY, _CTRL, _ACT, _FORCE = (
+    RawRows._fields.index(name) for name in ("ten_length", "ten_velocity", "ctrl", "act", "actuator_force")
+)
 
 
-@compiled_call(types.void, _ARRAY, _PLACES, _ARRAY, _PLACES)
-def copy_columns(rows, columns, out, places):
-    """Copies some columns.
-
-    Args:
-        rows: Raw rows, shape (n, m).
-        columns: Which columns of them.
-        out: Where they go, shape (n, k).
-        places: Which columns of it they become.
-    """
-    for start in range(0, len(rows), _ROWS_AT_ONCE):
-        end = min(start + _ROWS_AT_ONCE, len(rows))
-        for index in range(len(columns)):
-            column, place = columns[index], places[index]
-            for row in range(start, end):
-                out[row, place] = rows[row, column]
+@inlined
+def _place(array, row, column):
+    """Pointer to a number: numba's own indexing looks each time whether an index is negative."""
+    return f64_pointer(array.ctypes.data + row * array.strides[0] + column * array.strides[1])
 
 
-@compiled_call(types.void, _ARRAY, _ARRAY, _FORCES, _ARRAY, _PLACES)
-def axial_forces(length_m, velocity_mps, forces, out, places):
-    """Forces of springs, stops and links.
-
-    Args:
-        length_m: Lengths of all tendons [m], shape (n, number of tendons).
-        velocity_mps: How fast they grow [m/s], of the same shape.
-        forces: Laws of those that are wanted.
-        out: Where the forces go [N], shape (n, k).
-        places: Which columns of it they become.
-    """
-    for start in range(0, len(length_m), _ROWS_AT_ONCE):
-        end = min(start + _ROWS_AT_ONCE, len(length_m))
-        for index in range(len(forces)):
-            law, place = forces[index], places[index]
-            tendon, low, high, damping = law.tendon, law.low_m, law.high_m, law.damping_Nspm
-            first, second, third = law.stiffness_Npm, law.second_Npm2, law.third_Npm3
-            for row in range(start, end):
-                length = length_m[row, tendon]
-                x = length - (low if length < low else high if length > high else length)
-                spring = x * (first + x * (second + x * third))
-                out[row, place] = spring + damping * velocity_mps[row, tendon] if damping != 0.0 else spring
+@inlined
+def _copy_columns(rows, start, count, copies, out, largest):
+    ends, columns, places = copies
+    good, first = True, 0
+    for array in range(len(ends)):
+        source, step = _place(rows[array], start, 0), rows[array].strides[0] // 8
+        last = ends[array]
+        for index in range(first, last):
+            column, target = columns[index], _place(out, start, places[index])
+            for row in range(count):
+                value = source[row * step + column]
+                target[row] = value
+                # NaN compares as false.
+                good &= abs(value) <= largest
+        first = last
+    return good
 
 
-@compiled_call(types.void, _ARRAY, _ARRAY, _ARRAY, _ACTUATORS, _ARRAY, _PLACES)
-def saturations(commands, activations, forces, actuators, out, places):
-    """Where actuators are at a limit of angle, rate or force: 1, elsewhere 0.
+@inlined
+def _axial_forces(rows, start, count, laws, out, largest):
+    forces, places = laws
+    lengths_m, velocities_mps = rows[_LENGTH], rows[_VELOCITY]
+    length_step, velocity_step = lengths_m.strides[0] // 8, velocities_mps.strides[0] // 8
+    good = True
+    for index in range(len(forces)):
+        law, target = forces[index], _place(out, start, places[index])
+        length_m, velocity_mps = _place(lengths_m, start, law.tendon), _place(velocities_mps, start, law.tendon)
+        low, high, damping = law.low_m, law.high_m, law.damping_Nspm
+        first, second, third = law.stiffness_Npm, law.second_Npm2, law.third_Npm3
+        for row in range(count):
+            length = length_m[row * length_step]
+            x = length - (low if length < low else high if length > high else length)
+            spring = x * (first + x * (second + x * third))
+            force = spring + damping * velocity_mps[row * velocity_step] if damping != 0.0 else spring
+            target[row] = force
+            good &= abs(force) <= largest
+    return good
 
-    Args:
-        commands: Commands of all actuators, shape (n, number of actuators).
-        activations: All activations, shape (n, number of activations).
-        forces: Forces of all actuators, shape (n, number of actuators).
-        actuators: Limits of those that are wanted.
-        out: Where the flags go, shape (n, k).
-        places: Which columns of it they become.
-    """
+
+@inlined
+def _saturations(rows, start, count, laws, out):
+    actuators, places = laws
+    commands, activations, forces = rows[_CTRL], rows[_ACT], rows[_FORCE]
     for index in range(len(actuators)):
         law, place = actuators[index], places[index]
-        for row in range(len(commands)):
+        for row in range(start, start + count):
             command, force = commands[row, law.control], forces[row, law.control]
             target = min(max(command, law.low_rad), law.high_rad)
             rate = (target - activations[row, law.activation]) / law.lag_s
             beyond = command < law.low_rad or command > law.high_rad or abs(rate) >= law.rate_radps
             out[row, place] = 1.0 if beyond or force <= law.low_Nm or force >= law.high_Nm else 0.0
+
+
+@inlined
+def _take(rows, start, count, copies, input_copies, forces, actuators, out, inputs, largest):
+    good = _copy_columns(rows, start, count, copies, out, largest)
+    _copy_columns(rows, start, count, input_copies, inputs, largest)
+    good &= _axial_forces(rows, start, count, forces, out, largest)
+    _saturations(rows, start, count, actuators, out)
+    return good
+
+
+@compiled_call(types.boolean, _ROWS, _COPIES, _COPIES, _FORCES, _ACTUATORS, _ARRAY, _ARRAY, types.float64)
+def take_rows(rows, copies, input_copies, forces, actuators, out, inputs, largest):
+    """Turns raw rows into all channels that compiled code makes.
+
+    Args:
+        rows: The arrays of a `RawRows`, shape (n, m) each.
+        copies: What is copied to channels: for each array where its part of the two others ends, columns of the array,
+            columns of `out` that they become.
+        input_copies: What is copied to `inputs`, likewise.
+        forces: Laws of springs, stops and links, and the columns of `out` that their forces become [N].
+        actuators: Actuators, and the columns of `out` that become 1 where they are at a limit of angle, rate or force,
+            and 0 elsewhere.
+        out: Where the channels go, shape (n, k), by column.
+        inputs: Where the other copies go, shape (n, j), by column.
+        largest: Most that the size of a value may be.
+
+    Returns:
+        Whether all channels are finite and none is larger.
+    """
+    good, whole = True, len(out) - len(out) % _ROWS_AT_ONCE
+    # A count that the compiler knows: it then keeps these rows of a column in one register.
+    for start in range(0, whole, _ROWS_AT_ONCE):
+        good &= _take(rows, start, _ROWS_AT_ONCE, copies, input_copies, forces, actuators, out, inputs, largest)
+    return good & _take(rows, whole, len(out) - whole, copies, input_copies, forces, actuators, out, inputs, largest)
+
+
+@compiled_call(types.boolean, _ARRAY, _PLACES, types.float64)
+def within(values, columns, largest):
+    """Whether all values in some columns are finite, and none is larger.
+
+    Args:
+        values: Channels, shape (n, k).
+        columns: Which columns of them.
+        largest: Most that the size of a value may be.
+    """
+    good = True
+    for index in range(len(columns)):
+        column = values[:, columns[index]]
+        for row in range(len(column)):
+            good &= abs(column[row]) <= largest
+    return good

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple, TypeAlias
 
+import mujoco
+
 from activesteer.conventions import Array
 from activesteer.signals import Channel
-from activesteer.vehicle.channels.native_channels import Actuator, AxialForce
+from activesteer.vehicle.named_parts import sensor_columns
 
 
 class RawRows(NamedTuple):
@@ -41,8 +43,56 @@ class Column(NamedTuple):
     column: int
 
 
-Values: TypeAlias = Column | AxialForce | Actuator | Callable[[RawRows], Array]
-"""How to get a channel from raw rows: by compiled code, or block by block."""
+class AxialForce(NamedTuple):
+    """The law of a tendon with a stiffness of its own, tension positive."""
+
+    tendon: int
+    stiffness_Npm: float
+    """First coefficient of the polynomial in the elongation; so the next two [N/m2], [N/m3]."""
+    second_Npm2: float
+    third_Npm3: float
+    damping_Nspm: float
+    low_m: float
+    """Length below which it is compressed, and above the next one stretched; between them it is slack."""
+    high_m: float
+
+
+class Actuator(NamedTuple):
+    """The limits of an actuator that follows a command with a lag."""
+
+    control: int
+    """Its place among the commands and the forces."""
+    activation: int
+    """Its place among the activations."""
+    lag_s: float
+    rate_radps: float
+    low_rad: float
+    high_rad: float
+    low_Nm: float
+    """Its forces; without limits, those of a float."""
+    high_Nm: float
+
+
+class Computed(NamedTuple):
+    """What is worked out from columns by numpy, for many rows at once."""
+
+    law: Callable[..., Array]
+    """Takes the columns one by one."""
+    columns: tuple[Column, ...]
+
+
+Values: TypeAlias = Column | AxialForce | Actuator | Computed
+"""How to get a channel from raw rows."""
+
+
+def sensor(model: mujoco.MjModel, name: str) -> tuple[Column, ...]:
+    """Columns of a sensor of the engine.
+
+    Raises:
+        ModelError: there is none of this name.
+    """
+    place = sensor_columns(model, name)
+    return tuple(Column("sensordata", column) for column in range(place.start, place.stop))
 
 
 class Signal(NamedTuple):

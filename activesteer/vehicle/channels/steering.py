@@ -8,9 +8,8 @@ import mujoco
 
 from activesteer.vehicle.channels.corners import toe
 from activesteer.vehicle.channels.links import axial_force
-from activesteer.vehicle.channels.native_channels import AxialForce
-from activesteer.vehicle.channels.raw_rows import Column, Signal, signal
-from activesteer.vehicle.named_parts import find, sensor_columns, tendon_arms
+from activesteer.vehicle.channels.raw_rows import AxialForce, Column, Computed, Signal, sensor, signal
+from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.parameters import Steering
 
 
@@ -23,36 +22,38 @@ def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:
     """
     of, ratio, felt = partial(signal, "vehicle"), steering.ratio, 1.0 - steering.assist_fraction
     wheel, added, rack, rl, rr = (
-        sensor_columns(model, name).start
+        column
         for name in ("steering_wheel_angle", "superposition_angle", "rack_travel", "rl_steer_angle", "rr_steer_angle")
+        for column in sensor(model, name)
     )
-    fl_axis, fr_axis = (sensor_columns(model, f"{corner}_wheel_axis") for corner in ("fl", "fr"))
+    fl_axis, fr_axis = (sensor(model, f"{corner}_wheel_axis")[:2] for corner in ("fl", "fr"))
     demand = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, "steering_wheel")
     return [
         of(
             "steering_wheel_rad", "rad", "steering wheel angle, left positive, not wrapped",
-            Column("sensordata", wheel),
+            wheel,
         ),
         of(
             "steering_wheel_demand_rad", "rad", "steering wheel angle that the driver demands", Column("ctrl", demand),
         ),
         of(
             "hand_torque_Nm", "Nm", "torque of the hands at the steering wheel, left positive",
-            _column_torque(model, felt) or (lambda rows: felt * rows.actuator_force[:, demand]),
+            _column_torque(model, felt)
+            or Computed(lambda torque_Nm: felt * torque_Nm, (Column("actuator_force", demand),)),
         ),
         of(
             "front_steer_rad", "rad", "mean steer angle of the front wheels against the chassis",
-            lambda rows: 0.5 * (toe(rows.sensordata[:, fl_axis]) + toe(rows.sensordata[:, fr_axis])),
+            Computed(lambda *axes: 0.5 * (toe(*axes[:2]) + toe(*axes[2:])), (*fl_axis, *fr_axis)),
         ),
         of(
             "superposition_rad", "rad", "angle added by the front superposition, at the road wheel",
-            lambda rows: rows.sensordata[:, added] / ratio,
+            Computed(lambda angle_rad: angle_rad / ratio, (added,)),
         ),
         of(
             "rear_steer_rad", "rad", "mean angle of the rear steering actuators",
-            lambda rows: 0.5 * (rows.sensordata[:, rl] + rows.sensordata[:, rr]),
+            Computed(lambda left_rad, right_rad: 0.5 * (left_rad + right_rad), (rl, rr)),
         ),
-        of("rack_m", "m", "rack travel, positive steers left", Column("sensordata", rack)),
+        of("rack_m", "m", "rack travel, positive steers left", rack),
     ]  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+import re
 
 import numpy as np
 import pytest
@@ -16,7 +16,8 @@ from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S, POSE_INTERVAL_S, Recorder
 from activesteer.simulation.runner import run_scenario
-from activesteer.vehicle.channels import ChannelMap
+from activesteer.vehicle.channels import ChannelMap, RawRows
+from activesteer.vehicle.force_block import output_slot
 from tests.raising import raises
 
 BLOCK_ROWS = round(BLOCK_INTERVAL_S / 0.001)
@@ -195,25 +196,33 @@ def test_run_too_long_for_memory_gives_what_its_file_holds(tmp_path, monkeypatch
     assert Recording.open(tmp_path / "long.mcap").metrics == long.metrics
 
 
-@pytest.mark.parametrize("keep_values", [0, 2**25])
-def test_recorded_value_that_is_not_finite_ends_the_run_with_its_name(tmp_path, monkeypatch, keep_values):
+@pytest.mark.parametrize(
+    ("keep_values", "channel"),
+    [(0, "rl_tyre_mz_Nm"), (2**25, "rl_tyre_mz_Nm"), (2**25, "rl_spring_force_N"), (2**25, "fr_camber_rad")],
+)
+def test_recorded_value_that_no_file_can_hold_ends_the_run_with_its_name(tmp_path, monkeypatch, keep_values, channel):
     """The state alone may stay finite for a whole run while a tyre records nonsense."""
     scenario = resolve("step_steer", overrides=KEYS)
     monkeypatch.setattr("activesteer.simulation.simulation.MAX_KEPT_VALUES", keep_values)
-    evaluate = ChannelMap.evaluate
+    take, taken, model = ChannelMap.take, [0], simulation().vehicle.model
+    array, column, value = {
+        "rl_tyre_mz_Nm": ("userdata", output_slot(CORNERS.index("rl"), "mz_Nm"), math.nan),
+        "rl_spring_force_N": ("ten_length", model.tendon("rl_spring").id, -1e39),
+        "fr_camber_rad": ("sensordata", model.sensor("fr_wheel_axis").adr[0] + 2, 2.0),
+    }[channel]
 
-    def damaged(self: ChannelMap, rows: Any, out: np.ndarray, last_yaw_rad: float) -> None:
-        evaluate(self, rows, out, last_yaw_rad)
-        column = [channel.name for channel in self.channels].index("rl_tyre_mz_Nm")
-        if out[0, 0] > 20.0:
-            out[100, column] = np.nan
+    def damaged(self: ChannelMap, rows: RawRows, out: np.ndarray, inputs: np.ndarray) -> bool:
+        if taken[0] <= 1100 < taken[0] + len(out):
+            getattr(rows, array)[1100 - taken[0], column] = value
+        taken[0] += len(out)
+        return take(self, rows, out, inputs)
 
-    monkeypatch.setattr(ChannelMap, "evaluate", damaged)
+    monkeypatch.setattr(ChannelMap, "take", damaged)
     path = tmp_path / "run.mcap"
-    with raises(SimulationDiverged, value="rl_tyre_mz_Nm") as caught:
+    with raises(SimulationDiverged, value=channel) as caught:
         run_scenario(scenario, "ars", path=path)
     saved = Recording.open(path)
     assert len(saved) == len(caught.value.recording) == 3 * BLOCK_ROWS
     assert saved.metadata["complete"] is False
-    assert saved.metadata["error"] == "SimulationDiverged: rl_tyre_mz_Nm is nan at 1.100 s"
-    assert np.flatnonzero(np.isnan(saved["rl_tyre_mz_Nm"])).tolist() == [1100]
+    assert re.fullmatch(rf"SimulationDiverged: {channel} is \S+ at 1\.100 s", saved.metadata["error"])
+    assert np.flatnonzero(~np.isfinite(saved[channel])).tolist() == [1100]

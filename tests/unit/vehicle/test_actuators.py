@@ -128,9 +128,8 @@ def test_what_a_controller_asks_of_brakes_and_drive_comes_on_top_of_the_driver()
     brakes = [vehicle.data.ctrl[actuator(vehicle, f"{corner}_brake")] for corner in CORNERS]
     assert brakes == pytest.approx([front_Nm + 300.0, front_Nm, rear_Nm - 50.0, rear_Nm + 20.0], rel=1e-3)
     assert vehicle.data.ctrl[actuator(vehicle, "fl_drive")] == pytest.approx(0.5 * 600.0)
-    values = np.empty((1, len(vehicle.channels.channels)))
-    vehicle.channels.evaluate(rows, values)
-    recorded = dict(zip((channel.name for channel in vehicle.channels.channels), values[0], strict=True))
+    values = vehicle.channels.evaluate(rows)[0]
+    recorded = dict(zip((channel.name for channel in vehicle.channels.channels), values, strict=True))
     assert [recorded[f"{corner}_brake_torque_demand_Nm"] for corner in CORNERS] == [300.0, 0.0, -50.0, 20.0]
     assert recorded["drive_torque_change_Nm"] == -200.0
 
