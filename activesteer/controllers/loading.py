@@ -59,9 +59,8 @@ _MAX_PRESSURE_PA: Final = 1e8
 class _ControllerKind(Kind):
     """Controllers; their brake torques are four numbers in one field."""
 
-    def checked(self, command: Any, name: str, setup: Any, said: str = "step returned") -> ActuatorCommand:
+    def completed(self, command: Any, name: str, setup: Any, said: str) -> ActuatorCommand:
         """A command as it may be carried out; see the base class."""
-        super().checked(command, name, setup, said)
         torques = command.brake_torque_demand_Nm
         if torques is not NO_BRAKES and not _are_torques(torques):
             needed = f"four finite torques of at most {_MAX_TORQUE_NM:g} Nm, fl fr rl rr, are needed"

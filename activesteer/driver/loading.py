@@ -14,10 +14,11 @@ from activesteer.driver.human import HumanDriver
 from activesteer.errors import DriverError, shown
 from activesteer.plugins import Kind, Plugin, find
 from activesteer.resources import list_drivers
-from activesteer.signals import DriverCommand, WheelTorques
+from activesteer.signals import DriverCommand, WheelTorques, made
 
 _MAX_ANGLE_RAD: Final = 50.0
 """No steering wheel turns so far; more is taken for a mistake, such as degrees [rad]."""
+_FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
 _MAX_TORQUE_NM: Final = 1e6
 """No car has so much drive torque [N m]."""
 
@@ -26,16 +27,15 @@ _MAX_TORQUE_NM: Final = 1e6
 class _DriverKind(Kind):
     """Drivers; their command is completed by the angle at the road wheel."""
 
-    def checked(self, command: Any, name: str, setup: DriverSetup, said: str = "step returned") -> DriverCommand:
+    def completed(self, command: Any, name: str, setup: DriverSetup, said: str) -> DriverCommand:
         """A command as it may be carried out; see the base class."""
-        super().checked(command, name, setup, said)
         torques, front = command.wheel_torques, command.front_steer_demand_rad
         if torques is not None and not _are_torques(torques):
             needed = "an activesteer.signals.WheelTorques of finite numbers is needed"
             raise self.fail(name, f"{said} wheel_torques = {shown(torques)}; {needed}", torques)
         ours = command.steering_wheel_demand_rad / setup.steering_ratio
         if math.isnan(front):
-            return command._replace(front_steer_demand_rad=ours)
+            return made(DriverCommand, (*command[:_FRONT_STEER], ours, *command[_FRONT_STEER + 1 :]))
         if not math.isclose(front, ours, rel_tol=1e-9, abs_tol=1e-12):
             what = f"the steering wheel angle over the steering ratio is {ours:g}; leave it out"
             raise self.fail(name, f"{said} front_steer_demand_rad = {front:g}, but {what}", front)

@@ -6,6 +6,7 @@ import os
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -44,11 +45,14 @@ class Kind:
     unchecked: tuple[str, ...] = ()
     data: Callable[[], list[str]] = list
     _places: tuple[tuple[int, float, float], ...] = field(init=False)
+    _numbers: Callable[[Any], tuple[Any, ...]] = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         """Looks up where the fields stand: they are checked in every step."""
         fields = self.result._fields
         object.__setattr__(self, "_places", tuple((fields.index(key), *limits) for key, limits in self.ranges.items()))
+        numbers = (place for place, key in enumerate(fields) if key not in self.unchecked)
+        object.__setattr__(self, "_numbers", itemgetter(*numbers))
 
     def names(self) -> list[str]:
         """Names of all that come with the package."""
@@ -69,13 +73,13 @@ class Kind:
         """
         return self.error(problem, key=f"{self.word} {name}".rstrip(), value=value, allowed=allowed)
 
-    def checked(self, command: Any, name: str, _setup: Any, said: str = "step returned") -> Any:
+    def checked(self, command: Any, name: str, setup: Any, said: str = "step returned") -> Any:
         """A command as it may be carried out.
 
         Args:
             command: What `step` returned, or what was given in its place.
             name: Who returned it, for the message.
-            _setup: What the block was made from.
+            setup: What the block was made from.
             said: What comes before the command in the message.
 
         Returns:
@@ -86,15 +90,19 @@ class Kind:
         """
         if not self._is_usual(command):
             self._check(command, name, said)
+        return self.completed(command, name, setup, said)
+
+    def completed(self, command: Any, name: str, setup: Any, said: str) -> Any:
+        """A command whose plain numbers are in order, with all else checked and filled in; see `checked`."""
         return command
 
     def _is_usual(self, command: Any) -> bool:
-        if command.__class__ is not self.result:
+        if command.__class__ is not self.result or not _USUAL.issuperset(map(type, self._numbers(command))):
             return False
-        for value, key in zip(command, self.result._fields, strict=True):
-            if value.__class__ not in _USUAL and key not in self.unchecked:
+        for index, low, high in self._places:  # noqa: SIM110 - a generator costs more than all else here
+            if not low <= command[index] <= high:
                 return False
-        return all(low <= command[index] <= high for index, low, high in self._places)
+        return True
 
     def _check(self, command: Any, name: str, said: str) -> None:
         if not isinstance(command, self.result):
