@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import (
     add_car,
@@ -17,13 +19,19 @@ from activesteer.commands.arguments import (
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError
+from activesteer.files import make_folder
 from activesteer.resources import DEFAULT_DRIVER
+
+if TYPE_CHECKING:
+    from activesteer.studies.envelope import Envelope
 
 
 def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("envelope", help="how fast cars get through lanes or cones, and where who is lost")
-    parser.add_argument("maneuver", metavar="MANEUVER", help="a lane change or slalom: a name, or a TOML file")
+    parser.add_argument(
+        "maneuvers", nargs="+", metavar="MANEUVER", help="lane changes and slaloms: names, or TOML files"
+    )
     add_controller(parser, several=True, default="none, ars and afs")
     add_driver(parser, several=True)
     add_car(parser)
@@ -36,33 +44,70 @@ def add_to(commands: Any) -> None:
 
 
 def _envelope(options: argparse.Namespace) -> int:
-    from activesteer.studies.envelope import RANGE_KMH, State, envelope
+    from activesteer.studies.envelope import envelope
 
-    with ProgressBar("envelope", quiet=options.json) as bar:
-        made = envelope(
-            options.maneuver,
-            options.controller or ("none", "ars", "afs"),
-            options.vehicle,
-            overrides_of(options),
-            drivers=options.driver or (DEFAULT_DRIVER,),
-            speeds_kmh=_numbers(options.speeds_kmh, "--speeds-kmh"),
-            lines_m=_numbers(options.lines_m, "--lines-m"),
-            jobs=options.jobs,
-            scheduler=options.scheduler,
-            progress=lambda what, done, total: bar(done / total, f"{what} {done}/{total}"),
-        )
-    figure = None
-    if options.output is not None:
-        from activesteer.errors import StudyError
-        from activesteer.files import make_folder
-        from activesteer.studies.envelope_figure import draw_envelope
-
-        figure = draw_envelope(made, make_folder(options.output, StudyError) / f"envelope_{made.maneuver}.png")
+    overrides, drivers = overrides_of(options), options.driver or (DEFAULT_DRIVER,)
+    speeds_kmh, lines_m = _numbers(options.speeds_kmh, "--speeds-kmh"), _numbers(options.lines_m, "--lines-m")
+    _check(options, overrides, drivers[0], given_lines=bool(lines_m))
+    found = []
+    for maneuver in options.maneuvers:
+        with ProgressBar(f"envelope of {maneuver}", quiet=options.json) as bar:
+            made = envelope(
+                maneuver,
+                options.controller or ("none", "ars", "afs"),
+                options.vehicle,
+                overrides,
+                drivers=drivers,
+                speeds_kmh=speeds_kmh,
+                lines_m=lines_m,
+                jobs=options.jobs,
+                scheduler=options.scheduler,
+                progress=lambda what, done, total, bar=bar: bar(done / total, f"{what} {done}/{total}"),
+            )
+        figures = _drawn(made, options.output)
+        found.append(made.to_json() | {"figures": figures})
+        if not options.json:
+            _print(made, figures)
     if options.json:
-        print_json(made.to_json() | {"figures": [] if figure is None else [str(figure)]})
-        return 0
+        print_json({"envelopes": found})
+    return 0
+
+
+def _check(options: argparse.Namespace, overrides: Mapping[str, Any], driver: Any, *, given_lines: bool) -> None:
+    """What is wrong with the last manoeuvre is said before the first is driven, which takes minutes."""
+    from activesteer.scenario import resolve
+    from activesteer.studies.envelope import line_of
+
+    scenarios = [resolve(maneuver, options.vehicle, overrides, driver) for maneuver in options.maneuvers]
+    keys = list(dict.fromkeys(line_of(scenario).key for scenario in scenarios))
+    if given_lines and len(keys) > 1:
+        raise ParameterError(
+            f"would be {' and '.join(keys)} at once; one command for each of them is needed",
+            key="--lines-m", value=options.lines_m,
+        )  # fmt: skip
+    names = [scenario.maneuver.name for scenario in scenarios]
+    if len(set(names)) < len(names):
+        raise ParameterError(
+            f"{', '.join(options.maneuvers)}: two of them have the same name, which tells figures apart",
+            key="MANEUVER", value=tuple(options.maneuvers),
+        )  # fmt: skip
+
+
+def _drawn(made: Envelope, folder: Path | None) -> list[str]:
+    """The files of the figure; none without a folder."""
+    if folder is None:
+        return []
+    from activesteer.errors import StudyError
+    from activesteer.studies.envelope_figure import draw_envelope
+
+    return [str(draw_envelope(made, make_folder(folder, StudyError) / f"envelope_{made.maneuver}.png"))]
+
+
+def _print(made: Envelope, figures: Sequence[str]) -> None:
+    from activesteer.studies.envelope import RANGE_KMH, State
+
     tried = f"between {RANGE_KMH[0]:g} and {RANGE_KMH[1]:g} km/h"
-    print(f"highest entry speed at {made.line.key} = {made.nominal[1]:g}, {tried}")
+    print(f"{made.maneuver}: highest entry speed at {made.line.key} = {made.nominal[1]:g}, {tried}")
     for entry in made.entry_speeds:
         found = "gets through at none" if entry["entry_speed_kmh"] is None else f"{entry['entry_speed_kmh']:.0f} km/h"
         print(f"  {entry['driver']:<12}{entry['controller']:<8}{found}")
@@ -75,9 +120,8 @@ def _envelope(options: argparse.Namespace) -> int:
             f"not as bisection assumes: {case['driver']} {case['controller']} at {made.line.key} = {case['line_m']:g} "
             f"is lost at {case['lost_kmh']:g} km/h and not at {case['kept_kmh']:g}"
         )
-    if figure is not None:
+    for figure in figures:
         print(f"figure: {figure}")
-    return 0
 
 
 def _numbers(text: str | None, option: str) -> list[float]:

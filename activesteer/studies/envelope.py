@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 
 from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, StudyError
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, check_gains, resolve
+from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.plan import label_of
 from activesteer.studies.run_task import Status
@@ -75,6 +75,23 @@ LINES: Final = {
 }
 """Kind of manoeuvre -> its second axis."""
 _METRICS: Final = ("stays_in_lanes", "lane_overstep_m", "cones_*", "*_peak_abs_*", "*_gates_rms_*", "track_amplitude_m")
+
+
+def line_of(scenario: Scenario) -> Line:
+    """The second axis of a scenario's map.
+
+    Raises:
+        ParameterError: its manoeuvre has no lanes and no cones.
+    """
+    name, kind = scenario.maneuver.name, scenario.maneuver.kind
+    if kind not in LINES:
+        raise ParameterError(
+            f"{name} is a {kind}; entry speeds are those of {' and '.join(LINES)}",
+            key="maneuver",
+            value=kind,
+            allowed=tuple(LINES),
+        )
+    return LINES[kind]
 
 
 class State(StrEnum):
@@ -198,7 +215,8 @@ def envelope(
         drivers: Who drives; a map for each.
         speeds_kmh: Speeds of the map [km/h]; from 30 below that of the manoeuvre to 30 above where not given.
         lines_m: Values of the line of the map [m]; those of `LINES` where not given.
-        output: Folder for the studies of the map, which can be gone on with; they are not kept where not given.
+        output: Folder for the studies of the maps, which can be gone on with, each below the names of the manoeuvre
+            and of who drives; they are not kept where not given.
         jobs: Number of processes; that of the processors where not given.
         scheduler: Address of a Dask scheduler, or its scheduler file, that does all of it instead.
         progress: Called with what is done, how many runs or searches are, and how many there are.
@@ -212,15 +230,7 @@ def envelope(
     given = dict(overrides or {})
     scenario = resolve(maneuver, vehicle, given, drivers[0])
     check_gains(given, controllers)
-    kind = scenario.maneuver.kind
-    if kind not in LINES:
-        raise ParameterError(
-            f"{scenario.maneuver.name} is a {kind}; entry speeds are those of {' and '.join(LINES)}",
-            key="maneuver",
-            value=kind,
-            allowed=tuple(LINES),
-        )
-    line = LINES[kind]
+    line = line_of(scenario)
     nominal_kmh = 3.6 * scenario.maneuver.speed_mps
     speeds = tuple(speeds_kmh) or tuple(nominal_kmh + step for step in range(-30, 31, 10))
     lines = tuple(lines_m) or line.values
@@ -253,7 +263,7 @@ def envelope(
                 "metrics": list(_METRICS),
                 "factors": factors,
             },
-            output=None if output is None else Path(output) / label_of(driver),
+            output=None if output is None else Path(output) / scenario.maneuver.name / label_of(driver),
             jobs=jobs,
             scheduler=scheduler,
             progress=lambda counted, tell=tell: tell(counted.done, counted.total),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from activesteer.cli import main
 from activesteer.errors import ParameterError, SimulationDiverged, StudyError
 from activesteer.recording import Recording
 from activesteer.studies import envelope as module
@@ -87,14 +90,43 @@ def test_json_and_picture(tmp_path: Path) -> None:
     assert draw_envelope(made(), tmp_path / "map.png").stat().st_size > 5000
 
 
+def test_command_draws_several_manoeuvres_into_one_folder(monkeypatch, tmp_path, capsys) -> None:
+    monkeypatch.setattr(module, "envelope", lambda maneuver, *_, **__: replace(made(), maneuver=maneuver))
+    words = ["envelope", "double_lane_change", "slalom", "-o", str(tmp_path)]
+    assert main([*words, "--json"]) == 0
+    files = [tmp_path / f"envelope_{name}.png" for name in ("double_lane_change", "slalom")]
+    found = json.loads(capsys.readouterr().out)["envelopes"]
+    assert [one["maneuver"] for one in found] == ["double_lane_change", "slalom"]
+    assert [one["figures"] for one in found] == [[str(file)] for file in files]
+    assert sorted(tmp_path.iterdir()) == files
+    assert main(words) == 0
+    assert "slalom: highest entry speed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("slalom", "step_steer"), "maneuver: "),
+        (("slalom", "double_lane_change", "--lines-m", "0.1"), "--lines-m: "),
+        (("slalom", "slalom"), "MANEUVER: "),
+    ],
+)
+def test_command_says_what_is_wrong_before_it_drives(monkeypatch, capsys, words, named) -> None:
+    monkeypatch.setattr(module, "envelope", lambda *_, **__: pytest.fail("it drives"))
+    assert main(["envelope", *words]) == 1
+    assert f"activesteer: {named}" in capsys.readouterr().err
+
+
 def test_what_has_no_gates_has_no_entry_speed() -> None:
     with raises(ParameterError, key="maneuver", value="step_steer", allowed=tuple(LINES)):
         envelope("step_steer")
 
 
-def test_a_map_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_map_is_driven(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(module, "in_parallel", lambda _, pairs, *__, **___: [50.0] * len(pairs))
-    found = envelope("double_lane_change", ("none",), speeds_kmh=(60.0, 140.0), lines_m=(0.15,), jobs=1)
+    axes = {"speeds_kmh": (60.0, 140.0), "lines_m": (0.15,)}
+    found = envelope("double_lane_change", ("none",), **axes, output=tmp_path, jobs=1)
+    assert (tmp_path / "double_lane_change" / "typical" / "study.toml").is_file()
     assert found.cells("typical") == {(60.0, 0.15): State.NOBODY, (140.0, 0.15): State.ALL}
     assert found.nominal == (80.0, 0.2)
     assert found.exceptions == []
