@@ -6,8 +6,10 @@ from typing import Final
 
 import mujoco
 import numpy as np
+from numba import types
 
-from activesteer.conventions import Array, yaw_of
+from activesteer.compilation import compiled_call
+from activesteer.conventions import Array
 from activesteer.signals import Channel
 from activesteer.vehicle.channels.raw_rows import Column, sensor
 
@@ -73,38 +75,63 @@ def motion_inputs(model: mujoco.MjModel) -> tuple[Column, ...]:
     return *orientation, *velocity[:2], *acceleration, *rates[1:]
 
 
+_ARRAY: Final = types.Array(types.float64, 2, "A")
+
+
+@compiled_call(types.void, _ARRAY, _ARRAY)
+def _angle_sides(columns, out):
+    """Of yaw and roll (ISO 8855: yaw, pitch, roll in this order) both sides of the tangent, of pitch the sine."""
+    for row in range(len(columns)):
+        w, x, y, z = columns[row, 0], columns[row, 1], columns[row, 2], columns[row, 3]
+        out[row, 0], out[row, 2] = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
+        out[row, 1], out[row, 3] = 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+        sine = 2.0 * (w * y - x * z)
+        out[row, 4] = -1.0 if sine < -1.0 else 1.0 if sine > 1.0 else sine
+
+
+@compiled_call(types.void, _ARRAY, _ARRAY, _ARRAY, types.Array(types.float64, 1, "C"), _ARRAY)
+def _in_the_road_plane(columns, sines, cosines, gravity_mps2, out):
+    """Velocity, acceleration and yaw rate; sines and cosines of yaw, roll and pitch."""
+    for row in range(len(columns)):
+        vx, vy, ax, ay, az = columns[row, 4], columns[row, 5], columns[row, 6], columns[row, 7], columns[row, 8]
+        sin, sr, sp = sines[row, 0], sines[row, 1], sines[row, 2]
+        cos, cr, cp = cosines[row, 0], cosines[row, 1], cosines[row, 2]
+        out[row, 0], out[row, 1] = vx * cos + vy * sin, vy * cos - vx * sin
+        # An accelerometer measures the specific force: turned into the road plane, gravity (which has a part there on a
+        # grade) is added to get the acceleration.
+        out[row, 2] = cp * ax + sp * (sr * ay + cr * az) + gravity_mps2[0] * cos
+        out[row, 3] = cr * ay - sr * az - gravity_mps2[0] * sin
+        out[row, 4] = -sp * ax + cp * (sr * ay + cr * az) + gravity_mps2[2]
+        # Euler angle rate about the road's normal, not the body's z axis.
+        out[row, 5] = (sr * columns[row, 9] + cr * columns[row, 10]) / cp
+
+
 class CarMotion:
     """Motion of the centre of gravity in the axes of ISO 8855, from sensors in world and body axes."""
 
-    def __init__(self, columns: Array, gravity: Array, last_yaw_rad: float) -> None:
+    def __init__(self, columns: Array, gravity_mps2: Array, last_yaw_rad: float) -> None:
         """Evaluates all of it; the members are called as the channels.
 
+        Sines and angles are numpy's: it works out eight at a time, and recordings keep their last digits.
+
         Args:
-            columns: Those of `motion_inputs`, shape (n, 11).
-            gravity: Acceleration of gravity in the world [m/s2].
+            columns: Those of `motion_inputs`, shape (n, 11), by column.
+            gravity_mps2: Acceleration of gravity in the world [m/s2].
             last_yaw_rad: Yaw angle of the row before the first one, which the angle is unwrapped from [rad].
         """
-        w, x, y, z, vx, vy, ax, ay, az, pitch_rate, body_yaw = columns.T
-        # Body axes in the world: yaw, pitch, roll in this order (ISO 8855).
-        yaw = yaw_of(columns[:, :4])
-        turned = np.diff(yaw, prepend=last_yaw_rad)
+        sides, angles, turned = (np.empty((len(columns), count), order="F") for count in (5, 3, 6))
+        _angle_sides(columns, sides)
+        np.arctan2(sides[:, :2], sides[:, 2:4], out=angles[:, :2])
+        np.arcsin(sides[:, 4], out=angles[:, 2])
+        self.yaw_rad, self.roll_rad, self.pitch_rad = angles.T
+        steps = np.abs(self.yaw_rad[1:] - self.yaw_rad[:-1])
         # Unwrapping takes longer than all the rest; where no jump is to be taken out, it adds 0.
-        jumps = not np.abs(turned).max() < np.pi
-        self.yaw_rad = np.unwrap(np.concatenate(([last_yaw_rad], yaw)))[1:] if jumps else yaw + 0.0
-        self.pitch_rad = np.arcsin(np.clip(2 * (w * y - x * z), -1.0, 1.0))
-        self.roll_rad = np.arctan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
-        cos, sin = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
-        self.vx_mps = vx * cos + vy * sin
-        self.vy_mps = vy * cos - vx * sin
-        self.speed_mps = np.hypot(vx, vy)
+        if steps.max(initial=abs(self.yaw_rad[0] - last_yaw_rad)) < np.pi:
+            self.yaw_rad += 0.0
+        else:
+            self.yaw_rad[:] = np.unwrap(np.concatenate(([last_yaw_rad], self.yaw_rad)))[1:]
+        _in_the_road_plane(columns, np.sin(angles), np.cos(angles), gravity_mps2, turned)
+        self.vx_mps, self.vy_mps, self.ax_mps2, self.ay_mps2, self.az_mps2, self.yaw_rate_radps = turned.T
+        self.speed_mps = np.hypot(columns[:, 4], columns[:, 5])
         slowest = np.where(self.vx_mps < 0.0, _ROCKS_BACK_MPS, _STANDSTILL_MPS)
         self.sideslip_rad = np.where(self.speed_mps > slowest, np.arctan2(self.vy_mps, self.vx_mps), 0.0)
-        cp, sp = np.cos(self.pitch_rad), np.sin(self.pitch_rad)
-        cr, sr = np.cos(self.roll_rad), np.sin(self.roll_rad)
-        # An accelerometer measures the specific force: turned into the road plane, gravity (which has a part there on a
-        # grade) is added to get the acceleration.
-        self.ax_mps2 = cp * ax + sp * (sr * ay + cr * az) + gravity[0] * cos
-        self.ay_mps2 = cr * ay - sr * az - gravity[0] * sin
-        self.az_mps2 = -sp * ax + cp * (sr * ay + cr * az) + gravity[2]
-        # Euler angle rate about the road's normal, not the body's z axis.
-        self.yaw_rate_radps = (sr * pitch_rate + cr * body_yaw) / cp
