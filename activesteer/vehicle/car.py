@@ -17,7 +17,7 @@ from activesteer.errors import ModelError
 from activesteer.road.road import Road
 from activesteer.sensors import SensorBlock
 from activesteer.sensors.block import speed_radii
-from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion
+from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion, made
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_step
@@ -31,7 +31,6 @@ from activesteer.vehicle.implicit_plan import drop_metric, implicit_plan
 from activesteer.vehicle.loading import load_model
 from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.native_forces import install_native_forces
-from activesteer.vehicle.native_step import sensed
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.vehicle.recorded_arrays import RecordedArrays
@@ -208,7 +207,7 @@ class Vehicle:
         )
         if not sane:
             self.check()
-        return sensed(measurement, motion)
+        return made(Measurement, measurement), made(Motion, motion)
 
     def replay(self, inputs: NDArray[np.float64]) -> None:
         """Makes steps of the engine alone, in one native call: nothing is looked at, asked or recorded.
@@ -257,7 +256,7 @@ class Vehicle:
         sane, measurement, motion = native_step.sense(self._plan_address)
         if not sane:
             self.check()
-        return sensed(measurement, motion)
+        return made(Measurement, measurement), made(Motion, motion)
 
     def check(self) -> None:
         """Looks for warnings of the engine and for what is not finite, commands first.

@@ -7,7 +7,7 @@ looks up once; so the compiled code is the same for every car.
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 from numba import carray, from_dtype, types
 
@@ -17,7 +17,6 @@ from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS
 from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.sensors.signal_chain import CHAIN
-from activesteer.signals import Measurement, Motion, made
 from activesteer.vehicle.channels.raw_rows import ENGINE_ARRAYS
 from activesteer.vehicle.chassis_heading import YAW_DOF
 from activesteer.vehicle.command_row import (
@@ -133,7 +132,7 @@ def sense(plan_address):
         plan_address: Address of a `STEP_PLAN`.
 
     Returns:
-        Whether all is well, and what `sensed` takes.
+        Whether all is well, and the members of `Measurement` and of `Motion`.
     """
     return _sense(carray(_plan_pointer(plan_address), (1,))[0])
 
@@ -151,7 +150,7 @@ def step(plan_address, command, asked, tape_address, torques_stand):
             and the pedal, then do not count.
 
     Returns:
-        Whether all is well, and what `sensed` takes.
+        Whether all is well, and the members of `Measurement` and of `Motion`.
     """
     plan = carray(_plan_pointer(plan_address), (1,))[0]
     commands_address = plan.sources[_ENGINE_ARRAYS]
@@ -209,8 +208,3 @@ def replay(plan_address, inputs):
         for actuator in range(inputs.shape[1]):
             ctrl[actuator] = inputs[step, actuator]
         advance(implicit)
-
-
-def sensed(measurement: tuple[Any, ...], motion: tuple[float, ...]) -> tuple[Measurement, Motion]:
-    """Measurement and motion from what `sense` and `step` return behind the first member."""
-    return made(Measurement, measurement), made(Motion, motion)
