@@ -94,6 +94,11 @@ class Search:
     """Steering wheel angle found [rad] -> the manoeuvre with it."""
 
 
+def within(value: float, most: float) -> float:
+    """A value, limited to 0 and `most`: as `min` and `max` do it, which cost more than all else in a reference."""
+    return 0.0 if value < 0.0 else most if value > most else value
+
+
 def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
     """A search needs a car that drives forwards, and not slowly.
 

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver, check_search_speed
+from activesteer.maneuver.base import Maneuver, check_search_speed, within
 from activesteer.maneuver.step_steer import SteadyTurn, StepInput, StepSteer
 from activesteer.signals import Reference
 
@@ -106,10 +106,12 @@ class BrakeInTurn(Maneuver):
         """Ramp of the steering wheel, ramp of the brake; see the base class."""
         turn, brake = self.turn, self.brake
         amplitude = turn.steering_wheel_rad or 0.0
-        turned = min(max(time_s - turn.start_s, 0.0) * turn.rate_radps, abs(amplitude))
-        pressed = min(max((time_s - brake.start_s) / brake.rise_s, 0.0), 1.0)
-        hold = time_s < brake.start_s
-        return Reference(math.copysign(turned, amplitude), self.speed_mps, pressed * brake.pedal, hold_speed=hold)
+        turned = within((time_s - turn.start_s) * turn.rate_radps, abs(amplitude))
+        angle = math.copysign(turned, amplitude)
+        if time_s < brake.start_s:
+            return self.at_speed(angle)
+        pressed = within((time_s - brake.start_s) / brake.rise_s, 1.0)
+        return Reference(angle, self.speed_mps, pressed * brake.pedal, False)
 
     def settling_reference(self) -> Reference:
         """Straight ahead at the speed of the manoeuvre."""

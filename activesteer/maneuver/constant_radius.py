@@ -8,7 +8,7 @@ from typing import Annotated
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver
+from activesteer.maneuver.base import Maneuver, within
 from activesteer.signals import Reference
 
 
@@ -57,9 +57,9 @@ class ConstantRadius(Maneuver):
     def reference(self, time_s: float) -> Reference:
         """Curvature and speed; see the base class."""
         circle = self.circle
-        fraction = min(max(time_s / circle.entry_s, 0.0), 1.0)
+        fraction = within(time_s / circle.entry_s, 1.0)
         # Half a wave of a cosine: the curvature begins and ends to rise without a kink.
         curvature = 0.5 * (1.0 - math.cos(math.pi * fraction)) / circle.radius_m
         rising_s = max(time_s - circle.entry_s, 0.0)
         speed = min(self.speed_mps + rising_s * circle.acceleration_mps2, circle.end_speed_mps)
-        return Reference(0.0, speed, 0.0, hold_speed=True, curvature_demand_1pm=curvature)
+        return Reference(0.0, speed, 0.0, True, curvature)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver, Search
+from activesteer.maneuver.base import Maneuver, Search, within
 from activesteer.signals import Reference
 
 
@@ -52,7 +52,7 @@ class SlowlyIncreasingSteer(Maneuver):
     def reference(self, time_s: float) -> Reference:
         """Steering wheel angle of the ramp; see the base class."""
         ramp = self.steer
-        turned = min(max(time_s - ramp.start_s, 0.0) * abs(ramp.rate_radps), ramp.end_rad)
+        turned = within((time_s - ramp.start_s) * abs(ramp.rate_radps), ramp.end_rad)
         return self.at_speed(math.copysign(turned, ramp.rate_radps))
 
 

@@ -60,10 +60,18 @@ class StraightBraking(Maneuver):
 
     def reference(self, time_s: float) -> Reference:
         """Speed, then the ramp of the brake; see the base class."""
-        brake, course = self.brake, self.course
-        pressed = min(max((time_s - brake.start_s) / brake.rise_s, 0.0), 1.0)
-        path = None if course is None else course.path
-        return Reference(0.0, self.speed_mps, pressed * brake.pedal, hold_speed=time_s < brake.start_s, path=path)
+        brake, (before, after) = self.brake, self._ends
+        if time_s < brake.start_s:
+            return before
+        pressed = (time_s - brake.start_s) / brake.rise_s
+        return after if pressed >= 1.0 else after._replace(brake_pedal=pressed * brake.pedal)
+
+    @cached_property
+    def _ends(self) -> tuple[Reference, Reference]:
+        """Before the ramp of the brake and after it."""
+        course = self.course
+        before = self.settling_reference()._replace(path=None if course is None else course.path)
+        return before, before._replace(brake_pedal=self.brake.pedal, hold_speed=False)
 
     def settling_reference(self) -> Reference:
         """Straight ahead at the speed of the manoeuvre."""
