@@ -7,8 +7,14 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+from tests.conftest import PHONE
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 ROOT = Path(__file__).resolve().parents[2]
 LOADED = re.compile(
@@ -56,3 +62,16 @@ def test_pages_for_the_disk_promise_no_search(site: Path) -> None:
 )
 def test_reference_has_what_users_call(site: Path, page: str, name: str) -> None:
     assert f'id="{name}"' in (site / "reference" / f"{page}.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("page", ["chassis_control", "claims", "gallery", "manoeuvre_keys", "reference/vehicle"])
+def test_pages_are_no_wider_than_a_telephone(site: Path, browser: Browser, page: str) -> None:
+    """Wide tables and code scroll by themselves; the title, which comes in at the top, is cut."""
+    context = browser.new_context(**PHONE)
+    shown = context.new_page()
+    shown.goto((site / f"{page}.html").as_uri())
+    for place in ("0", "document.body.scrollHeight / 2"):
+        shown.evaluate(f"scrollTo(0, {place})")
+        assert shown.evaluate("document.documentElement.scrollWidth") == PHONE["viewport"]["width"]
+    context.close()

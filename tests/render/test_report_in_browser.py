@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,6 +12,7 @@ import pytest
 
 from activesteer.analysis.report import write_report
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from tests.conftest import PHONE
 from tests.contrast import contrast
 from tests.unit.analysis.synthetic_files import lane_changes, step_steers
 
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.render
 
 DESK = {"viewport": {"width": 1280, "height": 800}}
-PHONE = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
 DARK = DESK | {"color_scheme": "dark"}
 DURATION_S = 7.0
 LOST = {"stays_in_lanes": 0.0, "lane_overstep_m": 1.2, "cones_hit": 2.0, "sideslip_peak_abs_rad": 0.8}
@@ -65,21 +63,6 @@ TELL_WIDTHS = """() => {
   const widths = () => [...document.querySelectorAll(".uplot")].map((plot) => plot.clientWidth);
   addEventListener("beforeprint", () => { window.printed = widths(); });
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright, of the extra `dev`")
-    names = ("chromium", "chromium-browser", "google-chrome")
-    found = next((path for name in names if (path := shutil.which(name))), None)
-    if found is None:
-        pytest.skip("needs a browser: apt-get install chromium")
-    # As root, as in a container, Chromium refuses to start with its sandbox.
-    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-    with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=found, args=arguments)
-        yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")
