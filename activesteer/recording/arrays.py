@@ -22,12 +22,13 @@ def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.
     times = np.asarray(time_s, np.float64)
     if times.ndim != 1:
         raise RecordingError(f"has shape {times.shape} in place of (n,)", key=what)
-    usable = (times >= 0.0) & (times < 2.0**35)
-    if not usable.all():
+    # NaN compares as false, and is what `min` and `max` return where there is one.
+    if times.size and not (times.min() >= 0.0 and times.max() < 2.0**35):
+        usable = (times >= 0.0) & (times < 2.0**35)
         raise RecordingError(f"is {times[~usable][0]} s: it must be finite and not negative", key=what)
     result = np.rint(times * 1e9).astype(np.int64)
-    steps = np.diff(result, prepend=after_ns)
-    if (steps <= 0).any():
+    if times.size and not (result[0] > after_ns and (result[1:] > result[:-1]).all()):
+        steps = np.diff(result, prepend=after_ns)
         row = int(np.argmax(steps <= 0))
         before_s = (result[row] - steps[row]) * 1e-9
         raise RecordingError(
@@ -35,7 +36,7 @@ def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.
             key=what,
             value=float(times[row]),
         )
-    return result.astype(np.uint64)
+    return result.view(np.uint64)
 
 
 def shaped(array: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -86,7 +87,7 @@ class BlockEncoder:
         self._rows = _Rows(layout)
         self._transforms_id = transforms_id
         self._poses = _Rows(message_record(transforms_id, transforms_layout(body_names)))
-        self._sources = self._column_slices(layout)
+        self._stretches = self._column_stretches(layout)
         self._row_count = 0
         self._pose_count = 0
 
@@ -95,19 +96,28 @@ class BlockEncoder:
         """Length of a row, without its poses."""
         return len(self._rows.layout)
 
-    def _column_slices(self, layout: FixedMessage) -> list[slice | list[int]]:
-        """For each run of channel values, the columns that it takes; a slice where they are neighbours."""
-        sources: list[slice | list[int]] = []
+    def _column_stretches(self, layout: FixedMessage) -> list[list[tuple[slice, slice]]]:
+        """For each run of channel values, which parts of it come from neighbouring columns, and from which.
+
+        A list of columns in their place would be copied by numpy before it is.
+        """
+        stretches: list[list[tuple[slice, slice]]] = []
         runs = iter(layout.runs)
         for group in self._columns:
             _sequence, _times = next(runs), next(runs)
             used = 0
             while used < len(group):
-                columns = group[used : used + next(runs).count]
+                columns = np.array(group[used : used + next(runs).count])
                 used += len(columns)
-                adjacent = columns == list(range(columns[0], columns[0] + len(columns)))
-                sources.append(slice(columns[0], columns[0] + len(columns)) if adjacent else columns)
-        return sources
+                breaks = np.flatnonzero(np.diff(columns) != 1) + 1
+                bounds = [0, *breaks.tolist(), len(columns)]
+                stretches.append(
+                    [
+                        (slice(first, last), slice(int(columns[first]), int(columns[last - 1]) + 1))
+                        for first, last in pairwise(bounds)
+                    ]
+                )
+        return stretches
 
     def encode(
         self,
@@ -150,7 +160,7 @@ class BlockEncoder:
         rows = len(row_ns)
         self._rows.at_least(rows)
         views = iter(self._rows.views)
-        sources = iter(self._sources)
+        runs = iter(self._stretches)
         sequence = np.arange(self._row_count, self._row_count + rows, dtype=np.uint32)
         self._row_count += rows
         with np.errstate(over="ignore"):  # A diverging run may exceed what 32 bit hold: infinity is what it is then.
@@ -160,7 +170,8 @@ class BlockEncoder:
                 used = 0
                 while used < len(columns):
                     view = next(views)
-                    view[:rows] = values[:, next(sources)]
+                    for part, neighbours in next(runs):
+                        view[:rows, part] = values[:, neighbours]
                     used += view.shape[1]
 
     def _encode_poses(
@@ -173,9 +184,9 @@ class BlockEncoder:
         self._pose_count += poses
         times[:poses] = pose_ns[:, None]
         stamps = timestamps(pose_ns)
+        rotations = quaternions[:, :, (1, 2, 3, 0)]  # Foxglove's order is x y z w.
         for body in range(len(bodies) // 3):
             stamp, position, rotation = bodies[3 * body : 3 * body + 3]
             stamp[:poses] = stamps
             position[:poses] = positions_m[:, body]
-            rotation[:poses, :3] = quaternions[:, body, 1:]  # Foxglove's order is x y z w.
-            rotation[:poses, 3] = quaternions[:, body, 0]
+            rotation[:poses] = rotations[:, body]

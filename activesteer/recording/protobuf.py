@@ -24,6 +24,10 @@ VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
 STAMP_LENGTH = 12
 """Bytes of a google.protobuf.Timestamp as `timestamps` writes it."""
 
+_SHIFTS = np.arange(0, 35, 7, dtype=np.uint64)
+_CONTINUES = np.array([0x80, 0x80, 0x80, 0x80, 0], np.uint64)
+"""Of a varint padded to five bytes: where the seven bits of each byte are in the number, and that others follow."""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -70,9 +74,7 @@ def timestamps(time_ns: NDArray[np.uint64]) -> NDArray[np.uint8]:
     billion = np.uint64(1_000_000_000)
     for field, start, value in ((1, 0, time_ns // billion), (2, 6, time_ns % billion)):
         out[:, start] = tag(field, VARINT)[0]
-        for byte in range(5):
-            out[:, start + 1 + byte] = (value >> np.uint64(7 * byte)) & np.uint64(0x7F)
-        out[:, start + 1 : start + 5] |= 0x80
+        out[:, start + 1 : start + 6] = (value[:, np.newaxis] >> _SHIFTS) & np.uint64(0x7F) | _CONTINUES
     return out
 
 
