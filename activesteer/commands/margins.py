@@ -5,7 +5,14 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.commands.arguments import add_car, add_controller, add_json, add_speeds, overrides_of
+from activesteer.commands.arguments import (
+    add_car,
+    add_controller,
+    add_json,
+    add_speeds,
+    add_workers,
+    overrides_of,
+)
 from activesteer.commands.output import print_json, print_table
 from activesteer.commands.progress import RunCounter
 from activesteer.errors import ParameterError
@@ -40,6 +47,7 @@ def add_to(commands: Any) -> None:
         "--study", metavar="STUDY", help="the smallest over the samples of a study, by its file or name: its factors "
         "on the car, its design and overrides; controllers know the car without its factors",
     )  # fmt: skip
+    add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_margins)
 
@@ -67,8 +75,14 @@ def _found(options: argparse.Namespace) -> list[LoopMargins]:
     speeds_kmh, overrides = options.speed_kmh or SPEEDS_KMH, overrides_of(options)
     controllers = options.controller or ("ars", "afs")
     if options.study is None:
+        for name in ("jobs", "scheduler"):
+            if getattr(options, name) is not None:
+                raise ParameterError("belongs to --study", key=f"--{name}", value=getattr(options, name))
         return loop_margins(controllers, options.vehicle, speeds_kmh, overrides)
     from activesteer.studies.worst_margins import worst_margins
 
     with RunCounter("margins", quiet=options.json) as counter:
-        return worst_margins(options.study, controllers, options.vehicle, speeds_kmh, overrides, counter)
+        return worst_margins(
+            options.study, controllers, options.vehicle, speeds_kmh, overrides, counter,
+            jobs=options.jobs, scheduler=options.scheduler,
+        )  # fmt: skip

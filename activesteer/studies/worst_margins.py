@@ -6,15 +6,19 @@ the study changes under `controllers` or `single_track`.
 
 from __future__ import annotations
 
+import functools
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from activesteer.scenario import FileOrTable, check_gains
 from activesteer.studies.margins import SPEEDS_KMH, LoopMargins, margins_of_cars, straight_on, weakest
-from activesteer.studies.plan import Plan
+from activesteer.studies.plan import Plan, task_size
 from activesteer.studies.study import StudyProgress
 from activesteer.studies.study_file import StudyFile, read_study
+from activesteer.studies.task_queue import in_parallel
+from activesteer.studies.workers import workers_for
 
 
 def worst_margins(
@@ -24,6 +28,9 @@ def worst_margins(
     speeds_kmh: Sequence[float] = SPEEDS_KMH,
     overrides: Mapping[str, Any] | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
 ) -> list[LoopMargins]:
     """The smallest margins of every loop at every speed over the samples of a study.
 
@@ -34,7 +41,9 @@ def worst_margins(
         vehicle: Name, path, or table of a vehicle.
         speeds_kmh: Speeds [km/h].
         overrides: Dotted key -> value, of none that the study varies.
-        progress: Called after every sample.
+        progress: Called whenever some samples are done.
+        jobs: Number of processes; that of the processors where not given. With more than one, controllers must pickle.
+        scheduler: Address of a Dask scheduler, or its scheduler file, that does all of it instead.
 
     Returns:
         Each margin the smallest of all samples; `factors` are those of the smallest disk margin.
@@ -56,11 +65,21 @@ def worst_margins(
     check_gains(changed, controllers)
     plan = Plan(study)
     requests = plan.requests(range(0, len(plan), len(study.controllers)))
-    every: list[list[LoopMargins]] = []
-    for found in margins_of_cars(controllers, vehicle, speeds_kmh, (request.overrides for request in requests)):
-        every.append(found)
-        if progress is not None:
-            progress(StudyProgress(len(every), len(requests), 0, len(every)))
+    with workers_for(jobs, scheduler=scheduler) as workers:
+        # Cars that are looked at together share what the controller answers.
+        cars, size = [request.overrides for request in requests], task_size(len(requests), 1, workers.in_flight)
+        parts = [cars[start : start + size] for start in range(0, len(cars), size)]
+        looked_at = 0
+
+        def report(place: int, _: int) -> None:
+            nonlocal looked_at
+            looked_at += len(parts[place])
+            if progress is not None:
+                progress(StudyProgress(looked_at, len(requests), 0, looked_at))
+
+        look = functools.partial(_margins, controllers, vehicle, speeds_kmh)
+        found = in_parallel(look, [(part,) for part in parts], report=report, workers=workers)
+    every = list(itertools.chain.from_iterable(found))
     worst = []
     for row in zip(*every, strict=True):
         least = min(range(len(row)), key=lambda number: row[number].margins.disk)
@@ -68,3 +87,12 @@ def worst_margins(
             replace(row[least], margins=weakest([each.margins for each in row]), factors=requests[least].factors)
         )
     return worst
+
+
+def _margins(
+    controllers: Sequence[Any],
+    vehicle: FileOrTable,
+    speeds_kmh: Sequence[float],
+    cars: Sequence[Mapping[str, Any]],
+) -> list[list[LoopMargins]]:
+    return list(margins_of_cars(controllers, vehicle, speeds_kmh, cars))

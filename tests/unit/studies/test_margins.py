@@ -224,7 +224,9 @@ def test_worst_margins_are_those_of_single_cars_that_the_controller_does_not_kno
     other = {"factors.mass": 1.1, "factors.rear_cornering_stiffness": 0.9, "load.cg_forward_change_m": 0.1}
     known = {resolve("step_steer", overrides=car).controller_setup(0.001) for car in ({}, other, *cars)}
     assert len(known) == 1
-    found = worst_margins(SPREAD, ["ars"], speeds_kmh=[100.0])[0]
+    seen = []
+    found = worst_margins(SPREAD, ["ars"], speeds_kmh=[100.0], progress=seen.append, jobs=2)[0]
+    assert [(now.done, now.total) for now in seen] == [(1, 2), (2, 2)]
     quick, nominal, slow = (
         loop_margins(["ars"], speeds_kmh=[100.0], overrides=car)[0].margins for car in (cars[0], {}, cars[1])
     )
@@ -237,6 +239,11 @@ def test_worst_margins_are_those_of_single_cars_that_the_controller_does_not_kno
 def test_a_loop_that_is_unstable_in_one_car_has_no_margins():
     unstable = margins_of(integrator(), FREQUENCIES_RADPS, stable=False)
     assert weakest([margins_of(integrator(0.05), FREQUENCIES_RADPS), unstable]) is unstable
+
+
+def test_processes_are_for_the_cars_of_a_study(capsys):
+    assert main(["margins", "--jobs", "2"]) == 1
+    assert "--jobs: belongs to --study" in capsys.readouterr().err
 
 
 def test_what_a_study_varies_and_the_speed_are_given_in_one_place():
