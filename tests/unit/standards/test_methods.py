@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,12 +14,13 @@ from activesteer.analysis.handling import CarGeometry, evaluate
 from activesteer.config import Range
 from activesteer.errors import ManeuverError, ParameterError, RecordingError
 from activesteer.files import json_text
-from activesteer.standards import iso7401, iso7975, iso13674
+from activesteer.standards import examination, iso7401, iso7975, iso13674
 from activesteer.standards.catalogue import STANDARDS, standard_of
 from activesteer.standards.examination import Examination, examine
 from activesteer.standards.iso14512 import after_one_second
 from activesteer.standards.iso21994 import corrected_distance
 from activesteer.standards.page_parts import metrics_table
+from activesteer.standards.proving_ground import ProvingGround
 from activesteer.standards.standard import Findings, Run
 from activesteer.standards.steering_angle import steering_wheel_at
 from tests.raising import raises
@@ -40,6 +42,24 @@ def no_verdict(result: Examination) -> Findings:
 def test_what_the_standard_says_is_not_changed():
     with raises(ParameterError, key="speed_kmh", allowed=["vehicle", "driver", "road"]):
         examine("iso4138", overrides={"speed_kmh": 50.0})
+
+
+def test_settings_of_a_controller_are_for_the_controllers_that_read_them(monkeypatch):
+    changes = {"controllers.ars.limit_deg": 2.0, "factors.mass": 1.1}
+    given = {}
+
+    def look(ground: ProvingGround) -> Findings:
+        given[ground.controller] = dict(ground.overrides)
+        [run] = ground.drive("short", "straight_line", [{"speed_kmh": 50.0}], {"duration_s": 0.2})
+        return Findings({}, run.error)
+
+    quick = replace(standard_of("iso4138"), examine=look)
+    monkeypatch.setattr(examination, "standard_of", lambda _: quick)
+    result = examine("iso4138", ["none", "ars"], overrides=changes, jobs=1)
+    assert given == {"none": {"factors.mass": 1.1}, "ars": changes}
+    assert [found.summary for found in result.findings.values()] == ["", ""]
+    with raises(ParameterError, key="controllers.ars.limit_deg"):
+        examine("iso4138", ["none", "afs"], overrides=changes, jobs=1)
 
 
 def test_every_standard_says_what_it_is():
