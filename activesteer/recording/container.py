@@ -37,7 +37,11 @@ from mcap.writer import MCAP0_MAGIC
 
 from activesteer.recording.contents import MAX_EXPANSION
 
-_ZSTD_LEVEL = 1  # Level 3 takes twice the time and saves 3 % of the recorded run of a car.
+_ZSTD = zstandard.ZstdCompressionParameters.from_level(
+    1, strategy=zstandard.STRATEGY_FAST, hash_log=12, min_match=5, target_length=1
+)
+"""Level 1 with a table that stays in the nearest cache: recordings of driven cars take four fifths of its time, and
+are up to 2 % larger. Level 3 takes twice the time and saves 3 %."""
 _RECORD_HEAD = 9
 _CHUNK_HEAD = struct.Struct("<BQQQQII")
 """Opcode and length of a Chunk record, its two times, size and checksum of its messages, length of `compression`."""
@@ -72,7 +76,7 @@ class McapFile:
         self._stream = stream
         self._position = 0
         self._crc = 0
-        self._compressor = zstandard.ZstdCompressor(level=_ZSTD_LEVEL)
+        self._compressor = zstandard.ZstdCompressor(compression_params=_ZSTD)
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._chunks: list[ChunkIndex] = []
