@@ -26,7 +26,7 @@ _TRIM_ITERATIONS: Final = 10
 _TRIM_TOLERANCE: Final = 1e-11
 """Largest change of the state over a step that counts as none [m, rad, m/s, rad/s]; rounding leaves 1e-14."""
 _SOLVER_TOLERANCE: Final = 1e-14
-"""Of the engine's solver: its error of 1e-8 in a run would be divided by the small difference here."""
+"""Of the engine's own solver, where a car needs it: its error of 1e-8 would be divided by the small difference here."""
 
 
 class DiscreteTimeMap:
