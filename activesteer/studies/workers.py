@@ -10,11 +10,15 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from multiprocessing import connection
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
 from activesteer.studies import dask_cluster
+
+
+_BLAS_THREADS: Final = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Where the BLAS of numpy and scipy look for their number of threads as they are loaded."""
 
 
 class Workers(Protocol):
@@ -98,7 +102,8 @@ class LocalProcesses:
         # blocked here stays blocked there.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            return self._pool.submit(function, *arguments)
+            with _one_thread_each():
+                return self._pool.submit(function, *arguments)
         except BrokenExecutor as error:  # noticed before the futures that it breaks were looked at
             future: Future[Any] = Future()
             future.set_exception(error)
@@ -125,6 +130,22 @@ class LocalProcesses:
             for process in list((self._pool._processes or {}).values()):
                 process.terminate()
         self._pool.shutdown(cancel_futures=True)
+
+
+@contextlib.contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Processes that start in here solve linear equations in one thread, unless the environment says how many.
+
+    There is a process for each processor already, and the equations of a run are small: BLAS would wait for threads
+    longer than it calculates, which makes a run an eighth slower.
+    """
+    missing = [name for name in _BLAS_THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(missing, "1"))
+    try:
+        yield
+    finally:
+        for name in missing:
+            del os.environ[name]
 
 
 def _begin_worker() -> None:

@@ -190,8 +190,12 @@ class Vehicle:
             What the sensors then say, and where the car is; see `measure` and `motion`.
 
         Raises:
+            TypeError: `command` or `asked` is something else, or holds what is no number.
             SimulationDiverged: the engine warns, or something recorded is not finite or beyond all reason.
         """
+        # Native code takes the messages apart without a look: what is no message would end the process.
+        if command.__class__ is not DriverCommand or asked.__class__ is not ActuatorCommand:
+            raise TypeError(f"a DriverCommand and an ActuatorCommand are needed, not {command!r} and {asked!r}")
         if self._estimate_memory is not None:
             write_estimate(self._estimate_memory, asked.estimate)
         torques = command.wheel_torques

@@ -26,6 +26,23 @@ def _rolling() -> Vehicle:
     return vehicle
 
 
+@pytest.mark.parametrize(
+    ("command", "asked"),
+    [
+        (DriverCommand(), None),
+        (DriverCommand(), (1.0, 2.0)),
+        ((0.1,), STEER),
+        (DriverCommand("left"), STEER),  # type: ignore[arg-type]
+        (DriverCommand(), ActuatorCommand(brake_torque_demand_Nm=(1.0,))),  # type: ignore[arg-type]
+    ],
+)
+def test_what_is_no_message_is_an_error_and_ends_no_process(command, asked) -> None:
+    vehicle = _rolling()
+    with pytest.raises(TypeError):
+        vehicle.step(command, asked)
+    assert vehicle.step(COMMAND, STEER)[0].speed_mps == pytest.approx(20.0, abs=0.1)
+
+
 def test_a_row_is_a_copy_of_the_engine_s_arrays() -> None:
     vehicle = _rolling()
     rows, bodies = vehicle.rows.empty(3), vehicle.model.nbody - 1
