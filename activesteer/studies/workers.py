@@ -16,7 +16,6 @@ from activesteer.config import Range
 from activesteer.errors import ParameterError
 from activesteer.studies import dask_cluster
 
-
 _BLAS_THREADS: Final = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Where the BLAS of numpy and scipy look for their number of threads as they are loaded."""
 
