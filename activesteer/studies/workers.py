@@ -136,7 +136,7 @@ def _one_thread_each() -> Iterator[None]:
     """Processes that start in here solve linear equations in one thread, unless the environment says how many.
 
     There is a process for each processor already, and the equations of a run are small: BLAS would wait for threads
-    longer than it calculates, which makes a run an eighth slower.
+    longer than it calculates, which makes a run a tenth slower.
     """
     missing = [name for name in _BLAS_THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(missing, "1"))
