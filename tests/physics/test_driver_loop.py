@@ -18,11 +18,13 @@ from activesteer.studies.envelope import envelope
 from activesteer.studies.small_step import damping_of, small_step
 
 ALWAYS_ACTIVE = {
-    f"controllers.{system}.corrector.{key}": value
-    for system in ("ars", "afs")
-    for key, value in (("deadband_start_degps", 0.0), ("deadband_end_degps", 0.001))
+    "none": {},
+    "ars": {
+        "controllers.ars.corrector.deadband_start_degps": 0.0,
+        "controllers.ars.corrector.deadband_end_degps": 0.001,
+    },
 }
-"""Correctors without a tolerance band."""
+"""Controller -> its corrector without a tolerance band."""
 FRICTIONLESS = {"vehicle.friction.rack_N": 0.0}
 
 
@@ -75,7 +77,7 @@ def test_linear_loop_is_damped_as_the_car_is_in_a_run(controller):
     # nothing troubles but the offset itself swings; the typical one comes to the path without crossing it.
     swinging = {"driver.return_time_s": 0.0, "driver.steering_rate_per_metre_radps": 20.0}
     (loop,) = driver_loops(
-        controllers=[controller], speeds_kmh=[100.0], overrides=FRICTIONLESS | ALWAYS_ACTIVE | swinging
+        controllers=[controller], speeds_kmh=[100.0], overrides=FRICTIONLESS | ALWAYS_ACTIVE[controller] | swinging
     )
     linear, natural_radps = loop.loop.damping()
     assert loop.damping_in_run == pytest.approx(linear, abs=0.05)
