@@ -84,7 +84,7 @@ class BlockDecoder:
             self._topics[transforms_id] = TRANSFORMS_TOPIC
         self._lengths = {number: len(layout) for number, layout in layouts.items()}
         self._others = set(others)
-        self._last_length, self._last_starts = 0, dict[int, list[int]]()
+        self._last_length, self._last_starts = -1, dict[int, list[int]]()
 
     def decode(self, data: bytes) -> Block:
         """Decode the messages of a chunk.

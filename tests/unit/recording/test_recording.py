@@ -57,6 +57,12 @@ def test_without_poses_scene_and_rows(channels: list[Channel], tmp_path: Path) -
     assert opened["yaw_rate_radps"].shape == (0,)
 
 
+def test_without_channels_it_opens_too(tmp_path: Path) -> None:
+    """Its only chunk is empty: without channels there is nothing that a row could be written as."""
+    Recording([], np.arange(2) / 20.0, np.empty((2, 0))).save(tmp_path / "nothing.mcap")
+    assert len(Recording.open(tmp_path / "nothing.mcap").channels) == 0
+
+
 def test_values_that_are_not_finite_or_exceed_32_bit_are_kept_as_such(tmp_path: Path) -> None:
     """The last rows of a run that diverged."""
     table = [Channel("single_m", "m", "", "vehicle"), Channel("double_m", "m", "", "vehicle", single=False)]
