@@ -56,6 +56,15 @@ def decide(yaw_rate_radps: float, error_radps: float) -> Decision:
     return _RIGHT_OVERSTEER if error_radps > 0.0 else _RIGHT_UNDERSTEER
 
 
+def cut_off(angle_rad: float, limit_rad: float) -> tuple[float, int]:
+    """An angle within a limit to either side [rad], and which side cut it off: 1, -1, or 0 for none."""
+    if angle_rad > limit_rad:
+        return limit_rad, 1
+    if angle_rad < -limit_rad:
+        return -limit_rad, -1
+    return angle_rad, 0
+
+
 class Corrector:
     """PID on the yaw rate error behind the tolerance function; the size of the angle, without its orientation.
 

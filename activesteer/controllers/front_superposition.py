@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from activesteer.controllers.corrector import Corrector, decide
+from activesteer.controllers.corrector import Corrector, cut_off, decide
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
 from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
@@ -51,11 +51,6 @@ class FrontSuperposition:
             return steering(0.0, 0.0, desired, 0.0, 0.0, False)
         yaw_rate = measurement.yaw_rate_radps
         feedback = self._corrector.step(desired - yaw_rate, self._saturated)
-        angle = correction = decide(yaw_rate, feedback).front * abs(feedback)
-        limit, saturated = self._limit_rad, 0
-        if angle > limit:
-            angle, saturated = limit, 1
-        elif angle < -limit:
-            angle, saturated = -limit, -1
-        self._saturated = saturated
-        return steering(0.0, angle, desired, 0.0, correction, saturated != 0)
+        correction = decide(yaw_rate, feedback).front * abs(feedback)
+        angle, self._saturated = cut_off(correction, self._limit_rad)
+        return steering(0.0, angle, desired, 0.0, correction, self._saturated != 0)

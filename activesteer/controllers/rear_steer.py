@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from activesteer.controllers.corrector import Corrector, decide
+from activesteer.controllers.corrector import Corrector, cut_off, decide
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
 from activesteer.controllers.parameters import ControllerSetup, RearSteerParameters
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
@@ -107,11 +107,5 @@ class RearSteer:
         # The rear wheels turn against the corrector's angle, and so does their limit.
         feedback = self._corrector.step(desired - yaw_rate, -self._saturated)
         correction = decide(yaw_rate, feedback).rear * abs(feedback)
-        angle = prediction + correction
-        limit, saturated = self._limit_rad, 0
-        if angle > limit:
-            angle, saturated = limit, 1
-        elif angle < -limit:
-            angle, saturated = -limit, -1
-        self._saturated = saturated
-        return steering(angle, 0.0, desired, prediction, correction, saturated != 0)
+        angle, self._saturated = cut_off(prediction + correction, self._limit_rad)
+        return steering(angle, 0.0, desired, prediction, correction, self._saturated != 0)
