@@ -114,6 +114,14 @@ def test_without_a_display_the_error_says_so(monkeypatch: pytest.MonkeyPatch) ->
     assert all(word in refused.value.problem for word in ("display", "--web", "--save"))
 
 
+def _runs_viewer(process: psutil.Process) -> bool:
+    """Whether it is the viewer; another child may just have ended, and is then no programme any more."""
+    try:
+        return Path(process.exe()) == viewer_binary()
+    except psutil.NoSuchProcess:
+        return False
+
+
 def test_web_serves_the_viewer_to_this_machine_until_it_is_interrupted(file: Path, tmp_path: Path) -> None:
     code = "import sys; from activesteer.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", code, "replay", str(file), "--web"]
@@ -130,7 +138,7 @@ def test_web_serves_the_viewer_to_this_machine_until_it_is_interrupted(file: Pat
         with urllib.request.urlopen(found[1], timeout=10) as page:
             assert page.status == 200
             assert b"rerun" in page.read().lower()
-        (viewer,) = (child for child in psutil.Process(process.pid).children() if Path(child.exe()) == viewer_binary())
+        (viewer,) = (child for child in psutil.Process(process.pid).children() if _runs_viewer(child))
         listening = [c.laddr for c in viewer.net_connections("inet") if c.status == psutil.CONN_LISTEN]
         assert {address.ip for address in listening} == {"127.0.0.1"}
         assert int(found[2]) in {address.port for address in listening}
