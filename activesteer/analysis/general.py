@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
@@ -16,6 +17,20 @@ SIGNALS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("
 
 MIN_LOAD_N: Final = 100.0
 """Vertical load below which a tyre carries nothing that matters and its force ratio is not looked at [N]."""
+
+KEY_METRICS: Final = (
+    KeyMetric("yaw_rate_peak_abs_radps", 1e-3),
+    KeyMetric("yaw_rate_rms_radps", 1e-3),
+    KeyMetric("ay_peak_abs_mps2", 0.02),
+    KeyMetric("ay_rms_mps2", 0.02),
+    KeyMetric("sideslip_peak_abs_rad", 2e-4),
+    KeyMetric("sideslip_rms_rad", 2e-4),
+    KeyMetric("roll_peak_abs_rad", 2e-4),
+    KeyMetric("roll_rms_rad", 2e-4),
+    KeyMetric("steering_wheel_peak_abs_rad", 2e-4),
+    KeyMetric("speed_end_mps", 0.02),
+)
+"""Key metrics, the most telling first, with their tolerances [SI]."""
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:

@@ -21,6 +21,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.series import timestep
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import Array
@@ -35,6 +36,20 @@ SMOOTHING_S: Final = 0.5
 """Window of the moving average that limits are read from [s]."""
 MIN_SPEED_MPS: Final = 1.0
 """Slower than this, curvature is not evaluated [m/s]."""
+
+KEY_METRICS: Final = (
+    KeyMetric("understeer_gradient_radpmps2", 1e-5),
+    KeyMetric("characteristic_speed_mps", 0.02),
+    KeyMetric("steer_gradient_radpmps2", 1e-5),
+    KeyMetric("ackermann_gradient_radpmps2", 1e-5),
+    KeyMetric("roll_gradient_radpmps2", 1e-5),
+    KeyMetric("sideslip_gradient_radpmps2", 1e-5),
+    KeyMetric("front_slip_gradient_radpmps2", 1e-5),
+    KeyMetric("rear_slip_gradient_radpmps2", 1e-5),
+    KeyMetric("linear_range_mps2", 0.02),
+    KeyMetric("limit_acceleration_mps2", 0.02),
+)
+"""Key metrics, the most telling first, with their tolerances [SI]."""
 
 
 class CarGeometry(NamedTuple):

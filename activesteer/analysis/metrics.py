@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple
 
 from activesteer.analysis import (
     brake_in_turn,
@@ -16,35 +16,70 @@ from activesteer.analysis import (
     step_response,
     straight_braking,
 )
+from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
+from activesteer.errors import RecordingError, nearest_names
 
-BY_KIND: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
-    "step_steer": step_response.metrics,
-    "slowly_increasing_steer": slow_ramp.metrics,
-    "constant_radius": handling.metrics,
-    "sine_sweep": frequency_response.metrics,
-    "sine_with_dwell": sine_with_dwell.metrics,
-    "lane_change": path_following.metrics,
-    "slalom": path_following.metrics,
-    "follow_path": path_following.metrics,
-    "brake_in_turn": brake_in_turn.metrics,
-    "straight_braking": straight_braking.metrics,
-    "measured": general.measured_metrics,
+
+class Evaluation(NamedTuple):
+    """How the runs of one kind of manoeuvre are evaluated.
+
+    Attributes:
+        metrics: Function from a run to its metrics.
+        key_metrics: The metrics that are printed first and held against the baseline, the most telling first.
+    """
+
+    metrics: Callable[[RecordingLike], dict[str, float]]
+    key_metrics: tuple[KeyMetric, ...]
+
+
+_GENERAL: Final = Evaluation(general.metrics, general.KEY_METRICS)
+EVALUATIONS: Final[dict[str, Evaluation]] = {
+    "step_steer": Evaluation(step_response.metrics, step_response.KEY_METRICS),
+    "open_loop": _GENERAL,
+    "random_steer": _GENERAL,
+    "slowly_increasing_steer": Evaluation(slow_ramp.metrics, slow_ramp.KEY_METRICS),
+    "constant_radius": Evaluation(handling.metrics, handling.KEY_METRICS),
+    "sine_sweep": Evaluation(frequency_response.metrics, frequency_response.KEY_METRICS),
+    "sine_with_dwell": Evaluation(sine_with_dwell.metrics, sine_with_dwell.KEY_METRICS),
+    "lane_change": Evaluation(path_following.metrics, path_following.LANE_CHANGE_KEY_METRICS),
+    "slalom": Evaluation(path_following.metrics, path_following.SLALOM_KEY_METRICS),
+    "follow_path": Evaluation(path_following.metrics, path_following.PATH_KEY_METRICS),
+    "brake_in_turn": Evaluation(brake_in_turn.metrics, brake_in_turn.KEY_METRICS),
+    "straight_braking": Evaluation(straight_braking.metrics, straight_braking.KEY_METRICS),
+    "measured": Evaluation(general.measured_metrics, general.KEY_METRICS),
 }
-"""Kinds of manoeuvre with metrics of their own; every other kind gets those of `general`."""
+"""Kind of manoeuvre -> its evaluation."""
+
+
+def evaluation_of(recording: RecordingLike) -> Evaluation:
+    """Return the evaluation of a run's kind of manoeuvre.
+
+    Raises:
+        RecordingError: the metadata name no kind, or a kind without an evaluation.
+    """
+    kind = maneuver_kind(recording)
+    if kind not in EVALUATIONS:
+        raise RecordingError(
+            f"there is no evaluation for the kind {kind!r}; {nearest_names(kind, EVALUATIONS)}",
+            file="the metadata",
+            key="maneuver.kind",
+            value=kind,
+        )
+    return EVALUATIONS[kind]
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
-    """Metrics of a run.
+    """Return the metrics of a run.
 
     Args:
-        recording: The run; `metadata["maneuver"]["kind"]` says what was driven.
+        recording: The run; `metadata["maneuver"]["kind"]` names the kind of manoeuvre.
 
     Returns:
         Metric name, ending in its unit, to value; nan where the run does not define one.
 
     Raises:
-        RecordingError: the metadata name no kind, a channel is missing or not finite, there are less than two rows, or
-            the run is not what its kind promises.
+        RecordingError: the metadata name no kind or an unknown one, a channel is missing or not finite, there are fewer
+            than two rows, or the run is not what its kind promises.
     """
-    return BY_KIND.get(maneuver_kind(recording), general.metrics)(Evaluable(recording))
+    return evaluation_of(recording).metrics(Evaluable(recording))

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.filters import low_pass
+from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.series import crossing_time, timestep
 from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.zeroing import THRESHOLD_RAD, offset, zeroing_range
@@ -46,6 +47,20 @@ RATIO_LIMITS: Final = (0.35, 0.20)
 
 PEAKS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("roll", "rad"), ("steering_wheel", "rad"))
 """Channels whose largest magnitude is given: name and unit suffix."""
+
+KEY_METRICS: Final = (
+    KeyMetric("yaw_rate_after_1000ms_share", 0.01),
+    KeyMetric("yaw_rate_after_1750ms_share", 0.01),
+    KeyMetric("lateral_displacement_m", 0.01),
+    KeyMetric("sideslip_peak_abs_rad", 2e-4),
+    KeyMetric("yaw_rate_peak_abs_radps", 1e-3),
+    KeyMetric("yaw_rate_reversal_peak_radps", 1e-3),
+    KeyMetric("ay_peak_abs_mps2", 0.02),
+    KeyMetric("roll_peak_abs_rad", 2e-4),
+    KeyMetric("steering_wheel_peak_abs_rad", 2e-4),
+    KeyMetric("speed_end_mps", 0.02),
+)
+"""Key metrics, the most telling first, with their tolerances [SI]."""
 
 
 class Steering(NamedTuple):

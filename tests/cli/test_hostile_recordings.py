@@ -17,7 +17,7 @@ from mcap.records import McapRecord, Metadata
 
 from activesteer import simulate
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS, claims_for
-from activesteer.analysis.metrics import BY_KIND, metrics
+from activesteer.analysis.metrics import EVALUATIONS, metrics
 from activesteer.analysis.report import report_page
 from activesteer.cli import main
 from activesteer.errors import ActiveSteerError, RecordingError
@@ -162,7 +162,7 @@ def check_topics(driven: Recording, folder: Path, count: int, rng: np.random.Gen
 
 def odd_runs(driven: Recording, count: int, rng: np.random.Generator) -> Iterator[tuple[str, Recording]]:
     """Runs with few rows, few channels, strange values, strange poses, of any kind of manoeuvre."""
-    kinds = [*BY_KIND, "open_loop", "standstill"]
+    kinds = [*EVALUATIONS, "standstill"]
     names = [*SCENARIOS, "mine"]
     for _ in range(count):
         rows = [0, 1, 2, 3, len(driven)][rng.integers(5)]

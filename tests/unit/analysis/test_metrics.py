@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 
 from activesteer.analysis import general, step_response
-from activesteer.analysis.metrics import metrics
+from activesteer.analysis.key_metric import KeyMetric
+from activesteer.analysis.metrics import EVALUATIONS, metrics
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
+from activesteer.maneuver.kinds import KINDS
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun, step_steer
 
 TIME_S = np.arange(2001) * 0.001
 
 
-def wave(kind: str = "straight") -> SyntheticRun:
+def wave(kind: str = "open_loop") -> SyntheticRun:
     channels = {
         "yaw_rate_radps": 0.3 * np.sin(2.0 * np.pi * TIME_S),
         "ay_mps2": -5.0 * np.sin(2.0 * np.pi * TIME_S),
@@ -37,9 +39,31 @@ def test_step_steer_gets_the_metrics_of_iso_7401():
     assert metrics(run) == pytest.approx(step_response.metrics(run), nan_ok=True)
 
 
-@pytest.mark.parametrize("kind", ["straight", "something_new"])
-def test_other_kinds_get_the_general_ones(kind):
+@pytest.mark.parametrize("kind", ["open_loop", "random_steer"])
+def test_kinds_without_metrics_of_their_own_get_the_general_ones(kind):
     assert metrics(wave(kind)) == general.metrics(wave(kind))
+
+
+def test_a_kind_without_an_evaluation_is_an_error():
+    with raises(RecordingError, key="maneuver.kind", value="step_stear") as caught:
+        metrics(wave("step_stear"))
+    assert "'step_steer'" in str(caught.value)
+
+
+def test_every_kind_of_manoeuvre_has_an_evaluation():
+    assert set(EVALUATIONS) == {*KINDS, "measured"}
+
+
+@pytest.mark.parametrize("kind", EVALUATIONS)
+def test_a_kind_has_ten_different_key_metrics(kind):
+    assert len({metric.name for metric in EVALUATIONS[kind].key_metrics}) == 10
+
+
+def test_the_tolerance_of_a_key_metric_grows_with_its_value():
+    metric = KeyMetric("ay_peak_abs_mps2", 0.02)
+    assert metric.tolerance_of(0.5) == 0.02
+    assert metric.tolerance_of(-8.0) == pytest.approx(0.08)
+    assert KeyMetric("cones_hit", 0.0).tolerance_of(300.0) == 0.0
 
 
 def test_peaks_and_root_mean_squares_of_a_sine():
