@@ -49,7 +49,7 @@ def _reproduce(options: argparse.Namespace) -> int:
     default = "_".join(name for name, value in given.items() if value is not None) or "runs"
     options.output = options.output or Path(default)
     if options.population is not None:
-        options.how_to_go_on = "; the same command goes on with it"
+        options.how_to_resume = "; the same command resumes it"
         return _population(options)
     for name in ("seed", "scheduler"):
         if getattr(options, name) is not None:

@@ -37,7 +37,7 @@ class StopSignals:
     Attributes:
         number: The signal that has come; None where none has.
         options: What the command was called with; its `output` is the file or folder that it writes, and
-            `how_to_go_on`, where it has one, is said behind what is saved.
+            `how_to_resume`, where it has one, is said behind what is saved.
         finished: Whether the command is done, and only the interpreter still has to end.
     """
 
@@ -115,7 +115,7 @@ class StopSignals:
             except Exception:
                 saved = "what was saved cannot be told"
             name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
-            line = f"activesteer: stopped by {name}; {saved}{getattr(self.options, 'how_to_go_on', '')}"
+            line = f"activesteer: stopped by {name}; {saved}{getattr(self.options, 'how_to_resume', '')}"
             if "activesteer.files" in sys.modules:
                 sys.modules["activesteer.files"].delete_passing()
             if not self._watching:

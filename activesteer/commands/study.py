@@ -1,4 +1,4 @@
-"""`activesteer study`: many runs from one file, on this machine or a cluster, interrupted and gone on with at will."""
+"""`activesteer study`: many runs from one file, on this machine or a cluster, interrupted and resumed at will."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("study", help="drive many runs over varied parameters; say how far they are")
     parser.add_argument("study", metavar="STUDY_OR_DIR", help="a study file or its name, or the folder of a study")
-    add_output(parser, "DIR", "folder for the results, needed for a new study; one that is there is gone on with")
+    add_output(parser, "DIR", "folder for the results, needed for a new study; a study found there is resumed")
     add_workers(parser)
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--limit", type=int, metavar="N", help="make at most N runs now and leave the rest")
@@ -46,7 +46,7 @@ def _study(options: argparse.Namespace) -> int:
     if given.is_dir():
         read_environment(given)  # says what is wrong with a folder without a study
     options.output = folder
-    options.how_to_go_on = f"; go on with `activesteer study {folder}`"
+    options.how_to_resume = f"; resume with `activesteer study {folder}`"
     with RunCounter("study", quiet=options.json) as counter:
         study(
             given / "study.toml" if given.is_dir() else options.study,
@@ -57,12 +57,14 @@ def _study(options: argparse.Namespace) -> int:
             progress=counter,
         )
     result = folder / RESULTS
+    made = _progress_of(folder)
+    status = 1 if made["by_status"] and set(made["by_status"]) <= {"failed", "crashed"} else 0
     if options.json:
-        print_json(_progress_of(folder) | {"results": str(result) if result.exists() else None})
-        return 0
+        print_json(made | {"results": str(result) if result.exists() else None})
+        return status
     _status(folder, as_json=False)
-    print(f"results: {result}" if result.exists() else f"not finished; go on with `activesteer study {folder}`")
-    return 0
+    print(f"results: {result}" if result.exists() else f"not finished; resume with `activesteer study {folder}`")
+    return status
 
 
 def _progress_of(folder: Path) -> dict[str, Any]:

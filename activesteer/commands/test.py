@@ -27,7 +27,7 @@ def add_to(commands: Any) -> None:
     add_controller(parser, several=True)
     add_car(parser)
     add_driver(parser, default="whom the standard asks for")
-    add_output(parser, "DIR", "folder for page, JSON and runs, which is gone on with; none are written without it")
+    add_output(parser, "DIR", "folder for page, JSON and runs; an interrupted test found there is resumed; nothing is written without it")
     add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_test)
@@ -38,7 +38,7 @@ def _test(options: argparse.Namespace) -> int:
     from activesteer.standards.page import write_page
 
     if options.output is not None:
-        options.how_to_go_on = "; the same command goes on with it"
+        options.how_to_resume = "; the same command resumes it"
     with ProgressBar(options.standard, quiet=options.json) as bar:
         result = examine(
             options.standard,

@@ -18,7 +18,7 @@ def add_to(commands: Any) -> None:
     """Adds the command to the parser's."""
     parser = commands.add_parser("tune", help="find values of a study's factors that make objectives small")
     parser.add_argument("study", metavar="STUDY", help="a study file with a table [tune], or its name")
-    add_output(parser, "DIR", "folder of the search; one that is there is gone on with", "tuning")
+    add_output(parser, "DIR", "folder of the search; a search found there is resumed", "tuning")
     parser.add_argument("--trials", type=int, metavar="N", help="sets to have tried in the end (default: the file's)")
     add_workers(parser)
     add_json(parser)
@@ -28,7 +28,7 @@ def add_to(commands: Any) -> None:
 def _tune(options: argparse.Namespace) -> int:
     from activesteer.studies.tuning import tune
 
-    options.how_to_go_on = "; the same command goes on with it"
+    options.how_to_resume = "; the same command resumes it"
     with ProgressBar("tune", quiet=options.json) as bar:
         result = tune(
             options.study,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,6 +22,8 @@ DESIGNS: Final = ("grid", "list", "sobol", "latin_hypercube", "random", "saltell
 FOR_INDICES: Final = ("saltelli", "morris")
 """Designs that SALib makes for its sensitivity indices; every factor must be sampled."""
 MORRIS_LEVELS: Final = 4
+MAX_SAMPLES: Final = 10_000_000
+"""Largest number of combinations of a design."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class DesignTable:
 
     kind: str = ""
     """One of `DESIGNS`; by itself `list` where cases are given, `grid` where every factor is one, else `sobol`."""
-    samples: Annotated[int, Range(1, 10_000_000)] = 0
+    samples: Annotated[int, Range(1, MAX_SAMPLES)] = 0
     """Size of the sample; of `saltelli` the base sample (D + 2 runs each), of `morris` trajectories (D + 1 each)."""
     paired: bool = True
     """Whether all controllers are driven with the same sample."""
@@ -86,15 +87,15 @@ def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: in
         inner = len(unit)
     else:
         columns, inner = {}, 1
-    crossed = list(itertools.product(*(factor.values for factor in grids)))
-    found: dict[str, list[Value]] = {}
-    for factor in factors:
-        if factor.kind == "grid":
-            place = grids.index(factor)
-            found[factor.key] = [values[place] for values in crossed for _ in range(inner)]
-        else:
-            found[factor.key] = columns[factor.key] * len(crossed)
-    return Samples(found, len(crossed) * inner)
+    crossed = math.prod(len(factor.values) for factor in grids)
+    repeats = crossed * inner
+    for factor in grids:
+        repeats //= len(factor.values)
+        once = [value for value in factor.values for _ in range(repeats)]
+        columns[factor.key] = once * (crossed * inner // len(once))
+    for factor in sampled:
+        columns[factor.key] *= crossed
+    return Samples({factor.key: columns[factor.key] for factor in factors}, crossed * inner)
 
 
 def _unit_sample(kind: str, dimensions: int, count: int, seed: list[int]) -> NDArray[np.float64]:
@@ -197,6 +198,7 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
     if kind in ("grid", "list"):
         if table.samples:
             raise source.fail(("design", "samples"), f"belongs to a sample, not to a {kind}")
+        _check_size(factors, 1, source)
         return DesignTable(kind, 0, table.paired)
     if all_grids:
         raise source.fail(where, f"is {kind}, but every factor is a grid; leave it out, or give a distribution")
@@ -206,4 +208,23 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
         raise source.fail(("design", "samples"), f"{kind} needs the size of the sample")
     if kind == "saltelli" and table.samples & (table.samples - 1):
         raise source.fail(("design", "samples"), f"is {table.samples}; saltelli needs a power of 2")
+    points = {"saltelli": len(factors) + 2, "morris": len(factors) + 1}.get(kind, 1) * table.samples
+    _check_size(factors, points, source)
     return DesignTable(kind, table.samples, table.paired)
+
+
+def _check_size(factors: Sequence[Factor], points: int, source: Source) -> None:
+    """Refuse a design with too many combinations before any of them is made.
+
+    Args:
+        factors: Factors of the study; its grids are crossed with each other and with the points of the sample.
+        points: Points of the sample of all other factors.
+        source: Source of the study, for the error message.
+    """
+    sizes = [len(factor.values) for factor in factors if factor.kind == "grid"]
+    count = math.prod(sizes) * points
+    if count > MAX_SAMPLES:
+        parts = " x ".join(map(str, [*sizes, *([points] if points > 1 else [])]))
+        raise source.fail(
+            ("design",), f"has {parts} = {count} combinations; at most {MAX_SAMPLES} are allowed", count, MAX_SAMPLES
+        )

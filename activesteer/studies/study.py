@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fnmatch
+import logging
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
@@ -11,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from activesteer.scenario import FileOrTable
 from activesteer.studies.plan import Plan, task_size
+from activesteer.studies.row_table import IDENTITY, OUTCOME
 from activesteer.studies.run_settings import Request, prepare
 from activesteer.studies.run_task import Status, drive, failed_row
 from activesteer.studies.store import Store
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 RECORDINGS: Final = "recordings"
+_logger: Final = logging.getLogger(__name__)
 
 
 class StudyProgress(NamedTuple):
@@ -100,7 +104,19 @@ def study(
             _drive_all(plan, store, workers, missing, limit, progress)
         if not store.missing(len(plan)):
             store.join()
-        return store.read()
+        table = store.read()
+        _warn_of_patterns(parsed, table)
+        return table
+
+
+def _warn_of_patterns(study_file: StudyFile, table: pa.Table) -> None:
+    """Log each pattern of `metrics` that matches no metric of the runs made so far."""
+    if not table.num_rows or Status.OK not in table.column("status").to_pylist():
+        return
+    metrics = set(table.column_names) - {*IDENTITY, *OUTCOME, *study_file.keys}
+    for pattern in study_file.metrics:
+        if not fnmatch.filter(metrics, pattern):
+            _logger.warning("metrics: the pattern %r matches no metric of these runs", pattern)
 
 
 def _drive_all(

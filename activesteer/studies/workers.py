@@ -18,6 +18,8 @@ from activesteer.studies import dask_cluster
 
 _BLAS_THREADS: Final = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Where the BLAS of numpy and scipy look for their number of threads as they are loaded."""
+_MOST_JOBS: Final = 16
+"""Number of processes that is allowed on a machine with few processors; four times the processors on a larger one."""
 
 
 class Workers(Protocol):
@@ -173,11 +175,12 @@ def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str |
         The workers.
 
     Raises:
-        ParameterError: fewer than one job, or jobs beside a scheduler.
+        ParameterError: `jobs` is below 1 or above four times the number of processors, or is given with a scheduler.
         StudyError: there is no such scheduler, it has no workers, or `distributed` is not installed.
     """
-    if jobs is not None and jobs < 1:
-        raise ParameterError("at least 1 is needed", key=f"--jobs {jobs}", value=jobs, allowed=Range(1))
+    most = max(_MOST_JOBS, 4 * _processors())
+    if jobs is not None and not 1 <= jobs <= most:
+        raise ParameterError(f"must be 1 to {most}", key=f"--jobs {jobs}", value=jobs, allowed=Range(1, most))
     if jobs is not None and scheduler is not None:
         raise ParameterError(
             "has no effect with --scheduler, whose workers do all of it", key=f"--jobs {jobs}", value=jobs

@@ -54,7 +54,7 @@ def test_a_study_is_made_in_pieces_and_says_how_far_it_is(file, tmp_path, call):
     first = call("study", str(file), "-o", folder, "--jobs", "1", "--limit", "2")
     assert first.status == 0
     assert "2 of 64 runs are done: 2 ok" in first.out
-    assert f"go on with `activesteer study {folder}`" in first.out
+    assert f"resume with `activesteer study {folder}`" in first.out
     second = call("study", folder, "--jobs", "1", "--limit", "1", "--json").json
     assert (second["done"], second["missing"], second["results"]) == (3, 61, None)
     assert call("study", folder, "--status", "--json").json["by_status"] == {"ok": 3}
@@ -71,11 +71,45 @@ def test_a_search_goes_on_where_it_was(file, tmp_path, call):
     assert "road.mu = " in told.out
 
 
+GRID = """
+controllers = ["{controller}"]
+metrics = ["yaw_rate_over*", "yaw_rate_peek*"]
+
+[[maneuvers]]
+name = "short"
+kind = "step_steer"
+speed_kmh = 80
+duration_s = 2.3
+settle_s = 0.1
+steer = {{ start_s = 0.05, steering_wheel_deg = 20.0 }}
+
+[factors]
+"road.mu" = {{ grid = [0.8, 1.0] }}
+"""
+
+
+def test_a_study_whose_runs_all_fail_has_a_status_other_than_0(call, controller, tmp_path):
+    name = controller("raise RuntimeError('on purpose') if self.steps > 200 else None\nreturn ActuatorCommand()")
+    (tmp_path / "bad.toml").write_text(GRID.format(controller=name))
+    told = call("study", "bad.toml", "-o", "s", "--jobs", "1")
+    assert told.status == 1
+    assert "2 of 2 runs are done: 2 failed" in told.out
+    assert call("study", "s", "--json").status == 1
+
+
+def test_a_metric_pattern_that_matches_nothing_is_said(call, tmp_path):
+    (tmp_path / "good.toml").write_text(GRID.format(controller="none"))
+    told = call("study", "good.toml", "-o", "s", "--jobs", "1")
+    assert told.status == 0
+    assert "metrics: the pattern 'yaw_rate_peek*' matches no metric of these runs" in told.err
+    assert "yaw_rate_over*" not in told.err
+
+
 @pytest.mark.parametrize(
     ("words", "made", "how"),
     [
-        (("study",), "parts/[0-9]*", r"go on with `activesteer study \S+`"),
-        (("tune", "--trials", "1000"), "*.journal", "the same command goes on with it"),
+        (("study",), "parts/[0-9]*", r"resume with `activesteer study \S+`"),
+        (("tune", "--trials", "1000"), "*.journal", "the same command resumes it"),
     ],
 )
 def test_ctrl_c_says_how_to_go_on(file, tmp_path, words, made, how):

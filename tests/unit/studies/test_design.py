@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import StudyError
-from activesteer.studies.design import draw, read_cases
+from activesteer.studies.design import MAX_SAMPLES, draw, read_cases
 from activesteer.studies.factors import Factor
 from activesteer.studies.study_file import read_study
 from tests.raising import raises
@@ -29,6 +29,22 @@ def test_every_value_of_a_grid_meets_the_same_sample():
     columns = np.reshape(found.columns["road.mu"], (3, 8))
     assert (columns == columns[0]).all()
     assert np.unique(columns[0]).size == 8
+
+
+GRID = {"grid": list(range(1, 101))}
+HUGE = [
+    ({f"factors.{name}": GRID for name in ("mass", "inertia", "stiffness", "damping", "grip")}, {}, 100**5),
+    ({"a": GRID, "b": GRID, "road.mu": {"uniform": [0.8, 1.0]}}, {"samples": 1001}, 100 * 100 * 1001),
+    ({"a": {"uniform": [0.0, 1.0]}}, {"kind": "saltelli", "samples": 2**22}, 3 * 2**22),
+]
+
+
+@pytest.mark.parametrize(("factors", "design", "count"), HUGE)
+def test_too_many_combinations_are_refused_before_one_is_made(monkeypatch, factors, design, count):
+    monkeypatch.setattr("activesteer.studies.study_file.draw", lambda *_: pytest.fail("drawn"))
+    with raises(StudyError, key="design", value=count, allowed=MAX_SAMPLES) as refused:
+        read_study({"maneuvers": ["step_steer"], "factors": factors, "design": design})
+    assert f"= {count} combinations; at most {MAX_SAMPLES}" in str(refused.value)
 
 
 @pytest.mark.parametrize("kind", ["sobol", "latin_hypercube"])

@@ -6,7 +6,10 @@ import os
 
 import pytest
 
-from activesteer.studies.workers import LocalProcesses
+from activesteer.config import Range
+from activesteer.errors import ParameterError
+from activesteer.studies.workers import LocalProcesses, workers_for
+from tests.raising import raises
 
 
 @pytest.mark.parametrize(("given", "there"), [(None, "1"), ("3", "3")])
@@ -21,3 +24,11 @@ def test_a_worker_solves_equations_in_one_thread_unless_told_otherwise(monkeypat
     finally:
         workers.close(abandon=False)
     assert os.environ.get(name) == given, "this process is as it was"
+
+
+@pytest.mark.parametrize("jobs", [0, 65, 99_999_999])
+def test_the_number_of_processes_is_bounded_before_one_is_started(monkeypatch, jobs) -> None:
+    monkeypatch.setattr("activesteer.studies.workers._processors", lambda: 16)
+    monkeypatch.setattr("activesteer.studies.workers.LocalProcesses", lambda _: pytest.fail("started"))
+    with raises(ParameterError, key=f"--jobs {jobs}", value=jobs, allowed=Range(1, 64)), workers_for(jobs):
+        pytest.fail("accepted")
