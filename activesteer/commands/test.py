@@ -27,7 +27,7 @@ def add_to(commands: Any) -> None:
     add_controller(parser, several=True)
     add_car(parser)
     add_driver(parser, default="whom the standard asks for")
-    add_output(parser, "DIR", "folder for page, JSON and runs, where an interrupted test is resumed; without it nothing is kept")
+    add_output(parser, "DIR", "folder for page, JSON and runs; an interrupted test is resumed there (default: none)")
     add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_test)

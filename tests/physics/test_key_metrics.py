@@ -1,4 +1,4 @@
-"""Every key metric that a kind of manoeuvre declares is among the metrics of a run; the bench holds the paper's kinds."""
+"""Key metrics of each kind of manoeuvre are metrics of its runs; the bench covers the kinds of the paper."""
 
 from __future__ import annotations
 
