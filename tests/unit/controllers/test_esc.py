@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from activesteer.controllers import load_controller
-from activesteer.controllers.esc import brake_levers, wheel_torques
+from activesteer.controllers.esc import Esc, brake_levers, wheel_torques
+from activesteer.controllers.turn_reference import TurnReference
 from activesteer.scenario import resolve
-from activesteer.signals import DriverCommand
+from activesteer.signals import DriverCommand, Estimate
 from activesteer.theory.single_track import SingleTrack
 from tests.unit.controllers.cars import held, measured, steering
 
@@ -44,12 +46,34 @@ def test_outer_front_wheel_works_against_oversteer_and_inner_rear_wheel_against_
     assert torques[wheel] == pytest.approx(abs(moment_Nm) * LEVERS[0])
 
 
-def test_brake_makes_the_moment_that_is_asked_for(known):
+@pytest.mark.parametrize(("axle", "wheel", "yaw_rate_radps"), [("front", 0, -0.3), ("rear", 2, 0.3)])
+def test_brake_makes_the_demanded_moment_at_either_axle(known, axle, wheel, yaw_rate_radps):
     car = known.estimation
-    lever = brake_levers(known)[0]
-    torque = wheel_torques(1000.0, -0.3, (lever, lever), 2000.0)[0]
-    force_N = torque / car.rolling_radius_m[0]
-    assert force_N * car.two_track.front_track_m / 2.0 == pytest.approx(1000.0)
+    tyres = tuple(replace(tyre, rolling_radius_m=radius) for tyre, radius in zip(car.tyres, (0.30, 0.34), strict=True))
+    tracks = replace(car.two_track, front_track_m=1.4, rear_track_m=1.7)
+    uneven = replace(known, estimation=replace(car, two_track=tracks, tyres=tyres))
+    force_N = wheel_torques(1000.0, yaw_rate_radps, brake_levers(uneven), 2000.0)[wheel]
+    force_N /= {"front": 0.30, "rear": 0.34}[axle]
+    assert force_N * {"front": 0.7, "rear": 0.85}[axle] == pytest.approx(1000.0)
+
+
+@pytest.mark.parametrize("sideslip_time_s", [0.1, 0.2, 0.4])
+def test_brake_turns_a_sliding_car_back_in_a_time_proportional_to_the_sideslip_time(known, sideslip_time_s):
+    car, beyond_rad = known.estimation, 0.003
+    p = replace(known.gains.esc, sideslip_time_s=sideslip_time_s)
+    sideslip_rad = p.sideslip_limit_rad + beyond_rad
+
+    class Sliding:
+        def step(self, _measurement):
+            return Estimate(SPEED_MPS, SPEED_MPS * sideslip_rad, sideslip_rad, 0.0, 0.9, *[0.0] * 5)
+
+    inertia_kgm2 = known.single_track.yaw_inertia_kgm2
+    reference = TurnReference(known.single_track, p.reference_length_m, p.friction_fraction, known.timestep_s)
+    esc = Esc(reference, Sliding(), p, inertia_kgm2, brake_levers(known))  # pyright: ignore[reportArgumentType]
+    torque_Nm = esc.step(steering(0.0), measured(0.0)).brake_torque_demand_Nm[0]
+    moment_Nm = torque_Nm / car.rolling_radius_m[0] * 0.5 * car.two_track.front_track_m
+    # A constant moment M turns an inertia J from rest by an angle a in the time sqrt(2 a J / M).
+    assert math.sqrt(2.0 * beyond_rad * inertia_kgm2 / moment_Nm) == pytest.approx(math.sqrt(2.0) * sideslip_time_s)
 
 
 def test_torque_ends_at_its_limit():

@@ -12,6 +12,7 @@ from activesteer.controllers.family_parameters import LqrParameters, ServoParame
 from activesteer.controllers.lqr import SPEEDS_MPS, STATES, Lqr, feedback, model, schedule, steady_turn
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.scenario import resolve
+from activesteer.signals import Estimate
 from activesteer.theory.single_track import SingleTrack
 from tests.unit.controllers.cars import CAR, held, measured, steering
 
@@ -109,6 +110,23 @@ def test_desired_yaw_rate_is_the_cars_own_up_to_what_the_friction_gives(known):
 def test_at_rest_nothing_is_steered(known):
     answer = first(known, steering(0.3), measured(0.0, 0.0))
     assert answer.rear_steer_demand_rad == answer.superposition_demand_rad == 0.0
+
+
+@pytest.mark.parametrize("angle", ["superposition_rad", "rear_steer_rad"])
+def test_tyres_of_the_regulator_follow_an_angle_by_63_percent_over_one_relaxation_length(known, angle):
+    speed_mps, regulator = 20.0, Lqr(known)
+    straight = Estimate(speed_mps, 0.0, 0.0, 0.0, 0.9, *[0.0] * 5)
+
+    class Straight:
+        def step(self, _measurement):
+            return straight
+
+    regulator._estimator = Straight()  # pyright: ignore[reportAttributeAccessIssue]
+    turned = measured(0.0, speed_mps)._replace(**{angle: 0.01})
+    calls = round(known.gains.lqr.relaxation_length_m / (speed_mps * INTERVAL_S))
+    demands = [regulator.turn(steering(0.0), turned).demand_rad[0] for _ in range(50 * calls)]
+    left_first, left_later = demands[0] - demands[-1], demands[calls] - demands[-1]
+    assert left_later / left_first == pytest.approx(math.exp(-1.0), rel=1e-6)
 
 
 def test_moment_of_the_drivers_brakes_is_held_by_both_axles_without_side_force(known):

@@ -19,11 +19,13 @@ from activesteer.estimation.records import (
     AY_OFFSET,
     FRICTION,
     FRONT_ERROR,
+    FRONT_SLIP,
     LATERAL_SPEED,
     MEMORY,
     N_STATES,
     RATE_OFFSET,
     REAR_ERROR,
+    REAR_SLIP,
     YAW_RATE,
     known_of,
 )
@@ -137,6 +139,21 @@ def test_forces_that_stay_wrong_make_the_motion_as_wrong_and_single_measurements
     assert low < nees < high
     # What is wrong all the time is taken for less again and again: one measurement is nearer than the filter expects.
     assert nis < bounds(2, RUNS * STEPS)[0]
+
+
+@pytest.mark.parametrize(("slip", "sign"), [(FRONT_SLIP, 1.0), (REAR_SLIP, -1.0)])
+def test_wrong_force_of_one_axle_moves_lateral_speed_and_yaw_rate_together(known_and_tyres, slip, sign):
+    """A front force that is too large pushes and turns the car to the same side, a rear one to opposite sides."""
+    known, tyres = known_and_tyres
+    alone, memory = known.copy(), np.zeros(1, MEMORY)[0]
+    for other_noise in ("force_std_N", "along_fraction", "lateral_density_m2ps3", "yaw_density_rad2ps3"):
+        alone[other_noise] = 0.0
+    begin(alone, memory)
+    memory["covariance"] = 0.0
+    memory["speed_mps"], memory["state"][slip] = SPEED_MPS, 0.03
+    predict(alone, tyres, memory, INTERVAL_S)
+    (lateral, both), (_, yaw) = memory["covariance"][np.ix_(MOTION, MOTION)]
+    assert both / math.sqrt(lateral * yaw) == pytest.approx(sign)
 
 
 @pytest.mark.slow
