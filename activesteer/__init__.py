@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from activesteer.recording import Recording
-    from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion, Reference
+    from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion, Setpoint
     from activesteer.simulation.runner import simulate
     from activesteer.simulation.simulation import Simulation
     from activesteer.studies.study import study
@@ -21,7 +21,7 @@ __all__ = [
     "Measurement",
     "Motion",
     "Recording",
-    "Reference",
+    "Setpoint",
     "Simulation",
     "__version__",
     "simulate",
@@ -35,7 +35,7 @@ _HOMES = {
     "Estimate": "activesteer.signals",
     "Measurement": "activesteer.signals",
     "Motion": "activesteer.signals",
-    "Reference": "activesteer.signals",
+    "Setpoint": "activesteer.signals",
     "Simulation": "activesteer.simulation.simulation",
     "ActuatorCommand": "activesteer.signals",
     "simulate": "activesteer.simulation.runner",

@@ -55,7 +55,7 @@ class WheelTorques(NamedTuple):
     brake_Nm: tuple[float, float, float, float]
 
 
-class Reference(NamedTuple):
+class Setpoint(NamedTuple):
     """What the manoeuvre asks of the driver at one instant.
 
     Attributes:

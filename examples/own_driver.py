@@ -26,18 +26,18 @@ class PurePursuit:
         self.preview_s = preview_s
         self.travelled_m = 0.0
 
-    def step(self, reference, measurement, motion):
+    def step(self, setpoint, measurement, motion):
         """Called every millisecond with what the manoeuvre asks for, what the sensors say, and where the car is."""
-        if reference.path is None:  # the car still settles, or the manoeuvre gives the steering wheel angle itself
-            return self.robot.step(reference, measurement, motion)
-        search = PathSearch(reference.path)
+        if setpoint.path is None:  # the car still settles, or the manoeuvre gives the steering wheel angle itself
+            return self.robot.step(setpoint, measurement, motion)
+        search = PathSearch(setpoint.path)
         self.travelled_m = search.nearest(motion.x_m, motion.y_m, self.travelled_m, 5.0)
         (x_m,), (y_m,) = search.at(np.array([self.travelled_m + self.preview_s * motion.speed_mps]))
         bearing_rad = math.atan2(y_m - motion.y_m, x_m - motion.x_m) - motion.yaw_rad
         distance_m = math.hypot(x_m - motion.x_m, y_m - motion.y_m)
         curvature_1pm = 2.0 * math.sin(bearing_rad) / distance_m
         angle_rad = self.steering_ratio * math.atan(self.wheelbase_m * curvature_1pm)
-        return self.robot.turn(angle_rad, reference, measurement)
+        return self.robot.turn(angle_rad, setpoint, measurement)
 
 
 def compare(speed_kmh=60.0):

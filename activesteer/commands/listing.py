@@ -40,7 +40,7 @@ def _list(options: argparse.Namespace) -> int:
         print_json(found)
         return 0
     found["controllers"]["my_file.py:MyController"] = "your own: step(self, command, measurement)"
-    found["drivers"]["my_file.py:MyDriver"] = "your own: step(self, reference, measurement, motion)"
+    found["drivers"]["my_file.py:MyDriver"] = "your own: step(self, setpoint, measurement, motion)"
     for kind, titles in found.items():
         print(f"{kind}:")
         for name, title in titles.items():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from activesteer.driver.parameters import DriverParameters
-from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.theory.single_track import SingleTrackParameters
 
 
@@ -19,18 +19,18 @@ class Driver(Protocol):
         >>> import math
         >>> import activesteer
         >>> class Holds:
-        ...     def step(self, reference, measurement, motion):
+        ...     def step(self, setpoint, measurement, motion):
         ...         return activesteer.DriverCommand(steering_wheel_demand_rad=math.radians(30.0), gear=0)
         >>> recording = activesteer.simulate("straight_line", driver=Holds())
         >>> bool(recording["yaw_rate_radps"].max() > 0.1)
         True
     """
 
-    def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:
+    def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
         """What the driver does now.
 
         Args:
-            reference: What the manoeuvre asks for.
+            setpoint: What the manoeuvre asks for.
             measurement: What the car's sensors say.
             motion: Where the car is and how it moves, as the driver sees it.
 

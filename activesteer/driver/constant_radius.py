@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from activesteer.driver.open_loop import OpenLoopDriver
-from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 
 _TIME_CONSTANT_S: Final = 0.5
 """Time in which an error of the curvature is steered away [s]: slower than the car answers, faster than speed rises."""
@@ -34,23 +34,23 @@ class ConstantRadiusDriver:
         self._share = timestep_s / _TIME_CONSTANT_S
         self._correction_1pm = 0.0
 
-    def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:
+    def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
         """What the driver does now.
 
         Args:
-            reference: What is asked; without a curvature its steering wheel angle is taken.
+            setpoint: What is asked; without a curvature its steering wheel angle is taken.
             measurement: What the car's sensors say.
             motion: Not used.
 
         Returns:
             The command.
         """
-        curvature = reference.curvature_demand_1pm
+        curvature = setpoint.curvature_demand_1pm
         if curvature is None:
-            return self.robot.step(reference, measurement, motion)
+            return self.robot.step(setpoint, measurement, motion)
         robot = self.robot
         angle = robot.steering_ratio * self._wheelbase_m * (curvature + self._correction_1pm)
-        command = robot.turn(angle, reference, measurement)
+        command = robot.turn(angle, setpoint, measurement)
         if command.steering_wheel_demand_rad == angle and measurement.speed_mps > _MIN_SPEED_MPS:
             error = curvature - measurement.yaw_rate_radps / measurement.speed_mps
             self._correction_1pm += self._share * error

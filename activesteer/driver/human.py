@@ -6,7 +6,7 @@ from activesteer.driver.base import DriverSetup
 from activesteer.driver.constant_radius import ConstantRadiusDriver
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.path_preview import PathPreviewDriver
-from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.theory.single_track import SingleTrack
 
 
@@ -40,10 +40,10 @@ class HumanDriver:
             PathPreviewDriver(robot, single_track.matrices, setup.parameters, setup.timestep_s),
         )
 
-    def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:
+    def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
         """What the driver does now; see `Driver`."""
-        if reference.path is not None:
-            return self._path.step(reference, measurement, motion)
-        if reference.curvature_demand_1pm is not None:
-            return self._constant_radius.step(reference, measurement, motion)
-        return self._open_loop.step(reference, measurement, motion)
+        if setpoint.path is not None:
+            return self._path.step(setpoint, measurement, motion)
+        if setpoint.curvature_demand_1pm is not None:
+            return self._constant_radius.step(setpoint, measurement, motion)
+        return self._open_loop.step(setpoint, measurement, motion)

@@ -45,7 +45,7 @@ class _DriverKind(Kind):
 DRIVER: Final = _DriverKind(
     word="driver",
     example="my_file.py:MyDriver",
-    inputs="reference, measurement, motion",
+    inputs="setpoint, measurement, motion",
     built_in={},
     result=DriverCommand,
     ranges={

@@ -5,7 +5,7 @@ from __future__ import annotations
 from activesteer.driver.base import DriverSetup
 from activesteer.driver.speed_hold import SpeedHold
 from activesteer.errors import ManeuverError
-from activesteer.signals import DriverCommand, Measurement, Motion, Reference, made
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, made
 
 
 class OpenLoopDriver:
@@ -44,11 +44,11 @@ class OpenLoopDriver:
         speed_hold = SpeedHold(setup.parameters, setup.drive, mass_kg, setup.wheel_radius_m, setup.timestep_s)
         return cls(speed_hold, setup.steering_ratio, setup.steering_wheel_limit_rad, setup.rack_per_steering_wheel_m)
 
-    def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:
+    def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
         """What the driver does now.
 
         Args:
-            reference: What is asked.
+            setpoint: What is asked.
             measurement: What the car's sensors say.
             motion: Not used.
 
@@ -58,20 +58,20 @@ class OpenLoopDriver:
         Raises:
             ManeuverError: a rack position is asked for and the car has no rack.
         """
-        if reference.rack_demand_m is None:
-            return self.turn(reference.steering_wheel_demand_rad, reference, measurement)
+        if setpoint.rack_demand_m is None:
+            return self.turn(setpoint.steering_wheel_demand_rad, setpoint, measurement)
         if self._rack_per_steering_wheel_m is None:
             raise ManeuverError(
                 "the car has no rack that its steering wheel drives; give steering_wheel_rad", key="steering.rack_m"
             )
-        return self.turn(reference.rack_demand_m / self._rack_per_steering_wheel_m, reference, measurement)
+        return self.turn(setpoint.rack_demand_m / self._rack_per_steering_wheel_m, setpoint, measurement)
 
-    def turn(self, angle: float, reference: Reference, measurement: Measurement) -> DriverCommand:
-        """The same with another steering wheel angle than that of the reference.
+    def turn(self, angle: float, setpoint: Setpoint, measurement: Measurement) -> DriverCommand:
+        """The same with another steering wheel angle than that of the setpoint.
 
         Args:
             angle: Steering wheel angle [rad].
-            reference: What is asked otherwise.
+            setpoint: What is asked otherwise.
             measurement: What the car's sensors say.
 
         Returns:
@@ -82,8 +82,8 @@ class OpenLoopDriver:
             angle, saturated = self.steering_wheel_limit_rad, True
         elif angle < -self.steering_wheel_limit_rad:
             angle, saturated = -self.steering_wheel_limit_rad, True
-        if reference.hold_speed:
-            speed_mps, hold = reference.speed_demand_mps, self.speed_hold
+        if setpoint.hold_speed:
+            speed_mps, hold = setpoint.speed_demand_mps, self.speed_hold
             torque = hold.step(speed_mps, measurement)
             saturated = saturated or hold.saturated
             gear = 1 if speed_mps >= 0.0 else -1
@@ -91,6 +91,6 @@ class OpenLoopDriver:
             self.speed_hold.reset()
             torque, gear = 0.0, 0
         return made(DriverCommand, (
-            angle, torque, reference.brake_pedal, saturated, reference.wheel_torques, gear,
-            angle / self.steering_ratio, reference.parking_brake,
+            angle, torque, setpoint.brake_pedal, saturated, setpoint.wheel_torques, gear,
+            angle / self.steering_ratio, setpoint.parking_brake,
         ))  # fmt: skip

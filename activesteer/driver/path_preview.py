@@ -26,7 +26,7 @@ from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
 from activesteer.road.path import Path
 from activesteer.road.path_search import PathSearch, nearest, point_at
-from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 
 LateralModel = Callable[[float], tuple[Array, Array]]
 """Speed [m/s] -> system matrix (2, 2) and input matrix (2, k) of a model with the states yaw rate [rad/s] and sideslip
@@ -115,19 +115,19 @@ class PathPreviewDriver:
         decided[0] = min(max(angle, -self.robot.steering_wheel_limit_rad), self.robot.steering_wheel_limit_rad)
         self._acted_on_rad = float(decided[-1])
 
-    def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:
+    def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
         """What the driver does now.
 
         Args:
-            reference: The path and the speed that are asked for; without a path he goes on as decided before.
+            setpoint: The path and the speed that are asked for; without a path he goes on as decided before.
             measurement: What the car's sensors say.
             motion: Where the car is and how it moves; looked at every `PREVIEW_INTERVAL_S`.
 
         Returns:
             The command.
         """
-        if self._steps % self._preview_every_steps == 0 and reference.path is not None:
-            self._update_preview(reference.path, motion)
+        if self._steps % self._preview_every_steps == 0 and setpoint.path is not None:
+            self._update_preview(setpoint.path, motion)
         self._steps += 1
         change = self._share * (self._acted_on_rad - self._wheel_rad)
         most = self._most_change_rad
@@ -139,7 +139,7 @@ class PathPreviewDriver:
         else:
             saturated = False
         wheel = self._wheel_rad + change
-        command = self.robot.turn(wheel, reference, measurement)
+        command = self.robot.turn(wheel, setpoint, measurement)
         self._wheel_rad = command.steering_wheel_demand_rad
         return command._replace(saturated=True) if saturated else command
 

@@ -11,7 +11,7 @@ from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver
 from activesteer.road.course import Course
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 
 Width = Annotated[float, Range(0.5, 4.0)]
 
@@ -62,15 +62,15 @@ class AlongCourse(Maneuver):
     def _make_course(self) -> Course:
         """Lays out the course; done once."""
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """The path and the speed."""
-        return self._reference
+        return self._setpoint
 
     @cached_property
-    def _reference(self) -> Reference:
-        return self.settling_reference()._replace(path=self.course.path)
+    def _setpoint(self) -> Setpoint:
+        return self.settling_setpoint()._replace(path=self.course.path)
 
-    def settling_reference(self) -> Reference:
+    def settling_setpoint(self) -> Setpoint:
         """Straight ahead at the speed of the manoeuvre: the path begins where the recording does."""
         return self.at_speed(0.0)
 

@@ -1,4 +1,4 @@
-"""What every manoeuvre has: speed, road, duration, and a reference for the driver at any time."""
+"""What every manoeuvre has: speed, road, duration, and a setpoint for the driver at any time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from activesteer.errors import ManeuverError
 from activesteer.faults import Fault
 from activesteer.road.course import Course
 from activesteer.road.road import Road
-from activesteer.signals import Reference, made
+from activesteer.signals import Setpoint, made
 
 Speed = Annotated[float, Range(-20.0, 100.0)]
 
@@ -31,7 +31,7 @@ class Maneuver(ABC):
         >>> maneuver = resolve(table).maneuver
         >>> maneuver.speed_mps
         20.0
-        >>> round(maneuver.reference(1.5).steering_wheel_demand_rad, 4)
+        >>> round(maneuver.setpoint(1.5).steering_wheel_demand_rad, 4)
         0.3927
     """
 
@@ -53,14 +53,14 @@ class Maneuver(ABC):
     """What goes wrong with actuators and sensors, and when."""
 
     @abstractmethod
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """What is asked of the driver.
 
         Args:
             time_s: Time since the start of the recording [s].
 
         Returns:
-            The reference at that time.
+            The setpoint at that time.
         """
 
     @property
@@ -73,13 +73,13 @@ class Maneuver(ABC):
         """What must be found by driving before the manoeuvre can be run; None where everything is known."""
         return None
 
-    def settling_reference(self) -> Reference:
+    def settling_setpoint(self) -> Setpoint:
         """What is asked of the driver while the car settles before the recording."""
-        return self.reference(0.0)
+        return self.setpoint(0.0)
 
-    def at_speed(self, steering_wheel_rad: float, hold_speed: bool = True) -> Reference:
+    def at_speed(self, steering_wheel_rad: float, hold_speed: bool = True) -> Setpoint:
         """A steering wheel angle [rad], left positive, while the drive holds the speed of the manoeuvre, or none."""
-        return made(Reference, (steering_wheel_rad, self.speed_mps, 0.0, hold_speed, None, None, None, None, 0.0))
+        return made(Setpoint, (steering_wheel_rad, self.speed_mps, 0.0, hold_speed, None, None, None, None, 0.0))
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Search:
 
 
 def within(value: float, most: float) -> float:
-    """A value, limited to 0 and `most`: as `min` and `max` do it, which cost more than all else in a reference."""
+    """A value, limited to 0 and `most`: as `min` and `max` do it, which cost more than all else in a setpoint."""
     return 0.0 if value < 0.0 else most if value > most else value
 
 

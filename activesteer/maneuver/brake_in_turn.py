@@ -11,7 +11,7 @@ from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver, check_search_speed, within
 from activesteer.maneuver.step_steer import SteadyTurn, StepInput, StepSteer
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class BrakeInTurn(Maneuver):
         """The same with its steering wheel angle known [rad]; the aim that led to it stays on record."""
         return dataclasses.replace(self, turn=dataclasses.replace(self.turn, steering_wheel_rad=steering_wheel_rad))
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """Ramp of the steering wheel, ramp of the brake; see the base class."""
         turn, brake = self.turn, self.brake
         amplitude = turn.steering_wheel_rad or 0.0
@@ -111,8 +111,8 @@ class BrakeInTurn(Maneuver):
         if time_s < brake.start_s:
             return self.at_speed(angle)
         pressed = within((time_s - brake.start_s) / brake.rise_s, 1.0)
-        return Reference(angle, self.speed_mps, pressed * brake.pedal, False)
+        return Setpoint(angle, self.speed_mps, pressed * brake.pedal, False)
 
-    def settling_reference(self) -> Reference:
+    def settling_setpoint(self) -> Setpoint:
         """Straight ahead at the speed of the manoeuvre."""
         return self.at_speed(0.0)

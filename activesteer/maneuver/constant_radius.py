@@ -9,7 +9,7 @@ from typing import Annotated
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver, within
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class ConstantRadius(Maneuver):
                 value=3.6 * circle.end_speed_mps,
             )
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """Curvature and speed; see the base class."""
         circle = self.circle
         fraction = within(time_s / circle.entry_s, 1.0)
@@ -62,4 +62,4 @@ class ConstantRadius(Maneuver):
         curvature = 0.5 * (1.0 - math.cos(math.pi * fraction)) / circle.radius_m
         rising_s = max(time_s - circle.entry_s, 0.0)
         speed = min(self.speed_mps + rising_s * circle.acceleration_mps2, circle.end_speed_mps)
-        return Reference(0.0, speed, 0.0, True, curvature)
+        return Setpoint(0.0, speed, 0.0, True, curvature)

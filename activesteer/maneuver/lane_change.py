@@ -20,7 +20,7 @@ from activesteer.maneuver.least_jerk import Bound, least_jerk
 from activesteer.road.course import Course
 from activesteer.road.lane import Lane
 from activesteer.road.path import Path
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 
 _AXLES_M: Final = (1.3, -1.3)
 """Where a car of 2.6 m wheelbase has its axles, ahead of its centre [m]: there its sides keep the margin."""
@@ -77,9 +77,9 @@ class LaneChange(AlongCourse):
     vehicle_width_m: Width | None = None
     """Width of the vehicle, which the lanes are made for [m]; that of the vehicle file where not given."""
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """The path and the speed, or no throttle any more."""
-        return self._reference if time_s < self._throttle_off_s else self._coasting
+        return self._setpoint if time_s < self._throttle_off_s else self._coasting
 
     @cached_property
     def _throttle_off_s(self) -> float:
@@ -87,8 +87,8 @@ class LaneChange(AlongCourse):
         return math.inf if off_m is None else (self.lane.entry_m + off_m) / self.speed_mps
 
     @cached_property
-    def _coasting(self) -> Reference:
-        return self._reference._replace(hold_speed=False)
+    def _coasting(self) -> Setpoint:
+        return self._setpoint._replace(hold_speed=False)
 
     def _make_course(self) -> Course:
         layout, width = self.lane, known_width(self.vehicle_width_m)

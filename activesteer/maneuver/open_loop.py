@@ -16,7 +16,7 @@ from activesteer.maneuver.open_loop_tables import (
     WheelTorqueTable,
     check_table,
 )
-from activesteer.signals import Reference, WheelTorques, made
+from activesteer.signals import Setpoint, WheelTorques, made
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,25 +82,25 @@ class OpenLoop(Maneuver):
             )
             raise ManeuverError(problem, key=f"{key}.time_s", value=times_s[-1])
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """Values of the tables; see the base class."""
         value = _interpolate(time_s, self.steering.time_s, self.steering.values)
         angle, rack = (value, None) if self.steering.rack_m is None else (0.0, value)
         if self.wheel_torques is not None:
-            return Reference(angle, self.speed_mps, 0.0, False, None, rack, self._torques(self.wheel_torques, time_s))
+            return Setpoint(angle, self.speed_mps, 0.0, False, None, rack, self._torques(self.wheel_torques, time_s))
         speed = self.speed_mps if self.speed is None else _interpolate(time_s, self.speed.time_s, self.speed.speed_mps)
         pedal = 0.0 if self.brake is None else _interpolate(time_s, self.brake.time_s, self.brake.pedal)
         parking = self.parking_brake
         applied = 0.0 if parking is None else _interpolate(time_s, parking.time_s, parking.applied)
         drives = self.drive == "hold_speed" and pedal == 0.0 and applied == 0.0
-        return made(Reference, (angle, speed, pedal, drives, None, rack, None, None, applied))
+        return made(Setpoint, (angle, speed, pedal, drives, None, rack, None, None, applied))
 
-    def settling_reference(self) -> Reference:
+    def settling_setpoint(self) -> Setpoint:
         """As at the start, but without torques of the wheels: the car is to roll at its speed; see the base class."""
-        reference = self.reference(0.0)
+        setpoint = self.setpoint(0.0)
         if self.wheel_torques is None:
-            return reference
-        return reference._replace(wheel_torques=None, hold_speed=self.drive == "hold_speed")
+            return setpoint
+        return setpoint._replace(wheel_torques=None, hold_speed=self.drive == "hold_speed")
 
     @staticmethod
     def _torques(table: WheelTorqueTable, time_s: float) -> WheelTorques:

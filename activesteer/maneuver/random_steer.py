@@ -13,7 +13,7 @@ from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.sine_sweep import Frequency
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 
 _STEP_S: Final = 0.005
 """Between these points the angle is interpolated [s]."""
@@ -78,7 +78,7 @@ class RandomSteer(Maneuver):
             angles *= 0.5 - 0.5 * np.cos(math.pi * fraction)
         return angles.tolist()
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """Steering wheel angle; see the base class."""
         place = max(time_s, 0.0) / _STEP_S
         index = min(int(place), len(self._angles_rad) - 2)
@@ -86,6 +86,6 @@ class RandomSteer(Maneuver):
         angle = before + (after - before) * (place - index)
         return self.at_speed(angle)
 
-    def settling_reference(self) -> Reference:
+    def settling_setpoint(self) -> Setpoint:
         """Straight ahead; see the base class."""
         return self.at_speed(0.0)

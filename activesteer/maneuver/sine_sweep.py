@@ -9,7 +9,7 @@ from typing import Annotated
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 
 Frequency = Annotated[float, Range(0.01, 50.0)]
 
@@ -63,7 +63,7 @@ class SineSweep(Maneuver):
                 key="sweep.fade_s",
             )
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """Steering wheel angle of the sweep; see the base class."""
         sweep = self.sweep
         t = time_s - sweep.start_s

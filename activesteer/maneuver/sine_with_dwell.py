@@ -14,7 +14,7 @@ from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver, check_search_speed
 from activesteer.maneuver.choices import DRIVES, SIDES, check_choice
 from activesteer.maneuver.slowly_increasing_steer import RampAngle, SlowlyIncreasingSteer, SlowRamp
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 
 _REFERENCE_MPS2: Final = 0.3 * GRAVITY_MPS2
 """Lateral acceleration whose steering wheel angle in a slow ramp is A [m/s2]: 0.3 g, FMVSS 126, S7.6."""
@@ -105,7 +105,7 @@ class SineWithDwell(Maneuver):
         """The same with its amplitude known [rad]; the factor that led to it stays on record."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """Steering wheel angle of the sine; see the base class."""
         steer, (before, after) = self.steer, self._ends
         t = time_s - steer.start_s
@@ -121,10 +121,10 @@ class SineWithDwell(Maneuver):
         return self.at_speed(amplitude * math.sin(2.0 * math.pi * phase / period), after.hold_speed)
 
     @cached_property
-    def _ends(self) -> tuple[Reference, Reference]:
+    def _ends(self) -> tuple[Setpoint, Setpoint]:
         """Before the sine and after it."""
         return self.at_speed(0.0), self.at_speed(0.0, self.drive == "hold_speed")
 
-    def settling_reference(self) -> Reference:
+    def settling_setpoint(self) -> Setpoint:
         """Straight ahead at the speed of the manoeuvre."""
         return self.at_speed(0.0)

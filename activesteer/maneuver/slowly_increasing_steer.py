@@ -9,7 +9,7 @@ from typing import Annotated
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver, Search, within
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class SlowlyIncreasingSteer(Maneuver):
                 "rate_degps and end_deg must not be 0, or the steering wheel does not turn", key="steer"
             )
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """Steering wheel angle of the ramp; see the base class."""
         ramp = self.steer
         turned = within((time_s - ramp.start_s) * abs(ramp.rate_radps), ramp.end_rad)

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Final
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver, Search
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 
 _SEARCH_S: Final = 4.5
 """Time after the beginning of the step that a run of the search for the amplitude takes [s]."""
@@ -60,7 +60,7 @@ class StepSteer(Maneuver):
                 value=step.start_s,
             )
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """Steering wheel angle of the ramp; see the base class."""
         step, (before, after) = self.steer, self._ends
         turned = (time_s - step.start_s) * step.rate_radps
@@ -70,12 +70,12 @@ class StepSteer(Maneuver):
         return after if turned >= abs(amplitude) else self.at_speed(math.copysign(turned, amplitude))
 
     @cached_property
-    def _ends(self) -> tuple[Reference, Reference]:
+    def _ends(self) -> tuple[Setpoint, Setpoint]:
         """Before the ramp and after it."""
         amplitude = self.steer.steering_wheel_rad or 0.0
         return self.at_speed(math.copysign(0.0, amplitude)), self.at_speed(amplitude)
 
-    def settling_reference(self) -> Reference:
+    def settling_setpoint(self) -> Setpoint:
         """Straight ahead at the speed of the manoeuvre."""
         return self.at_speed(0.0)
 

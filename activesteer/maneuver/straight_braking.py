@@ -12,7 +12,7 @@ from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.brake_in_turn import BrakeInput
 from activesteer.road.course import Course
 from activesteer.road.path import Path
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 
 _MIN_SPEED_MPS: Final = 10.0 / 3.6
 """Slower than this there is no braking to be evaluated [m/s]."""
@@ -58,7 +58,7 @@ class StraightBraking(Maneuver):
     def _course(self) -> Course:
         return Course(Path.through([0.0, self.speed_mps * self.duration_s], [0.0, 0.0]))
 
-    def reference(self, time_s: float) -> Reference:
+    def setpoint(self, time_s: float) -> Setpoint:
         """Speed, then the ramp of the brake; see the base class."""
         brake, (before, after) = self.brake, self._ends
         if time_s < brake.start_s:
@@ -67,12 +67,12 @@ class StraightBraking(Maneuver):
         return after if pressed >= 1.0 else after._replace(brake_pedal=pressed * brake.pedal)
 
     @cached_property
-    def _ends(self) -> tuple[Reference, Reference]:
+    def _ends(self) -> tuple[Setpoint, Setpoint]:
         """Before the ramp of the brake and after it."""
         course = self.course
-        before = self.settling_reference()._replace(path=None if course is None else course.path)
+        before = self.settling_setpoint()._replace(path=None if course is None else course.path)
         return before, before._replace(brake_pedal=self.brake.pedal, hold_speed=False)
 
-    def settling_reference(self) -> Reference:
+    def settling_setpoint(self) -> Setpoint:
         """Straight ahead at the speed of the manoeuvre."""
         return self.at_speed(0.0)

@@ -14,7 +14,7 @@ from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import Driver
 from activesteer.faults import Fault
 from activesteer.scenario import Scenario
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.control_unit import control_unit, told_by_sensor
 from activesteer.simulation.recorder import Recorder
 from activesteer.vehicle import engine_warnings_held
@@ -76,7 +76,7 @@ class ClosedLoop:
         self.driver_setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
         self.driver: Driver = scenario.driver.plugin.make(self.driver_setup)
         self.controller_setup, self.controller = control_unit(controller, scenario, vehicle)
-        settling, steps = maneuver.settling_reference(), round(maneuver.settle_s / timestep_s)
+        settling, steps = maneuver.settling_setpoint(), round(maneuver.settle_s / timestep_s)
         self.measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
         self.motion, self.step_count = vehicle.motion(), 0
         self.commands = DriverCommand(front_steer_demand_rad=0.0), ActuatorCommand()
@@ -128,11 +128,11 @@ class ClosedLoop:
             DriverError: the driver did.
             SimulationDiverged: the state became non-finite, or the engine raised a warning.
         """
-        self._advance(self.maneuver.reference, driver or self.driver, controller or self.controller, steps, recorder)
+        self._advance(self.maneuver.setpoint, driver or self.driver, controller or self.controller, steps, recorder)
 
     def _advance(
         self,
-        reference_at: Callable[[float], Reference],
+        setpoint_at: Callable[[float], Setpoint],
         driver: Driver,
         controller: Controller,
         steps: int,
@@ -147,8 +147,8 @@ class ClosedLoop:
                 unit = told_by_sensor(controller, vehicle.parameters.steering.ratio) if angle_fails else controller
                 for block in (stretch,) if recorder is None else recorder.blocks(stretch):
                     for step in block:
-                        reference = reference_at(step * timestep_s)
-                        command = driver.step(reference, measurement, motion)
+                        setpoint = setpoint_at(step * timestep_s)
+                        command = driver.step(setpoint, measurement, motion)
                         asked = unit.step(command, measurement)
                         measurement, motion = step_car(command, asked, tape_address)
         self.step_count, self.commands = self.step_count + steps, (command, asked)

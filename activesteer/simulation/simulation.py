@@ -17,7 +17,7 @@ from activesteer.errors import ManeuverError, ParameterError, RecordingError, sh
 from activesteer.recording import McapWriter, Recording
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Reference
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop, LoopState
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.recorder import RecordedRows, Recorder
@@ -123,9 +123,9 @@ class Simulation:
         return self.loop.step_count >= self.steps
 
     @property
-    def reference(self) -> Reference:
+    def setpoint(self) -> Setpoint:
         """What the manoeuvre now asks of the driver."""
-        return self.scenario.maneuver.reference(self.time_s)
+        return self.scenario.maneuver.setpoint(self.time_s)
 
     @property
     def measurement(self) -> Measurement:

@@ -304,12 +304,12 @@ def _blocks(scenario: Scenario) -> dict[str, float]:
         simulation.vehicle,
     )
     measurement, motion = vehicle.measure(), vehicle.motion()
-    reference = maneuver.reference(0.6)
-    command = driver.step(reference, measurement, motion)
+    setpoint = maneuver.setpoint(0.6)
+    command = driver.step(setpoint, measurement, motion)
     steer = controller.step(command, measurement)
     blocks: dict[str, Callable[[], object]] = {
-        "maneuver_us": lambda: maneuver.reference(0.6),
-        "driver_us": lambda: driver.step(reference, measurement, motion),
+        "maneuver_us": lambda: maneuver.setpoint(0.6),
+        "driver_us": lambda: driver.step(setpoint, measurement, motion),
         "controller_us": lambda: controller.step(command, measurement),
     }
     found = {name: _per_step_us(lambda block=block: _call(block, _CALLS), _CALLS) for name, block in blocks.items()}

@@ -22,7 +22,7 @@ from activesteer.errors import ParameterError, SimulationDiverged, nearest_names
 from activesteer.faults import Fault, fault_table
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, check_gains, check_parts, resolve
-from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
 from activesteer.studies.fault_figures import FIGURES
@@ -188,8 +188,8 @@ class _Keeps:
         self._driver = driver
         self.said: list[DriverCommand] = []
 
-    def step(self, reference: Reference, measurement: Measurement, motion: Motion) -> DriverCommand:
-        self.said.append(self._driver.step(reference, measurement, motion))
+    def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
+        self.said.append(self._driver.step(setpoint, measurement, motion))
         return self.said[-1]
 
 

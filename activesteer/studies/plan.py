@@ -254,7 +254,7 @@ def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
     if part == "vehicle" and first == "controllers":
         return any(rest[0] in keys_read(name) for name in others)
     if part == "vehicle" and first == "single_track" and rest[0] != "mass_kg":  # which the speed hold knows too
-        return bool(others) or follows_path or scenario.maneuver.settling_reference().curvature_demand_1pm is not None
+        return bool(others) or follows_path or scenario.maneuver.settling_setpoint().curvature_demand_1pm is not None
     if part == "driver":
         return not scenario.driver.plugin.ours or follows_path or first.startswith("speed_")
     return True

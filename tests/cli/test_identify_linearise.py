@@ -91,6 +91,6 @@ def test_driver_tells_how_stable_the_loop_is_and_draws(tmp_path, capsys):
 
 
 def test_driver_that_is_code_has_no_linear_form(tmp_path, capsys):
-    (tmp_path / "mine.py").write_text("class Mine:\n    def step(self, reference, measurement, motion): ...\n")
+    (tmp_path / "mine.py").write_text("class Mine:\n    def step(self, setpoint, measurement, motion): ...\n")
     assert main(["driver", f"{tmp_path}/mine.py:Mine"]) == 1
     assert "only a driver file has a linear form" in capsys.readouterr().err

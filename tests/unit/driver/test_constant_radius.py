@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from activesteer.driver import ConstantRadiusDriver, OpenLoopDriver, SpeedHold
-from activesteer.signals import Measurement, Motion, Reference
+from activesteer.signals import Measurement, Motion, Setpoint
 from tests.unit.driver.drives import DRIVE, parameters
 
 RATIO, WHEELBASE_M, LOCK_RAD, SPEED_MPS, STEP_S = 16.0, 2.6, 8.0, 15.0, 0.001
@@ -23,8 +23,8 @@ def turning(curvature_1pm: float, speed_mps: float = SPEED_MPS) -> Measurement:
     return Measurement(0.0, speed_mps, curvature_1pm * speed_mps, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
 
 
-def asked(curvature_1pm: float | None) -> Reference:
-    return Reference(0.5, SPEED_MPS, 0.0, True, curvature_1pm)
+def asked(curvature_1pm: float | None) -> Setpoint:
+    return Setpoint(0.5, SPEED_MPS, 0.0, True, curvature_1pm)
 
 
 @pytest.mark.parametrize("curvature_1pm", [0.01, -0.02])

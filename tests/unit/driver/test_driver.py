@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from activesteer.driver import OpenLoopDriver, SpeedHold
-from activesteer.signals import Measurement, Motion, Reference
+from activesteer.signals import Measurement, Motion, Setpoint
 from tests.unit.driver.drives import DRIVE, parameters
 
 MASS_KG, RADIUS_M = 1400.0, 0.31
@@ -80,7 +80,7 @@ def test_reset_forgets_the_trim():
 
 
 def test_driver_turns_the_steering_wheel_as_asked():
-    command = driver().step(Reference(0.8, 20.0, 0.0, True), at(20.0), MOTION)
+    command = driver().step(Setpoint(0.8, 20.0, 0.0, True), at(20.0), MOTION)
     assert command.steering_wheel_demand_rad == 0.8
     assert command.front_steer_demand_rad == pytest.approx(0.05)
     assert command.brake_pedal == 0.0
@@ -88,17 +88,17 @@ def test_driver_turns_the_steering_wheel_as_asked():
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_steering_wheel_stops_at_its_lock(side):
-    command = driver().step(Reference(side * 9.0, 20.0, 0.0, True), at(20.0), MOTION)
+    command = driver().step(Setpoint(side * 9.0, 20.0, 0.0, True), at(20.0), MOTION)
     assert command.steering_wheel_demand_rad == side * 8.0
     assert command.front_steer_demand_rad == side * 0.5
     assert command.saturated
-    assert not driver().step(Reference(side * 7.0, 20.0, 0.0, True), at(20.0), MOTION).saturated
+    assert not driver().step(Setpoint(side * 7.0, 20.0, 0.0, True), at(20.0), MOTION).saturated
 
 
 def test_driver_holds_speed_only_where_asked_and_presses_the_brake():
     asked = driver()
-    assert asked.step(Reference(0.0, 21.0, 0.0, True), at(20.0), MOTION).drive_torque_demand_Nm > 0.0
-    command = asked.step(Reference(0.0, 21.0, 0.6, False), at(20.0), MOTION)
+    assert asked.step(Setpoint(0.0, 21.0, 0.0, True), at(20.0), MOTION).drive_torque_demand_Nm > 0.0
+    command = asked.step(Setpoint(0.0, 21.0, 0.6, False), at(20.0), MOTION)
     assert command.drive_torque_demand_Nm == 0.0
     assert command.brake_pedal == 0.6
 
@@ -106,9 +106,9 @@ def test_driver_holds_speed_only_where_asked_and_presses_the_brake():
 def test_driver_starts_anew_after_braking():
     used = driver()
     for _ in range(3000):
-        used.step(Reference(0.0, 21.0, 0.0, True), at(20.5), MOTION)
-    used.step(Reference(0.0, 21.0, 0.6, False), at(20.0), MOTION)
-    held = Reference(0.0, 20.0, 0.0, True)
+        used.step(Setpoint(0.0, 21.0, 0.0, True), at(20.5), MOTION)
+    used.step(Setpoint(0.0, 21.0, 0.6, False), at(20.0), MOTION)
+    held = Setpoint(0.0, 20.0, 0.0, True)
     assert (
         used.step(held, at(19.9), MOTION).drive_torque_demand_Nm
         == driver().step(held, at(19.9), MOTION).drive_torque_demand_Nm
@@ -118,7 +118,7 @@ def test_driver_starts_anew_after_braking():
 def test_reversing_car_is_driven_backwards_and_braked_forwards_by_the_engine():
     assert speed_hold().step(-10.0, at(0.0)) == -1900.0
     assert 0.0 < speed_hold().step(-1.0, at(-10.0)) <= 350.0
-    assert driver().step(Reference(0.0, -10.0, 0.0, True), at(0.0), MOTION).gear == -1
+    assert driver().step(Setpoint(0.0, -10.0, 0.0, True), at(0.0), MOTION).gear == -1
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from activesteer.driver import DriverParameters, OpenLoopDriver, PathPreviewDriver, SpeedHold
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, steering_gains
 from activesteer.road.path import Path
-from activesteer.signals import DriverCommand, Measurement, Motion, Reference
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from tests.unit.driver.drives import DRIVE
 from tests.unit.driver.drives import parameters as somebody
 
@@ -41,7 +41,7 @@ def seen(y_m: float = 0.0, yaw_rad: float = 0.0, speed_mps: float = 22.0, x_m: f
 def command_of(block: PathPreviewDriver, motion: Motion, path: Path = STRAIGHT) -> DriverCommand:
     speed_mps = motion.speed_mps
     sensed = Measurement(0.0, speed_mps, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
-    return block.step(Reference(0.0, speed_mps, 0.0, hold_speed=True, path=path), sensed, motion)
+    return block.step(Setpoint(0.0, speed_mps, 0.0, hold_speed=True, path=path), sensed, motion)
 
 
 def answer_to(block: PathPreviewDriver, motion: Motion, seconds: float) -> list[float]:

@@ -32,16 +32,16 @@ def maneuver(**keys: Any) -> BrakeInTurn:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_wheel_is_turned_and_held_and_then_the_brake_is_pressed(side):
     asked = maneuver(turn={"rate_degps": 60, "steering_wheel_deg": side * 48})
-    wheel = [math.degrees(asked.reference(t).steering_wheel_demand_rad) for t in (0.0, 0.5, 0.9, 1.3, 6.5, 9.5)]
+    wheel = [math.degrees(asked.setpoint(t).steering_wheel_demand_rad) for t in (0.0, 0.5, 0.9, 1.3, 6.5, 9.5)]
     assert wheel == pytest.approx([0.0, 0.0, side * 24.0, side * 48.0, side * 48.0, side * 48.0], abs=1e-9)
-    pedal = [asked.reference(t).brake_pedal for t in (0.0, 5.999, 6.1, 6.2, 9.5)]
+    pedal = [asked.setpoint(t).brake_pedal for t in (0.0, 5.999, 6.1, 6.2, 9.5)]
     assert pedal == pytest.approx([0.0, 0.0, 0.2, 0.4, 0.4])
 
 
 def test_throttle_is_released_with_the_brake():
-    assert maneuver().reference(5.999).hold_speed
-    assert not maneuver().reference(6.0).hold_speed
-    assert maneuver().settling_reference().steering_wheel_demand_rad == 0.0
+    assert maneuver().setpoint(5.999).hold_speed
+    assert not maneuver().setpoint(6.0).hold_speed
+    assert maneuver().settling_setpoint().steering_wheel_demand_rad == 0.0
 
 
 def test_aim_asks_for_the_search_of_the_step_steer():
@@ -55,7 +55,7 @@ def test_aim_asks_for_the_search_of_the_step_steer():
     found = search.accept(0.8)
     assert isinstance(found, BrakeInTurn)
     assert found.search is None
-    assert found.reference(5.0).steering_wheel_demand_rad == pytest.approx(0.8)
+    assert found.setpoint(5.0).steering_wheel_demand_rad == pytest.approx(0.8)
     assert found.turn.lateral_acceleration_mps2 == 5.0
 
 

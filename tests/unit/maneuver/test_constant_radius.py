@@ -26,8 +26,7 @@ def circle(**keys: Any) -> ConstantRadius:
 def test_curvature_rises_smoothly_to_that_of_the_circle(radius_m):
     maneuver = circle(radius_m=radius_m, entry_s=4.0)
     asked = (
-        np.array([maneuver.reference(time_s).curvature_demand_1pm for time_s in np.linspace(0.0, 10.0, 1001)])
-        * radius_m
+        np.array([maneuver.setpoint(time_s).curvature_demand_1pm for time_s in np.linspace(0.0, 10.0, 1001)]) * radius_m
     )
     assert asked[0] == 0.0
     assert asked[400:] == pytest.approx(1.0)
@@ -38,11 +37,11 @@ def test_curvature_rises_smoothly_to_that_of_the_circle(radius_m):
 def test_speed_rises_after_the_entry_and_stops_at_its_end():
     maneuver = circle(entry_s=4.0, acceleration_mps2=0.5, end_speed_mps=16.0)
     for time_s, speed_mps in {0.0: 6.0, 4.0: 6.0, 14.0: 11.0, 24.0: 16.0, 50.0: 16.0}.items():
-        assert maneuver.reference(time_s).speed_demand_mps == pytest.approx(speed_mps)
+        assert maneuver.setpoint(time_s).speed_demand_mps == pytest.approx(speed_mps)
 
 
 def test_car_settles_straight_ahead():
-    assert circle().settling_reference().curvature_demand_1pm == 0.0
+    assert circle().settling_setpoint().curvature_demand_1pm == 0.0
 
 
 @pytest.mark.parametrize(

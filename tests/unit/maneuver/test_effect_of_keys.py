@@ -23,7 +23,7 @@ NUMBERS = (0.0, 0.05, 0.3, 0.7, 1.0, 1.7, 3.1, 5.0, 12.0, 33.0, 61.0)
 
 
 def seen(maneuver: Maneuver) -> str:
-    """All that driver and wheels will meet: references over time, friction where the car drives, path, lanes, cones."""
+    """All that driver and wheels will meet: setpoints over time, friction where the car drives, path, lanes, cones."""
     times = np.linspace(0.0, maneuver.duration_s, 300)
     search = maneuver.search
     if search is not None:
@@ -34,7 +34,7 @@ def seen(maneuver: Maneuver) -> str:
         for y in (-2.0, 2.0):
             inside = [area.mu for area in road.areas() if _inside(area, x, y)]
             frictions.append(inside[-1] if inside else road.mu)
-    met: list[Any] = [[maneuver.reference(time) for time in times], maneuver.settling_reference(), maneuver.settle_s]
+    met: list[Any] = [[maneuver.setpoint(time) for time in times], maneuver.settling_setpoint(), maneuver.settle_s]
     met += [maneuver.duration_s, maneuver.speed_mps, frictions, road.grade]
     met += [None if course is None else course.to_table()]
     met += [None if search is None else [search.lateral_acceleration_mps2, search.accept(1.0), search.probe]]

@@ -104,13 +104,13 @@ def test_course_is_the_same_every_time():
 
 def test_driver_is_asked_for_speed_and_path_and_while_the_car_settles_for_speed_only():
     maneuver = change()
-    reference = maneuver.reference(3.0)
-    assert reference.path is maneuver.course.path
-    assert reference._replace(path=None) == maneuver.settling_reference()
-    assert reference.speed_demand_mps == pytest.approx(80.0 / 3.6)
-    assert reference.hold_speed
-    assert reference.steering_wheel_demand_rad == 0.0
-    assert reference.curvature_demand_1pm is None
+    setpoint = maneuver.setpoint(3.0)
+    assert setpoint.path is maneuver.course.path
+    assert setpoint._replace(path=None) == maneuver.settling_setpoint()
+    assert setpoint.speed_demand_mps == pytest.approx(80.0 / 3.6)
+    assert setpoint.hold_speed
+    assert setpoint.steering_wheel_demand_rad == 0.0
+    assert setpoint.curvature_demand_1pm is None
 
 
 def test_lanes_are_made_for_the_car_unless_the_file_says_otherwise():

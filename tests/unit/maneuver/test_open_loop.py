@@ -22,16 +22,16 @@ def open_loop(**keys: Any) -> OpenLoop:
 
 
 def test_nothing_is_asked_but_the_speed_where_no_table_is_given():
-    reference = open_loop().reference(2.0)
-    assert (reference.steering_wheel_demand_rad, reference.speed_demand_mps, reference.brake_pedal) == (0.0, 10.0, 0.0)
-    assert reference.hold_speed
+    setpoint = open_loop().setpoint(2.0)
+    assert (setpoint.steering_wheel_demand_rad, setpoint.speed_demand_mps, setpoint.brake_pedal) == (0.0, 10.0, 0.0)
+    assert setpoint.hold_speed
 
 
 def test_tables_are_linear_between_their_times_and_constant_outside():
     maneuver = open_loop(hold_last=True, steering={"time_s": [1.0, 2.0, 4.0], "steering_wheel_deg": [0.0, 90.0, -90.0]})
     asked = {0.0: 0.0, 1.0: 0.0, 1.5: 45.0, 2.0: 90.0, 3.0: 0.0, 4.0: -90.0, 9.0: -90.0}
     for time_s, angle_deg in asked.items():
-        assert math.degrees(maneuver.reference(time_s).steering_wheel_demand_rad) == pytest.approx(angle_deg, abs=1e-12)
+        assert math.degrees(maneuver.setpoint(time_s).steering_wheel_demand_rad) == pytest.approx(angle_deg, abs=1e-12)
 
 
 SHORT = {"time_s": [0.0, 4.9], "steering_wheel_deg": [0.0, 90.0]}
@@ -51,21 +51,21 @@ def test_table_that_ends_before_the_manoeuvre_is_not_prolonged_without_a_word(ke
 
 
 def test_table_of_one_time_is_constant():
-    assert open_loop(brake={"time_s": [0.0], "pedal": [0.4]}).reference(3.0).brake_pedal == 0.4
+    assert open_loop(brake={"time_s": [0.0], "pedal": [0.4]}).setpoint(3.0).brake_pedal == 0.4
 
 
 def test_drive_is_off_while_the_brake_is_pressed():
     maneuver = open_loop(brake={"time_s": [1.0, 1.5, 2.0], "pedal": [0.0, 0.5, 0.0]})
-    assert [maneuver.reference(time_s).hold_speed for time_s in (1.0, 1.25, 1.5, 2.0)] == [True, False, False, True]
+    assert [maneuver.setpoint(time_s).hold_speed for time_s in (1.0, 1.25, 1.5, 2.0)] == [True, False, False, True]
 
 
 def test_coasting_car_is_not_driven():
-    assert not open_loop(drive="coast").reference(1.0).hold_speed
+    assert not open_loop(drive="coast").setpoint(1.0).hold_speed
 
 
 def test_speed_follows_its_table():
     maneuver = open_loop(speed={"time_s": [1.0, 3.0], "speed_kmh": [36.0, 72.0]})
-    assert [maneuver.reference(time_s).speed_demand_mps for time_s in (0.0, 2.0, 4.0)] == pytest.approx(
+    assert [maneuver.setpoint(time_s).speed_demand_mps for time_s in (0.0, 2.0, 4.0)] == pytest.approx(
         [10.0, 15.0, 20.0]
     )
 

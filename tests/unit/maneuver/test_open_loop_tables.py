@@ -32,7 +32,7 @@ def maneuver(path: Path) -> OpenLoop:
 
 def test_a_steering_csv_is_found_beside_the_file_and_kept_with_the_run(tmp_path: Path) -> None:
     path = write(tmp_path, 'steering_csv = "wheel.csv"\n', wheel="time_s,steering_wheel_rad,note\n0,0,1\n1,0.5,2\n")
-    assert maneuver(path).reference(0.5).steering_wheel_demand_rad == pytest.approx(0.25)
+    assert maneuver(path).setpoint(0.5).steering_wheel_demand_rad == pytest.approx(0.25)
     scenario = resolve(path)
     assert "tables/wheel.csv" in scenario.files
     # From a recording's table alone, without the file, the same comes out.
@@ -55,8 +55,8 @@ def test_a_csv_that_ends_before_the_manoeuvre_is_not_prolonged_without_a_word(
 
 def test_a_rack_column_asks_for_the_rack_not_the_wheel(tmp_path: Path) -> None:
     path = write(tmp_path, 'steering_csv = "rack.csv"\n', rack="time_s,rack_m\n0,0\n0.2,0.002\n")
-    reference = maneuver(path).reference(0.1)
-    assert reference.rack_demand_m == pytest.approx(0.001)
+    setpoint = maneuver(path).setpoint(0.1)
+    assert setpoint.rack_demand_m == pytest.approx(0.001)
     run = simulate(path, vehicle="sedan")
     assert run["rack_m"][-1] == pytest.approx(0.002, rel=1e-3)
     assert run["yaw_rate_radps"][-1] > 0.05  # positive steers left

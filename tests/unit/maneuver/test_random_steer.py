@@ -26,7 +26,7 @@ def steering(**keys: Any) -> RandomSteer:
 
 
 def angles_deg(maneuver: RandomSteer) -> np.ndarray:
-    return np.degrees([maneuver.reference(time_s).steering_wheel_demand_rad for time_s in TIME_S])
+    return np.degrees([maneuver.setpoint(time_s).steering_wheel_demand_rad for time_s in TIME_S])
 
 
 def test_begins_straight_ahead_and_has_its_root_mean_square():

@@ -25,7 +25,7 @@ def sweep(**keys: Any) -> SineSweep:
 
 
 def angles_deg(maneuver: SineSweep) -> np.ndarray:
-    return np.degrees([maneuver.reference(time_s).steering_wheel_demand_rad for time_s in TIME_S])
+    return np.degrees([maneuver.setpoint(time_s).steering_wheel_demand_rad for time_s in TIME_S])
 
 
 def test_begins_and_ends_straight_ahead_and_reaches_its_amplitude():

@@ -12,7 +12,7 @@ from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import SineWithDwell, build_maneuver
 from activesteer.maneuver.slowly_increasing_steer import RampAngle
-from activesteer.signals import Reference
+from activesteer.signals import Setpoint
 from tests.raising import raises
 
 SOURCE = Source("my_dwell.toml", error=ManeuverError)
@@ -28,7 +28,7 @@ def dwell(**keys: Any) -> SineWithDwell:
 
 
 def angles_deg(maneuver: SineWithDwell, times_s: Any) -> list[float]:
-    return [math.degrees(maneuver.reference(float(time_s)).steering_wheel_demand_rad) for time_s in times_s]
+    return [math.degrees(maneuver.setpoint(float(time_s)).steering_wheel_demand_rad) for time_s in times_s]
 
 
 @pytest.mark.parametrize(("direction", "sign"), [("left", 1.0), ("right", -1.0)])
@@ -54,10 +54,10 @@ def test_without_dwell_it_is_a_sine():
 
 
 def test_throttle_is_released_when_the_sine_begins():
-    assert dwell().reference(0.499).hold_speed
-    assert not dwell().reference(0.5).hold_speed
-    assert dwell().settling_reference() == Reference(0.0, 80.0 / 3.6, 0.0, hold_speed=True)
-    assert dwell(drive="hold_speed").reference(2.0).hold_speed
+    assert dwell().setpoint(0.499).hold_speed
+    assert not dwell().setpoint(0.5).hold_speed
+    assert dwell().settling_setpoint() == Setpoint(0.0, 80.0 / 3.6, 0.0, hold_speed=True)
+    assert dwell(drive="hold_speed").setpoint(2.0).hold_speed
 
 
 def test_amplitude_by_factor_asks_for_the_ramp_of_fmvss_126():

@@ -26,11 +26,11 @@ def ramp(**steer: Any) -> SlowlyIncreasingSteer:
 def test_steering_wheel_turns_at_the_rate_to_its_end(side):
     maneuver = ramp(start_s=1.0, rate_degps=side * 5.0, end_deg=40.0)
     for time_s, angle_deg in {0.0: 0.0, 1.0: 0.0, 3.0: 10.0, 9.0: 40.0, 15.0: 40.0}.items():
-        assert math.degrees(maneuver.reference(time_s).steering_wheel_demand_rad) == pytest.approx(
+        assert math.degrees(maneuver.setpoint(time_s).steering_wheel_demand_rad) == pytest.approx(
             side * angle_deg, abs=1e-9
         )
-    assert maneuver.reference(15.0).speed_demand_mps == pytest.approx(80 / 3.6)
-    assert maneuver.reference(15.0).hold_speed
+    assert maneuver.setpoint(15.0).speed_demand_mps == pytest.approx(80 / 3.6)
+    assert maneuver.setpoint(15.0).hold_speed
 
 
 @pytest.mark.parametrize(

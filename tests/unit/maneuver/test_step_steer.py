@@ -25,7 +25,7 @@ def step(**keys: Any) -> StepSteer:
 
 
 def angle_deg(maneuver: StepSteer, time_s: float) -> float:
-    return math.degrees(maneuver.reference(time_s).steering_wheel_demand_rad)
+    return math.degrees(maneuver.setpoint(time_s).steering_wheel_demand_rad)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -43,23 +43,23 @@ def test_usual_rate_is_faster_than_iso_7401_asks():
 
 
 def test_speed_is_held_and_the_brake_is_released():
-    reference = step().reference(1.0)
-    assert reference.speed_demand_mps == pytest.approx(80.0 / 3.6)
-    assert reference.hold_speed
-    assert reference.brake_pedal == 0.0
+    setpoint = step().setpoint(1.0)
+    assert setpoint.speed_demand_mps == pytest.approx(80.0 / 3.6)
+    assert setpoint.hold_speed
+    assert setpoint.brake_pedal == 0.0
 
 
 def test_car_settles_straight_ahead_even_if_the_step_comes_at_once():
     maneuver = step(steer={"start_s": 0.0})
-    assert maneuver.settling_reference().steering_wheel_demand_rad == 0.0
-    assert maneuver.settling_reference().speed_demand_mps == maneuver.speed_mps
+    assert maneuver.settling_setpoint().steering_wheel_demand_rad == 0.0
+    assert maneuver.settling_setpoint().speed_demand_mps == maneuver.speed_mps
 
 
 def test_amplitude_found_by_a_search_keeps_the_aim_on_record():
     aimed = step(steer={"steering_wheel_deg": None, "lateral_acceleration_g": 0.4})
     assert angle_deg(aimed, 2.0) == 0.0
     known = aimed.with_amplitude(0.6)
-    assert known.reference(2.0).steering_wheel_demand_rad == 0.6
+    assert known.setpoint(2.0).steering_wheel_demand_rad == 0.6
     assert known.steer.lateral_acceleration_mps2 == pytest.approx(0.4 * 9.81)
 
 

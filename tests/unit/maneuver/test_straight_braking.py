@@ -24,16 +24,16 @@ def maneuver(**keys: Any) -> StraightBraking:
 
 def test_the_speed_is_held_until_the_brake_is_pressed() -> None:
     asked = maneuver(brake={"start_s": 0.5, "rise_s": 0.2, "pedal": 0.8})
-    pedal = [asked.reference(time_s).brake_pedal for time_s in (0.0, 0.5, 0.6, 0.7, 6.0)]
+    pedal = [asked.setpoint(time_s).brake_pedal for time_s in (0.0, 0.5, 0.6, 0.7, 6.0)]
     assert pedal == pytest.approx([0.0, 0.0, 0.4, 0.8, 0.8])
-    assert [asked.reference(time_s).hold_speed for time_s in (0.0, 0.499, 0.5, 6.0)] == [True, True, False, False]
+    assert [asked.setpoint(time_s).hold_speed for time_s in (0.0, 0.499, 0.5, 6.0)] == [True, True, False, False]
 
 
 def test_the_line_is_straight_and_long_enough() -> None:
     asked = maneuver()
     assert asked.course is not None
     path = asked.course.path
-    assert path is asked.reference(1.0).path
+    assert path is asked.setpoint(1.0).path
     assert not np.any(path.y_m)
     assert path.x_m[-1] == pytest.approx(100 / 3.6 * 6.0)
 
@@ -41,7 +41,7 @@ def test_the_line_is_straight_and_long_enough() -> None:
 def test_without_a_line_the_steering_wheel_is_held() -> None:
     asked = maneuver(hold_line=False)
     assert asked.course is None
-    assert (asked.reference(1.0).path, asked.reference(1.0).steering_wheel_demand_rad) == (None, 0.0)
+    assert (asked.setpoint(1.0).path, asked.setpoint(1.0).steering_wheel_demand_rad) == (None, 0.0)
 
 
 @pytest.mark.parametrize(

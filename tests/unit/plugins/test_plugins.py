@@ -214,7 +214,7 @@ class Robot:
     def __init__(self, angle_rad: float = 0.5) -> None:
         self.angle_rad = angle_rad
 
-    def step(self, reference: Any, measurement: Any, motion: Any) -> DriverCommand:
+    def step(self, setpoint: Any, measurement: Any, motion: Any) -> DriverCommand:
         assert math.hypot(motion.x_m, motion.y_m) < 10.0
         return DriverCommand(self.angle_rad if measurement.time_s > 0.1 else 0.0, brake_pedal=0.1)
 
@@ -237,8 +237,8 @@ def test_driver_on_a_path_is_given_the_path():
         def __init__(self) -> None:
             self.paths: set[int] = set()
 
-        def step(self, reference: Any, measurement: Any, motion: Any) -> DriverCommand:
-            assert (reference.path is None) == (measurement.time_s < -1e-9)
+        def step(self, setpoint: Any, measurement: Any, motion: Any) -> DriverCommand:
+            assert (setpoint.path is None) == (measurement.time_s < -1e-9)
             return DriverCommand()
 
     simulate("double_lane_change", driver=Follower, overrides={"settle_s": 0.05})
@@ -259,14 +259,14 @@ def test_driver_on_a_path_is_given_the_path():
     ],
 )
 def test_nonsense_of_a_driver_is_answered(write, expression, value, allowed):
-    path = write(f"class Mine:\n    def step(self, reference, measurement, motion):\n        return {expression}\n")
+    path = write(f"class Mine:\n    def step(self, setpoint, measurement, motion):\n        return {expression}\n")
     with raises(DriverError, key=f"driver {path}:Mine", allowed=allowed) as refused:
         simulate("step_steer", driver=f"{path}:Mine", overrides=SHORT)
     assert repr(refused.value.value) == value
 
 
 def test_error_in_the_step_of_a_driver_is_answered_with_its_line(write):
-    path = write("class Mine:\n    def step(self, reference, measurement, motion):\n        return 1 / 0\n")
+    path = write("class Mine:\n    def step(self, setpoint, measurement, motion):\n        return 1 / 0\n")
     with raises(DriverError, cause=ZeroDivisionError, key=f"driver {path}:Mine") as refused:
         simulate("step_steer", driver=f"{path}:Mine", overrides=SHORT)
     assert "mine.py, line 5" in refused.value.problem

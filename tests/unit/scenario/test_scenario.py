@@ -105,7 +105,7 @@ def test_overrides_may_come_from_numpy():
 
 def test_override_replaces_a_whole_table():
     scenario = resolve("standstill", overrides={"brake": {"time_s": [0.0], "pedal": [0.5]}})
-    assert scenario.maneuver.reference(0.0).brake_pedal == 0.5
+    assert scenario.maneuver.setpoint(0.0).brake_pedal == 0.5
 
 
 @pytest.mark.parametrize(

@@ -160,7 +160,7 @@ def test_what_is_seen_from_outside() -> None:
     assert simulation.time_s == 0.8
     assert measurement.time_s == pytest.approx(0.8)
     assert simulation.motion.speed_mps == pytest.approx(80 / 3.6, rel=0.02)
-    assert simulation.reference == simulation.scenario.maneuver.reference(simulation.time_s)
+    assert simulation.setpoint == simulation.scenario.maneuver.setpoint(simulation.time_s)
     assert "Simulation" in activesteer.__all__
 
 
@@ -239,7 +239,7 @@ def test_given_what_the_blocks_would_say_it_is_the_same_run() -> None:
     driver, controller = alone.loop.driver, alone.loop.controller
     shadow = made().loop
     while not outside.done:
-        command = shadow.driver.step(outside.reference, outside.measurement, outside.motion)
+        command = shadow.driver.step(outside.setpoint, outside.measurement, outside.motion)
         outside.step(command, shadow.controller.step(command, outside.measurement))
     alone.run()
     assert (driver, controller) == (alone.loop.driver, alone.loop.controller)

@@ -74,10 +74,10 @@ def test_throttle_is_released_two_metres_into_the_entry_lane(side):
     changes = {"lane.throttle_off_m": 2.0, "lane.side": side, "speed_kmh": 36.0}
     maneuver = resolve("severe_lane_change", overrides=changes).maneuver
     off_s = (30.0 + 2.0) / 10.0
-    assert maneuver.reference(off_s - 1e-6).hold_speed
-    assert not maneuver.reference(off_s + 1e-6).hold_speed
-    assert maneuver.reference(off_s + 1e-6).path is maneuver.reference(0.0).path
-    assert resolve("severe_lane_change").maneuver.reference(off_s + 1e-6).hold_speed
+    assert maneuver.setpoint(off_s - 1e-6).hold_speed
+    assert not maneuver.setpoint(off_s + 1e-6).hold_speed
+    assert maneuver.setpoint(off_s + 1e-6).path is maneuver.setpoint(0.0).path
+    assert resolve("severe_lane_change").maneuver.setpoint(off_s + 1e-6).hold_speed
 
 
 @pytest.mark.slow
