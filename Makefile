@@ -17,9 +17,10 @@ demo: $(READY)  ## the paper's scenarios with three steering systems: scorecard,
 	$(BIN)/activesteer reproduce --figures -o demo
 
 test: MARK := -m "not slow"
-test: $(READY_DEV) pictures  ## lint, types, module borders, every test that is not slow, and what a step costs
+test: $(READY_DEV) pictures  ## lint, types, module borders, every test that is not slow, and both benchmarks
 	$(MAKE) --no-print-directory -j2 lint pytest MARK='$(MARK)'
 	$(BIN)/activesteer bench --rounds 2
+	$(BIN)/activesteer bench --maneuvers
 
 test-all: $(READY_DEV) pictures  ## the same with the slow tests
 	$(MAKE) --no-print-directory -j2 lint pytest

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any, Final
+from typing import Any
 
-from activesteer.commands.arguments import add_json
+from activesteer.commands.arguments import add_json, add_output
 from activesteer.commands.output import print_json
 from activesteer.errors import ParameterError
 
@@ -20,7 +20,13 @@ def add_to(commands: Any) -> None:
     )
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--tyre", action="store_true", help="what a tyre's evaluation costs instead")
-    what.add_argument("--maneuvers", action="store_true", help="the paper's scenarios instead, and their key metrics")
+    what.add_argument(
+        "--maneuvers", action="store_true",
+        help="drive the paper's scenarios instead and compare their key metrics with the stored baseline; "
+        "exit with 1 if one has drifted",
+    )  # fmt: skip
+    parser.add_argument("--renew", action="store_true", help="with --maneuvers: store the metrics as the new baseline")
+    add_output(parser, "SUMMARY.md", "with --maneuvers: write a summary in Markdown")
     add_json(parser)
     parser.add_argument("--rounds", type=int, metavar="N", help="the best of N counts (default: 5)")
     parser.set_defaults(action=_bench)
@@ -31,10 +37,13 @@ def _bench(options: argparse.Namespace) -> int:
 
     if options.rounds is not None and options.rounds < 1:
         raise ParameterError(f"--rounds {options.rounds}: at least 1 is needed")
+    for key, given in (("--renew", options.renew), ("--output", options.output is not None)):
+        if given and not options.maneuvers:
+            raise ParameterError("has an effect with --maneuvers only", key=key)
     if options.maneuvers and options.rounds:
         raise ParameterError("has no effect with --maneuvers: each is driven once", key="--rounds")
     if options.maneuvers:
-        return _maneuvers(as_json=options.json)
+        return _maneuvers(options)
     results = (bench_tyre if options.tyre else bench)(options.rounds or 5)
     if options.json:
         print_json(results)
@@ -44,31 +53,34 @@ def _bench(options: argparse.Namespace) -> int:
     return 0
 
 
-_KEY_METRICS: Final = (
-    "yaw_rate_peak_radps", "sideslip_peak_rad", "ay_peak_mps2", "yaw_rate_ratio_1_00_s", "yaw_rate_ratio_1_75_s",
-    "after_last_gate_yaw_rate_rms_radps", "after_last_gate_sideslip_rms_rad", "lane_overstep_m",
-)  # fmt: skip
-
-
-def _maneuvers(*, as_json: bool) -> int:
+def _maneuvers(options: argparse.Namespace) -> int:
     from activesteer.analysis.tables import comparison
-    from activesteer.studies.benchmark import bench_maneuvers
+    from activesteer.files import write_text
+    from activesteer.studies import maneuver_benchmark as benchmark
 
-    rows = bench_maneuvers()
-    if as_json:
-        print_json({"runs": rows})
-        return 0
-    for name in dict.fromkeys(row["maneuver"] for row in rows):
-        runs = {row["controller"]: row for row in rows if row["maneuver"] == name}
-        factors = ", ".join(f"{system} {row['real_time_factor']:.1f}" for system, row in runs.items())
-        print(f"{name}: times real time: {factors}")
-        print(
-            comparison(
-                {
-                    system: {metric: row["metrics"][metric] for metric in _KEY_METRICS if metric in row["metrics"]}
-                    for system, row in runs.items()
-                }
-            )
-        )
+    baseline = {} if options.renew else benchmark.read_baseline()
+    found = benchmark.bench_maneuvers()
+    if options.renew:
+        baseline = found.key_metrics()
+        benchmark.write_baseline(found)
+    drifts = benchmark.drifts(found, baseline)
+    if options.output is not None:
+        write_text(options.output, benchmark.as_markdown(found, drifts), ParameterError)
+    if options.json:
+        print_json(benchmark.as_json(found, drifts))
+        return 1 if drifts else 0
+    for name in dict.fromkeys(run.maneuver for run in found.runs):
+        runs = {run.controller: run for run in found.runs if run.maneuver == name}
+        factors = ", ".join(f"{system} {run.real_time_factor:.0f}" for system, run in runs.items())
+        search = benchmark.search_told(found, name)
+        print(f"{name}: {factors} times real time" + (f"; {search}" if search else ""))
+        print(comparison({system: run.metrics for system, run in runs.items()}))
         print()
-    return 0
+    print(f"peak memory {found.peak_memory_B / 1e6:.0f} MB")
+    if options.renew:
+        print(f"renewed {benchmark.BASELINE}")
+    for drift in drifts:
+        print(drift)
+    checked = sum(len(run.metrics) for run in found.runs)
+    print(f"{checked - len(drifts)} of {checked} key metrics are as in the baseline")
+    return 1 if drifts else 0

@@ -11,12 +11,11 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import mujoco
 import numpy as np
 
-from activesteer.analysis.claims import SCENARIOS, SYSTEMS
 from activesteer.scenario import Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.simulation.closed_loop import ClosedLoop
@@ -104,34 +103,6 @@ def bench(rounds: int = _ROUNDS) -> dict[str, float]:
     best["threads_2_speedup"] = best["closed_loop_step_us"] / best.pop("two_threads_step_us")
     best["step_steers_per_min"] = _runs_per_min()
     return best | _blocks(scenario)
-
-
-def bench_maneuvers() -> list[dict[str, Any]]:
-    """Drives the paper's scenarios with its three systems, without files, one after the other in this process.
-
-    Returns:
-        For each run `maneuver`, `controller`, `simulated_s` (the settling before the recording included), `wall_s`
-        (everything from building the car to the metrics), `real_time_factor`, and `metrics`.
-    """
-    rows = []
-    for name in SCENARIOS:
-        scenario = prepared(resolve(name))
-        for system in SYSTEMS:
-            start = time.perf_counter()
-            recording = run_scenario(scenario, system)
-            wall_s = time.perf_counter() - start
-            simulated_s = scenario.maneuver.settle_s + scenario.maneuver.duration_s
-            rows.append(
-                {
-                    "maneuver": name,
-                    "controller": system,
-                    "simulated_s": simulated_s,
-                    "wall_s": wall_s,
-                    "real_time_factor": simulated_s / wall_s,
-                    "metrics": recording.metrics,
-                }
-            )
-    return rows
 
 
 def _interleaved(stages: dict[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
