@@ -23,10 +23,10 @@ def add_to(commands: Any) -> None:
 
 def _list(options: argparse.Namespace) -> int:
     from activesteer import resources
-    from activesteer.controllers import BUILT_IN, read_variant
+    from activesteer.controllers import CONTROLLERS, read_variant
     from activesteer.standards.catalogue import STANDARDS
 
-    controllers = {name: (made_from.__doc__ or "").splitlines()[0] for name, made_from in BUILT_IN.items()}
+    controllers = {name: (made_from.__doc__ or "").splitlines()[0] for name, made_from in CONTROLLERS.items()}
     controllers |= {name: read_variant(name).title for name in resources.list_controller_variants()}
     found = {
         "manoeuvres": _titles(resources.list_maneuvers(), resources.find_maneuver),

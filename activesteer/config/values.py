@@ -18,7 +18,7 @@ _MAX_TEXT: Final = 1000
 """Longest text [characters]."""
 
 
-def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence[str] = ()) -> T:
+def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence[str] = (), base: Any = None) -> T:
     """Makes a dataclass from a table.
 
     Args:
@@ -26,6 +26,7 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
         table: Keys and values; edge units are converted.
         source: For error messages.
         path: Keys that lead to this table.
+        base: Object whose values fill the keys that are missing and have no default in the class.
 
     Returns:
         The dataclass.
@@ -44,11 +45,14 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
         if name in values:
             first = next(other for other in table if field_in_unit(other, fields)[0] == name)
             raise source.fail(where, f"{first} and {key} are the same in two units; give one of them")
-        values[name] = _convert(hints[name], raw, factor, source, where)
+        values[name] = _convert(hints[name], raw, factor, source, where, _default_of(fields[name]))
     for name, field in fields.items():
         if name in values or field.default is not dataclasses.MISSING:
             continue
         if field.default_factory is not dataclasses.MISSING:
+            continue
+        if base is not None:
+            values[name] = getattr(base, name)
             continue
         raise source.fail((*path, name), f"the key {' or '.join(spellings(name))} is missing")
     try:
@@ -57,8 +61,15 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
         raise source.placed(path, reason) from reason
 
 
-def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[str]) -> Any:
-    """One value, checked against its type hint."""
+def _default_of(field: dataclasses.Field[Any]) -> Any:
+    """Default of a field, or None."""
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return None if field.default is dataclasses.MISSING else field.default
+
+
+def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[str], base: Any = None) -> Any:
+    """One value, checked against its type hint; `base` as in `build`, for a table."""
     limits = Range()
     if typing.get_origin(hint) is typing.Annotated:
         hint, *notes = typing.get_args(hint)
@@ -67,12 +78,12 @@ def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[
         if raw is None:
             return None
         hint = next(option for option in typing.get_args(hint) if option is not type(None))
-        return _convert(typing.Annotated[hint, limits], raw, factor, source, path)
+        return _convert(typing.Annotated[hint, limits], raw, factor, source, path, base)
     origin = typing.get_origin(hint)
     if isinstance(hint, type) and dataclasses.is_dataclass(hint):
         if not isinstance(raw, Mapping):
             raise source.fail(path, f"{shown(raw)} is no table; a table [{'.'.join(path)}] is needed", raw)
-        return build(hint, raw, source, path)
+        return build(hint, raw, source, path, base)
     if origin is dict:
         if not isinstance(raw, Mapping):
             raise source.fail(path, f"{shown(raw)} is no table", raw)

@@ -1,8 +1,6 @@
-"""Active steering controllers: DriverCommand, Measurement -> ActuatorCommand."""
+"""Active steering controllers: DriverCommand and Measurement to ActuatorCommand."""
 
-from activesteer.controllers.front_superposition import FrontSuperposition
-from activesteer.controllers.loading import (
-    BUILT_IN,
+from activesteer.controllers.find import (
     CONTROLLER,
     Controller,
     find_controller,
@@ -11,15 +9,17 @@ from activesteer.controllers.loading import (
     load_controller,
     system_of,
 )
+from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
+from activesteer.controllers.registry import CONTROLLERS
 from activesteer.controllers.variant import read_variant
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
 __all__ = [
-    "BUILT_IN",
     "CONTROLLER",
+    "CONTROLLERS",
     "Controller",
     "ControllerParameters",
     "ControllerSetup",

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from activesteer.controllers.family_parameters import EscParameters
+from activesteer.controllers.file_gains import EscParameters
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.turn_reference import TurnReference
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
@@ -34,6 +34,7 @@ class Esc:
 
     interval_s = 0.005
     reads = ("esc", "estimator")
+    gains = EscParameters
 
     def __init__(
         self,

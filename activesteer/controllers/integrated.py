@@ -41,6 +41,7 @@ import numpy as np
 
 from activesteer.controllers.axle_slopes import AxleSlopes
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
+from activesteer.controllers.file_gains import IntegratedParameters
 from activesteer.controllers.lqr import Lqr, Turn
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.quadratic_programme import solver
@@ -57,6 +58,7 @@ class Integrated:
 
     interval_s = 0.005
     reads = (*Lqr.reads, "integrated")
+    gains = IntegratedParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Makes the controller of one run.

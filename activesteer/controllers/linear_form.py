@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.controllers.loading import is_variant, system_of
+from activesteer.controllers.find import is_variant, system_of
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup, CorrectorParameters
 from activesteer.controllers.variant import read_variant
 from activesteer.conventions import Array

@@ -49,7 +49,7 @@ import numpy as np
 from activesteer.controllers.axle_slopes import AxleSlopes
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
 from activesteer.controllers.esc import brake_levers
-from activesteer.controllers.family_parameters import LqrParameters
+from activesteer.controllers.file_gains import LqrParameters
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.turn_reference import TurnReference
 from activesteer.conventions import Array
@@ -93,6 +93,7 @@ class Lqr:
 
     interval_s = 0.005
     reads = ("lqr", "servos", "estimator")
+    gains = LqrParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Makes the controller of one run.

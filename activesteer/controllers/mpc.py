@@ -35,7 +35,7 @@ import numpy as np
 
 from activesteer.controllers.axle_slopes import AxleSlopes
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
-from activesteer.controllers.family_parameters import MpcParameters
+from activesteer.controllers.file_gains import MpcParameters
 from activesteer.controllers.lqr import steady_turn
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.quadratic_programme import solver
@@ -81,6 +81,7 @@ class Mpc:
 
     interval_s = 0.01
     reads = ("mpc", "servos", "estimator")
+    gains = MpcParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Makes the controller of one run.

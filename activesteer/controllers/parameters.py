@@ -1,19 +1,20 @@
-"""Gains and limits of the controllers; keys of the table [controllers] in a vehicle file."""
+"""Gains and limits of the controllers: keys of the table [controllers] in a vehicle file."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from activesteer.config import Range
-from activesteer.controllers.family_parameters import (
+from activesteer.controllers.file_gains import (
     EscParameters,
     IntegratedParameters,
     LqrParameters,
     MpcParameters,
-    ServoParameters,
     SideslipRearSteerParameters,
+    file_gains,
 )
 from activesteer.errors import ControllerError
 from activesteer.estimation import EstimatorParameters, EstimatorSetup
@@ -23,16 +24,19 @@ if TYPE_CHECKING:
     from activesteer.estimation.estimator import Estimator
 
 _NotNegative = Annotated[float, Range(0.0)]
+_Limit = Annotated[float, Range(0.0, math.radians(10.0))]
+_Rate = Annotated[float, Range(0.01, 100.0)]
+_Lag = Annotated[float, Range(0.001, 1.0)]
 
 
 @dataclass(frozen=True)
 class DesiredYawRateParameters:
-    """How the driver's demand becomes a desired yaw rate (eqs. 3 and 6)."""
+    """Desired yaw rate for the driver's demand (eqs. 3 and 6)."""
 
     max_lateral_acceleration_mps2: Annotated[float, Range(0.1, 20.0)] = 8.0
-    """a_y_max: the desired yaw rate stays below a_y_max / v. It is what the controllers assume that the road gives,
-    whatever road it is: nobody tells them its friction [m/s2]."""
-    delay_s: Annotated[float, Range(0.001, 1.0)] = 0.06
+    """a_y_max: the desired yaw rate stays below a_y_max / v. The controllers assume this value on every road, because
+    they do not know its friction [m/s2]."""
+    delay_s: _Lag = 0.06
     """Time constant of the delay element: a car cannot follow a sudden change [s]."""
 
 
@@ -43,14 +47,14 @@ class CorrectorParameters:
     deadband_start_radps: _NotNegative = math.radians(0.5)
     """c_off: below this error there is no action [rad/s]."""
     deadband_end_radps: _NotNegative = math.radians(2.0)
-    """c_in: above this error the action is full [rad/s]."""
+    """c_in: above this error there is full action [rad/s]."""
     proportional_gain_s: _NotNegative = 0.25
     """Steer angle per yaw rate error [rad/(rad/s)]."""
     integral_gain: _NotNegative = 0.0
     """Steer angle per integrated yaw rate error [rad/rad]."""
     derivative_gain_s2: _NotNegative = 0.0
-    """Steer angle per change of the yaw rate error [rad/(rad/s2)]."""
-    derivative_filter_s: Annotated[float, Range(0.001, 1.0)] = 0.02
+    """Steer angle per rate of change of the yaw rate error [rad/(rad/s2)]."""
+    derivative_filter_s: _Lag = 0.02
     """Time constant of the filter of the D part [s]."""
 
 
@@ -61,9 +65,9 @@ class RearSteerParameters:
     corrector: CorrectorParameters = CorrectorParameters()
     """Feedback of the yaw rate."""
     prediction_gain: Annotated[float, Range(0.0, 2.0)] = 1.0
-    """Fraction of the predicted rear angle that is used; 1 is the zero-sideslip feed-forward of eq. 5 [-]."""
-    limit_rad: Annotated[float, Range(0.0, math.radians(10.0))] = math.radians(3.0)
-    """Most rear angle demanded [rad]."""
+    """Fraction of the predicted rear angle that is used; 1 is the zero-sideslip feedforward of eq. 5 [-]."""
+    limit_rad: _Limit = math.radians(3.0)
+    """Largest rear angle demanded [rad]."""
 
 
 @dataclass(frozen=True)
@@ -72,51 +76,74 @@ class FrontSuperpositionParameters:
 
     corrector: CorrectorParameters = CorrectorParameters()
     """Feedback of the yaw rate."""
-    limit_rad: Annotated[float, Range(0.0, math.radians(10.0))] = math.radians(3.0)
-    """Most angle added at the road wheels [rad]."""
+    limit_rad: _Limit = math.radians(3.0)
+    """Largest angle added at the road wheels [rad]."""
+
+
+@dataclass(frozen=True)
+class ServoParameters:
+    """The actuators of both axles as `lqr`, `integrated` and `mpc` know them; angles at the road wheels."""
+
+    lag_s: _Lag = 0.025
+    """Lag of both actuators [s]."""
+    rear_limit_rad: _Limit = math.radians(3.0)
+    """Largest rear angle [rad]."""
+    rear_rate_radps: _Rate = math.radians(28.0)
+    """Rate of the rear steering [rad/s]."""
+    superposition_limit_rad: _Limit = math.radians(3.0)
+    """Largest superposition angle [rad]."""
+    superposition_rate_radps: _Rate = math.radians(29.0)
+    """Rate of the superposition [rad/s]."""
 
 
 @dataclass(frozen=True)
 class ControllerParameters:
-    """Parameters of all controllers of a vehicle file."""
+    """Parameters of all controllers of a vehicle file.
+
+    The files in `models/controllers` give what the vehicle file leaves out of `ars_sideslip`, `lqr`, `esc`,
+    `integrated` and `mpc`.
+    """
 
     desired_yaw_rate: DesiredYawRateParameters = DesiredYawRateParameters()
-    """What both systems steer for."""
+    """Desired yaw rate of the paper's controllers."""
     ars: RearSteerParameters = RearSteerParameters()
     """Active rear steering."""
     afs: FrontSuperpositionParameters = FrontSuperpositionParameters()
     """Active front steering."""
     servos: ServoParameters = ServoParameters()
-    """What controllers beyond the paper's know of the actuators of both axles."""
-    ars_sideslip: SideslipRearSteerParameters = SideslipRearSteerParameters()
+    """The actuators as controllers beyond the paper's know them."""
+    ars_sideslip: SideslipRearSteerParameters = field(
+        default_factory=partial(file_gains, "ars_sideslip", SideslipRearSteerParameters)
+    )
     """Rear steering with a sideslip term."""
-    lqr: LqrParameters = LqrParameters()
+    lqr: LqrParameters = field(default_factory=partial(file_gains, "lqr", LqrParameters))
     """Both axles together."""
-    esc: EscParameters = EscParameters()
+    esc: EscParameters = field(default_factory=partial(file_gains, "esc", EscParameters))
     """Single brakes."""
-    integrated: IntegratedParameters = IntegratedParameters()
+    integrated: IntegratedParameters = field(default_factory=partial(file_gains, "integrated", IntegratedParameters))
     """Steering and brakes together."""
-    mpc: MpcParameters = MpcParameters()
+    mpc: MpcParameters = field(default_factory=partial(file_gains, "mpc", MpcParameters))
     """Both axles within an envelope."""
     estimator: EstimatorParameters = EstimatorParameters()
-    """Speed, sideslip and friction, for controllers that ask for them."""
+    """Speed, sideslip and friction, for controllers that use an estimator."""
     interval_s: Annotated[float, Range(1e-4, 0.1)] | None = None
-    """Time between two calls of a controller, whole steps; its own `interval_s`, else every step, if not given [s]."""
+    """Time between two calls of a controller, in whole steps of the simulation [s]. Default: the controller's own
+    `interval_s`, or every step."""
     bus_delay_s: Annotated[float, Range(0.0, 0.1)] = 0.0
-    """How long a command takes to the actuators, whole steps [s]."""
+    """Delay of a command on its way to the actuators, in whole steps of the simulation [s]."""
 
 
 @dataclass(frozen=True)
 class ControllerSetup:
-    """What a controller gets when it is made.
+    """Input from which a controller is made.
 
     Attributes:
-        single_track: The car as a single-track model sees it.
+        single_track: The car as a single-track model.
         gains: Gains and limits from the vehicle file.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
         timestep_s: Time between two calls [s].
-        overridden: Dotted keys of the gains that were replaced for this run.
-        estimation: What an estimator knows of the car; None where its file has no table [two_track].
+        overridden: Dotted keys of the gains that were overridden for this run.
+        estimation: The car as an estimator knows it; None if its file has no table [two_track].
     """
 
     single_track: SingleTrackParameters
@@ -127,10 +154,10 @@ class ControllerSetup:
     estimation: EstimatorSetup | None = None
 
     def estimator(self) -> Estimator:
-        """Makes an estimator of speed, sideslip, yaw rate and friction, to be called in each step of the controller.
+        """Make an estimator of speed, sideslip, yaw rate and friction, to be called in each step of the controller.
 
         Raises:
-            ControllerError: the vehicle file does not say what it needs.
+            ControllerError: the vehicle file lacks the table [two_track].
         """
         if self.estimation is None:
             raise ControllerError(

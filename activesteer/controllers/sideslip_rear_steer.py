@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
+from activesteer.controllers.file_gains import SideslipRearSteerParameters
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
@@ -25,6 +26,7 @@ class SideslipRearSteer:
 
     interval_s = 0.005
     reads = (*RearSteer.reads, "ars_sideslip", "estimator")
+    gains = SideslipRearSteerParameters
 
     def __init__(self, paper: RearSteer, estimator: Estimator, sideslip_gain: float, limit_rad: float) -> None:
         """Makes the controller of one run.

@@ -2,8 +2,8 @@
 
 from activesteer.driver.base import Driver, DriverSetup
 from activesteer.driver.constant_radius import ConstantRadiusDriver
+from activesteer.driver.find import DRIVER, find_driver, is_driver_file
 from activesteer.driver.human import HumanDriver
-from activesteer.driver.loading import DRIVER, find_driver, is_driver_file
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
 from activesteer.driver.path_preview import PathPreviewDriver

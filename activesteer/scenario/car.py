@@ -40,7 +40,7 @@ class VehicleConfig(VehicleParameters):
     """The car as the controllers see it."""
     two_track: TwoTrackParameters | None = None
     """What estimators know beyond that; without it there are none."""
-    controllers: ControllerParameters = ControllerParameters()
+    controllers: ControllerParameters = field(default_factory=ControllerParameters)
     """Gains and limits."""
     KEY_HINTS: ClassVar = VehicleParameters.KEY_HINTS | {"driver": _DRIVER_HINT}
 

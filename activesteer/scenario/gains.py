@@ -7,9 +7,8 @@ from dataclasses import fields
 from typing import Any, Final
 
 from activesteer.config import field_path
-from activesteer.controllers import BUILT_IN, ControllerParameters, find_controller, keys_read
+from activesteer.controllers import CONTROLLER, ControllerParameters, find_controller, keys_read
 from activesteer.errors import ParameterError
-from activesteer.resources import list_controller_variants
 
 _KEYS: Final = frozenset(field.name for field in fields(ControllerParameters))
 
@@ -48,7 +47,9 @@ def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> Non
         ParameterError: one is not; what is allowed are the keys that they read.
     """
     for key, names in unread_gains(overrides, controllers).items():
-        readers = [name for name in (*BUILT_IN, *list_controller_variants()) if names & keys_read(name)]
+        readers = [
+            name for name in CONTROLLER.names() if names & keys_read(name)
+        ]
         driving = " and ".join(find_controller(given).label for given in controllers)
         allowed = [f"controllers.{name}" for name in sorted(frozenset[str]().union(*map(keys_read, controllers)))]
         verb = "reads" if len(controllers) == 1 else "read"

@@ -12,7 +12,7 @@ import activesteer
 
 PACKAGE = Path(activesteer.__file__).parent
 PUBLIC = (
-    "activesteer.controllers.loading.Controller",
+    "activesteer.controllers.find.Controller",
     "activesteer.driver.base.Driver",
     "activesteer.maneuver.base.Maneuver",
     "activesteer.recording.recording.Recording",

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from activesteer.controllers import load_controller
-from activesteer.controllers.family_parameters import LqrParameters, ServoParameters
+from activesteer.controllers import ControllerParameters, load_controller
 from activesteer.controllers.lqr import SPEEDS_MPS, STATES, Lqr, feedback, model, schedule, steady_turn
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.scenario import resolve
@@ -17,7 +17,7 @@ from activesteer.theory.single_track import SingleTrack
 from tests.unit.controllers.cars import CAR, held, measured, steering
 
 INTERVAL_S = 0.005
-PARAMETERS, LAG_S = LqrParameters(), ServoParameters().lag_s
+PARAMETERS, LAG_S = ControllerParameters().lqr, ControllerParameters().servos.lag_s
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_what_does_not_work_is_not_asked():
 
 def test_model_without_lags_is_the_single_track_model():
     speed_mps = 25.0
-    quick = LqrParameters(relaxation_length_m=0.01)
+    quick = replace(PARAMETERS, relaxation_length_m=0.01)
     a, b = model(CAR, quick, 0.001, speed_mps, INTERVAL_S)
     state, angles = np.zeros(len(STATES)), np.array([0.01, 0.004])
     for _ in range(2000):

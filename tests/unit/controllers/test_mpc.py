@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.controllers import load_controller
+from activesteer.controllers import ControllerParameters, load_controller
 from activesteer.controllers.axle_slopes import AxleSlopes
-from activesteer.controllers.family_parameters import MpcParameters, ServoParameters
 from activesteer.controllers.lqr import steady_turn
 from activesteer.controllers.mpc import GIVEN, STATES, envelope_problem, model
 from activesteer.controllers.quadratic_programme import solver
@@ -19,7 +18,7 @@ from tests.unit.controllers.cars import CAR, held, measured, steering
 
 pytest.importorskip("daqp")
 INTERVAL_S, SPEED_MPS = 0.01, 25.0
-PARAMETERS, LAG_S = MpcParameters(), ServoParameters().lag_s
+PARAMETERS, LAG_S = ControllerParameters().mpc, ControllerParameters().servos.lag_s
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from activesteer.controllers import load_controller
-from activesteer.controllers.family_parameters import ServoParameters
+from activesteer.controllers.parameters import ServoParameters
 from activesteer.resources import list_vehicles
 from activesteer.scenario import resolve
 from tests.unit.controllers.cars import measured, steering

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from activesteer.controllers import BUILT_IN, ControllerParameters, find_controller, keys_read
+from activesteer.controllers import CONTROLLERS, ControllerParameters, find_controller, keys_read
 from activesteer.controllers.variant import Variant
 from activesteer.errors import ParameterError
 from activesteer.resources import list_controller_variants
@@ -28,7 +28,7 @@ class Asked:
         return getattr(self.gains, name)
 
 
-@pytest.mark.parametrize("name", [*BUILT_IN, *list_controller_variants()])
+@pytest.mark.parametrize("name", sorted({*CONTROLLERS, *list_controller_variants()}))
 def test_controller_says_what_it_reads(name, monkeypatch):
     setup = resolve("straight_line").controller_setup(0.01)
     asked = Asked(setup.gains)

@@ -10,17 +10,15 @@ import pytest
 
 from activesteer.config import Range
 from activesteer.controllers import (
-    BUILT_IN,
     CONTROLLER,
+    CONTROLLERS,
     FrontSuperposition,
     NoControl,
     RearSteer,
     find_controller,
     load_controller,
-    read_variant,
 )
 from activesteer.errors import ControllerError
-from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
@@ -53,7 +51,7 @@ def returning(write):
 @pytest.mark.parametrize(("name", "kind"), [("none", NoControl), ("ars", RearSteer), ("afs", FrontSuperposition)])
 def test_built_in_controllers_are_found_by_name(name, kind):
     assert type(load_controller(name, setup())) is kind
-    assert BUILT_IN[name] is kind
+    assert CONTROLLERS[name] is kind
 
 
 def test_users_controller_is_made_and_asked(write):
@@ -252,9 +250,3 @@ def test_controllers_are_told_what_sensors_measure_and_nothing_else():
         "wheel_torques",
         "parking_brake",
     }
-
-
-@pytest.mark.parametrize("name", ["ars_sideslip", "lqr", "esc", "integrated", "mpc"])
-def test_file_of_a_controller_says_what_stands_in_the_code(name):
-    gains = resolve("straight_line").controller_setup(0.001).gains
-    assert read_variant(name).gains_in(setup(gains=gains)) == gains

@@ -1,4 +1,4 @@
-"""Controllers by name, or a user's own."""
+"""Find a controller by name, or a user's own."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ from dataclasses import dataclass, fields
 from typing import Any, Final, Protocol
 
 from activesteer.config import Range
-from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.no_control import NoControl
-from activesteer.controllers.observer import Observer
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
-from activesteer.controllers.rear_steer import RearSteer
+from activesteer.controllers.registry import WITHOUT_FILE
 from activesteer.controllers.variant import read_variant
 from activesteer.errors import ControllerError, shown
 from activesteer.plugins import Kind, Plugin, find
@@ -19,7 +17,7 @@ from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estim
 
 
 class Controller(Protocol):
-    """What a controller must have: one method, called once every step of the simulation.
+    """Interface of a controller: one method, called once every step of the simulation.
 
     Example:
         >>> import activesteer
@@ -36,31 +34,28 @@ class Controller(Protocol):
     """
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """What to ask of the actuators in the next step."""
+        """Return the command to the actuators for the next step."""
         ...
 
 
-BUILT_IN: Final = {"none": NoControl, "observer": Observer, "ars": RearSteer, "afs": FrontSuperposition}
-"""Name -> class, which says as `reads` what keys of the table [controllers] it reads; variants are data: `variant`."""
-
 _UNIT_READS: Final = frozenset(("interval_s", "bus_delay_s"))
-"""Keys of the table [controllers] that decide when a command is made and when it arrives."""
+"""Keys of the table [controllers] that set the time of a command and of its arrival."""
 
 _MAX_ANGLE_RAD: Final = 1.0
-"""No road wheel is steered further by a controller; more is taken for a mistake, such as degrees [rad]."""
+"""Largest angle of a command; a larger one is taken for a mistake, such as degrees [rad]."""
 
 _MAX_TORQUE_NM: Final = 1e5
-"""No brake gives so much, and no engine has so much to be taken back [N m]."""
+"""Largest torque of a command: more than any brake or engine has [N m]."""
 _MAX_PRESSURE_PA: Final = 1e8
-"""No brake gets so much [Pa]."""
+"""Largest pressure difference of a command: more than any brake gets [Pa]."""
 
 
 @dataclass(frozen=True)
 class _ControllerKind(Kind):
-    """Controllers; their brake torques are four numbers in one field."""
+    """Controllers, whose brake torques are four numbers in one field."""
 
     def completed(self, command: Any, name: str, setup: Any, said: str) -> ActuatorCommand:
-        """A command as it may be carried out; see the base class."""
+        """Return a command whose other fields are checked too; see the base class."""
         torques = command.brake_torque_demand_Nm
         if torques is not NO_BRAKES and not _are_torques(torques):
             needed = f"four finite torques of at most {_MAX_TORQUE_NM:g} Nm, fl fr rl rr, are needed"
@@ -68,7 +63,7 @@ class _ControllerKind(Kind):
         if command.estimate is not None and not isinstance(command.estimate, Estimate):
             problem = f"{said} estimate = {shown(command.estimate)}; an activesteer.Estimate is needed"
             raise self.fail(name, problem, command.estimate, Estimate)
-        # A list or an array is as good, but the native step takes a tuple.
+        # A list or an array is allowed, but the native step takes a tuple.
         return command if isinstance(torques, tuple) else command._replace(brake_torque_demand_Nm=tuple(torques))
 
 
@@ -84,7 +79,7 @@ CONTROLLER: Final = _ControllerKind(
     word="controller",
     example="my_file.py:MyController",
     inputs="command, measurement",
-    built_in=BUILT_IN,
+    built_in=WITHOUT_FILE,
     result=ActuatorCommand,
     ranges={
         "rear_steer_demand_rad": Range(-_MAX_ANGLE_RAD, _MAX_ANGLE_RAD),
@@ -96,14 +91,14 @@ CONTROLLER: Final = _ControllerKind(
     unchecked=("brake_torque_demand_Nm", "estimate"),
     data=list_controller_variants,
 )
-"""What controllers have in common."""
+"""Rules that all controllers follow."""
 
 
 def find_controller(given: Any) -> Plugin:
-    """Finds a controller; see `activesteer.plugins.find`.
+    """Find a controller; see `activesteer.plugins.find`.
 
     Args:
-        given: `none`, `observer`, `ars`, `afs`; the name of a variant, or its file; or a user's own code:
+        given: Name of a controller or variant, or path of a variant file; or a user's own code:
             `path/to/file.py:ClassName`, a class, an object, a factory.
 
     Raises:
@@ -116,17 +111,19 @@ def find_controller(given: Any) -> Plugin:
 
 
 def is_variant(given: Any) -> bool:
-    """Whether a controller is given as data, by the name of a variant or by its file."""
+    """Return whether a controller is given as data: by the name of a variant or by its file."""
     return CONTROLLER.is_data(given)
 
 
 def system_of(given: str) -> str:
-    """The system that a controller is or is a variant of; a user's own code is its own."""
+    """Return the name of the registered controller behind a variant; other names stay as they are."""
     return read_variant(given).system if is_variant(given) else given
 
 
 def keys_read(given: Any) -> frozenset[str]:
-    """Keys of the table [controllers] that a controller and its control unit read; a user's own code may read all.
+    """Return the keys of the table [controllers] that a controller and its control unit read.
+
+    A user's own code may read all of them.
 
     Args:
         given: See `find_controller`.
@@ -138,14 +135,14 @@ def keys_read(given: Any) -> frozenset[str]:
 
 
 def load_controller(given: Any, setup: ControllerSetup) -> Controller:
-    """Finds and makes a controller.
+    """Find and make a controller.
 
     Args:
         given: See `find_controller`.
         setup: What the controller may know of the car.
 
     Returns:
-        The controller; a user's own inside one that explains what goes wrong in it.
+        The controller; a user's own is wrapped so that its errors name file and class.
 
     Raises:
         ControllerError: there is no such controller, or it cannot be made.

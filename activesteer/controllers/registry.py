@@ -1,0 +1,39 @@
+"""The controllers that come with the package.
+
+A registered class has the method `step` of `Controller` and the classmethod `from_vehicle`, which makes it from a
+`ControllerSetup`. Its attributes say
+
+    reads        keys of the table [controllers] that it reads
+    interval_s   time between two calls [s]; every step of the simulation if absent
+    gains        dataclass of its own table, whose values are those of `models/controllers/NAME.toml`;
+                 absent if the vehicle file gives all gains
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from activesteer.controllers.esc import Esc
+from activesteer.controllers.front_superposition import FrontSuperposition
+from activesteer.controllers.integrated import Integrated
+from activesteer.controllers.lqr import Lqr
+from activesteer.controllers.mpc import Mpc
+from activesteer.controllers.no_control import NoControl
+from activesteer.controllers.observer import Observer
+from activesteer.controllers.rear_steer import RearSteer
+from activesteer.controllers.sideslip_rear_steer import SideslipRearSteer
+
+CONTROLLERS: Final[dict[str, type[Any]]] = {
+    "none": NoControl,
+    "observer": Observer,
+    "ars": RearSteer,
+    "afs": FrontSuperposition,
+    "ars_sideslip": SideslipRearSteer,
+    "esc": Esc,
+    "lqr": Lqr,
+    "mpc": Mpc,
+    "integrated": Integrated,
+}
+"""Name -> class."""
+WITHOUT_FILE: Final = {name: kind for name, kind in CONTROLLERS.items() if not hasattr(kind, "gains")}
+"""Those whose gains the vehicle file gives."""
