@@ -101,8 +101,8 @@ def read_variant(given: str | os.PathLike[str]) -> Variant:
     table, source = read_toml(path, ControllerError)
     known = build(VariantFile, {"name": path.stem, **table}, source)
     if known.system not in CONTROLLERS:
-        help_ = nearest_names(known.system, CONTROLLERS)
-        raise source.fail(("system",), f"there is no controller {shown(known.system)}; {help_}", known.system, list(CONTROLLERS))
+        problem = f"there is no controller {shown(known.system)}; {nearest_names(known.system, CONTROLLERS)}"
+        raise source.fail(("system",), problem, known.system, list(CONTROLLERS))
     gains = {key: value for key, value in table.items() if key not in _OWN_KEYS}
     if not gains:
         raise source.fail((), f"nothing differs from {known.system}; give gains, as [{known.system}] limit_deg = 2")
