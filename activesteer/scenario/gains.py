@@ -47,9 +47,7 @@ def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> Non
         ParameterError: one is not; what is allowed are the keys that they read.
     """
     for key, names in unread_gains(overrides, controllers).items():
-        readers = [
-            name for name in CONTROLLER.names() if names & keys_read(name)
-        ]
+        readers = [name for name in CONTROLLER.names() if names & keys_read(name)]
         driving = " and ".join(find_controller(given).label for given in controllers)
         allowed = [f"controllers.{name}" for name in sorted(frozenset[str]().union(*map(keys_read, controllers)))]
         verb = "reads" if len(controllers) == 1 else "read"
