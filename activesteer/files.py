@@ -24,6 +24,9 @@ MAX_TEXT_BYTES: Final = 2_000_000
 """Longest text file that is read as an input, unless said otherwise; those of the package have some 20 kB."""
 MAX_CSV_BYTES: Final = 10_000_000
 """Longest CSV; an hour of samples every 10 ms has 8 MB."""
+MAX_NUMBER: Final = 1e12
+"""Largest absolute value of a number in a file, in any unit. A larger number describes nothing of a car, and overflows
+in what is computed with it."""
 _passing: Final[set[Path]] = set()
 _DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
@@ -267,6 +270,33 @@ def read_csv(
     except csv.Error as reason:
         raise error(f"no valid CSV: {reason}", file=Path(path).name, line=reader.line_num) from reason
     return rows
+
+
+def csv_number(cell: str, error: type[ActiveSteerError], file: str, line: int, column: str) -> float:
+    """Return the number in a cell of a CSV.
+
+    Args:
+        cell: Text of the cell.
+        error: Class of the error to raise.
+        file: Name of the file.
+        line: Line of the cell, from 1.
+        column: Name of its column.
+
+    Raises:
+        ActiveSteerError: the cell holds no finite number, or one above `MAX_NUMBER`; of class `error`.
+    """
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise error(f"{shown(cell)} is not a finite number", file=file, line=line, key=column, value=cell)
+    if abs(value) > MAX_NUMBER:
+        raise error(
+            f"is {value:g}; the largest number allowed in a file is {MAX_NUMBER:g}", file=file, line=line, key=column,
+            value=cell, allowed=MAX_NUMBER,
+        )  # fmt: skip
+    return value
 
 
 def make_folder(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import add_json, add_output, add_workers
-from activesteer.commands.output import print_entry, print_json
+from activesteer.commands.output import print_entry, print_json, print_notes
 from activesteer.commands.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def _fit(options: argparse.Namespace) -> int:
         from activesteer.measured.fit_page import write_fit
 
         files = write_fit(found, Path(options.study).stem, options.output)
+    print_notes(found.notes)
     if options.json:
         print_json(found.to_json())
         return 0
@@ -62,8 +63,6 @@ def _fit(options: argparse.Namespace) -> int:
     print(f"{found.rounds} rounds, {found.runs} runs; what is left is {found.misfit:.3g} times the noise")
     for line in rests_on(found)[:1]:
         print_entry("", line, hanging=0)
-    for note in found.notes:
-        print_entry("! ", note)
     for path in files:
         print(path)
     return 0

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.commands.arguments import add_json, add_output, add_vehicle
-from activesteer.commands.output import print_entry, print_json
+from activesteer.commands.output import print_entry, print_json, print_notes
 from activesteer.errors import ParameterError
 
 
@@ -30,12 +30,13 @@ def add_to(commands: Any) -> None:
 def _import(options: argparse.Namespace) -> int:
     from activesteer.measured.importing import import_file
 
-    output = options.output or options.file.with_suffix(".mcap")
-    if output.suffix != ".mcap":
-        raise ParameterError(f"-o {output}: a recording's name ends in .mcap")
+    if options.output is not None and options.output.suffix != ".mcap":
+        raise ParameterError(f"-o {options.output}: the name of a recording ends in .mcap")
+    output = options.output or options.file.parent / f"{options.file.stem}.mcap"
     found = import_file(options.file, options.map, options.vehicle)
     recording = found.recording
     recording.save(output)
+    print_notes(found.notes)
     if options.json:
         step_s = float(recording.time_s[1] - recording.time_s[0])
         print_json({"file": str(output), "rows": len(recording), "step_s": step_s, "channels": found.taken,
@@ -44,6 +45,4 @@ def _import(options: argparse.Namespace) -> int:
     print(f"{output}: {len(recording)} rows, {recording.time_s[0]:.3f} to {recording.time_s[-1]:.3f} s")
     for name, column in found.taken.items():
         print_entry(f"  {name:24} ", column)
-    for note in found.notes:
-        print_entry("! ", note)
     return 0

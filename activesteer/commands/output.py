@@ -7,9 +7,9 @@ import os
 import re
 import sys
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 from activesteer.files import json_text
 
@@ -65,20 +65,27 @@ def coloured(text: str) -> str:
     return _VERDICT.sub(lambda found: f"{found[1]}{painted(found[2], _COLOURS[found[2]])}", text)
 
 
-def print_entry(head: str, text: str, hanging: int = 2) -> None:
-    """Prints a line of 80 columns, or several of which the further ones hang.
+def print_notes(notes: Iterable[str]) -> None:
+    """Print to standard error what is unusual in a result, a note in each line."""
+    for note in notes:
+        print_entry("! ", note, file=sys.stderr)
+
+
+def print_entry(head: str, text: str, hanging: int = 2, file: TextIO | None = None) -> None:
+    """Print a text in lines of 80 columns.
 
     Args:
-        head: What it begins with, kept as it is.
-        text: What follows. It may come from a file of anybody's: what a terminal would obey is written out.
-        hanging: How far the further lines hang.
+        head: Beginning of the first line, printed as it is.
+        text: Text after it. It may come from any file: control characters are printed as escape sequences.
+        hanging: Indent of further lines.
+        file: Where to print; standard output by default.
     """
     plain = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
     lines = textwrap.wrap(
         plain, _COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, break_on_hyphens=False,
         break_long_words=False,
     )  # fmt: skip
-    print("\n".join(lines) or head.rstrip())
+    print("\n".join(lines) or head.rstrip(), file=file)
 
 
 @contextmanager

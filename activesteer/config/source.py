@@ -5,12 +5,10 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from activesteer.errors import ActiveSteerError, ParameterError
-
-MAX_NUMBER: Final = 1e12
-"""Beyond this no number of a file has a meaning, in whatever unit."""
+from activesteer.files import MAX_NUMBER
 
 
 class Range(NamedTuple):

@@ -10,8 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final, TypeVar
 
 from activesteer.config.keys import element_of, field_in_unit, fields_of, hints_of, no_such_key, spellings
-from activesteer.config.source import MAX_NUMBER, Range, Source
+from activesteer.config.source import Range, Source
 from activesteer.errors import ActiveSteerError, shown
+from activesteer.files import MAX_NUMBER
 
 T = TypeVar("T")
 _MAX_TEXT: Final = 1000
@@ -135,9 +136,7 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
     if not finite:
         raise source.fail(path, f"{shown(raw)} is not finite", raw, limits)
     if abs(value) > MAX_NUMBER:
-        raise source.fail(
-            path, f"{shown(raw)} is larger than anything of a car; allowed is at most {MAX_NUMBER:g}", raw, limits
-        )
+        raise source.fail(path, f"is {shown(raw)}; the largest number allowed in a file is {MAX_NUMBER:g}", raw, limits)
     if not limits.low <= value <= limits.high:
         allowed = Range(limits.low / factor, limits.high / factor)
         raise source.fail(path, f"{shown(raw)} is out of range; allowed is {allowed}", raw, allowed)

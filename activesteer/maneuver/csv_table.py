@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from activesteer.config import Source, field_in_unit
 from activesteer.errors import ManeuverError, nearest_names, shown
-from activesteer.files import is_file, read_csv, user_path
+from activesteer.files import csv_number, is_file, read_csv, user_path
 
 
 def find_csv(name: str, own: Path | None, source: Source, key: Sequence[str]) -> Path:
@@ -90,18 +89,11 @@ def read_columns(
                 allowed=(*required, *optional),
             )
     columns: dict[str, list[float]] = {
-        name: [_number(row.cells, place, path.name, row.line, given) * factor for row in rows]
+        name: [
+            csv_number(row.cells[place] if place < len(row.cells) else "", ManeuverError, path.name, row.line, given)
+            * factor
+            for row in rows
+        ]
         for name, (place, given, factor) in places.items()
     }
     return columns, [row.line for row in rows]
-
-
-def _number(cells: Sequence[str], place: int, file: str, line: int, column: str) -> float:
-    text = cells[place] if place < len(cells) else ""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ManeuverError(f"{shown(text)} is not a number", file=file, line=line, key=column, value=text)
-    return value

@@ -12,9 +12,12 @@ import numpy as np
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, shown
 from activesteer.files import shown_path
+from activesteer.recording.contents import MAX_ROWS
 
-_BROKEN: Final = (Exception,)
-"""What bytes of anybody's make the libraries of these formats raise has no bound."""
+MAX_BYTES: Final = 2**30
+"""Largest size of a file that is read whole, decompressed [bytes]."""
+BROKEN: Final = (Exception,)
+"""Exceptions that the libraries of these formats raise for broken files: any."""
 
 
 class Column(NamedTuple):
@@ -31,6 +34,18 @@ class Column(NamedTuple):
     read: Callable[[], tuple[Array, Array | None]]
 
 
+def check_rows(count: int, path: Path) -> None:
+    """Refuse a file by its number of rows, which its metadata tell before the rows are read.
+
+    Raises:
+        RecordingError: there are more than `MAX_ROWS` rows.
+    """
+    if count > MAX_ROWS:
+        raise RecordingError(
+            f"{shown_path(path)} has {count} rows; at most {MAX_ROWS} are allowed", value=count, allowed=MAX_ROWS
+        )
+
+
 @contextmanager
 def understood(path: Path, what: str) -> Iterator[None]:
     """Stands around what reads a file: whatever it raises becomes a RecordingError of one line."""
@@ -38,7 +53,7 @@ def understood(path: Path, what: str) -> Iterator[None]:
         yield
     except RecordingError:
         raise
-    except _BROKEN as reason:
+    except BROKEN as reason:
         raise RecordingError(f"{shown_path(path)} is no {what} that can be read: {reason}", value=path) from reason
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import gc
+import struct
 import sys
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -13,11 +15,14 @@ import numpy as np
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, nearest_names, not_installed, shown
 from activesteer.files import is_file, shown_path, why_no_file
-from activesteer.measured.column import Column, numbers, understood
+from activesteer.measured.column import BROKEN, MAX_BYTES, Column, check_rows, numbers, understood
 from activesteer.measured.csv_columns import csv_columns
 
-_BROKEN: Final = (Exception,)
-"""See `column.understood`."""
+_MAT_HEADER: Final = 128
+"""Length of the header of a MATLAB file of version 5 [bytes]."""
+_MAT_COMPRESSED: Final = 15
+"""Type of a compressed element of a MATLAB file."""
+_PIECE_BYTES: Final = 2**20
 
 
 def read_columns(path: Path) -> list[Column]:
@@ -29,24 +34,29 @@ def read_columns(path: Path) -> list[Column]:
     Raises:
         RecordingError: it cannot be read, or its ending is none of these.
     """
+    if not is_file(path):
+        raise RecordingError(f"cannot read {shown_path(path)}: it {why_no_file(path)}", value=path)
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise RecordingError(
             f"{shown_path(path)}: files of measured data end in {', '.join(_READERS)}", value=path.suffix
         )
-    if not is_file(path):
-        raise RecordingError(f"cannot read {shown_path(path)}: it {why_no_file(path)}", value=path)
-    return _told_apart(reader(path))
+    return _numbered(reader(path))
 
 
-def _told_apart(columns: list[Column]) -> list[Column]:
-    """A name that several columns have, as those of an MDF file may, gets a number behind it from the second on."""
+def _numbered(columns: list[Column]) -> list[Column]:
+    """Append a number to a name from its second column on; files such as MDF may repeat names."""
     seen: dict[str, int] = {}
     found = []
     for column in columns:
         seen[column.name] = count = seen.get(column.name, 0) + 1
         found.append(column if count == 1 else column._replace(name=f"{column.name} ({count})"))
     return found
+
+
+def second_of(name: str) -> str:
+    """Name given to the second column of a name."""
+    return f"{name} (2)"
 
 
 def find(columns: list[Column], name: str, path: Path) -> Column:
@@ -70,14 +80,21 @@ def _in_memory(name: str, unit: str, values: Any, path: Path) -> Column:
 
 
 def _parquet(path: Path) -> list[Column]:
-    from pyarrow import parquet  # noqa: PLC0415 - slow to import
+    import pyarrow as pa  # noqa: PLC0415 - slow to import
+    from pyarrow import parquet  # noqa: PLC0415
 
     with understood(path, "Parquet file"):
         file = parquet.ParquetFile(path)
+        check_rows(file.metadata.num_rows, path)
         fields = list(file.schema_arrow)
 
-    def lazy(name: str) -> Callable[[], tuple[Array, None]]:
+    def lazy(name: str, kind: Any) -> Callable[[], tuple[Array, None]]:
+        kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+
         def read() -> tuple[Array, None]:
+            # A text or a list may be of any length, so that the number of rows would limit nothing.
+            if not (pa.types.is_primitive(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind)):
+                raise RecordingError(f"column {shown(name)} holds no numbers: its type is {kind}", file=path.name)
             with understood(path, "Parquet file"):
                 column = file.read(columns=[name]).column(0).to_numpy()
             return numbers(column, name, path), None
@@ -85,16 +102,22 @@ def _parquet(path: Path) -> list[Column]:
         return read
 
     return [
-        Column(field.name, (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace"), lazy(field.name))
+        Column(
+            field.name,
+            (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace"),
+            lazy(field.name, field.type),
+        )
         for field in fields
     ]
 
 
 def _mat(path: Path) -> list[Column]:
-    from scipy.io import loadmat  # noqa: PLC0415 - slow to import
+    from scipy.io import loadmat, whosmat  # noqa: PLC0415 - slow to import
 
     try:
         with understood(path, "MATLAB file"):
+            _check_mat_size(path)
+            check_rows(max((max(shape, default=0) for _, shape, _ in whosmat(path)), default=0), path)
             variables = loadmat(path, simplify_cells=True)
     except RecordingError as error:
         if isinstance(error.__cause__, NotImplementedError):
@@ -109,6 +132,32 @@ def _mat(path: Path) -> list[Column]:
         for name, values in _flat(variables)
         if not name.startswith(("__", "units.", "metrics.", "meanings."))
     ]
+
+
+def _check_mat_size(path: Path) -> None:
+    """Refuse a MATLAB file that is too large when it is decompressed, without keeping what is decompressed.
+
+    Raises:
+        RecordingError: it has more than `MAX_BYTES`.
+    """
+    left = MAX_BYTES - path.stat().st_size
+    with path.open("rb") as file:
+        order = {b"IM": "<", b"MI": ">"}.get(file.read(_MAT_HEADER)[-2:])
+        while order and left > 0 and len(tag := file.read(8)) == 8:
+            kind, length = struct.unpack(f"{order}II", tag)
+            if kind != _MAT_COMPRESSED:
+                file.seek(length, 1)
+                continue
+            unpacker = zlib.decompressobj()
+            while length > 0 and left > 0 and (packed := file.read(min(length, _PIECE_BYTES))):
+                length -= len(packed)
+                while packed and left > 0:
+                    left -= len(unpacker.decompress(packed, _PIECE_BYTES))
+                    packed = unpacker.unconsumed_tail
+    if left <= 0:
+        raise RecordingError(
+            f"{shown_path(path)} has more than {MAX_BYTES} bytes when decompressed", value=path, allowed=MAX_BYTES
+        )
 
 
 def _flat(table: Mapping[str, Any], start: str = "") -> Iterator[tuple[str, Any]]:
@@ -131,7 +180,7 @@ def _mdf(path: Path) -> list[Column]:
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         file = MDF(path)
-    except _BROKEN as reason:
+    except BROKEN as reason:
         problem = str(reason) or type(reason).__name__
     finally:
         gc.collect()
@@ -139,6 +188,7 @@ def _mdf(path: Path) -> list[Column]:
     if problem:
         raise RecordingError(f"{shown_path(path)} is no MDF file that can be read: {problem}", value=path)
     with understood(path, "MDF file"):
+        check_rows(max((int(group.channel_group.cycles_nr) for group in file.groups), default=0), path)
         places = [
             (channel.name, group, index, str(channel.unit or ""))
             for group, each in enumerate(file.groups)

@@ -15,10 +15,8 @@ import numpy as np
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, shown
 from activesteer.files import read_bytes
-from activesteer.measured.column import Column, numbers, understood
+from activesteer.measured.column import MAX_BYTES, Column, check_rows, numbers, understood
 
-MAX_BYTES: Final = 2**30
-"""Longest file that is read [bytes]."""
 _HEAD_LINES: Final = 200
 """Within so many lines a CSV must begin with its numbers."""
 _NUMBER: Final = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf)", re.IGNORECASE)
@@ -41,6 +39,7 @@ def csv_columns(path: Path) -> list[Column]:
     from pyarrow import csv as arrow  # noqa: PLC0415
 
     data = read_bytes(path, RecordingError, MAX_BYTES)
+    check_rows(max(data.count(b"\n"), data.count(b"\r")), path)
     lines = _text(data).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     head = lines[:_HEAD_LINES]
     first, separator = _first_numbers(head, path)

@@ -12,10 +12,20 @@ from activesteer.analysis.metrics import metrics
 from activesteer.config import field_in_unit
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, nearest_names, shown
-from activesteer.measured.columns import Column, find, read_columns
+from activesteer.files import MAX_NUMBER
+from activesteer.measured.columns import Column, find, read_columns, second_of
 from activesteer.measured.map_file import ChannelMap, MeasurementMap, read_map
 from activesteer.measured.motion import moved_car, with_motion
-from activesteer.measured.names import TURNED_IN_SAE, UNITS, Known, is_time, known_column, si_of, split_unit
+from activesteer.measured.names import (
+    TURNED_IN_SAE,
+    UNITS,
+    Known,
+    before_bracket,
+    is_time,
+    known_column,
+    si_of,
+    split_unit,
+)
 from activesteer.measured.plausibility import suspicions
 from activesteer.measured.resampling import Samples, gaps, resampled, samples
 from activesteer.recording import Recording
@@ -30,6 +40,8 @@ _OWN_UNITS: Final = {
     "_radps": "rad/s", "_rad": "rad", "_mps2": "m/s2", "_mps": "m/s", "_Nm": "Nm", "_N": "N", "_Pa": "Pa", "_m": "m",
     "_s": "s",
 }  # fmt: skip
+_MOST_REPEATED: Final = 5
+"""Number of repeated column names that are listed."""
 _LATEST_S: Final = 1e6
 """Times beyond are those of a calendar, and begin at zero in a recording."""
 
@@ -73,10 +85,17 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
     """
     chosen = read_map(map_path)
     columns = read_columns(path)
+    names = {column.name for column in columns}
+    repeated = [name for name in names if second_of(name) in names]
     car = load_car(vehicle)
     model = car.on(Road())
     table = {channel.name: channel for channel in model.channels.channels}
-    notes: list[str] = []
+    notes = [
+        f"several columns are named {shown(name)}: the first is used; a map can name {shown(second_of(name))}"
+        for name in sorted(repeated)[:_MOST_REPEATED]
+    ]
+    if len(repeated) > _MOST_REPEATED:
+        notes.append(f"{len(repeated) - _MOST_REPEATED} more names stand over several columns each")
     sources = _mapped(chosen, columns, table, path) if chosen.channels else _by_name(columns, table, path, notes)
     shared = _shared_time(columns, chosen, path, needed=any(_own_time(source) is None for source in sources.values()))
     signals = {
@@ -152,6 +171,8 @@ def _by_name(columns: list[Column], table: Mapping[str, Channel], path: Path, no
     for column in columns:
         known = known_column(column.name, names, channels)
         if known is None:
+            if (base := before_bracket(column.name)) and known_column(base, names, channels) is not None:
+                notes.append(f"{shown(column.name)} is left out: its unit is unknown; known are {', '.join(UNITS)}")
             continue
         if known.channel in sources:
             first = sources[known.channel].column.name
@@ -164,8 +185,6 @@ def _by_name(columns: list[Column], table: Mapping[str, Channel], path: Path, no
             unit = _si_unit(known.channel, table)
             if unit and not known.sure:
                 notes.append(f"{column.name} has no unit and is taken for {unit} (a map can say another)")
-        if (second := f"{column.name} (2)") in names:
-            notes.append(f"of several columns {shown(column.name)} the first is taken; a map can take {shown(second)}")
         sources[known.channel] = _Source(column, known._replace(unit=unit), None)
     if not sources:
         some = ", ".join(shown(name) for name in sorted(names)[:8])
@@ -204,7 +223,7 @@ def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, n
     found = si_of(unit)
     if found is None or found[0] != "s":
         raise RecordingError(f"the time has the unit {shown(unit)}; known are s, ms, us", file=path.name, value=unit)
-    return column.read()[0] * found[1]
+    return _plausible(column.read()[0] * found[1], "s", column.name, path)
 
 
 def known_time_unit(name: str) -> str:
@@ -248,7 +267,22 @@ def _signal(
                     f"{column.name} begins at {time_s[0]:g} s, after zero_until_s", key=f"channels.{name}.zero_until_s"
                 )
             values = values - values[early].mean()
-    return Samples(time_s, values * (known.sign * found[1]))
+    return Samples(time_s, _plausible(values * (known.sign * found[1]), wanted, column.name, path))
+
+
+def _plausible(values: Array, unit: str, column: str, path: Path) -> Array:
+    """Return the values if they are small enough for a file.
+
+    Raises:
+        RecordingError: a value is above `MAX_NUMBER`.
+    """
+    if not (np.abs(values[np.isfinite(values)]) <= MAX_NUMBER).all():
+        raise RecordingError(
+            f"column {shown(column)} holds {np.abs(values[np.isfinite(values)]).max():g} {unit}; the largest number "
+            f"allowed in a file is {MAX_NUMBER:g}",
+            file=path.name, allowed=MAX_NUMBER,
+        )  # fmt: skip
+    return values
 
 
 def _bridge_s(chosen: MeasurementMap, signal: Samples) -> float:

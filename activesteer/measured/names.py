@@ -114,6 +114,12 @@ def split_unit(name: str) -> tuple[str, str]:
     return (found[1], found[2]) if found and si_of(found[2]) else (name, "")
 
 
+def before_bracket(name: str) -> str:
+    """Return the part of a column's name before a bracket at its end; empty if there is none."""
+    found = re.fullmatch(r"(.*?)\s*[\[(][^\])]*[\])]\s*", name)
+    return found[1] if found else ""
+
+
 def is_time(name: str) -> bool:
     """Whether a column is called as times are."""
     return name == "time_s" or _word(split_unit(name)[0]) in TIME_WORDS

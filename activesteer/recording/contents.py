@@ -6,11 +6,13 @@ are numbers, and a small file cannot fill memory or time.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from activesteer.errors import RecordingError
+from activesteer.files import MAX_NUMBER
 from activesteer.road.course import course_of
 from activesteer.road.footprint import footprint_of
 from activesteer.road.recorded import fail, table_of, text
@@ -196,6 +198,11 @@ def check_metrics(metrics: Mapping[str, Any]) -> None:
             raise RecordingError(f"metric name {name!r:.{_SHOWN}}: letters, digits and '_', a letter first")
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise RecordingError(f"metric {name!r} is {value!r:.{_SHOWN}}, which is no number", key=name, value=value)
+        if MAX_NUMBER < abs(value) < math.inf:
+            raise RecordingError(
+                f"metric {name!r} is {value:g}; the largest number allowed in a file is {MAX_NUMBER:g}",
+                key=name, value=value, allowed=MAX_NUMBER,
+            )  # fmt: skip
 
 
 def check_names(names: Sequence[Any], what: str, maximum: int) -> None:

@@ -12,6 +12,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from activesteer.errors import RecordingError
+from activesteer.files import MAX_NUMBER
 from activesteer.recording.contents import MAX_FOREIGN_MESSAGES
 from activesteer.recording.encoder import MESSAGE_HEAD, message_record
 from activesteer.recording.format import TRANSFORMS_TOPIC
@@ -30,11 +31,13 @@ class Group(NamedTuple):
 
     Attributes:
         topic: Its name.
+        names: Names of its fields.
         columns: Columns of its fields.
         layout: Layout of its messages.
     """
 
     topic: str
+    names: list[str]
     columns: list[int]
     layout: FixedMessage
 
@@ -115,8 +118,15 @@ class BlockDecoder:
                 row_ns, first = times[:, 0], group.topic
             elif not np.array_equal(times[:, 0], row_ns):
                 raise RecordingError(f"{group.topic} and {first} do not have the same times")
-            values = (run[:, place] for run in runs for place in range(run.shape[1]))
+            values = [run[:, place] for run in runs for place in range(run.shape[1])]
             columns.update(zip(group.columns, values, strict=True))
+            if any(_too_large(run).any() for run in runs):
+                place = next(place for place, column in enumerate(values) if _too_large(column).any())
+                largest = values[place][_too_large(values[place])][0]
+                raise RecordingError(
+                    f"channel {group.names[place]} holds {largest:g}; the largest number allowed in a file is "
+                    f"{MAX_NUMBER:g}"
+                )
         poses = [] if self._transforms_id is None else starts[self._transforms_id]
         _, times, *runs = self._poses.parse(_messages(data, poses, len(self._poses)), TRANSFORMS_TOPIC)
         positions = np.empty((len(poses), len(self.body_names), 3))
@@ -164,6 +174,12 @@ class BlockDecoder:
             return f"a message belongs to topic {number}, which does not exist"
         needed = self._lengths[number] - _RECORD_HEAD
         return f"{self._topics[number]}: a message has {length} bytes in place of {needed}"
+
+
+def _too_large(values: NDArray) -> NDArray[np.bool_]:
+    """Return which values are finite and above `MAX_NUMBER`."""
+    size = np.abs(values)
+    return (size > MAX_NUMBER) & (size < np.inf)
 
 
 def _messages(data: bytes, starts: Sequence[int], length: int) -> NDArray[np.uint8]:

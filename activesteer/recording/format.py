@@ -7,6 +7,7 @@ second, the record of the result, metrics. Values of metadata are JSON text, met
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -14,6 +15,7 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from activesteer.errors import RecordingError
+from activesteer.files import MAX_NUMBER
 from activesteer.recording.contents import check_metadata, check_metrics
 
 FORMAT_VERSION = 1
@@ -59,6 +61,9 @@ def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict
             f"is a {type(metrics).__name__} in place of numbers by name", file="the metadata", key="metrics"
         )
     metrics = {name: value.item() if isinstance(value, np.generic) else value for name, value in metrics.items()}
+    # As in the rows: what is too large for a file is infinite there.
+    metrics |= {name: math.copysign(math.inf, value) for name, value in metrics.items()
+                if isinstance(value, float) and abs(value) > MAX_NUMBER}  # fmt: skip
     check_metrics(metrics)
     for key, value in metadata.items():
         if key == "metrics":

@@ -238,7 +238,7 @@ def _channels(records: Records, topics: Mapping[str, Channel]) -> tuple[ChannelT
                 raise RecordingError(f"channel {field_name!r:.100} has column {column!r:.40}")
             columns.append(column)
             described[column] = SignalChannel(field_name, unit, meaning, name.removeprefix(STATE_TOPIC), single)
-        groups[topic.id] = Group(name, columns, layout)
+        groups[topic.id] = Group(name, names, columns, layout)
     if sorted(described) != list(range(len(described))):
         raise RecordingError("the columns of its channels are not numbered 0, 1, 2 ...")
     return ChannelTable(described[column] for column in sorted(described)), groups

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from activesteer.errors import RecordingError
-from activesteer.files import shown_path
+from activesteer.files import MAX_NUMBER, shown_path
 from activesteer.recording.arrays import nanoseconds, shaped
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.container import McapFile
@@ -176,6 +176,8 @@ class McapWriter:
     ) -> None:
         """Write one block, best about one simulated second. The arrays may be reused as soon as it returns.
 
+        A value above `MAX_NUMBER` is written as infinity of its sign.
+
         Args:
             time_s: Time of each row [s], >= 0, increasing from row to row and from block to block, shape (n,).
             values: Channel values, shape (n, number of channels).
@@ -193,6 +195,8 @@ class McapWriter:
         pose_ns = nanoseconds(pose_time_s, "pose_time_s", self._last_pose_ns)
         rows, poses, bodies = len(row_ns), len(pose_ns), len(self.body_names)
         values = shaped(values, "values", (rows, len(self.channels)))
+        if (huge := np.abs(values) > MAX_NUMBER).any():  # of a run that diverges
+            values = np.where(huge, np.copysign(np.inf, values), values)
         positions = shaped(positions_m, "positions_m", (poses, bodies, 3))
         turns = shaped(quaternions, "quaternions", (poses, bodies, 4))
         self._row_count += rows

@@ -12,7 +12,6 @@ curve that is laid through them. `names.toml` says what a laboratory calls the c
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,7 +24,7 @@ from scipy.interpolate import make_lsq_spline
 from activesteer.config import Source, read_toml
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names, shown
-from activesteer.files import is_file, is_folder, read_csv
+from activesteer.files import MAX_NUMBER, csv_number, is_file, is_folder, read_csv
 from activesteer.rigs.kc.tables import CHANNELS, OF_THE_AXLE, TESTS, UNITS
 
 _HEAD: Final = re.compile(r"(?P<name>[\w ]+?)\s*\[\s*(?P<unit>[\w/]+)\s*\]")
@@ -200,20 +199,10 @@ def _raw_columns(file: Path) -> dict[str, Array]:
                 f"has {len(row.cells)} cells, the first row {len(heads)}", file=file.name, line=row.line
             )
     return {
-        head: np.array([_number(row.cells[index], file, head, row.line) for row in rows[1:]])
+        head: np.array([csv_number(row.cells[index], ParameterError, file.name, row.line, head) for row in rows[1:]])
         for index, head in enumerate(heads)
         if head
     }
-
-
-def _number(cell: str, file: Path, head: str, line: int) -> float:
-    try:
-        number = float(cell)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise ParameterError(f"{shown(cell)} is no finite number", file=file.name, line=line, key=head)
-    return number
 
 
 def _numbers(head: str, values: Any, source: Source) -> Array:
@@ -221,8 +210,8 @@ def _numbers(head: str, values: Any, source: Source) -> Array:
         numbers = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as reason:
         raise source.fail((head,), "holds something that is no number") from reason
-    if numbers.ndim != 1 or not np.isfinite(numbers).all():
-        raise source.fail((head,), "is no list of finite numbers")
+    if numbers.ndim != 1 or not (np.abs(numbers) <= MAX_NUMBER).all():
+        raise source.fail((head,), f"must be a list of finite numbers up to {MAX_NUMBER:g}")
     return numbers
 
 

@@ -23,6 +23,25 @@ def truth():
     return activesteer.simulate(table)
 
 
+@pytest.mark.parametrize("folder", [".", "..", "sub"])
+def test_a_folder_cannot_be_imported(call, tmp_path, folder):
+    (tmp_path / "sub").mkdir()
+    told = call("import", folder)
+    assert (told.status, told.out) == (1, "")
+    assert told.err == f"activesteer: cannot read {folder}: it is a folder\n"
+
+
+def test_what_is_unusual_in_a_file_is_said_on_standard_error(call, tmp_path):
+    rows = "".join(f"{0.01 * row:.2f},0,0,72,1\n" for row in range(100))
+    (tmp_path / "a.csv").write_text("t,yaw rate[rad/s],yaw rate[rad/s],v[km/h],roll[furlong]\n" + rows)
+    for more in ((), ("--json",)):
+        told = call("import", "a.csv", *more)
+        assert told.status == 0
+        assert "several columns are named 'yaw rate[rad/s]': the first is used" in told.err
+        assert "'roll[furlong]' is left out: its unit is unknown" in told.err
+        assert "furlong" not in told.out or more
+
+
 def test_a_run_written_in_degrees_50_ms_late_comes_back_and_is_driven_again(call, tmp_path, truth):
     columns = [truth.time_s + 0.05, *(np.degrees(truth[name]) for name in NAMES.values()), truth["ay_mps2"],
                3.6 * truth["speed_mps"]]  # fmt: skip
@@ -60,7 +79,7 @@ def test_what_cannot_be_compared_or_imported_is_answered(call, truth, tmp_path):
     (tmp_path / "a.csv").write_text("t,yawrate\n0,0\n1,1\n")
     assert "ends in .mcap" in call("import", "a.csv", "-o", "a.txt").err
     told = call("import", "a.csv")
-    assert "yawrate has no unit and is taken for rad/s" in told.out
+    assert "yawrate has no unit and is taken for rad/s" in told.err
     assert "steering_wheel_rad or rack_m is needed" in call("run", "a.mcap").err
 
 

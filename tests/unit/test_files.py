@@ -6,7 +6,16 @@ from pathlib import Path
 import pytest
 
 from activesteer.errors import ParameterError, PlaybackError
-from activesteer.files import delete_passing, make_folder, reading, replacing, shown_path, write_text, writing
+from activesteer.files import (
+    csv_number,
+    delete_passing,
+    make_folder,
+    reading,
+    replacing,
+    shown_path,
+    write_text,
+    writing,
+)
 from tests.raising import raises
 
 
@@ -98,3 +107,11 @@ def test_path_is_shown_without_what_a_terminal_would_obey() -> None:
     assert shown_path("a\x1b[2Jb\nc") == "a\\x1b[2Jb\\nc"
     assert shown_path(os.fsdecode(b"a\xffb")) == "a\\udcffb"
     assert len(shown_path("x" * 5000)) == 200
+
+
+@pytest.mark.parametrize("cell", ["", "x", "nan", "-inf", "1e308", "-1e308", "1.1e12"])
+def test_a_cell_without_a_plausible_number_is_refused(cell: str) -> None:
+    assert csv_number("-1e12", ParameterError, "a.csv", 2, "x_m") == -1e12
+    with raises(ParameterError, file="a.csv", line=2, key="x_m", value=cell) as refused:
+        csv_number(cell, ParameterError, "a.csv", 2, "x_m")
+    assert ("1e+12" in str(refused.value)) is ("e" in cell)

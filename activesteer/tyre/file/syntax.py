@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from activesteer.errors import TyreFileError
-from activesteer.files import read_bytes
+from activesteer.files import MAX_NUMBER, read_bytes
 
 MAX_BYTES = 4_000_000
 """Longest file that is read; real ones have some tens of kilobytes."""
@@ -97,7 +97,8 @@ def parse(text: str, source: str) -> Syntax:
         source: Name of the file, for messages.
 
     Raises:
-        TyreFileError: a line is neither a section, `KEY = value`, a row of numbers, a `{heading}` nor a comment.
+        TyreFileError: a line is neither a section, `KEY = value`, a row of numbers, a `{heading}` nor a comment; or a
+            value is above `MAX_NUMBER`.
     """
     section = ""
     entries: list[Entry] = []
@@ -118,7 +119,13 @@ def parse(text: str, source: str) -> Syntax:
             if not _KEY.match(key):
                 what = repr(key[:60]) if entries else "this"
                 raise TyreFileError(f"{what} is no key, expected KEY = value", file=source, line=count)
-            entries.append(Entry(section, key.upper(), _value(rest), count))
+            value = _value(rest)
+            if isinstance(value, float) and abs(value) > MAX_NUMBER:
+                raise TyreFileError(
+                    f"is {value:g}; the largest number allowed in a file is {MAX_NUMBER:g}", file=source, line=count,
+                    key=key, value=value, allowed=MAX_NUMBER,
+                )  # fmt: skip
+            entries.append(Entry(section, key.upper(), value, count))
             continue
         row = [number(word) for word in line.replace(",", " ").split()]
         if any(value is None for value in row):

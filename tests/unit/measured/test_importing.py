@@ -6,10 +6,13 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
 from scipy.io import savemat
 
 from activesteer.errors import RecordingError
+from activesteer.measured.columns import find, read_columns
 from activesteer.measured.importing import import_file
 from activesteer.measured.plausibility import suspicions
 from activesteer.playback.runs import runs_of
@@ -78,13 +81,78 @@ def test_quotes_words_clocks_and_unicode_text_are_understood(tmp_path, names, ce
     assert recording["speed_mps"][0] == pytest.approx(20.0)
 
 
-def test_of_columns_of_one_name_the_first_is_taken_which_is_said_and_a_map_takes_another(tmp_path):
+def test_first_of_several_columns_with_one_name_is_used_with_a_note_and_a_map_names_another(tmp_path):
     path = write(tmp_path / "a.csv", "t,yawrate,yawrate,v", [TIME_S, RATE_RADPS, 2.0 * RATE_RADPS, SPEED_MPS])
     found = import_file(path)
     check_rate(found.recording, 1.0)
-    assert any("of several columns 'yawrate' the first is taken" in note for note in found.notes)
+    assert any("several columns are named 'yawrate': the first is used" in note for note in found.notes)
     (tmp_path / "map.toml").write_text('[channels]\nyaw_rate_radps = { column = "yawrate (2)" }\n')
     check_rate(import_file(path, tmp_path / "map.toml").recording, 2.0)
+
+
+def test_a_column_with_an_unknown_unit_is_left_out_with_a_note(tmp_path):
+    path = write(tmp_path / "a.csv", "t,yaw_rate[furlong],v[m/s],foo[bar]", [TIME_S, RATE_RADPS, SPEED_MPS, SPEED_MPS])
+    found = import_file(path)
+    assert "yaw_rate_radps" not in found.taken
+    (note,) = found.notes
+    assert note.startswith("'yaw_rate[furlong]' is left out: its unit is unknown; known are rad, deg")
+
+
+@pytest.mark.parametrize("value", [1e308, -1e308, 1.1e12])
+@pytest.mark.parametrize("column", [0, 1])
+def test_a_number_above_the_limit_is_refused_with_the_limit(tmp_path, value, column):
+    columns = [TIME_S.copy(), RATE_RADPS.copy(), SPEED_MPS]
+    columns[column][0 if value < 0.0 else -1] = value
+    with raises(RecordingError, file="a.csv", allowed=1e12) as refused:
+        import_file(write(tmp_path / "a.csv", "time_s,yaw_rate_radps,speed_mps", columns))
+    assert "the largest number allowed in a file is 1e+12" in str(refused.value)
+
+
+def written_by(name: str, path: Path) -> Path:
+    if name == "csv":
+        return write(path, "time_s,yaw_rate_radps", [TIME_S, RATE_RADPS])
+    if name == "mat":
+        savemat(path, {"time_s": TIME_S, "yaw_rate_radps": RATE_RADPS})
+    elif name == "parquet":
+        parquet.write_table(pa.table({"time_s": TIME_S, "yaw_rate_radps": RATE_RADPS}), path)
+    else:
+        asammdf = pytest.importorskip("asammdf")
+        with asammdf.MDF(version="4.10") as file:
+            file.append([asammdf.Signal(RATE_RADPS, TIME_S, name="YawRate", unit="rad/s")])
+            file.save(path, overwrite=True)
+    return path
+
+
+@pytest.mark.parametrize("name", ["csv", "mat", "parquet", "mf4"])
+def test_too_many_rows_are_refused_before_one_is_read(tmp_path, monkeypatch, name):
+    path = written_by(name, tmp_path / f"a.{name}")
+    import_file(path)
+    monkeypatch.setattr("activesteer.measured.column.MAX_ROWS", len(TIME_S) - 1)
+    for reader in ("pyarrow.csv.read_csv", "scipy.io.loadmat", "pyarrow.parquet.ParquetFile.read"):
+        monkeypatch.setattr(reader, lambda *_, **__: pytest.fail("read"))
+    monkeypatch.setattr("activesteer.measured.columns.numbers", lambda *_: pytest.fail("read"))
+    rows = len(TIME_S) + (name == "csv")  # the line of names counts
+    with raises(RecordingError, value=rows, allowed=len(TIME_S) - 1):
+        import_file(path)
+
+
+def test_a_matlab_file_that_grows_beyond_the_limit_is_refused_before_it_is_loaded(tmp_path, monkeypatch):
+    path = tmp_path / "a.mat"
+    savemat(path, {"run": {"x": np.zeros(1_000_000)}}, do_compression=True)
+    assert path.stat().st_size < 10_000
+    monkeypatch.setattr("activesteer.measured.columns.MAX_BYTES", 4_000_000)
+    monkeypatch.setattr("scipy.io.loadmat", lambda *_, **__: pytest.fail("loaded"))
+    with raises(RecordingError, allowed=4_000_000):
+        import_file(path)
+
+
+def test_a_parquet_column_of_texts_is_not_read(tmp_path, monkeypatch):
+    table = pa.table({"time_s": TIME_S, "yaw_rate_radps": ["x" * 1000] * len(TIME_S)})
+    parquet.write_table(table, tmp_path / "a.parquet")
+    monkeypatch.setattr("pyarrow.parquet.ParquetFile.read", lambda *_, **__: pytest.fail("read"))
+    with raises(RecordingError) as refused:
+        find(read_columns(tmp_path / "a.parquet"), "yaw_rate_radps", tmp_path / "a.parquet").read()
+    assert "its type is string" in str(refused.value)
 
 
 def check_rate(recording: Recording, factor: float) -> None:

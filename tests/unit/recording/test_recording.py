@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path, PurePath
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from activesteer.errors import RecordingError
 from activesteer.recording import Link, McapWriter, Poses, Primitive, Recording
+from activesteer.recording.contents import check_metrics
 from activesteer.signals import Channel
 from tests.raising import raises
 from tests.unit.recording.conftest import assert_same
@@ -63,14 +65,14 @@ def test_without_channels_it_opens_too(tmp_path: Path) -> None:
     assert len(Recording.open(tmp_path / "nothing.mcap").channels) == 0
 
 
-def test_values_that_are_not_finite_or_exceed_32_bit_are_kept_as_such(tmp_path: Path) -> None:
+def test_values_that_are_not_finite_are_kept_and_those_beyond_the_limit_are_infinite(tmp_path: Path) -> None:
     """The last rows of a run that diverged."""
     table = [Channel("single_m", "m", "", "vehicle"), Channel("double_m", "m", "", "vehicle", single=False)]
     path = tmp_path / "diverged.mcap"
-    Recording(table, [0.0, 0.1, 0.2], [[1e200, 1e200], [np.nan, np.nan], [-np.inf, -np.inf]]).save(path)
+    Recording(table, [0.0, 0.1, 0.2], [[1e200, 1e13], [np.nan, np.nan], [-np.inf, -np.inf]]).save(path)
     opened = Recording.open(path)
     assert np.array_equal(opened["single_m"], [np.inf, np.nan, -np.inf], equal_nan=True)
-    assert np.array_equal(opened["double_m"], [1e200, np.nan, -np.inf], equal_nan=True)
+    assert np.array_equal(opened["double_m"], [np.inf, np.nan, -np.inf], equal_nan=True)
 
 
 def test_a_channel_is_a_read_only_float64_array(mcap_file: Path) -> None:
@@ -146,3 +148,29 @@ def test_unusable_primitives_and_bodies_are_refused(channels: list[Channel], tmp
         with raises(RecordingError, value=names):
             McapWriter(path, channels, names)
     assert not path.exists()
+
+
+@pytest.mark.parametrize("value", [1e308, -1e308, 1.1e12])
+def test_a_value_above_the_limit_is_written_as_infinity_and_refused_where_a_file_holds_it(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, value: float
+) -> None:
+    values = recording.values.copy()
+    values[150, 0] = value
+    large = Recording(recording.channels, recording.time_s, values, metrics={"peak_rad": value})
+    path = tmp_path / "run.mcap"
+    large.save(path)
+    opened = Recording.open(path)
+    assert opened["yaw_rate_radps"][150] == opened.metrics["peak_rad"] == math.copysign(math.inf, value)
+    monkeypatch.setattr("activesteer.recording.writer.MAX_NUMBER", math.inf)
+    large.metrics.clear()
+    large.save(path)
+    with pytest.raises(RecordingError) as refused:
+        Recording.open(path)
+    said = f"channel yaw_rate_radps holds {value:g}; the largest number allowed in a file is 1e+12"
+    assert said in str(refused.value)
+    assert len(Recording.open(path, recover=True)) < 150
+
+
+def test_a_metric_above_the_limit_is_refused() -> None:
+    with raises(RecordingError, key="peak_rad", allowed=1e12):
+        check_metrics({"peak_rad": -1e308})
