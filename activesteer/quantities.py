@@ -44,12 +44,9 @@ _BY_SUFFIX: Final = {
     "_m": DisplayUnit("m", 1.0),
     "_s": DisplayUnit("s", 1.0),
 }
-_FRACTIONS: Final = ("_overshoot", "_share", "_friction_utilisation", "_efficiency", "wheel_slip_max")
-"""Endings of pure numbers that are shown in percent; they are words of the name."""
 _PERCENT: Final = DisplayUnit("%", 100.0)
 _PURE: Final = DisplayUnit("-", 1.0)
 _KILONEWTON: Final = DisplayUnit("kN", 1e-3)
-_WORDS: Final = {"ay": "lateral acceleration", "tb": "TB"}
 
 
 class Quantity(NamedTuple):
@@ -157,49 +154,10 @@ def display_unit(name: str) -> DisplayUnit:
     Args:
         name: Name of a channel, a metric or a parameter, ending in its SI unit.
     """
-    if name.endswith(_FRACTIONS):
-        return _PERCENT
     return next((unit for suffix, unit in _BY_SUFFIX.items() if name.endswith(suffix)), _PURE)
 
 
-def metric_label(name: str) -> tuple[str, str, float]:
-    """How a metric is shown.
-
-    Args:
-        name: Name with unit suffix, such as `yaw_rate_peak_radps`.
-
-    Returns:
-        Its name in words, its unit (`-` for a pure number), and the factor from the SI value to it.
-    """
-    suffix = next((suffix for suffix in _BY_SUFFIX if name.endswith(suffix)), "")
-    head, _, tail = name.removesuffix(suffix).partition("_")
-    words = " ".join(part for part in (_WORDS.get(head, head), tail.replace("_", " ")) if part)
-    unit = display_unit(name)
-    return words, unit.name, unit.factor
-
-
-_COUNTS: Final = frozenset({"cones_hit", "cones_missed"})
-_YES_OR_NO: Final = frozenset({"stays_in_lanes"})
 _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
-
-
-def metric_number(name: str, value: float) -> str:
-    """The value of a metric as tables show it, in the unit of `metric_label`; `-` where it is not defined (nan).
-
-    Args:
-        name: Name with unit suffix.
-        value: Its value, SI.
-    """
-    if math.isnan(value):
-        return "-"
-    if name in _YES_OR_NO:
-        return "yes" if value else "no"
-    return f"{value:.0f}" if is_count(name) else f"{value * metric_label(name)[2]:.3f}"
-
-
-def is_count(name: str) -> bool:
-    """Whether a metric is a whole number, or yes (1) or no (0)."""
-    return name in _COUNTS or name in _YES_OR_NO
 
 
 def typeset(text: str) -> str:
@@ -230,6 +188,9 @@ _QUANTITIES: Final = {
         _row("roll_rad", "roll angle", 1, 0.1),
         _row("ax_mps2", "longitudinal acceleration", 1, 0.2, "longitudinal acc."),
         _row("pitch_rad", "pitch angle", 1, 0.1),
+        _row("yaw_rad", "yaw angle", 1, 0.5),
+        _row("y_m", "lateral position", 2, 0.1),
+        _row("hand_torque_Nm", "steering wheel torque", 2, 0.5),
         _row("front_steer_rad", "steer angle of the front wheels", 2, 0.1, "front wheels"),
         _row("rear_steer_rad", "steer angle of the rear wheels", 2, 0.05, "rear steer"),
         _row("superposition_rad", "front superposition angle", 2, 0.05, "superposition"),

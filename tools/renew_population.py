@@ -21,7 +21,7 @@ from typing import Final
 from activesteer.analysis.claims import STATEMENTS, Kind
 from activesteer.analysis.claims.population import Change, Population, percent
 from activesteer.commands.progress import RunCounter
-from activesteer.quantities import metric_label
+from activesteer.metric_table import metric
 from activesteer.resources import find_study
 from activesteer.studies.comparison_population import compare_population, store_comparison
 from activesteer.studies.comparison_shares import ComparisonPopulation
@@ -143,9 +143,9 @@ def _systems(found: Population) -> list[str]:
 
 
 def _change(change: Change) -> str:
-    words, unit, factor = metric_label(change.metric)
-    low, median, high = (_number(factor * value) for value in (change.low, change.median, change.high))
-    return f"{words} {median}{'' if unit == '-' else f' {unit}'} ({low} to {high})"
+    shown = metric(change.metric)
+    low, median, high = (_number(shown.unit.factor * value) for value in (change.low, change.median, change.high))
+    return f"{f'{shown.label} {median} {shown.unit_name}'.rstrip()} ({low} to {high})"
 
 
 def _number(value: float) -> str:

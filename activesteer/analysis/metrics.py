@@ -19,6 +19,7 @@ from activesteer.analysis import (
 from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
 from activesteer.errors import RecordingError, nearest_names
+from activesteer.metric_table import metric
 
 
 class Evaluation(NamedTuple):
@@ -81,5 +82,9 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     Raises:
         RecordingError: the metadata name no kind or an unknown one, a channel is missing or not finite, there are fewer
             than two rows, or the run is not what its kind promises.
+        ParameterError: the evaluation returns a metric that `metric_table` does not declare.
     """
-    return evaluation_of(recording).metrics(Evaluable(recording))
+    values = evaluation_of(recording).metrics(Evaluable(recording))
+    for name in values:
+        metric(name)
+    return values

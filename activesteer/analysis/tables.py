@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from activesteer.quantities import metric_label, metric_number
+from activesteer.metric_table import recorded_metric
 
 Paint = Callable[[str, float, float, str], str]
 """Of a metric: its name, its value in a run, that in the first run, its text -> the text as it is shown."""
@@ -24,9 +24,9 @@ def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = No
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows = [["", "", *runs]]
     for name in names:
-        words, unit, _ = metric_label(name)
-        numbers = [metric_number(name, metrics[name]) if name in metrics else "" for metrics in runs.values()]
-        rows.append([words, unit, *numbers])
+        metric = recorded_metric(name)
+        numbers = [metric.text(metrics[name]) if name in metrics else "" for metrics in runs.values()]
+        rows.append([metric.label, metric.unit.name, *numbers])
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     cells = [_cells(row, widths) for row in rows]
     first = next(iter(runs.values()), {})

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from activesteer.analysis.loss import SIDESLIP_PEAKS, kept, losses
+from activesteer.analysis.loss_of_control import kept, losses
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.judgement import judge
-from activesteer.quantities import metric_label, metric_number
+from activesteer.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.recording import Recording
 
 _ALSO: Final = ("yaw_rate_steady_state_radps", "stopping_distance_m", "steering_wheel_rms_rad")
@@ -28,8 +28,8 @@ def outcome(recording: Recording) -> str:
     peaks = [name for name in SIDESLIP_PEAKS if name in metrics]
     for name in (*peaks[:1], *_ALSO):
         if name in metrics:
-            words, unit, _ = metric_label(name)
-            said.append(f"{words.removesuffix(' abs')} {metric_number(name, metrics[name])} {unit}")
+            shown = metric(name)
+            said.append(f"{shown.label.removesuffix(' abs')} {shown.text(metrics[name])} {shown.unit.name}")
     return ", ".join(said)
 
 

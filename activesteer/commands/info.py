@@ -20,7 +20,7 @@ def add_to(commands: Any) -> None:
 
 
 def _info(options: argparse.Namespace) -> int:
-    from activesteer.analysis.loss import kept, losses
+    from activesteer.analysis.loss_of_control import kept, losses
     from activesteer.analysis.tables import comparison
     from activesteer.recording import Recording
 

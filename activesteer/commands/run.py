@@ -86,15 +86,15 @@ def _run(options: argparse.Namespace) -> int:
 
 def _paint(name: str, value: float, first: float, text: str) -> str:
     """What is better than in the first run in green, what is worse in red."""
-    from activesteer.analysis.report.worth import Change, worth
+    from activesteer.analysis.report.significance import Change, significance
 
-    colour = {Change.BETTER: GOOD, Change.WORSE: BAD}.get(worth(name, value, first))
+    colour = {Change.BETTER: GOOD, Change.WORSE: BAD}.get(significance(name, value, first))
     return text if colour is None else painted(text, colour)
 
 
 def _print_outcomes(metrics: Mapping[str, Mapping[str, float]]) -> None:
     """What each run lost or kept, below its numbers."""
-    from activesteer.analysis.loss import kept, losses
+    from activesteer.analysis.loss_of_control import kept, losses
 
     for label, found in metrics.items():
         for words, colour in ((losses(found), BAD), (kept(found), GOOD)):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from activesteer.metric_table import recorded_metric
 from activesteer.playback.runs import Run
-from activesteer.quantities import metric_label, metric_number
 
 
 def summary(runs: Sequence[Run], verdict: Sequence[str] = ()) -> str:
@@ -25,10 +25,10 @@ def summary(runs: Sequence[Run], verdict: Sequence[str] = ()) -> str:
     if names:
         lines += [f"| metric | {' | '.join(run.short for run in runs)} |", "|---" * (1 + len(runs)) + "|"]
     for name in names:
-        words, unit, _ = metric_label(name)
+        metric = recorded_metric(name)
         found = [run.recording.metrics.get(name) for run in runs]
-        values = ("" if value is None else metric_number(name, value) for value in found)
-        lines.append(f"| {words}{'' if unit == '-' else f' [{unit}]'} | {' | '.join(values)} |")
+        values = ("" if value is None else metric.text(value) for value in found)
+        lines.append(f"| {metric.label}{metric.unit_name and f' [{metric.unit_name}]'} | {' | '.join(values)} |")
     lines.append("")
     for run in runs:
         metadata = run.recording.metadata

@@ -11,7 +11,7 @@ import numpy as np
 from activesteer.analysis.hysteresis import loop, slope_at_zero
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import RecordingError
-from activesteer.quantities import display_unit
+from activesteer.quantities import quantity_of
 from activesteer.standards.page_parts import Curve, Panel, Picture, Table, axis_label, cell
 from activesteer.standards.standard import Findings, Ground, NoResult, Run, Standard
 from activesteer.standards.steering_angle import steering_wheel_at
@@ -55,7 +55,7 @@ def weave_loops(signals: Signals) -> list[dict[str, Any]]:
     """
     found = []
     for abscissa, ordinate in _PLOTS:
-        x, y = (display_unit(name).factor * signals[name] for name in (abscissa, ordinate))
+        x, y = (quantity_of(name).factor * signals[name] for name in (abscissa, ordinate))
         try:
             values: dict[str, float | None] = loop(x, y)._asdict()
         except RecordingError:
@@ -142,7 +142,7 @@ def transition_lines(signals: Signals) -> list[dict[str, Any]]:
     near = np.abs(ay) <= _CENTRE_MPS2
     found = []
     for abscissa, ordinate in _PLOTS:
-        x, y = (display_unit(name).factor * signals[name] for name in (abscissa, ordinate))
+        x, y = (quantity_of(name).factor * signals[name] for name in (abscissa, ordinate))
         if ordinate == "hand_torque_Nm":
             line = np.polynomial.Polynomial.fit(np.abs(x[~near]), (np.sign(x) * y)[~near], 1).convert().coef
             intercept, slope = (float(value) for value in line)
@@ -155,7 +155,7 @@ def transition_lines(signals: Signals) -> list[dict[str, Any]]:
 
 
 def _panels(signals: Signals) -> list[Panel]:
-    shown = {name: display_unit(name).factor * values for name, values in signals.items()}
+    shown = {name: quantity_of(name).factor * values for name, values in signals.items()}
     return [Panel(axis_label(x), axis_label(y), [Curve(shown[x], shown[y])]) for x, y in _PLOTS]
 
 

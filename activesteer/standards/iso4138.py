@@ -10,7 +10,8 @@ import numpy as np
 from activesteer.analysis.handling import CarGeometry, Handling, evaluate
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
-from activesteer.quantities import display_unit
+from activesteer.metric_table import metric
+from activesteer.quantities import quantity_of
 from activesteer.standards.page_parts import Curve, Panel, Picture, axis_label, metrics_table
 from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 
@@ -102,7 +103,7 @@ def _words(found: dict[str, dict[str, float]]) -> str:
     if not found:
         return "no result"
     metrics = next(iter(found.values()))
-    gradient = display_unit(_RESULT).factor * metrics[_RESULT]
+    gradient = metric(_RESULT).unit.factor * metrics[_RESULT]
     linear = metrics.get("linear_range_mps2")
     return (
         f"understeer gradient {gradient:.2f} deg/g, "
@@ -113,7 +114,7 @@ def _words(found: dict[str, dict[str, float]]) -> str:
 
 def _picture(method: str, runs: dict[str, Run]) -> Picture:
     def panel(channel: str) -> Panel:
-        factor = display_unit(channel).factor
+        factor = quantity_of(channel).factor
         curves = []
         for side, run in runs.items():
             if run.error and not run.channels:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.quantities import display_unit
-from activesteer.standards.page_parts import Curve, Panel, Picture, axis_label, metrics_table, time_panels
+from activesteer.metric_table import metric
+from activesteer.standards.page_parts import Curve, Panel, Picture, metrics_table, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 from activesteer.standards.steering_angle import steering_wheel_at
 
@@ -58,17 +58,17 @@ def _examine(ground: Ground) -> Findings:
 
 
 def _over_deceleration(name: str, by_side: dict[str, list[Run]]) -> Panel:
-    factor = display_unit(name).factor
+    shown = metric(name)
     curves = [
         Curve(
             [run.metric("mean_deceleration_mps2") for run in group],
-            [factor * run.metric(name) for run in group],
+            [shown.unit.factor * run.metric(name) for run in group],
             side,
             marked=True,
         )
         for side, group in by_side.items()
     ]
-    return Panel("mean deceleration [m/s²]", axis_label(name), curves)
+    return Panel("mean deceleration [m/s²]", shown.title, curves)
 
 
 STANDARD: Final = Standard(

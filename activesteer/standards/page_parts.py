@@ -8,7 +8,8 @@ from typing import Any, NamedTuple, Protocol
 
 from numpy.typing import ArrayLike
 
-from activesteer.quantities import metric_label, metric_number
+from activesteer.metric_table import metric
+from activesteer.quantities import quantity_of
 
 
 class Curve(NamedTuple):
@@ -92,16 +93,16 @@ def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
     """
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows = [
-        [*metric_label(name)[:2], *(metric_number(name, metrics.get(name, math.nan)) for metrics in runs.values())]
-        for name in names
+        [shown.label, shown.unit.name, *(shown.text(metrics.get(shown.name, math.nan)) for metrics in runs.values())]
+        for shown in map(metric, names)
     ]
     return Table(title, ("", "unit", *runs), rows)
 
 
 def axis_label(name: str) -> str:
-    """Words and unit of a channel or metric, as they stand at an axis."""
-    words, unit, _ = metric_label(name)
-    return f"{words} [{unit}]"
+    """Label and unit of a channel, as they stand at an axis."""
+    shown = quantity_of(name)
+    return f"{shown.label} [{shown.unit.name}]"
 
 
 class OverTime(Protocol):

@@ -11,7 +11,7 @@ import numpy as np
 
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import ManeuverError, RecordingError
-from activesteer.quantities import display_unit
+from activesteer.quantities import quantity_of
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.standards.page_parts import Curve, Picture, Table
 
@@ -90,7 +90,7 @@ class Run:
         values = self.channels.get(channel, np.empty(0))
         time_s = self.time_s[: len(values)] - begin_s
         shown = time_s >= -_LEAD_S
-        return Curve(time_s[shown], display_unit(channel).factor * values[shown], **words)
+        return Curve(time_s[shown], quantity_of(channel).factor * values[shown], **words)
 
 
 class Ground(Protocol):

@@ -20,7 +20,7 @@ from activesteer.analysis.claims import SCENARIOS
 from activesteer.controllers import find_controller
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder
-from activesteer.quantities import metric_label
+from activesteer.metric_table import metric as declared
 from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.studies.comparison_targets import Target, short, targets, targets_text
@@ -128,8 +128,8 @@ class Comparison:
             if scenario != before:
                 lines.append(scenario)
             before = scenario
-            words, unit, factor = metric_label(metric)
-            label = f"  {words} [{unit}]"
+            label = f"  {declared(metric).title}"
+            factor = declared(metric).unit.factor
             shown = [short(values.get(name, math.nan) * factor) for name in self.controllers]
             cells = "".join(f"{text:>{width}}" for text, width in zip(shown, columns, strict=True))
             lines.append(f"{label:{_LABEL}}{cells}")

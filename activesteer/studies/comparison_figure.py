@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from activesteer.analysis.claims.population import percent
-from activesteer.analysis.report.worth import Change, cost, worth
+from activesteer.analysis.report.significance import Change, significance
+from activesteer.metric_table import metric as declared
 from activesteer.plotting import new_figure, save
-from activesteer.quantities import metric_label
 from activesteer.studies.comparison import Comparison
 from activesteer.studies.comparison_shares import ComparisonPopulation
 from activesteer.studies.comparison_targets import REFERENCES, short
@@ -49,7 +49,7 @@ def comparison_figure(made: Comparison) -> Figure:
     figure = new_figure(4.2 + 0.85 * len(made.controllers), 1.2 + 0.26 * len(lines))
     axes = figure.subplots()
     for row, (_, metric, values) in enumerate(lines):
-        _, _, factor = metric_label(metric)
+        factor = declared(metric).unit.factor
         for column, name in enumerate(made.controllers):
             if name not in values:
                 continue
@@ -60,9 +60,8 @@ def comparison_figure(made: Comparison) -> Figure:
     axes.xaxis.tick_top()
     labels, before = [], ""
     for row, (scenario, metric, _) in enumerate(lines):
-        label, unit, _ = metric_label(metric)
         name = f"{scenario.replace('_', ' ')}: " if scenario != before else ""
-        labels.append(f"{name}{label} [{unit}]")
+        labels.append(f"{name}{declared(metric).title}")
         if scenario != before and row:
             axes.axhline(row - 0.5, color="black", linewidth=0.8)
         before = scenario
@@ -78,10 +77,10 @@ def comparison_figure(made: Comparison) -> Figure:
 
 def _shade(metric: str, value: float, first: float) -> float:
     """How much better a value is than that of the first controller, 1 by a factor of `_RANGE`; below 0 it is worse."""
-    change = worth(metric, value, first)
+    change = significance(metric, value, first)
     if change not in (Change.BETTER, Change.WORSE):
         return 0.0 if math.isfinite(value) else math.nan
-    size, before = cost(metric, value), cost(metric, first)
+    size, before = declared(metric).cost(value), declared(metric).cost(first)
     # Where one of them is nothing, or touches where the other does not, there is no factor between them.
     depth = abs(math.log(size / before)) / math.log(_RANGE) if size * before > 0.0 else 1.0
     return math.copysign(_PALEST + (1.0 - _PALEST) * min(depth, 1.0), 1.0 if change is Change.BETTER else -1.0)

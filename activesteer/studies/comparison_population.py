@@ -18,10 +18,10 @@ import numpy as np
 import pyarrow as pa
 
 from activesteer.analysis.claims.population import SystemEffect
-from activesteer.analysis.loss import SIDESLIP_PEAKS
 from activesteer.config import read_toml
 from activesteer.errors import ManeuverError, ParameterError, StudyError
 from activesteer.files import make_folder, reading, write_text
+from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.resources import find_maneuver, studies_dir
 from activesteer.scenario import FileOrTable
 from activesteer.studies.comparison import CASES, SHOWN, Row

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from activesteer.quantities import metric_label
+from activesteer.metric_table import metric
 
 NONE: Final = "none"
 REFERENCES: Final = ("ars", "afs", "esc")
@@ -64,12 +64,13 @@ class _Rule(NamedTuple):
             return None
         value = abs(values.get(controller, math.nan))
         bound = self.factor * (abs(values.get(self.than, math.nan)) if self.than else 1.0)
-        words, unit, factor = metric_label(self.metric)
+        shown = metric(self.metric)
+        factor, unit = shown.unit.factor, shown.unit.name
         sign = ("<" if not self.above else ">") + ("" if self.strict else "=")
         whose = f", {self.factor:.0%} of {self.than}" if self.factor != 1.0 else f" of {self.than}"
         text = (
-            f"{self.scenario}: {words} {short(value * factor)} {unit}, asked for {sign} {short(bound * factor)} {unit}"
-            f"{whose if self.than else ''}"
+            f"{self.scenario}: {shown.label} {short(value * factor)} {unit}, "
+            f"asked for {sign} {short(bound * factor)} {unit}{whose if self.than else ''}"
         )
         further = value > bound if self.above else value < bound
         return Target(controller, text, further or (value == bound and not self.strict))

@@ -23,7 +23,7 @@ from activesteer.analysis.tables import comparison
 from activesteer.controllers import SingleTrackParameters
 from activesteer.errors import RecordingError
 from activesteer.files import json_text
-from activesteer.quantities import metric_label
+from activesteer.metric_table import metric
 from activesteer.scenario import FileOrTable, check_gains, check_parts, resolve
 from activesteer.scenario.vehicle_file import write_values
 from activesteer.simulation.runner import run_scenario
@@ -73,14 +73,14 @@ class Identification:
             for name, value in handling._asdict().items():
                 if math.isnan(value):
                     continue
-                _, unit, factor = metric_label(name)
-                shown = value * factor
+                unit = metric(name).unit
+                shown = value * unit.factor
                 low, high, source = CLASS_BANDS.get(name, (None, None, None))
                 inside = None if low is None or high is None else low <= shown <= high
                 band = None if low is None else [low, high]
                 metrics.append(
                     {
-                        "name": name.rpartition("_")[0], "test": test, "value": shown, "unit": unit, "band": band,
+                        "name": name.rpartition("_")[0], "test": test, "value": shown, "unit": unit.name, "band": band,
                         "inside": inside, "source": source,
                     }
                 )  # fmt: skip

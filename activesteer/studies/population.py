@@ -15,7 +15,8 @@ import pyarrow as pa
 
 from activesteer.analysis.claims import SYSTEMS, Claim
 from activesteer.analysis.claims.population import NONE, Change, ClaimShare, Population, SystemEffect
-from activesteer.analysis.loss import SIDESLIP_PEAKS, has_spun, is_lost
+from activesteer.analysis.loss_of_control import has_spun, is_lost
+from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.scenario import FileOrTable
 from activesteer.studies.dependence import strongest
 from activesteer.studies.factors import Factor

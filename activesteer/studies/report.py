@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from activesteer.conventions import Array, run_looks
 from activesteer.errors import StudyError
 from activesteer.files import write_text
+from activesteer.metric_table import recorded_metric
 from activesteer.pages import render
-from activesteer.quantities import metric_label, parameter_label
+from activesteer.quantities import parameter_label
 from activesteer.studies.factor_values import FactorValues, label_of
 from activesteer.studies.row_table import IDENTITY, OUTCOME
 from activesteer.studies.run_task import CURVE
@@ -70,7 +71,8 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
     others = (*IDENTITY, *OUTCOME, *study.keys)
     metrics = [name for name in table.column_names if name not in others and not name.startswith(CURVE)]
     values = {name: table[name].to_numpy(zero_copy_only=False).astype(np.float64) for name in metrics}
-    values = {name: column * metric_label(name)[2] for name, column in values.items() if np.isfinite(column).any()}
+    found = [recorded_metric(name) for name, column in values.items() if np.isfinite(column).any()]
+    values = {metric.name: values[metric.name] * metric.unit.factor for metric in found}
     who = {name: _codes(table[name]) for name in ("maneuver", "vehicle", "controller")}
     groups = sorted(set(zip(who["maneuver"][1].tolist(), who["vehicle"][1].tolist(), strict=True)))
     shown = _shown_rows(table)
@@ -78,7 +80,7 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
         "controllers": who["controller"][0],
         "places": [run_looks(who["controller"][0])[name].place for name in who["controller"][0]],
         "groups": [f"{who['maneuver'][0][m]}, {who['vehicle'][0][v]}" for m, v in groups],
-        "metrics": [{"name": name, "label": metric_label(name)[0], "unit": metric_label(name)[1]} for name in values],
+        "metrics": [{"name": metric.name, "label": metric.label, "unit": metric.unit.name} for metric in found],
         "factors": [_factor(study, key, table[key]) for key in study.keys],
         "rows": {
             "group": [groups.index(pair) for pair in zip(

@@ -10,8 +10,8 @@ import pytest
 
 from activesteer import ActuatorCommand, simulate
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Fake
-from activesteer.analysis.claims.noticeable import STEER_RAD
 from activesteer.controllers import load_controller
+from activesteer.metric_table import STEER_RAD
 from activesteer.recording import Recording
 
 Runs = Mapping[str, Mapping[str, Recording]]

@@ -16,7 +16,7 @@ import pytest
 from activesteer.analysis.bands import TRACK, bands_of
 from activesteer.analysis.claims import SCENARIOS, STATEMENTS, SYSTEMS
 from activesteer.analysis.claims.population import Population, stored_population
-from activesteer.analysis.loss import is_lost
+from activesteer.analysis.loss_of_control import is_lost
 from activesteer.recording import Recording
 from activesteer.studies.comparison_population import stored_comparison
 from activesteer.studies.plan import Plan

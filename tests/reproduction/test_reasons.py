@@ -11,8 +11,8 @@ import pytest
 
 from activesteer import simulate
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim
-from activesteer.analysis.claims.noticeable import STEER_RAD
 from activesteer.conventions import CORNERS
+from activesteer.metric_table import STEER_RAD
 from activesteer.studies.fault_map import fault_map
 
 pytestmark = pytest.mark.slow

@@ -6,27 +6,8 @@ import math
 
 import pytest
 
-from activesteer.quantities import display_unit, metric_label, parameter_title, quantity_of
-
-
-@pytest.mark.parametrize(
-    ("name", "words", "unit", "shown_for_one"),
-    [
-        ("yaw_rate_peak_radps", "yaw rate peak", "deg/s", 180.0 / math.pi),
-        ("roll_peak_rad", "roll peak", "deg", 180.0 / math.pi),
-        ("tb_srad", "TB", "s deg", 180.0 / math.pi),
-        ("ay_steady_state_mps2", "lateral acceleration steady state", "m/s²", 1.0),
-        ("speed_end_mps", "speed end", "km/h", 3.6),
-        ("yaw_rate_response_time_s", "yaw rate response time", "s", 1.0),
-        ("ay_overshoot", "lateral acceleration overshoot", "%", 100.0),
-        ("friction_used_max", "friction used max", "-", 1.0),
-        ("yaw_rate_after_1000ms_share", "yaw rate after 1000ms share", "%", 100.0),
-        ("lane_overstep_m", "lane overstep", "m", 1.0),
-        ("steering_wheel_rate_rms_radps", "steering wheel rate rms", "deg/s", 180.0 / math.pi),
-    ],
-)
-def test_names_become_words_and_display_units(name, words, unit, shown_for_one):
-    assert metric_label(name) == (words, unit, pytest.approx(shown_for_one))
+from activesteer.metric_table import METRICS
+from activesteer.quantities import parameter_title, quantity_of
 
 
 def test_the_channel_of_a_corner_is_shown_as_that_of_any_other():
@@ -42,7 +23,7 @@ def test_the_unit_of_a_quantity_is_the_one_of_its_metrics():
         ("yaw_rate_radps", "yaw_rate_peak_radps"), ("speed_mps", "speed_end_mps"), ("ay_mps2", "ay_rms_mps2"),
         ("sideslip_rad", "sideslip_peak_abs_rad"),
     ):  # fmt: skip
-        assert quantity_of(channel).unit == display_unit(metric)
+        assert quantity_of(channel).unit == METRICS[metric].unit
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """A claim of the paper: what is stated, what must hold for it, and what became of it in three runs.
 
 The sizes of a statement come from what its words mean and from what a driver or a
-sensor can notice (`noticeable`), and it names the fakes that it must not be taken in by.
+sensor can notice (`metric_table`), and it names the fakes that it must not be taken in by.
 """
 
 from __future__ import annotations

@@ -12,13 +12,11 @@ from typing import Final
 
 from activesteer.analysis import path_following, track
 from activesteer.analysis.claims.claim import SYSTEMS, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.noticeable import SIDESLIP_RAD, YAW_RATE_RADPS
 from activesteer.analysis.claims.path_following import (
     AFTER_SIDESLIP,
     AFTER_YAW_RATE,
     CALMED,
     CALMED_WORDS,
-    CONES_HIT,
     SETTLED_YAW_RATE_RADPS,
     SIDESLIP_PEAK,
     calmed,
@@ -27,6 +25,7 @@ from activesteer.analysis.claims.path_following import (
 )
 from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.source import RecordingLike, read_course
+from activesteer.metric_table import CONES_HIT, SIDESLIP_RAD, YAW_RATE_RADPS
 
 ALIKE_M: Final = 0.5
 """Tracks look alike when they are nowhere further apart than this [m], a seventh of the way to the side lane."""

@@ -10,9 +10,9 @@ import math
 from typing import Final
 
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.noticeable import SIDESLIP_RAD, YAW_RATE_RADPS
 from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.path_following import AFTER_S
+from activesteer.metric_table import SIDESLIP_RAD, YAW_RATE_RADPS
 
 CALMED: Final = 0.5
 """A system calms an oscillation when it brings its root mean square down to this fraction."""
@@ -23,7 +23,6 @@ AFTER_SIDESLIP: Final = "sideslip_after_gates_rms_rad"
 LOW_SIDESLIP_RAD: Final = math.radians(2.0)
 """A driver knows sideslip angles up to this one from normal driving [rad]."""
 SIDESLIP_PEAK: Final = "sideslip_peak_abs_rad"
-CONES_HIT: Final = "cones_hit"
 LARGE_STEERING_WHEEL_RAD: Final = math.radians(90.0)
 """Beyond this steering wheel angle a driver must cross his arms or change his grip [rad]."""
 

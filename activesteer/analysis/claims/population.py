@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from activesteer.errors import StudyError
 from activesteer.files import reading
-from activesteer.quantities import metric_label
+from activesteer.metric_table import metric
 from activesteer.resources import studies_dir
 from activesteer.theory.shares import ShareVerdict, share_verdict
 
@@ -188,9 +188,10 @@ class Population:
                 f"{effect.fine_without} that are not"
             )
             for change in effect.changes:
-                words, unit, factor = metric_label(change.metric)
-                low, median, high = (f"{factor * value:+.3g}" for value in (change.low, change.median, change.high))
-                lines.append(f"    {words}: {median}{'' if unit == '-' else f' {unit}'} ({low} to {high})")
+                shown = metric(change.metric)
+                values = (change.low, change.median, change.high)
+                low, median, high = (f"{shown.unit.factor * value:+.3g}" for value in values)
+                lines.append(f"    {shown.label}: {f'{median} {shown.unit_name}'.rstrip()} ({low} to {high})")
         return lines
 
 

@@ -15,7 +15,7 @@ from activesteer.analysis.claims.population import ClaimShare, Population, perce
 from activesteer.analysis.claims.scenarios import STATEMENTS
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.files import finite
-from activesteer.quantities import metric_label
+from activesteer.metric_table import recorded_metric
 from activesteer.theory.shares import ShareVerdict
 
 FILE: Final = "not_reproduced.toml"
@@ -211,9 +211,9 @@ def number_lines(values: Mapping[str, float]) -> list[str]:
         by_metric.setdefault(metric if known else name, []).append((system if known else "", value))
     lines = []
     for metric, pairs in by_metric.items():
-        words, unit, factor = metric_label(metric)
-        numbers = "  ".join(f"{system} {_number(value * factor)}".strip() for system, value in pairs)
-        lines.append(f"{words}: {numbers}" + ("" if unit == "-" else f" {unit}"))
+        shown = recorded_metric(metric)
+        numbers = "  ".join(f"{system} {_number(value * shown.unit.factor)}".strip() for system, value in pairs)
+        lines.append(f"{shown.label}: {numbers} {shown.unit_name}".rstrip())
     return lines
 
 

@@ -18,11 +18,11 @@ import numpy as np
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.noticeable import SIDESLIP_RAD
 from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.sine_with_dwell import INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import Array
+from activesteer.metric_table import SIDESLIP_RAD
 
 LOST_SIDESLIP_RAD: Final = math.radians(20.0)
 """Beyond this sideslip angle a car is lost [rad]."""

@@ -13,12 +13,10 @@ from typing import Final
 
 from activesteer.analysis import path_following
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.noticeable import SIDESLIP_RAD, STEERING_WHEEL_RAD, TRACK_M, YAW_RATE_RADPS
 from activesteer.analysis.claims.path_following import (
     AFTER_SIDESLIP,
     AFTER_YAW_RATE,
     CALMED_WORDS,
-    CONES_HIT,
     LARGE_STEERING_WHEEL_RAD,
     calmed,
     held,
@@ -26,6 +24,14 @@ from activesteer.analysis.claims.path_following import (
 )
 from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.source import RecordingLike
+from activesteer.metric_table import (
+    CONES_HIT,
+    CONES_MISSED,
+    SIDESLIP_RAD,
+    STEERING_WHEEL_RAD,
+    TRACK_M,
+    YAW_RATE_RADPS,
+)
 
 NOT_REDUCED: Final = 0.95
 """An amplitude is not reduced when it stays above this fraction of the one without control."""
@@ -34,7 +40,6 @@ YAW_RATE: Final = "yaw_rate_gates_rms_radps"
 SIDESLIP: Final = "sideslip_gates_rms_rad"
 STEERING: Final = "steering_wheel_gates_rms_rad"
 STEERING_PEAK: Final = "steering_wheel_peak_abs_rad"
-CONES_MISSED: Final = "cones_missed"
 
 Z1: Final = Statement.about(
     Kind.DRIVER,

@@ -11,11 +11,11 @@ from typing import Final
 
 from activesteer.analysis import path_following
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.noticeable import TRACK_M
-from activesteer.analysis.claims.path_following import CONES_HIT, LARGE_STEERING_WHEEL_RAD, held, held_statement
+from activesteer.analysis.claims.path_following import LARGE_STEERING_WHEEL_RAD, held, held_statement
 from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.series import rms
 from activesteer.analysis.source import RecordingLike
+from activesteer.metric_table import CONES_HIT, LANE_OVERSTEP, STAYS_IN_LANES, TRACK_M
 
 LARGER: Final = 1.5
 """The driver without control needs this many times the angle that the others need."""
@@ -25,8 +25,6 @@ LARGE_SIDESLIP_RAD: Final = math.radians(5.0)
 """A car that goes on straight has a smaller sideslip at the end [rad]."""
 END_S: Final = 3.0
 """The end of the run, which the paper's figures show [s]."""
-OVERSTEP: Final = "lane_overstep_m"
-IN_LANES: Final = "stays_in_lanes"
 WHEEL: Final = "steering_wheel_peak_abs_rad"
 YAW_RATE_END: Final = "yaw_rate_end_rms_radps"
 SIDESLIP_END: Final = "sideslip_end_rms_rad"
@@ -81,7 +79,7 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
 
 def _metrics(recording: RecordingLike) -> dict[str, float]:
     # A course without lanes has no track to stay on.
-    without = {OVERSTEP: math.nan, IN_LANES: math.nan, CONES_HIT: math.nan}
+    without = {LANE_OVERSTEP: math.nan, STAYS_IN_LANES: math.nan, CONES_HIT: math.nan}
     last = recording.time_s >= recording.time_s[-1] - END_S
     end = {YAW_RATE_END: rms(recording["yaw_rate_radps"][last]), SIDESLIP_END: rms(recording["sideslip_rad"][last])}
     return without | path_following.metrics(recording) | end
@@ -93,15 +91,17 @@ def _leaves(trio: Trio) -> Claim:
         none[WHEEL] > LARGER * trio.metrics[system][WHEEL] for system in SYSTEMS_WITH_CONTROL
     )
     lost = none[YAW_RATE_END] > LARGE_YAW_RATE_RADPS and none[SIDESLIP_END] > LARGE_SIDESLIP_RAD
-    values = {f"none_{name}": none[name] for name in (OVERSTEP, IN_LANES, CONES_HIT, YAW_RATE_END, SIDESLIP_END)}
-    return trio.judge(W1, none[IN_LANES] == 0.0 and steers and lost, values | trio.pick(WHEEL))
+    names = (LANE_OVERSTEP, STAYS_IN_LANES, CONES_HIT, YAW_RATE_END, SIDESLIP_END)
+    values = {f"none_{name}": none[name] for name in names}
+    return trio.judge(W1, none[STAYS_IN_LANES] == 0.0 and steers and lost, values | trio.pick(WHEEL))
 
 
 def _stays(trio: Trio, statement: Statement, system: str) -> Claim:
-    names = (OVERSTEP, IN_LANES, CONES_HIT)
+    names = (LANE_OVERSTEP, STAYS_IN_LANES, CONES_HIT)
     none, kept = trio.metrics["none"], trio.metrics[system]
+    further_m = none[LANE_OVERSTEP] - kept[LANE_OVERSTEP]
     return trio.judge(
         statement,
-        kept[IN_LANES] == 1.0 and none[IN_LANES] == 0.0 and none[OVERSTEP] - kept[OVERSTEP] >= TRACK_M,
+        kept[STAYS_IN_LANES] == 1.0 and none[STAYS_IN_LANES] == 0.0 and further_m >= TRACK_M,
         {f"{run}_{name}": trio.metrics[run][name] for name in names for run in ("none", system)},
     )

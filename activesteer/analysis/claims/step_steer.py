@@ -15,9 +15,9 @@ import numpy as np
 from activesteer.analysis import step_response
 from activesteer.analysis.claims.action import mean_straight_ahead
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.noticeable import SETTLED_SIDESLIP_RAD, STEER_RAD, TIME_S, YAW_RATE_RADPS
 from activesteer.analysis.claims.trio import Trio
 from activesteer.analysis.source import RecordingLike
+from activesteer.metric_table import SETTLED_SIDESLIP_RAD, STEER_RAD, TIME_S, YAW_RATE_RADPS
 
 PEAK: Final = "yaw_rate_peak_abs_radps"
 """Over the whole run, to either side: that of a car that swings back counts too."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from activesteer.analysis.claims.action import MEAN_S, largest_action
 from activesteer.analysis.claims.claim import SYSTEMS, SYSTEMS_WITH_CONTROL, Claim, Statement, check_systems
-from activesteer.analysis.claims.noticeable import STEER_RAD
 from activesteer.analysis.series import timestep
 from activesteer.analysis.source import Evaluable, RecordingLike
 from activesteer.errors import RecordingError
+from activesteer.metric_table import STEER_RAD
 
 Metrics = Mapping[str, float]
 
@@ -27,7 +27,7 @@ class Trio:
         whole: Whether all three came to the end of their manoeuvre.
         obstacle: Why no claim can pass on these runs, a sentence; empty where nothing stands against it. A run must
             be whole. That of ars must turn the rear wheels and that of afs the superposition gear, by
-            `noticeable.STEER_RAD` more than straight ahead and for longer than noise does (`action.largest_action`);
+            `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`action.largest_action`);
             neither may ask the other for as much in any instant, and none asks nobody: what a system did not do proves
             nothing about it.
     """

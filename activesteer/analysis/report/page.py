@@ -15,6 +15,7 @@ from activesteer.analysis.report.groups import Group, entry, groups_of
 from activesteer.analysis.report.judgement import Judgement, judge
 from activesteer.analysis.report.parameter_table import Row, rows
 from activesteer.analysis.report.results import HEADLINE, Result, key_titles, results
+from activesteer.analysis.report.significance import Change
 from activesteer.analysis.report.tables import (
     MetricRow,
     changed_parameters,
@@ -23,7 +24,6 @@ from activesteer.analysis.report.tables import (
     metric_titles,
     verdict_counts,
 )
-from activesteer.analysis.report.worth import Change
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
 from activesteer.pages import render

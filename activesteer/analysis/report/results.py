@@ -6,14 +6,11 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from activesteer.analysis.claims.path_following import CONES_HIT
-from activesteer.analysis.claims.slalom import CONES_MISSED
-from activesteer.analysis.claims.slippery import OVERSTEP
-from activesteer.analysis.loss import SIDESLIP_PEAKS, kept, losses
+from activesteer.analysis.loss_of_control import kept, losses
 from activesteer.analysis.report.groups import Group, Run
+from activesteer.analysis.report.significance import Change, is_near, significance
 from activesteer.analysis.report.tables import difference_text, number
-from activesteer.analysis.report.worth import BETTER, Better, Change, is_near, worth
-from activesteer.quantities import metric_label
+from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP, SIDESLIP_PEAKS, Better, recorded_metric
 
 MAX_FIGURES: Final = 6
 """More key figures than this are no longer read at a glance."""
@@ -64,7 +61,7 @@ class Result(NamedTuple):
 KEY_FIGURES: Final = (
     KeyFigure("Cones hit", (CONES_HIT,)),
     KeyFigure("Cones missed", (CONES_MISSED,)),
-    KeyFigure("Beyond the lane", (OVERSTEP,)),
+    KeyFigure("Beyond the lane", (LANE_OVERSTEP,)),
     KeyFigure("Stopping distance", ("stopping_distance_m",)),
     KeyFigure("Peak sideslip", SIDESLIP_PEAKS),
     KeyFigure("Settled yaw rate", ("yaw_rate_steady_state_radps",)),
@@ -86,7 +83,10 @@ HEADLINE: Final = "Peak sideslip [deg]"
 
 def key_titles(group: Group) -> list[str]:
     """Titles of the columns of key figures, with their units."""
-    return [f"{figure.title} [{unit}]" if (unit := _unit(name)) else figure.title for figure, name in _chosen(group)]
+    return [
+        f"{figure.title} [{unit}]" if (unit := recorded_metric(name).unit_name) else figure.title
+        for figure, name in _chosen(group)
+    ]
 
 
 def results(group: Group) -> list[Result]:
@@ -103,10 +103,6 @@ def results(group: Group) -> list[Result]:
     return found
 
 
-def _unit(metric: str) -> str:
-    return metric_label(metric)[1].removesuffix("-")
-
-
 def _chosen(group: Group) -> Iterator[tuple[KeyFigure, str]]:
     """The key figures that any run has, with the metric that tells it."""
     names = {name for run in group.runs for name in run.recording.metrics}
@@ -117,7 +113,7 @@ def _chosen(group: Group) -> Iterator[tuple[KeyFigure, str]]:
 
 
 def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> Figure:
-    sizes = abs if BETTER.get(name) is Better.SMALLER else float
+    sizes = abs if recorded_metric(name).better is Better.SMALLER else float
     value = sizes(metrics.get(name, math.nan))
     text = number(name, value)
     before = math.nan if first is None else sizes(first.get(name, math.nan))
@@ -126,4 +122,4 @@ def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] 
     difference = difference_text(name, value, before)
     if is_near(name, value, before):
         return Figure(text, difference.text, Change.SAME)
-    return Figure(text, difference.percent or difference.text, worth(name, value, before))
+    return Figure(text, difference.percent or difference.text, significance(name, value, before))

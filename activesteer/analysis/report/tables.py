@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from activesteer.analysis.claims.noticeable import noticeable
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict
 from activesteer.analysis.report.groups import Group, Run, entry
-from activesteer.quantities import is_count, metric_label, metric_number, parameter_label, typeset
+from activesteer.metric_table import recorded_metric
+from activesteer.quantities import parameter_label, typeset
 
 
 class Cell(NamedTuple):
@@ -75,12 +75,12 @@ def metric_rows(group: Group) -> list[MetricRow]:
     values = [run.recording.metrics for run in group.runs]
     rows = []
     for name in dict.fromkeys(name for metrics in values for name in metrics):
-        words, unit, _ = metric_label(name)
+        metric = recorded_metric(name)
         first, *others = (metrics.get(name, math.nan) for metrics in values)
         cells = [Cell(number(name, first))]
         for value in others:
             cells += [Cell(number(name, value)), difference_text(name, value, first)]
-        rows.append(MetricRow(words, unit.removesuffix("-"), tuple(cells)))
+        rows.append(MetricRow(metric.label, metric.unit_name, tuple(cells)))
     return rows
 
 
@@ -88,7 +88,8 @@ def number(name: str, value: float) -> str:
     """The value of a metric [SI] in the unit that is shown: three decimals, fewer where large; a dash for none."""
     if not math.isfinite(value):
         return "\N{EN DASH}"
-    return metric_number(name, value) if is_count(name) else _decimal(value * metric_label(name)[2])
+    metric = recorded_metric(name)
+    return metric.text(value) if metric.whole else _decimal(value * metric.unit.factor)
 
 
 def difference_text(name: str, value: float, first: float) -> Cell:
@@ -99,15 +100,15 @@ def difference_text(name: str, value: float, first: float) -> Cell:
     """
     if not (math.isfinite(value) and math.isfinite(first)):
         return Cell("\N{EN DASH}")
-    _, unit, unit_factor = metric_label(name)
-    difference = (value - first) * unit_factor
-    if is_count(name):
+    metric = recorded_metric(name)
+    difference = (value - first) * metric.unit.factor
+    if metric.whole:
         return Cell(typeset(f"{difference:+.0f}") if difference else "0")
     if abs(difference) < 0.0005:
         return Cell("0")
     text = f"{'+' if difference > 0.0 else ''}{_decimal(difference)}"
-    nearly_nothing = max(noticeable(name) * unit_factor, 0.01)
-    if unit == "%" or first * unit_factor <= nearly_nothing:
+    nearly_nothing = max(metric.significance * metric.unit.factor, 0.01)
+    if metric.unit.name == "%" or first * metric.unit.factor <= nearly_nothing:
         return Cell(text)
     if not 0.005 <= abs(share := (value - first) / first) < 10.0:
         return Cell(text)

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.analysis.claims import SCENARIOS, STATEMENTS, SYSTEMS, Fake
 from activesteer.analysis.claims.action import largest_action
-from activesteer.analysis.claims.noticeable import STEER_RAD
+from activesteer.metric_table import STEER_RAD
 from tests.unit.analysis.good_runs import good, runs_of
 from tests.unit.analysis.synthetic import SyntheticRun
 

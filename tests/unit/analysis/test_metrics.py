@@ -11,7 +11,7 @@ from activesteer.analysis import general, step_response
 from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.metrics import EVALUATIONS, metrics
 from activesteer.conventions import CORNERS
-from activesteer.errors import RecordingError
+from activesteer.errors import ParameterError, RecordingError
 from activesteer.maneuver.kinds import KINDS
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun, step_steer
@@ -90,3 +90,10 @@ def test_a_recording_without_kind_is_refused():
     run.metadata["maneuver"] = "step_steer"
     with raises(RecordingError, file="the metadata", key="maneuver", value="step_steer"):
         metrics(run)
+
+
+def test_an_evaluation_that_returns_an_undeclared_metric_is_an_error(monkeypatch):
+    evaluation = EVALUATIONS["open_loop"]._replace(metrics=lambda recording: {"new_idea_s": 1.0})
+    monkeypatch.setitem(EVALUATIONS, "open_loop", evaluation)
+    with raises(ParameterError, value="new_idea_s"):
+        metrics(wave())

@@ -17,8 +17,8 @@ from activesteer.analysis.report.groups import MAX_RUNS, Group, groups_of
 from activesteer.analysis.report.judgement import judge
 from activesteer.analysis.report.parameter_table import rows
 from activesteer.analysis.report.results import Result, results
+from activesteer.analysis.report.significance import Change
 from activesteer.analysis.report.tables import difference_text, number
-from activesteer.analysis.report.worth import Change
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M

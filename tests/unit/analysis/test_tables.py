@@ -19,10 +19,10 @@ def test_values_stand_under_their_run():
 
 
 def test_what_does_not_exist_is_a_dash_and_what_is_missing_a_blank():
-    text = comparison({"a": {"x_s": math.nan, "y_s": 1.0}, "b": {"x_s": 2.0}})
+    text = comparison({"a": {"ay_lag_s": math.nan, "step_time_s": 1.0}, "b": {"ay_lag_s": 2.0}})
     _, first, second = text.splitlines()
-    assert first.split() == ["x", "s", "-", "2.000"]
-    assert second.split() == ["y", "s", "1.000"]
+    assert first.split() == ["lateral", "acceleration", "lag", "s", "-", "2.000"]
+    assert second.split() == ["step", "time", "s", "1.000"]
 
 
 def test_table_of_real_metrics_has_a_line_for_each():

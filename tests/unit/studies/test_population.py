@@ -12,9 +12,9 @@ import pytest
 
 from activesteer.analysis.claims import Claim
 from activesteer.analysis.claims.population import NONE, ClaimShare, Population
-from activesteer.analysis.loss import CONES_MISSED
 from activesteer.cli import main
 from activesteer.errors import StudyError
+from activesteer.metric_table import CONES_MISSED
 from activesteer.studies.plan import Plan
 from activesteer.studies.population import population_study, summarise
 from activesteer.studies.study import study

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from activesteer.analysis.loss import CONES_MISSED, IN_LANES, has_spun, is_lost
+from activesteer.analysis.loss_of_control import has_spun, is_lost
+from activesteer.metric_table import CONES_MISSED, STAYS_IN_LANES
 
 PEAK = "sideslip_peak_abs_rad"
 SMALL, LARGE = math.radians(5.0), math.radians(25.0)
@@ -19,8 +20,8 @@ SMALL, LARGE = math.radians(5.0), math.radians(25.0)
         ({PEAK: LARGE}, True),
         ({"sideslip_peak_rad": -LARGE}, True),
         ({"sideslip_peak_rad": -SMALL}, False),
-        ({PEAK: SMALL, IN_LANES: 1.0}, False),
-        ({PEAK: SMALL, IN_LANES: 0.0}, True),
+        ({PEAK: SMALL, STAYS_IN_LANES: 1.0}, False),
+        ({PEAK: SMALL, STAYS_IN_LANES: 0.0}, True),
         ({PEAK: SMALL, CONES_MISSED: 0.0, "cones_hit": 3.0}, False),
         ({PEAK: SMALL, CONES_MISSED: 1.0}, True),
     ],
@@ -33,6 +34,6 @@ def test_a_car_is_lost_that_spins_or_leaves_its_course(metrics: dict[str, float]
 def test_a_run_that_ended_before_it_could_be_said_is_lost(missing: float | None) -> None:
     assert is_lost({PEAK: missing})
     assert has_spun({PEAK: missing})
-    assert is_lost({PEAK: SMALL, IN_LANES: missing})
+    assert is_lost({PEAK: SMALL, STAYS_IN_LANES: missing})
     assert is_lost({PEAK: SMALL, CONES_MISSED: missing})
     assert is_lost({})

@@ -1,4 +1,4 @@
-"""What the difference of two values of a metric is worth."""
+"""Significance of the difference between two values of a metric."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ import math
 import pytest
 
 from activesteer.analysis.report.results import KEY_FIGURES
-from activesteer.analysis.report.worth import BETTER, Change, cost, worth
+from activesteer.analysis.report.significance import Change, significance
+from activesteer.metric_table import METRICS
 from activesteer.studies.comparison import SHOWN
+
+JUDGED = [metric for metric in METRICS.values() if metric.better is not None]
 
 
 @pytest.mark.parametrize(
@@ -24,17 +27,18 @@ from activesteer.studies.comparison import SHOWN
         ("stopping_distance_m", 50.0, 50.0, Change.SAME),
         ("yaw_rate_peak_abs_radps", 1.0, 2.0, Change.OTHER),
         ("sideslip_peak_rad", math.nan, 0.1, Change.OTHER),
+        ("a_metric_of_another_version_m", 1.0, 2.0, Change.OTHER),
     ],
 )
 def test_each_metric_is_better_in_its_own_direction(metric, value, first, change):
-    assert worth(metric, value, first) is change
+    assert significance(metric, value, first) is change
 
 
-def test_what_is_judged_exists():
+def test_every_metric_with_a_direction_is_shown_somewhere():
     shown = {metric for metrics in SHOWN.values() for metric in metrics}
-    assert {*shown, *(name for figure in KEY_FIGURES for name in figure.metrics)} >= BETTER.keys()
+    assert {*shown, *(name for figure in KEY_FIGURES for name in figure.metrics)} >= {metric.name for metric in JUDGED}
 
 
 def test_cost_is_less_for_the_better_value():
-    for metric in BETTER:
-        assert worth(metric, *sorted((-3.0, 1.0), key=lambda value: cost(metric, value))) is Change.BETTER
+    for metric in JUDGED:
+        assert significance(metric.name, *sorted((-3.0, 1.0), key=metric.cost)) is Change.BETTER

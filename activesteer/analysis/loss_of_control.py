@@ -4,15 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Final
 
-from activesteer.analysis.claims.path_following import CONES_HIT
 from activesteer.analysis.claims.sine_with_dwell import LOST_SIDESLIP_RAD
-from activesteer.analysis.claims.slalom import CONES_MISSED
-from activesteer.analysis.claims.slippery import IN_LANES, OVERSTEP
-
-SIDESLIP_PEAKS: Final = ("sideslip_peak_abs_rad", "sideslip_peak_rad")
-"""Metrics of the largest sideslip; a manoeuvre has one of them."""
+from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP, SIDESLIP_PEAKS, STAYS_IN_LANES
 
 Metrics = Mapping[str, float | None]
 """Metrics of a run; a value that does not exist is None or nan."""
@@ -36,7 +30,7 @@ def is_lost(metrics: Metrics) -> bool:
     Returns:
         Whether it was.
     """
-    if has_spun(metrics) or (IN_LANES in metrics and _number(metrics, IN_LANES) != 1.0):
+    if has_spun(metrics) or (STAYS_IN_LANES in metrics and _number(metrics, STAYS_IN_LANES) != 1.0):
         return True
     return CONES_MISSED in metrics and _number(metrics, CONES_MISSED) != 0.0
 
@@ -46,8 +40,8 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
     peak = next((abs(metrics[name]) for name in SIDESLIP_PEAKS if name in metrics), None)
     if peak is not None and has_spun(metrics):
         yield f"lost at {math.degrees(peak):.0f} deg of sideslip" if math.isfinite(peak) else "lost"
-    if IN_LANES in metrics and metrics[IN_LANES] != 1.0:
-        beyond = metrics.get(OVERSTEP, math.nan)
+    if STAYS_IN_LANES in metrics and metrics[STAYS_IN_LANES] != 1.0:
+        beyond = metrics.get(LANE_OVERSTEP, math.nan)
         yield f"leaves the lane by {beyond:.2f} m" if beyond > 0.0 else "does not get through the lanes"
     if missed := metrics.get(CONES_MISSED):
         yield f"misses {_cones(missed)}"
@@ -57,7 +51,7 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
 
 def kept(metrics: Mapping[str, float]) -> Iterator[str]:
     """What a run with these metrics kept to, in words; nothing where there is nothing to keep to."""
-    if metrics.get(IN_LANES) == 1.0:
+    if metrics.get(STAYS_IN_LANES) == 1.0:
         yield "stays in the lanes"
     if metrics.get(CONES_MISSED) == 0.0 and not metrics.get(CONES_HIT):
         yield "passes all cones"

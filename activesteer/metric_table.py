@@ -1,0 +1,236 @@
+"""Every metric that the package evaluates: its unit for display, the difference that counts, its preferred direction.
+
+A metric is declared here once. An evaluation that returns another name is an error; see `analysis.metrics`.
+
+The significances rest on what is published about sensors and humans. The guide (`docs/claims.md`) says that the results
+of an earlier driver and earlier gains were known when these sizes were written down.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from typing import Final, NamedTuple
+
+from activesteer.errors import ParameterError, nearest_names
+from activesteer.quantities import DisplayUnit, display_unit
+
+STEER_RAD: Final = math.radians(0.05)
+"""Angle of a road wheel that is turned or added [rad]: workshops set wheel alignment to some 3 minutes of arc. A demand
+counts as `claims.action` says, so that noise cannot pass for it."""
+SETTLED_SIDESLIP_RAD: Final = math.radians(0.05)
+"""Difference of sideslip angles averaged over a second [rad]: half of the +-0.1 deg of an optical sensor."""
+SIDESLIP_RAD: Final = math.radians(0.1)
+"""Difference of two sideslip angles of an instant or an oscillation [rad]: an optical sensor is good to 0.1 deg."""
+YAW_RATE_RADPS: Final = math.radians(0.5)
+"""Difference of two yaw rates [rad/s]: humans notice 0.6 deg/s of a quick rotation (Grabherr et al. 2008), production
+sensors have 0.1 to 0.2 deg/s of noise."""
+TIME_S: Final = 0.01
+"""Difference of two times [s]: a yaw rate or acceleration sensor on a car's bus reports every 10 ms."""
+TRACK_M: Final = 0.05
+"""Difference of two tracks [m]: differential satellite positioning gives each track to 0.02 m."""
+STEERING_WHEEL_RAD: Final = math.radians(5.0)
+"""Difference of two steering wheel angles [rad]: about what a driver can tell apart while he turns the wheel."""
+
+CONES_HIT: Final = "cones_hit"
+CONES_MISSED: Final = "cones_missed"
+LANE_OVERSTEP: Final = "lane_overstep_m"
+STAYS_IN_LANES: Final = "stays_in_lanes"
+SIDESLIP_PEAKS: Final = ("sideslip_peak_abs_rad", "sideslip_peak_rad")
+"""Metrics of the largest sideslip angle; a manoeuvre has one of them."""
+
+
+class Better(StrEnum):
+    """Preferred direction of a metric."""
+
+    SMALLER = "smaller in magnitude"
+    LOWER = "lower"
+    """For values with a sign: a lane that is not touched has an overstep below zero."""
+    HIGHER = "higher"
+
+
+class Form(StrEnum):
+    """How the value of a metric is written."""
+
+    NUMBER = "number"
+    COUNT = "count"
+    YES_OR_NO = "yes or no"
+
+
+class Metric(NamedTuple):
+    """A declared metric.
+
+    Attributes:
+        name: Its name in recordings, which ends in its SI unit.
+        label: Its name in words.
+        unit: Its unit for display, with the factor from the SI value.
+        significance: Smallest difference that a driver or a sensor in a test car could tell [SI]; 0 if unknown.
+        better: Its preferred direction; None where neither more nor less is better.
+        form: How its value is written.
+    """
+
+    name: str
+    label: str
+    unit: DisplayUnit
+    significance: float = 0.0
+    better: Better | None = None
+    form: Form = Form.NUMBER
+
+    @property
+    def unit_name(self) -> str:
+        """Name of the unit; empty for a pure number."""
+        return self.unit.name.removesuffix("-")
+
+    @property
+    def title(self) -> str:
+        """Label and unit, as they stand at an axis."""
+        return f"{self.label} [{self.unit.name}]"
+
+    @property
+    def whole(self) -> bool:
+        """Whether its value is a whole number, or yes (1) or no (0)."""
+        return self.form is not Form.NUMBER
+
+    def text(self, value: float) -> str:
+        """Return a value [SI] as tables show it; `-` where the value is not defined (nan)."""
+        if math.isnan(value):
+            return "-"
+        if self.form is Form.YES_OR_NO:
+            return "yes" if value else "no"
+        return f"{value:.0f}" if self.form is Form.COUNT else f"{value * self.unit.factor:.3f}"
+
+    def cost(self, value: float) -> float:
+        """Return what shall be small [SI]; the value itself where the metric has no preferred direction."""
+        if self.better is Better.SMALLER:
+            return abs(value)
+        return -value if self.better is Better.HIGHER else value
+
+
+_WORDS: Final = {"ay": "lateral acceleration", "tb": "TB"}
+_PERCENT: Final = DisplayUnit("%", 100.0)
+_PURE: Final = DisplayUnit("-", 1.0)
+
+
+def _declare(
+    si: str,
+    *stems: str,
+    significance: float = 0.0,
+    better: Better | None = None,
+    unit: DisplayUnit | None = None,
+    form: Form = Form.NUMBER,
+) -> list[Metric]:
+    """Return metrics of one unit, by their names without it."""
+    found = []
+    for stem in stems:
+        head, _, tail = stem.partition("_")
+        label = " ".join(part for part in (_WORDS.get(head, head), tail.replace("_", " ")) if part)
+        name = f"{stem}_{si}" if si else stem
+        found.append(Metric(name, label, unit or display_unit(f"_{si}"), significance, better, form))
+    return found
+
+
+def _pure(*stems: str, better: Better | None = None, unit: DisplayUnit = _PURE) -> list[Metric]:
+    return _declare("", *stems, better=better, unit=unit)
+
+
+_SMALLER, _LOWER, _HIGHER = Better.SMALLER, Better.LOWER, Better.HIGHER
+
+METRICS: Final = {
+    metric.name: metric
+    for metric in (
+        *_declare(
+            "radps", "yaw_rate_steady_state", "yaw_rate_peak", "yaw_rate_peak_abs", "yaw_rate_rms",
+            "yaw_rate_gates_rms", "yaw_rate_after_gates_rms", "yaw_rate_end_rms", "yaw_rate_reversal_peak",
+            "yaw_rate_begin", "yaw_rate_after_1000ms", significance=YAW_RATE_RADPS,
+        ),
+        *_declare("radps", "yaw_rate_deviation_after_1000ms", significance=YAW_RATE_RADPS, better=_SMALLER),
+        *_declare("radps", "steering_wheel_rate_rms", better=_SMALLER),
+        *_declare("radps", "steering_wheel_rate_peak", "steering_wheel_max_rate"),
+        *_declare(
+            "mps2", "ay_steady_state", "ay_peak", "ay_peak_abs", "ay_rms", "ay_gates_rms", "ay_after_gates_rms",
+            "ay_begin", "linear_range", "limit_acceleration",
+        ),
+        *_declare("mps2", "mean_deceleration", better=_HIGHER),
+        *_declare("rad", "sideslip_peak", "sideslip_peak_abs", significance=SIDESLIP_RAD, better=_SMALLER),
+        *_declare(
+            "rad", "sideslip_rms", "sideslip_gates_rms", "sideslip_after_gates_rms", "sideslip_end_rms",
+            significance=SIDESLIP_RAD,
+        ),
+        *_declare("rad", "sideslip_steady_state", significance=SETTLED_SIDESLIP_RAD),
+        *_declare(
+            "rad", "rear_steer_steady_state", "superposition_steady_state", "added_rear_steer_steady_state",
+            "added_superposition_steady_state", significance=STEER_RAD,
+        ),
+        *_declare("rad", "steering_wheel_peak_abs", significance=STEERING_WHEEL_RAD, better=_SMALLER),
+        *_declare(
+            "rad", "steering_wheel_steady_state", "steering_wheel_rms", "steering_wheel_gates_rms",
+            "steering_wheel_after_gates_rms", "steering_wheel_at_0_3g", significance=STEERING_WHEEL_RAD,
+        ),
+        *_declare(
+            "rad", "roll_steady_state", "roll_peak", "roll_peak_abs", "roll_rms", "front_steer_steady_state",
+            "yaw_rate_phase_at_1Hz", "ay_phase_at_1Hz", "roll_phase_at_1Hz", "yaw_angle_after_1000ms",
+        ),
+        *_declare("s", "yaw_rate_response_time", "ay_response_time", significance=TIME_S, better=_SMALLER),
+        *_declare(
+            "s", "step_time", "yaw_rate_peak_time", "ay_peak_time", "roll_response_time", "roll_peak_time",
+            "sideslip_response_time", "sideslip_peak_time", "steer_begin_time", "steer_reversal_time",
+            "steer_completion_time", "yaw_rate_reversal_peak_time", "braking_begin_time", "yaw_rate_lag", "ay_lag",
+            "added_angles_common", significance=TIME_S,
+        ),
+        *_declare("srad", "tb"),
+        *_declare(
+            "m", "stopping_distance", "path_deviation_after_1000ms", "track_deviation_max", "lateral_deviation_max",
+            "track_amplitude", significance=TRACK_M, better=_SMALLER,
+        ),
+        *_declare("m", "lane_overstep", significance=TRACK_M, better=_LOWER),
+        *_declare(
+            "m", "lateral_displacement", "lateral_displacement_by_ay", "track_deviation_rms", "cone_distance_min",
+            "cone_distance_mean", "radius_begin", "stopping_distance_corrected", "lateral_deviation_after_1000ms",
+            "track_difference_none_ars", "track_difference_none_afs", "track_difference_ars_afs", significance=TRACK_M,
+        ),
+        *_declare("mps", "speed_begin", "speed_end", "speed_loss", "characteristic_speed"),
+        *_declare("mps", "entry_speed_min", "entry_speed", "entry_speed_max", better=_HIGHER),
+        *_declare(
+            "radpmps2", "understeer_gradient", "steer_gradient", "ackermann_gradient", "roll_gradient",
+            "sideslip_gradient", "front_slip_gradient", "rear_slip_gradient",
+        ),
+        *_declare("1ps", "yaw_rate_gain"),
+        *_declare("mps2prad", "steering_wheel_gain", "ay_gain"),
+        *_declare("radprad", "roll_gain"),
+        *_declare("Hz", "yaw_rate_peak_gain", "yaw_rate_45deg", "yaw_rate_bandwidth"),
+        *_declare("Pa", "brake_pressure_peak"),
+        *_pure("yaw_rate_overshoot", better=_LOWER, unit=_PERCENT),
+        *_pure("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", better=_SMALLER, unit=_PERCENT),
+        *_pure(
+            "ay_overshoot", "roll_overshoot", "sideslip_overshoot", "braking_efficiency", "wheel_slip_max",
+            "added_angles_opposite_share", unit=_PERCENT,
+        ),
+        *_pure(
+            "friction_used_max", "tyre_use_max", "tyre_use_mean", "yaw_rate_peak_gain_ratio", "coherence_min",
+            "added_angles_correlation",
+        ),
+        *_declare("", CONES_HIT, CONES_MISSED, better=_SMALLER, unit=_PURE, form=Form.COUNT),
+        *_declare("", STAYS_IN_LANES, unit=_PURE, form=Form.YES_OR_NO),
+    )
+}  # fmt: skip
+"""Name -> metric."""
+
+
+def metric(name: str) -> Metric:
+    """Return a declared metric.
+
+    Raises:
+        ParameterError: no metric has this name.
+    """
+    if name not in METRICS:
+        raise ParameterError(f"no such metric; {nearest_names(name, METRICS)}", value=name, allowed=tuple(METRICS))
+    return METRICS[name]
+
+
+def recorded_metric(name: str) -> Metric:
+    """Return a metric that a file names.
+
+    A file of another version may hold a metric that this version does not declare. Such a metric is shown by its full
+    name, which says its SI unit, and its value is not converted.
+    """
+    return METRICS.get(name) or Metric(name, name, _PURE)
