@@ -71,10 +71,16 @@ def _default(field: dataclasses.Field[Any]) -> str:
 
 
 def _allowed(hint: Any) -> str:
+    if words := [word for option in (hint, *typing.get_args(hint)) for word in _words(option)]:
+        return ", ".join(f"`{word}`" for word in words)
     ranges = [extra for extra in getattr(hint, "__metadata__", ()) if isinstance(extra, Range)]
     for inner in typing.get_args(hint):
         ranges += [extra for extra in getattr(inner, "__metadata__", ()) if isinstance(extra, Range)]
     return str(ranges[0]) if ranges else ""
+
+
+def _words(hint: Any) -> tuple[Any, ...]:
+    return typing.get_args(hint) if typing.get_origin(hint) is typing.Literal else ()
 
 
 def _meanings(cls: type) -> dict[str, str]:

@@ -1,38 +1,10 @@
-"""Manoeuvres: TOML files that say what is asked of the driver, on which road, and for how long."""
+"""Manoeuvres: TOML files that give setpoint, road and duration.
+
+A kind of manoeuvre is one file with a subclass of `Maneuver`, and its line in `kinds.KINDS`. The package `analysis`
+evaluates its recordings: `analysis.metrics.EVALUATIONS` needs a line too.
+"""
 
 from activesteer.maneuver.base import Maneuver
-from activesteer.maneuver.brake_in_turn import BrakeInTurn
-from activesteer.maneuver.constant_radius import ConstantRadius
-from activesteer.maneuver.follow_path import FollowPath
-from activesteer.maneuver.kinds import KINDS, build_maneuver, filled_from_csv, maneuver_class
-from activesteer.maneuver.lane_change import LaneChange
-from activesteer.maneuver.open_loop import OpenLoop
-from activesteer.maneuver.random_steer import RandomSteer
-from activesteer.maneuver.sine_sweep import SineSweep
-from activesteer.maneuver.sine_with_dwell import SineWithDwell
-from activesteer.maneuver.slalom import Slalom
-from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
-from activesteer.maneuver.step_steer import StepSteer
-from activesteer.maneuver.straight_braking import StraightBraking
-from activesteer.road.lane import Lane
+from activesteer.maneuver.kinds import KINDS, build_maneuver, maneuver_class
 
-__all__ = [
-    "KINDS",
-    "BrakeInTurn",
-    "ConstantRadius",
-    "FollowPath",
-    "Lane",
-    "LaneChange",
-    "Maneuver",
-    "OpenLoop",
-    "RandomSteer",
-    "SineSweep",
-    "SineWithDwell",
-    "Slalom",
-    "SlowlyIncreasingSteer",
-    "StepSteer",
-    "StraightBraking",
-    "build_maneuver",
-    "filled_from_csv",
-    "maneuver_class",
-]
+__all__ = ["KINDS", "Maneuver", "build_maneuver", "maneuver_class"]

@@ -1,4 +1,4 @@
-"""What all manoeuvres along a course have in common: the driver looks at a path and holds the speed."""
+"""Base of the manoeuvres along a course: the driver follows a path and holds the speed."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from activesteer.signals import Setpoint
 Width = Annotated[float, Range(0.5, 4.0)]
 
 _MIN_SPEED_MPS: Final = 5.0 / 3.6
-"""Slower than this, a preview of a second or two does not look beyond the car's own length [m/s]."""
+"""Below this speed a preview of one or two seconds ends within the car's own length [m/s]."""
 _AFTER_S: Final = 3.5
-"""How long after the last gate a run should go on, so that it can be seen whether the car settles [s]."""
+"""Time after the last gate in which the car can be seen to settle [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,14 +26,14 @@ class AlongCourse(Maneuver):
     """Base of the kinds that are driven along a course at constant speed."""
 
     def __post_init__(self) -> None:
-        """The car must drive forwards and come to the last gate within the run.
+        """Check that the car drives forwards and passes the last gate within the run.
 
         Raises:
-            ManeuverError: it does not, or the course cannot be made.
+            ManeuverError: it does not, or the course cannot be laid out.
         """
         if self.speed_mps < _MIN_SPEED_MPS:
             raise ManeuverError(
-                f"is {3.6 * self.speed_mps:g} km/h; a course is driven forwards, with at least "
+                f"is {3.6 * self.speed_mps:g} km/h; a course is driven forwards, at no less than "
                 f"{3.6 * _MIN_SPEED_MPS:g} km/h",
                 key="speed_kmh",
                 value=3.6 * self.speed_mps,
@@ -43,7 +43,7 @@ class AlongCourse(Maneuver):
             gate_s = last / self.speed_mps
             raise ManeuverError(
                 f"is {self.duration_s:g} s, but at {3.6 * self.speed_mps:g} km/h the last gate, {last:g} m "
-                f"from the start, is reached at {gate_s:.1f} s; {gate_s + _AFTER_S:.1f} s show how the car settles",
+                f"from the start, is reached at {gate_s:.1f} s; the car settles by {gate_s + _AFTER_S:.1f} s",
                 key="duration_s",
                 value=self.duration_s,
                 allowed=Range(gate_s + _AFTER_S),
@@ -60,23 +60,19 @@ class AlongCourse(Maneuver):
 
     @abstractmethod
     def _make_course(self) -> Course:
-        """Lays out the course; done once."""
+        """Lay out the course; called once."""
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """The path and the speed."""
+        """Path and speed."""
         return self._setpoint
 
     @cached_property
     def _setpoint(self) -> Setpoint:
         return self.settling_setpoint()._replace(path=self.course.path)
 
-    def settling_setpoint(self) -> Setpoint:
-        """Straight ahead at the speed of the manoeuvre: the path begins where the recording does."""
-        return self.at_speed(0.0)
-
 
 def known_width(vehicle_width_m: float | None) -> float:
-    """The vehicle's width, which a course is laid out for [m].
+    """Return the width of the vehicle, for which a course is laid out [m].
 
     Raises:
         ManeuverError: it is not known.

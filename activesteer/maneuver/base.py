@@ -1,13 +1,14 @@
-"""What every manoeuvre has: speed, road, duration, and a setpoint for the driver at any time."""
+"""Base of all manoeuvres: speed, road, duration, and a setpoint for the driver at any time."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Final
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
 
-from activesteer.config import Range
+from activesteer.config import Range, Source
 from activesteer.errors import ManeuverError
 from activesteer.faults import Fault
 from activesteer.road.course import Course
@@ -15,9 +16,13 @@ from activesteer.road.road import Road
 from activesteer.signals import Setpoint, made
 
 Speed = Annotated[float, Range(-20.0, 100.0)]
+Side = Literal["left", "right"]
+SIGNS: Final[dict[Side, float]] = {"left": 1.0, "right": -1.0}
+"""Side -> sign of y, of steering and of yaw there (ISO 8855)."""
+DriveMode = Literal["hold_speed", "coast"]
 
 MIN_SEARCH_SPEED_MPS: Final = 30.0 / 3.6
-"""Slower than this, lateral acceleration hardly depends on the steering wheel angle [m/s]."""
+"""Below this speed the lateral acceleration hardly depends on the steering wheel angle [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,9 +41,9 @@ class Maneuver(ABC):
     """
 
     kind: str
-    """Which kind of manoeuvre this is."""
+    """Kind of manoeuvre."""
     name: str = ""
-    """Short name, for files and tables; the file's name where not given."""
+    """Short name, for files and tables. Default: the file's name."""
     title: str = ""
     """One line for lists and plots."""
     speed_mps: Speed
@@ -46,61 +51,85 @@ class Maneuver(ABC):
     duration_s: Annotated[float, Range(0.01, 3600.0)]
     """Length of the recording [s]."""
     settle_s: Annotated[float, Range(0.0, 60.0)] = 2.0
-    """Time before the recording in which the car rolls straight ahead and its speed settles [s]."""
+    """Time before the recording in which the car drives straight ahead and its speed settles [s]."""
     road: Road = Road()
-    """What the wheels roll on."""
+    """The road."""
     fault: tuple[Fault, ...] = ()
-    """What goes wrong with actuators and sensors, and when."""
+    """Faults of actuators and sensors, and their times."""
+
+    @classmethod
+    def filled_from_csv(
+        cls, table: Mapping[str, Any], folder: Path | None, source: Source
+    ) -> tuple[dict[str, Any], dict[str, bytes]]:
+        """Fill the values of the CSV files that a manoeuvre names into its table.
+
+        A table without a file may have both the name of a CSV and values. It comes from a recording, and the values are
+        those that were read then, unless an override names another CSV.
+
+        Args:
+            table: The table.
+            folder: Folder of the manoeuvre file; None for a table that has no file.
+            source: For error messages.
+
+        Returns:
+            The table, and the CSV files by their names, to be kept with the recording.
+
+        Raises:
+            ManeuverError: a CSV is not found or wrong, or a manoeuvre file gives the values too.
+        """
+        return dict(table), {}
 
     @abstractmethod
     def setpoint(self, time_s: float) -> Setpoint:
-        """What is asked of the driver.
+        """Return the setpoint for the driver.
 
         Args:
             time_s: Time since the start of the recording [s].
-
-        Returns:
-            The setpoint at that time.
         """
 
     @property
     def course(self) -> Course | None:
-        """Path, lanes and cones; None where the manoeuvre says what to do with the steering wheel instead."""
+        """Path, lanes and cones; None if the manoeuvre sets the steering wheel angle instead."""
         return None
 
     @property
     def search(self) -> Search | None:
-        """What must be found by driving before the manoeuvre can be run; None where everything is known."""
+        """Search that must be driven before the manoeuvre can be run; None if all values are known."""
         return None
 
     def settling_setpoint(self) -> Setpoint:
-        """What is asked of the driver while the car settles before the recording."""
-        return self.setpoint(0.0)
+        """Return the setpoint while the car settles before the recording: straight ahead."""
+        return self.at_speed(0.0)
 
     def at_speed(self, steering_wheel_rad: float, hold_speed: bool = True) -> Setpoint:
-        """A steering wheel angle [rad], left positive, while the drive holds the speed of the manoeuvre, or none."""
+        """Return a setpoint with a steering wheel angle and the speed of the manoeuvre.
+
+        Args:
+            steering_wheel_rad: Steering wheel angle, left positive [rad].
+            hold_speed: Whether the drive holds the speed; otherwise there is no drive torque.
+        """
         return made(Setpoint, (steering_wheel_rad, self.speed_mps, 0.0, hold_speed, None, None, None, None, 0.0))
 
 
 @dataclass(frozen=True)
 class Search:
-    """What must be found by driving the control-free car before a manoeuvre can be run: a steering wheel angle."""
+    """Search for a steering wheel angle by driving the car without control."""
 
     probe: Maneuver
-    """The manoeuvre by which it is found."""
+    """The manoeuvre that is driven."""
     lateral_acceleration_mps2: float
-    """What is to be reached [m/s2], left positive."""
+    """Lateral acceleration to reach [m/s2], left positive."""
     accept: Callable[[float], Maneuver]
-    """Steering wheel angle found [rad] -> the manoeuvre with it."""
+    """Function from the steering wheel angle found [rad] to the manoeuvre with it."""
 
 
 def within(value: float, most: float) -> float:
-    """A value, limited to 0 and `most`: as `min` and `max` do it, which cost more than all else in a setpoint."""
+    """Return a value limited to 0 and `most`; in a setpoint `min` and `max` would take most of the time."""
     return 0.0 if value < 0.0 else most if value > most else value
 
 
 def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
-    """A search needs a car that drives forwards, and not slowly.
+    """Check that the car drives forwards and fast enough for a search.
 
     Args:
         speed_mps: Speed of the manoeuvre [m/s].

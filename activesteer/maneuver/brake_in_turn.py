@@ -1,4 +1,4 @@
-"""Braking in a turn (ISO 7975): steady-state cornering, then the brake, the steering wheel held."""
+"""Braking in a turn (ISO 7975): steady-state cornering, then braking with a fixed steering wheel."""
 
 from __future__ import annotations
 
@@ -16,58 +16,58 @@ from activesteer.signals import Setpoint
 
 @dataclass(frozen=True)
 class TurnInput:
-    """The steering wheel on the way into the turn."""
+    """The steering wheel at the entry of the turn."""
 
     OVERRULED: ClassVar = {"lateral_acceleration_mps2": {"steering_wheel_rad": None}}
 
     start_s: Annotated[float, Range(0.0)] = 0.5
-    """When it begins to turn [s]."""
+    """Time at which the steering wheel begins to turn [s]."""
     rate_radps: Annotated[float, Range(0.1, 50.0)] = math.radians(60.0)
-    """How fast it turns [rad/s]."""
+    """Steering wheel rate [rad/s]."""
     steering_wheel_rad: Annotated[float, Range(-15.0, 15.0)] | None = None
-    """Angle that is then held, left positive [rad]; found by a search where not given."""
+    """Angle that is then held, left positive [rad]. Default: found by a search."""
     lateral_acceleration_mps2: Annotated[float, Range(-12.0, 12.0)] | None = None
-    """Steady-state lateral acceleration of the control-free car that the search aims at, left positive [m/s2]."""
+    """Steady-state lateral acceleration of the car without control that the search reaches, left positive [m/s2]."""
 
     def __post_init__(self) -> None:
-        """Angle or aim must be known; where both are, the angle is what the aim once led to.
+        """Check the keys. If both angle and lateral acceleration are given, a search has found the angle.
 
         Raises:
-            ManeuverError: neither of them is given.
+            ManeuverError: neither is given.
         """
         if self.steering_wheel_rad is None and self.lateral_acceleration_mps2 is None:
             raise ManeuverError(
-                "steering_wheel_deg (the angle to hold) or lateral_acceleration_mps2 (what the control-free car shall "
-                "reach) is needed"
+                "steering_wheel_deg (the angle to hold) or lateral_acceleration_mps2 (which the car without control "
+                "reaches) is needed"
             )
 
 
 @dataclass(frozen=True)
 class BrakeInput:
-    """The brake in the turn."""
+    """The brake pedal."""
 
     pedal: Annotated[float, Range(0.0, 1.0)]
     """Pedal position [-]."""
     start_s: Annotated[float, Range(0.0)] = 6.0
-    """When it begins to be pressed [s]; the throttle is released then."""
+    """Time at which the driver begins to press the pedal and releases the throttle [s]."""
     rise_s: Annotated[float, Range(0.01, 5.0)] = 0.2
-    """Time in which it is pressed [s]."""
+    """Time until the pedal is in position [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BrakeInTurn(Maneuver):
-    """A turn at constant speed and steering wheel angle, braked."""
+    """A turn at constant speed and steering wheel angle, then braking."""
 
     turn: TurnInput
-    """The way into the turn."""
+    """The entry of the turn."""
     brake: BrakeInput
     """The brake."""
 
     def __post_init__(self) -> None:
-        """One thing after the other, within the run.
+        """Check that turn and brake follow each other within the run.
 
         Raises:
-            ManeuverError: the brake comes before the turn, or after the end, or the car is too slow for the search.
+            ManeuverError: the brake begins before the turn or after the end, or the car is too slow for a search.
         """
         turn, brake = self.turn, self.brake
         if brake.start_s <= turn.start_s:
@@ -87,7 +87,7 @@ class BrakeInTurn(Maneuver):
 
     @property
     def search(self) -> SteadyTurn | None:
-        """For the steering wheel angle, where only the lateral acceleration is known: that of a step steer."""
+        """Search for the angle by a step steer, if only the lateral acceleration is given."""
         wanted = self.turn.lateral_acceleration_mps2
         if self.turn.steering_wheel_rad is not None or wanted is None:
             return None
@@ -95,15 +95,15 @@ class BrakeInTurn(Maneuver):
             kind="step_steer", name=self.name, speed_mps=self.speed_mps, duration_s=self.duration_s,
             settle_s=self.settle_s, road=self.road, steer=StepInput(lateral_acceleration_mps2=wanted),
         )  # fmt: skip
-        found = step.search
-        return None if found is None else dataclasses.replace(found, accept=self.with_amplitude)
+        search = step.search
+        return None if search is None else dataclasses.replace(search, accept=self.with_amplitude)
 
     def with_amplitude(self, steering_wheel_rad: float) -> BrakeInTurn:
-        """The same with its steering wheel angle known [rad]; the aim that led to it stays on record."""
+        """Return the manoeuvre with a steering wheel angle [rad]; the lateral acceleration stays on record."""
         return dataclasses.replace(self, turn=dataclasses.replace(self.turn, steering_wheel_rad=steering_wheel_rad))
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Ramp of the steering wheel, ramp of the brake; see the base class."""
+        """Ramp of the steering wheel, then ramp of the brake; see the base class."""
         turn, brake = self.turn, self.brake
         amplitude = turn.steering_wheel_rad or 0.0
         turned = within((time_s - turn.start_s) * turn.rate_radps, abs(amplitude))
@@ -112,7 +112,3 @@ class BrakeInTurn(Maneuver):
             return self.at_speed(angle)
         pressed = within((time_s - brake.start_s) / brake.rise_s, 1.0)
         return Setpoint(angle, self.speed_mps, pressed * brake.pedal, False)
-
-    def settling_setpoint(self) -> Setpoint:
-        """Straight ahead at the speed of the manoeuvre."""
-        return self.at_speed(0.0)

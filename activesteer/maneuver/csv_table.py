@@ -1,4 +1,4 @@
-"""Tables that a user gives as CSV: found beside the manoeuvre file, read by the names of their columns."""
+"""CSV tables of a user: found beside the manoeuvre file, read by the names of their columns."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from activesteer.errors import ManeuverError, nearest_names, shown
 from activesteer.files import csv_number, is_file, read_csv, user_path
 
 
-def find_csv(name: str, own: Path | None, source: Source, key: Sequence[str]) -> Path:
-    """A CSV that a manoeuvre names.
+def find_csv(name: str, folder: Path | None, source: Source, key: Sequence[str]) -> Path:
+    """Find a CSV that a manoeuvre names.
 
     Args:
-        name: What it is called there.
-        own: Folder of the manoeuvre file; None for a table that has no file.
+        name: Its name in the manoeuvre file.
+        folder: Folder of the manoeuvre file; None for a table that has no file.
         source: For error messages.
         key: Key that names it.
 
@@ -25,11 +25,11 @@ def find_csv(name: str, own: Path | None, source: Source, key: Sequence[str]) ->
     Raises:
         ManeuverError: there is no such file; the message names the nearest ones.
     """
-    beside = () if own is None else (own / name,)
+    beside = () if folder is None else (folder / name,)
     for candidate in (*beside, user_path(name, source.error)):
         if name.isprintable() and is_file(candidate):
             return candidate
-    folder = own or Path.cwd()
+    folder = folder or Path.cwd()
     present = [path.name for path in folder.iterdir() if path.suffix == ".csv"]
     raise source.fail(
         key, f"there is no file {shown(name)} in {shown(folder)}; {nearest_names(name, present)}", name, present
@@ -39,21 +39,21 @@ def find_csv(name: str, own: Path | None, source: Source, key: Sequence[str]) ->
 def read_columns(
     path: Path, required: Sequence[str], optional: Sequence[str] = ()
 ) -> tuple[dict[str, list[float]], list[int]]:
-    """Columns of a CSV whose first line names them; others may stand beside them.
+    """Read columns of a CSV whose first line names them; other columns are ignored.
 
-    A column may be in a unit of the edge, as in a TOML file: `steering_wheel_deg` fills `steering_wheel_rad`.
+    A column may be in degrees or km/h, as in a TOML file: `steering_wheel_deg` fills `steering_wheel_rad`.
 
     Args:
         path: The file.
-        required: Names of columns that it must have.
-        optional: Names of columns that it may have.
+        required: Names of the columns that must be there.
+        optional: Names of the columns that may be there.
 
     Returns:
-        Column name -> values in SI, and the line in which each row stands.
+        Column name to values in SI, and the line number of each row.
 
     Raises:
-        ManeuverError: the file cannot be read, a column is missing or given twice, a row has more cells than there
-            are columns, or a value is no number.
+        ManeuverError: the file cannot be read, a column is missing or given twice, a row has more cells than the
+            header, or a value is no number.
     """
     rows = read_csv(path, ManeuverError)
     if not rows:

@@ -1,4 +1,4 @@
-"""A path of the user's own, from a CSV or from the manoeuvre file, at constant speed."""
+"""A user's own path, from a CSV or from the manoeuvre file, at constant speed."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ class PathTable:
     """Points in the order of travel; the car starts at (0, 0), heading along x."""
 
     csv: str | None = None
-    """File with the columns x_m and y_m, beside the manoeuvre file or a path of its own."""
+    """CSV file with the columns x_m and y_m: a path, or a name in the manoeuvre's folder."""
     x_m: tuple[float, ...] | None = None
-    """World x of the points [m]; those of the CSV, where that is given."""
+    """World x of the points [m]. Default: the points of the CSV."""
     y_m: tuple[float, ...] | None = None
     """World y, left positive [m]."""
 
     def __post_init__(self) -> None:
-        """The points must make a path.
+        """Check that the points make a path.
 
         Raises:
-            ManeuverError: there are none, or they do not.
+            ManeuverError: there are none, or a car cannot follow them.
         """
         if self.x_m is None or self.y_m is None:
             raise ManeuverError("csv (a file with the columns x_m and y_m) or both lists x_m and y_m are needed")
@@ -46,38 +46,26 @@ class FollowPath(AlongCourse):
     path: PathTable
     """The points."""
 
+    @classmethod
+    def filled_from_csv(
+        cls, table: Mapping[str, Any], folder: FilePath | None, source: Source
+    ) -> tuple[dict[str, Any], dict[str, bytes]]:
+        """Fill in the points of the CSV; see the base class."""
+        points = table.get("path")
+        if not isinstance(points, Mapping) or not isinstance(points.get("csv"), str):
+            return dict(table), {}
+        if ("x_m" in points or "y_m" in points) and "path.csv" not in source.overridden:
+            if folder is None:
+                return dict(table), {}
+            raise source.fail(("path", "csv"), "csv and the lists x_m, y_m both give the points; leave one out")
+        file = find_csv(points["csv"], folder, source, ("path", "csv"))
+        try:
+            x_m, y_m, lines = read_csv(file)
+            check_points(x_m, y_m, lambda index: f"{file.name}, line {lines[index]}")
+        except ManeuverError as reason:
+            raise source.fail(("path", "csv"), str(reason), reason.value, reason.allowed) from reason
+        filled = {**table, "path": {**points, "x_m": x_m, "y_m": y_m}}
+        return filled, {f"path/{file.name}": read_bytes(file, ManeuverError, MAX_CSV_BYTES)}
+
     def _make_course(self) -> Course:
         return Course(Path.through(self.path.x_m or (), self.path.y_m or ()))
-
-
-def with_csv(table: Mapping[str, Any], own: FilePath | None, source: Source) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """A table of this kind with the points of its CSV filled in.
-
-    Args:
-        table: The table.
-        own: Folder of the manoeuvre file; None for a table that has no file.
-        source: For error messages.
-
-    Returns:
-        The table, and the CSV by its name, to be kept with the recording; as it was where it names no CSV. A table
-        without a file may have both CSV and points: it comes from a recording, and the points are what was read then,
-        unless an override names another CSV.
-
-    Raises:
-        ManeuverError: the CSV is not found or wrong, or points are given beside it in a file.
-    """
-    points = table.get("path")
-    if not isinstance(points, Mapping) or not isinstance(points.get("csv"), str):
-        return dict(table), {}
-    if ("x_m" in points or "y_m" in points) and "path.csv" not in source.overridden:
-        if own is None:
-            return dict(table), {}
-        raise source.fail(("path", "csv"), "csv and the lists x_m, y_m are two ways to give the points; leave one out")
-    file = find_csv(points["csv"], own, source, ("path", "csv"))
-    try:
-        x_m, y_m, lines = read_csv(file)
-        check_points(x_m, y_m, lambda index: f"{file.name}, line {lines[index]}")
-    except ManeuverError as reason:
-        raise source.fail(("path", "csv"), str(reason), reason.value, reason.allowed) from reason
-    filled = {**table, "path": {**points, "x_m": x_m, "y_m": y_m}}
-    return filled, {f"path/{file.name}": read_bytes(file, ManeuverError, MAX_CSV_BYTES)}

@@ -8,10 +8,10 @@
 | 4 | 25 m | 12.5 m |
 | 5 exit lane | 15 m + 15 m, 1.3 b + 0.25 m | 12 m, 3 m |
 
-b is the width of the vehicle. Sources differ in some points, and this is what is taken here. ISO 3888-1: the offset of
+b is the width of the vehicle. Sources differ in some points; this file chooses the following. ISO 3888-1: the offset of
 3.5 m is between the centre lines, and the exit lane has the centre line of the entry lane. ISO 3888-2: the offset of
-1 m is between those edges of entry and side lane that face each other; the exit lane is 3 m wide (elsewhere
-1.3 b + 0.25 m), and its edge away from the side lane is in line with that of the entry lane (so Project Chrono).
+1 m is between the facing edges of entry lane and side lane. The exit lane is 3 m wide (elsewhere 1.3 b + 0.25 m), and
+its edge away from the side lane is in line with the same edge of the entry lane (as in Project Chrono).
 
 Source: ISO 3888-1 and ISO 3888-2, Passenger cars - Test track for a severe lane-change manoeuvre.
 """
@@ -20,17 +20,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.road.lane import Lane
 
-STANDARDS: Final = ("iso_3888_1", "iso_3888_2")
-"""Standards that a course can be laid out by."""
+LaneStandard = Literal["iso_3888_1", "iso_3888_2"]
 _CONE_SPACING_M: Final = 5.0
-"""Largest distance of the cones along a lane [m]."""
+"""Largest distance between cones along a lane [m]."""
 
 
 class _Section(NamedTuple):
@@ -41,14 +40,14 @@ class _Section(NamedTuple):
     centre_m: float
 
 
-def lanes(standard: str, vehicle_width_m: float, start_x_m: float, side: float) -> tuple[Lane, ...]:
-    """The three lanes.
+def lanes(standard: LaneStandard, vehicle_width_m: float, start_x_m: float, side: float) -> tuple[Lane, ...]:
+    """Return the three lanes.
 
     Args:
-        standard: One of `STANDARDS`.
+        standard: Standard of the lanes.
         vehicle_width_m: Width of the vehicle, b [m].
-        start_x_m: Where the entry lane begins; its centre line is y = 0 [m].
-        side: 1 where the side lane is on the left, -1 on the right.
+        start_x_m: Beginning of the entry lane, whose centre line is y = 0 [m].
+        side: 1 for a side lane on the left, -1 on the right.
 
     Returns:
         Entry, side and exit lane.
@@ -78,9 +77,9 @@ def _lane(section: _Section, start_x_m: float, side: float) -> Lane:
 
 
 def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
-    """Where cones touch the edges of lanes: at both ends, and at equal distances of at most 5 m between.
+    """Return the points at which cones touch the edges of lanes: at both ends, and at most 5 m apart in between.
 
-    The standards lay the edges of a lane tangentially to the feet of its cones.
+    By the standards the edges of a lane are tangents to the feet of its cones.
 
     Returns:
         World x and y of the cones [m], shape (number of cones, 2).

@@ -1,9 +1,8 @@
-"""Which kinds of manoeuvre there are."""
+"""The kinds of manoeuvre."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any, Final
 
 from activesteer.config import Source, build
@@ -12,10 +11,9 @@ from activesteer.faults import check_faults
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.constant_radius import ConstantRadius
-from activesteer.maneuver.follow_path import FollowPath, with_csv
+from activesteer.maneuver.follow_path import FollowPath
 from activesteer.maneuver.lane_change import LaneChange
 from activesteer.maneuver.open_loop import OpenLoop
-from activesteer.maneuver.open_loop_tables import with_tables
 from activesteer.maneuver.random_steer import RandomSteer
 from activesteer.maneuver.sine_sweep import SineSweep
 from activesteer.maneuver.sine_with_dwell import SineWithDwell
@@ -40,40 +38,13 @@ KINDS: Final[dict[str, type[Maneuver]]] = {
 }
 """Value of `kind` in a file -> class."""
 
-_Fill = Callable[[Mapping[str, Any], Path | None, Source], tuple[dict[str, Any], dict[str, bytes]]]
-_FROM_CSV: Final[dict[type[Maneuver], _Fill]] = {FollowPath: with_csv, OpenLoop: with_tables}
-"""Kinds whose files may name CSV files, and what fills their values in."""
-
-
-def filled_from_csv(
-    table: Mapping[str, Any], own: Path | None, source: Source
-) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """A manoeuvre's table with the values of the CSV files that it names.
-
-    Args:
-        table: The table.
-        own: Folder of the manoeuvre file; None for a table that has no file.
-        source: For error messages.
-
-    Returns:
-        The table, and the files by their names, to be kept with the recording.
-
-    Raises:
-        ManeuverError: a file is not found or wrong, or values are given beside it.
-    """
-    fill = _FROM_CSV.get(maneuver_class(table, source))
-    return (dict(table), {}) if fill is None else fill(table, own, source)
-
 
 def maneuver_class(table: Mapping[str, Any], source: Source) -> type[Maneuver]:
-    """The class of a manoeuvre table.
+    """Return the class of a manoeuvre table.
 
     Args:
         table: The table.
         source: For error messages; its error class is raised.
-
-    Returns:
-        The class.
 
     Raises:
         ManeuverError: `kind` is missing or unknown.
@@ -87,14 +58,11 @@ def maneuver_class(table: Mapping[str, Any], source: Source) -> type[Maneuver]:
 
 
 def build_maneuver(table: Mapping[str, Any], source: Source) -> Maneuver:
-    """A manoeuvre from its table.
+    """Build a manoeuvre from its table.
 
     Args:
         table: Keys and values of the file.
         source: For error messages.
-
-    Returns:
-        The manoeuvre.
 
     Raises:
         ManeuverError: a key is unknown or missing, or a value is wrong.

@@ -1,4 +1,4 @@
-"""Double lane change (ISO 3888): into a lane beside one's own and back, at constant speed or coasting."""
+"""Double lane change (ISO 3888): into the neighbouring lane and back, at constant speed or coasting."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.along_course import AlongCourse, Width, known_width
-from activesteer.maneuver.choices import SIDES, check_choice
-from activesteer.maneuver.iso_3888 import STANDARDS, cones, lanes
+from activesteer.maneuver.base import SIGNS, Side
+from activesteer.maneuver.iso_3888 import LaneStandard, cones, lanes
 from activesteer.maneuver.least_jerk import Bound, least_jerk
 from activesteer.road.course import Course
 from activesteer.road.lane import Lane
@@ -23,49 +23,35 @@ from activesteer.road.path import Path
 from activesteer.signals import Setpoint
 
 _AXLES_M: Final = (1.3, -1.3)
-"""Where a car of 2.6 m wheelbase has its axles, ahead of its centre [m]: there its sides keep the margin."""
+"""Axles of a car of 2.6 m wheelbase ahead of its centre [m]: there its sides keep the margin."""
 _BOUND_SPACING_M: Final = 0.5
 _BEYOND_M: Final = 0.1
-"""The bounds reach so far beyond both ends of a lane [m]: a front wheel is ahead of its axle while the car turns."""
+"""Length of the bounds beyond both ends of a lane [m]: a front wheel is ahead of its axle while the car turns."""
 _SAMPLE_M: Final = 0.5
 _SLACK_M: Final = 0.01
-"""What a margin must leave in the narrowest lane [m]."""
-
-
-PATHS: Final = ("middle", "least_jerk")
-"""What a driver may aim at."""
+"""Room that a margin must leave in the narrowest lane [m]."""
 
 
 @dataclass(frozen=True)
 class LaneLayout:
-    """The lanes and how they are driven."""
+    """The lanes and the path through them."""
 
     OVERRULED: ClassVar = {"margin_m": {"path": "middle"}}
 
-    standard: str = "iso_3888_1"
-    """Whose lanes: `iso_3888_1` (double lane change) or `iso_3888_2` (obstacle avoidance)."""
-    side: str = "left"
-    """To which side the first change goes: `left` or `right`."""
+    standard: LaneStandard = "iso_3888_1"
+    """Standard of the lanes: `iso_3888_1` (double lane change) or `iso_3888_2` (obstacle avoidance)."""
+    side: Side = "left"
+    """Side of the first lane change: `left` or `right`."""
     entry_m: Annotated[float, Range(0.0, 1000.0)] = 30.0
     """Distance from the start to the entry lane, straight ahead [m]."""
-    path: str = "middle"
-    """The path to follow: `middle` of the lanes, changing between them in the sections between, or the one of
-    `least_jerk` that keeps the margin."""
+    path: Literal["middle", "least_jerk"] = "middle"
+    """Path to follow: the `middle` of the lanes, changed in the sections between them, or the path of `least_jerk` that
+    keeps the margin."""
     margin_m: Annotated[float, Range(0.0, 1.0)] = 0.1
-    """Path of least jerk: least distance between the car's sides, at its axles, and the edges of the lanes [m]."""
+    """Smallest distance of the car's sides, at its axles, from the edges of the lanes; path of least jerk only [m]."""
     throttle_off_m: Annotated[float, Range(0.0, 1000.0)] | None = None
-    """Distance into the entry lane from which on the car coasts, 2 m in ISO 3888-2 [m]; the speed is held where not
-    given."""
-
-    def __post_init__(self) -> None:
-        """Checks the words.
-
-        Raises:
-            ManeuverError: standard or side is unknown.
-        """
-        check_choice("standard", self.standard, STANDARDS)
-        check_choice("side", self.side, SIDES)
-        check_choice("path", self.path, PATHS)
+    """Distance into the entry lane at which the car begins to coast, 2 m in ISO 3888-2 [m]. Default: the speed is
+    held."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,10 +61,10 @@ class LaneChange(AlongCourse):
     lane: LaneLayout = LaneLayout()
     """The lanes."""
     vehicle_width_m: Width | None = None
-    """Width of the vehicle, which the lanes are made for [m]; that of the vehicle file where not given."""
+    """Width of the vehicle, for which the lanes are laid out [m]. Default: the width in the vehicle file."""
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """The path and the speed, or no throttle any more."""
+        """Path and speed, or the path without throttle."""
         return self._setpoint if time_s < self._throttle_off_s else self._coasting
 
     @cached_property
@@ -92,14 +78,14 @@ class LaneChange(AlongCourse):
 
     def _make_course(self) -> Course:
         layout, width = self.lane, known_width(self.vehicle_width_m)
-        # Laid out to the left and then mirrored, so that left and right are the same to the last digit.
+        # Laid out to the left and then mirrored, so that left and right agree to the last digit.
         left = lanes(layout.standard, width, layout.entry_m, 1.0)
         if layout.path == "middle":
             path_x, path_y = _middle(left)
         else:
             self._check_margin(left, width)
-            path_x, path_y = _way_through(left, 0.5 * width + layout.margin_m)
-        side = SIDES[layout.side]
+            path_x, path_y = _least_jerk_path(left, 0.5 * width + layout.margin_m)
+        side = SIGNS[layout.side]
         course = lanes(layout.standard, width, layout.entry_m, side)
         return Course(Path.through(path_x, side * path_y), course, cones(course), course[-1].end_x_m)
 
@@ -118,7 +104,7 @@ class LaneChange(AlongCourse):
 
 
 def _middle(course: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
-    """The middle of the lanes, and between them quintic polynomials, which join without heading and curvature."""
+    """Return the middle of the lanes, with quintics between them that join without heading and curvature."""
     end = course[-1].end_x_m
     x = np.linspace(0.0, end, math.ceil(end / _SAMPLE_M) + 1)
     middles = [0.5 * (lane.right_y_m + lane.left_y_m) for lane in course]
@@ -129,14 +115,14 @@ def _middle(course: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
     return x, y
 
 
-def _way_through(course: Sequence[Lane], half_width_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Straight to the first lane, then the path of least jerk to the middle of the last one at its end."""
+def _least_jerk_path(course: Sequence[Lane], half_width_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return a straight line to the first lane, then the path of least jerk to the middle of the last lane's end."""
     start, end = course[0].start_x_m, course[-1].end_x_m
     end_y = 0.5 * (course[-1].right_y_m + course[-1].left_y_m)
-    way = least_jerk(start, end, end_y, list(_bounds(course, half_width_m)))
+    path = least_jerk(start, end, end_y, list(_bounds(course, half_width_m)))
     before = np.linspace(0.0, start, math.ceil(start / _SAMPLE_M), endpoint=False)
     along = np.linspace(start, end, math.ceil((end - start) / _SAMPLE_M) + 1)
-    return np.concatenate([before, along]), np.concatenate([np.zeros(len(before)), way(along)])
+    return np.concatenate([before, along]), np.concatenate([np.zeros(len(before)), path(along)])
 
 
 def _bounds(course: Sequence[Lane], half_width_m: float) -> Iterator[Bound]:

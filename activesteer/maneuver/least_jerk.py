@@ -1,9 +1,9 @@
-"""The smoothest way through gates: least change of curvature, within bounds.
+"""The smoothest path through gates: least change of curvature within bounds.
 
-The path is a quintic B-spline y(x) between two straight stretches. Its coefficients minimise the integral of y'''^2, to
-which the lateral jerk at constant speed is proportional, while points of the car (ahead of and behind its centre, where
-the axles are) stay within bounds. That is a strictly convex quadratic programme; written as a least distance programme
-it is solved exactly, in a finite number of steps, by non-negative least squares.
+The path is a quintic B-spline y(x) between two straight sections. Its coefficients minimise the integral of y'''^2:
+the lateral jerk at constant speed is proportional to y'''. The axles of the car, ahead of and behind its
+centre, stay within bounds. This strictly convex quadratic programme is written as a least distance programme. Non-negative
+least squares solve it exactly in a finite number of steps.
 
 Source: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23 (problems LSI and LDP). Minimum
 jerk for smooth motion: T. Flash, N. Hogan, The coordination of arm movements, Journal of Neuroscience 5 (1985).
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 _DEGREE: Final = 5
-"""Where no bound acts, the least jerk is a quintic polynomial."""
+"""Without active bounds the path of least jerk is a quintic polynomial."""
 _KNOT_SPACING_M: Final = 2.0
 """Distance of the knots [m]; halving it changes the paths of ISO 3888 by less than 1 cm."""
 _INCOMPATIBLE: Final = 1e-9
@@ -32,11 +32,11 @@ _INCOMPATIBLE: Final = 1e-9
 
 
 class Bound(NamedTuple):
-    """A point that moves with the car must be between two sides.
+    """Bounds on y of a point that moves with the car.
 
     Attributes:
-        x_m: Where the car's centre is [m].
-        ahead_m: How far ahead of the centre the point is, along the path [m].
+        x_m: Position of the car's centre [m].
+        ahead_m: Distance of the point ahead of the centre, along the path [m].
         low_m: Least y of the point [m].
         high_m: Largest y of the point [m].
     """
@@ -48,16 +48,16 @@ class Bound(NamedTuple):
 
 
 def least_jerk(start_x_m: float, end_x_m: float, end_y_m: float, bounds: Sequence[Bound]) -> BSpline:
-    """The path y(x) of least jerk from y = 0 to another straight line along x.
+    """Return the path y(x) of least jerk from y = 0 to another straight line along x.
 
     Args:
-        start_x_m: Where it leaves y = 0, without heading and curvature [m].
-        end_x_m: Where it is straight again [m].
-        end_y_m: The y it then has [m].
-        bounds: What must be kept; bounds outside start and end are left out.
+        start_x_m: Point at which the path leaves y = 0, without heading and curvature [m].
+        end_x_m: Point at which it is straight again [m].
+        end_y_m: y at this point [m].
+        bounds: The bounds; those outside start and end are ignored.
 
     Returns:
-        y over x [m], and its derivatives, between start and end.
+        Spline y(x) [m] between start and end, with its derivatives.
 
     Raises:
         ManeuverError: the bounds contradict each other.
@@ -80,7 +80,8 @@ class _Spline:
     """Basis functions on clamped, equally spaced knots.
 
     Attributes:
-        basis: Values of all basis functions at given x, shape (k, n); with a second argument their derivatives.
+        basis: Function from x to the values of all basis functions, shape (k, n); a second argument selects a
+            derivative.
         jerk: Square root of the weight times third derivative at the points of a quadrature, shape (q, n).
     """
 
@@ -105,9 +106,9 @@ class _Spline:
 
 
 def _bounded(a: Array, b: Array, g: Array, low: Array, high: Array) -> Array:
-    """The z that minimises |A z - b| within low <= G z <= high; A of full column rank (Lawson and Hanson, LSI, LDP)."""
-    from scipy.linalg import solve_triangular  # noqa: PLC0415 - likewise
-    from scipy.optimize import nnls  # noqa: PLC0415 - likewise
+    """Return the z that minimises |A z - b| for low <= G z <= high; A has full column rank (LSI, LDP)."""
+    from scipy.linalg import solve_triangular  # noqa: PLC0415 - slow to import
+    from scipy.optimize import nnls  # noqa: PLC0415 - slow to import
 
     q, r = np.linalg.qr(a)
     target = q.T @ b

@@ -1,13 +1,16 @@
-"""Open loop: steering, speed, brake and the torques of the wheels as tables over time."""
+"""Open loop: steering, speed, brake and wheel torques as tables over time."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
+from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver
-from activesteer.maneuver.choices import DRIVES, check_choice
+from activesteer.maneuver.base import DriveMode, Maneuver
 from activesteer.maneuver.open_loop_tables import (
     BrakeTable,
     ParkingBrakeTable,
@@ -15,42 +18,49 @@ from activesteer.maneuver.open_loop_tables import (
     SteeringTable,
     WheelTorqueTable,
     check_table,
+    with_tables,
 )
 from activesteer.signals import Setpoint, WheelTorques, made
 
 
 @dataclass(frozen=True, kw_only=True)
 class OpenLoop(Maneuver):
-    """Tables over time; the drive holds the speed, or the car coasts, or the wheels' torques are given."""
+    """Tables over time. The drive holds the speed, or the car coasts, or the wheel torques are given."""
 
     steering: SteeringTable = SteeringTable()
-    """Steering wheel or rack; straight ahead where not given."""
+    """Steering wheel or rack. Default: straight ahead."""
     steering_csv: str | None = None
-    """File with the columns time_s and steering_wheel_rad or rack_m, beside the manoeuvre file or a path of its own."""
+    """CSV file with the columns time_s and steering_wheel_rad or rack_m: a path, or a name in the manoeuvre's folder."""
     speed: SpeedTable | None = None
-    """Speed to hold; the speed at the start where not given."""
+    """Speed to hold. Default: the speed at the start."""
     brake: BrakeTable | None = None
-    """Brake; released where not given. While it is pressed, or the parking brake applied, the drive is off."""
+    """Brake. Default: released. The drive is off while the brake is pressed or the parking brake is applied."""
     parking_brake: ParkingBrakeTable | None = None
-    """Parking brake, at the rear wheels; released where not given."""
+    """Parking brake, at the rear wheels. Default: released."""
     wheel_torques: WheelTorqueTable | None = None
-    """Torques of each wheel, at once and without the engine's lag; where given, nothing else drives or brakes."""
+    """Torques of each wheel, without the lag of the engine. If given, nothing else drives or brakes the car."""
     drive_csv: str | None = None
-    """File with the columns time_s and fl_drive_Nm ... rr_brake_Nm, as many as are needed."""
-    drive: str = "hold_speed"
-    """`hold_speed` or `coast`; with torques of the wheels, what happens before the recording starts."""
+    """CSV file with the column time_s and any of the columns fl_drive_Nm ... rr_brake_Nm."""
+    drive: DriveMode = "hold_speed"
+    """`hold_speed` or `coast`; with wheel torques it holds only before the recording starts."""
     hold_last: bool = False
-    """Whether steering or torques of the wheels that end before `duration_s` stay at their last value; a single value
-    always does."""
+    """Whether steering or wheel torques that end before `duration_s` keep their last value; a single value always
+    does."""
+
+    @classmethod
+    def filled_from_csv(
+        cls, table: Mapping[str, Any], folder: Path | None, source: Source
+    ) -> tuple[dict[str, Any], dict[str, bytes]]:
+        """Fill in the tables of the CSV files; see the base class."""
+        return with_tables(table, folder, source)
 
     def __post_init__(self) -> None:
-        """Checks the tables.
+        """Check the tables.
 
         Raises:
-            ManeuverError: a table's columns differ in length, its times do not increase, it ends too early, or two
-                contradict each other.
+            ManeuverError: the columns of a table differ in length, its times do not increase, it ends too early, or two
+                tables contradict each other.
         """
-        check_choice("drive", self.drive, DRIVES)
         torques = self.wheel_torques
         tables = [("steering", self.steering.time_s, self.steering.values)]
         if self.speed is not None:
@@ -63,7 +73,7 @@ class OpenLoop(Maneuver):
             columns = [*(torques.columns("drive") or ()), *(torques.columns("brake") or ())]
             tables += [("wheel_torques", torques.time_s, column) for column in columns]
             if self.speed is not None or self.brake is not None or self.parking_brake is not None:
-                raise ManeuverError("given beside a speed or a brake; either the one or the other", key="wheel_torques")
+                raise ManeuverError("cannot be given together with a speed or a brake", key="wheel_torques")
         for key, times_s, values in tables:
             try:
                 check_table(times_s, values)
@@ -74,7 +84,7 @@ class OpenLoop(Maneuver):
             self._check_end("wheel_torques", torques.time_s)
 
     def _check_end(self, key: str, times_s: tuple[float, ...]) -> None:
-        """A table that is shorter than the manoeuvre, as a measurement may be, is not prolonged without a word."""
+        """Refuse a table that is shorter than the manoeuvre, unless `hold_last` is set."""
         if len(times_s) > 1 and times_s[-1] < self.duration_s and not self.hold_last:
             problem = (
                 f"ends at {times_s[-1]:g} s, before duration_s = {self.duration_s:g}; add points, shorten duration_s, "
@@ -96,7 +106,7 @@ class OpenLoop(Maneuver):
         return made(Setpoint, (angle, speed, pedal, drives, None, rack, None, None, applied))
 
     def settling_setpoint(self) -> Setpoint:
-        """As at the start, but without torques of the wheels: the car is to roll at its speed; see the base class."""
+        """Setpoint of the start, but without wheel torques: the car drives at its speed."""
         setpoint = self.setpoint(0.0)
         if self.wheel_torques is None:
             return setpoint
@@ -114,7 +124,7 @@ class OpenLoop(Maneuver):
 
 
 def _interpolate(x: float, xs: tuple[float, ...], ys: tuple[float, ...]) -> float:
-    """Piecewise linear, constant outside; plain floats because it runs every step."""
+    """Interpolate linearly, constant outside; with plain floats because this runs every step."""
     index = bisect_right(xs, x)
     if index == 0:
         return ys[0]

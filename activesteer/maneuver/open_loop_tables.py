@@ -1,4 +1,4 @@
-"""The tables of an open-loop manoeuvre, and how they are filled from CSV files."""
+"""The tables of an open-loop manoeuvre, and their CSV files."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from activesteer.maneuver.csv_table import find_csv, read_columns
 
 
 def check_table(times_s: Sequence[float], values: Sequence[float]) -> None:
-    """A table needs as many values as times, and times that increase.
+    """Check that a table has as many values as times, and that its times increase.
 
     Raises:
-        ManeuverError: it has not.
+        ManeuverError: it has not, or they do not.
     """
     if not times_s or len(times_s) != len(values):
         raise ManeuverError(
@@ -32,25 +32,23 @@ def check_table(times_s: Sequence[float], values: Sequence[float]) -> None:
 
 @dataclass(frozen=True)
 class SteeringTable:
-    """Steering wheel angle over time, or where the rack is."""
+    """Steering wheel angle or rack position over time."""
 
     time_s: tuple[float, ...] = (0.0,)
     """Times, increasing [s]; linear between them, constant outside."""
     steering_wheel_rad: tuple[float, ...] | None = None
-    """Angles, left positive [rad]; zero where neither these nor positions of the rack are given."""
+    """Angles, left positive [rad]. Default: zero, if no rack positions are given."""
     rack_m: tuple[float, ...] | None = None
-    """Positions of the rack instead, from the centre, positive steers left [m]."""
+    """Rack positions from the centre instead of angles, positive steers left [m]."""
 
     def __post_init__(self) -> None:
-        """Both columns at once would contradict each other, and times alone say nothing.
+        """Check that times come with one of the two columns.
 
         Raises:
-            ManeuverError: both are given, or times alone.
+            ManeuverError: both columns are given, or times alone.
         """
         if self.steering_wheel_rad is not None and self.rack_m is not None:
-            raise ManeuverError(
-                "steering_wheel_rad and rack_m are two ways to say where the front wheels go; leave one out"
-            )
+            raise ManeuverError("steering_wheel_rad and rack_m both steer the front wheels; leave one out")
         if self.steering_wheel_rad is None and self.rack_m is None:
             if self.time_s != (0.0,):
                 raise ManeuverError("given without angles; add steering_wheel_deg or rack_m", key="time_s")
@@ -89,17 +87,17 @@ class ParkingBrakeTable:
     time_s: tuple[float, ...]
     """Times, increasing [s]; linear between them, constant outside."""
     applied: Annotated[tuple[float, ...], Range(0.0, 1.0)]
-    """How far it is applied, 0 to 1."""
+    """Positions, 0 (released) to 1."""
 
 
 @dataclass(frozen=True)
 class WheelTorqueTable:
-    """Torques of each wheel over time; what is not given is zero."""
+    """Torques of each wheel over time; a missing column is zero."""
 
     time_s: tuple[float, ...]
     """Times, increasing [s]; linear between them, constant outside."""
     fl_drive_Nm: tuple[float, ...] | None = None
-    """Drive torque, front left, forward positive [N m]."""
+    """Drive torque, front left, positive forwards [N m]."""
     fr_drive_Nm: tuple[float, ...] | None = None
     """Front right."""
     rl_drive_Nm: tuple[float, ...] | None = None
@@ -107,7 +105,7 @@ class WheelTorqueTable:
     rr_drive_Nm: tuple[float, ...] | None = None
     """Rear right."""
     fl_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
-    """Brake torque, front left, against the rotation [N m]; the car's brakes give no more than they have."""
+    """Brake torque, front left, against the rotation [N m]; the limits of the car's brakes apply."""
     fr_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
     """Front right."""
     rl_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
@@ -116,7 +114,7 @@ class WheelTorqueTable:
     """Rear right."""
 
     def columns(self, what: str) -> tuple[tuple[float, ...], ...] | None:
-        """Torques of the four wheels, `drive` or `brake`; None where no wheel has any."""
+        """Return the torques of the four wheels, `drive` or `brake`; None if no wheel has any."""
         given = [getattr(self, f"{corner}_{what}_Nm") for corner in CORNERS]
         if all(column is None for column in given):
             return None
@@ -128,34 +126,22 @@ _CSVS: Final = (
     ("steering_csv", "steering", ("steering_wheel_rad", "rack_m")),
     ("drive_csv", "wheel_torques", tuple(field.name for field in fields(WheelTorqueTable))[1:]),
 )
-"""Key that names a CSV, table that it fills, and columns of which it must have at least one."""
+"""Key that names a CSV, the table it fills, and the columns of which it must have at least one."""
 
 
-def with_tables(table: Mapping[str, Any], own: Path | None, source: Source) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """An open-loop manoeuvre's table with what its CSV files hold.
-
-    Args:
-        table: The table.
-        own: Folder of the manoeuvre file; None for a table that has no file.
-        source: For error messages.
-
-    Returns:
-        The table, and the CSV files by their names, to be kept with the recording. A table without a file may have both
-        a CSV's name and values: it comes from a recording, and the values are what was read then, unless an override
-        names another CSV.
-
-    Raises:
-        ManeuverError: a CSV is not found or wrong, or values are given beside it in a file.
-    """
+def with_tables(
+    table: Mapping[str, Any], folder: Path | None, source: Source
+) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """Fill the values of its CSV files into an open-loop table; see `Maneuver.filled_from_csv`."""
     filled, files = dict(table), {}
     for key, name, columns in _CSVS:
         if not isinstance(filled.get(key), str):
             continue
         if name in filled and key not in source.overridden:
-            if own is None:
+            if folder is None:
                 continue
-            raise source.fail((key,), f"{key} and the table [{name}] are two ways to give the values; leave one out")
-        file = find_csv(filled[key], own, source, (key,))
+            raise source.fail((key,), f"{key} and the table [{name}] both give the values; leave one out")
+        file = find_csv(filled[key], folder, source, (key,))
         try:
             filled[name] = _read(file, columns)
         except ManeuverError as reason:

@@ -1,4 +1,4 @@
-"""Points of a path that a user gives: read from a CSV, and checked before a car is sent along them."""
+"""Points of a user's path: read from a CSV, and checked before a car follows them."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from activesteer.errors import ManeuverError
 from activesteer.maneuver.csv_table import read_columns
 
 COLUMNS: Final = ("x_m", "y_m")
-"""Columns that a CSV must have, others may stand beside them."""
+"""Columns that a CSV must have; others are ignored."""
 
 MIN_POINTS: Final = 4
 _MAX_GAP_M: Final = 20.0
-"""Points further apart than this count as a jump [m]."""
+"""Largest distance of two points; a larger one counts as a jump [m]."""
 _MIN_GAP_M: Final = 1e-3
 _MAX_TURN_RAD: Final = math.radians(90.0)
-"""Turning by more than this at a point counts as going back [rad]."""
+"""Largest turn at a point; a larger one counts as going back [rad]."""
 _MIN_RADIUS_M: Final = 6.0
-"""A car of the compact class turns on 5.2 m; a tighter bend counts as a kink [m]."""
+"""Smallest radius; a tighter bend counts as a kink. A car of the compact class turns on 5.2 m [m]."""
 _MAX_START_M: Final = 1.0
-"""How far from the car the first point may be [m]."""
+"""Largest distance of the first point from the car [m]."""
 _MAX_START_RAD: Final = math.radians(15.0)
-"""By how much the first stretch may point off the car's heading [rad]."""
+"""Largest angle of the first section to the car's heading [rad]."""
 
 
 def read_csv(path: Path) -> tuple[list[float], list[float], list[int]]:
-    """The points in a CSV with the header x_m,y_m.
+    """Read the points from a CSV with the header x_m,y_m.
 
     Args:
         path: The file.
 
     Returns:
-        x, y [m], and the line in which each point stands.
+        x, y [m], and the line number of each point.
 
     Raises:
         ManeuverError: the file cannot be read, a column is missing, or a value is no number.
@@ -44,15 +44,16 @@ def read_csv(path: Path) -> tuple[list[float], list[float], list[int]]:
 
 
 def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[int], str]) -> None:
-    """A car must be able to start on the path and to follow it.
+    """Check that a car can start on the path and follow it.
 
     Args:
         x_m: World x of the points [m].
         y_m: World y of the points [m].
-        place: Index of a point -> where it stands, for error messages.
+        place: Function from the index of a point to its place in the file, for error messages.
 
     Raises:
-        ManeuverError: there are too few points, or the path jumps, goes back, has a kink, or does not begin at the car.
+        ManeuverError: there are too few points, or the path jumps, goes back, has a kink, or does not begin at
+            the car.
     """
     count = len(x_m)
     if count != len(y_m) or count < MIN_POINTS:
@@ -68,9 +69,9 @@ def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[in
     gaps = [math.hypot(x_m[i + 1] - x_m[i], y_m[i + 1] - y_m[i]) for i in range(count - 1)]
     for i, gap in enumerate(gaps, 1):
         if gap < _MIN_GAP_M:
-            fail(i, "is the same as the one before; leave one of them out")
+            fail(i, "is the same as the point before; leave one of them out")
         if gap > _MAX_GAP_M:
-            fail(i, f"is a jump of {gap:.3g} m from the one before; at most {_MAX_GAP_M:g} m are allowed, add points")
+            fail(i, f"is {gap:.3g} m from the point before; at most {_MAX_GAP_M:g} m are allowed, add points")
     for i in range(1, count - 1):
         ahead = math.atan2(y_m[i + 1] - y_m[i], x_m[i + 1] - x_m[i])
         behind = math.atan2(y_m[i] - y_m[i - 1], x_m[i] - x_m[i - 1])

@@ -1,4 +1,4 @@
-"""Random steering (ISO 7401): all frequencies of a band at once, different in every run, for frequency responses."""
+"""Random steering (ISO 7401): all frequencies of a band at once, for frequency responses."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from activesteer.maneuver.sine_sweep import Frequency
 from activesteer.signals import Setpoint
 
 _STEP_S: Final = 0.005
-"""Between these points the angle is interpolated [s]."""
+"""Distance of the points between which the angle is interpolated [s]."""
 _MOST_Hz: Final = 0.1 / _STEP_S
-"""Highest frequency [Hz]: there a line between two points is at most 5 % of its amplitude off a sine."""
+"""Highest frequency [Hz]: there the interpolation departs from a sine by at most 5 % of its amplitude."""
 _LINES: Final = 5
-"""So many sines there are at least."""
+"""Smallest number of sines."""
 
 
 @dataclass(frozen=True)
 class RandomSignal:
-    """The angle at the steering wheel: normally distributed, with the same power at all frequencies of a band."""
+    """The steering wheel angle: normally distributed, with the same power at all frequencies of a band."""
 
     rms_rad: Annotated[float, Range(0.0, 5.0)] = math.radians(8.0)
     """Root mean square [rad]; peaks are three to four times as large."""
@@ -34,9 +34,9 @@ class RandomSignal:
     highest_Hz: Frequency = 5.0
     """Upper end of the band [Hz]."""
     seed: Annotated[int, Range(0)] = 0
-    """Which of the random signals it is."""
+    """Seed of the random phases."""
     fade_s: Annotated[float, Range(0.0)] = 1.0
-    """Time in which it rises from nothing at the beginning [s]."""
+    """Time in which the signal is faded in at the beginning [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,10 +47,10 @@ class RandomSteer(Maneuver):
     """The angle."""
 
     def __post_init__(self) -> None:
-        """The band must be wide enough for a run of this length: a sum of few sines is not random.
+        """Check that the band is wide enough for a run of this length: a sum of few sines is not random.
 
         Raises:
-            ManeuverError: it is not, or goes too far up.
+            ManeuverError: it is not, or its upper end is too high.
         """
         random = self.random
         least_Hz = random.lowest_Hz + _LINES / self.duration_s
@@ -65,7 +65,7 @@ class RandomSteer(Maneuver):
 
     @cached_property
     def _angles_rad(self) -> list[float]:
-        """The angle every `_STEP_S`; a sum of sines with equal amplitudes and random phases, that of the band alone."""
+        """Angle every `_STEP_S`: a sum of sines within the band, of equal amplitudes and random phases."""
         random = self.random
         points = math.ceil(self.duration_s / _STEP_S) + 2
         lines_Hz = np.fft.rfftfreq(points, _STEP_S)
@@ -85,7 +85,3 @@ class RandomSteer(Maneuver):
         before, after = self._angles_rad[index], self._angles_rad[index + 1]
         angle = before + (after - before) * (place - index)
         return self.at_speed(angle)
-
-    def settling_setpoint(self) -> Setpoint:
-        """Straight ahead; see the base class."""
-        return self.at_speed(0.0)

@@ -1,4 +1,4 @@
-"""Sine sweep (ISO 7401): a small sine at the steering wheel whose frequency rises, for the frequency response."""
+"""Sine sweep (ISO 7401): a small sine of rising frequency at the steering wheel, for the frequency response."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ Frequency = Annotated[float, Range(0.01, 50.0)]
 
 @dataclass(frozen=True)
 class Sweep:
-    """The sweep at the steering wheel: amplitude, and frequency rising by the same factor every second."""
+    """The sweep at the steering wheel; its frequency rises by the same factor every second."""
 
     start_s: Annotated[float, Range(0.0)] = 0.5
-    """When it begins [s]."""
+    """Time at which the sweep begins [s]."""
     length_s: Annotated[float, Range(1.0)] = 60.0
-    """How long it takes [s]."""
+    """Length of the sweep [s]."""
     amplitude_rad: Annotated[float, Range(0.0, 15.0)] = math.radians(9.0)
     """Amplitude [rad]."""
     first_Hz: Frequency = 0.1
-    """Frequency at its beginning [Hz]."""
+    """Frequency at the beginning [Hz]."""
     last_Hz: Frequency = 5.0
-    """Frequency at its end [Hz]."""
+    """Frequency at the end [Hz]."""
     fade_s: Annotated[float, Range(0.0)] = 1.0
-    """Time in which the amplitude rises at the beginning and falls at the end [s]."""
+    """Time in which the amplitude rises at the beginning, and falls at the end [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +40,7 @@ class SineSweep(Maneuver):
     """The sweep."""
 
     def __post_init__(self) -> None:
-        """The sweep must rise and end within the run.
+        """Check that the frequency rises and that the sweep ends within the run.
 
         Raises:
             ManeuverError: it does not.

@@ -1,4 +1,4 @@
-"""Sine with dwell (FMVSS 126, UN R140): a sine at the steering wheel that waits at its second peak."""
+"""Sine with dwell (FMVSS 126, UN R140): a sine at the steering wheel with a pause at its second peak."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from typing import Annotated, ClassVar, Final
 from activesteer.config import Range
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver, check_search_speed
-from activesteer.maneuver.choices import DRIVES, SIDES, check_choice
+from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Side, check_search_speed
 from activesteer.maneuver.slowly_increasing_steer import RampAngle, SlowlyIncreasingSteer, SlowRamp
 from activesteer.signals import Setpoint
 
@@ -30,53 +29,51 @@ class DwellInput:
     OVERRULED: ClassVar = {"amplitude_factor": {"steering_wheel_rad": None}}
 
     start_s: Annotated[float, Range(0.0)] = 0.5
-    """When it begins [s]."""
+    """Time at which the sine begins [s]."""
     frequency_Hz: Annotated[float, Range(0.1, 5.0)] = 0.7
     """Frequency of the sine [Hz]."""
     dwell_s: Annotated[float, Range(0.0, 5.0)] = 0.5
-    """How long it waits at the second peak, after three quarters of the period [s]."""
-    direction: str = "left"
+    """Length of the pause at the second peak, after three quarters of the period [s]."""
+    direction: Side = "left"
     """Direction of the first half-wave: `left` or `right`."""
     steering_wheel_rad: Annotated[float, Range(0.0, 15.0)] | None = None
-    """Amplitude [rad]; `amplitude_factor` times A where not given."""
+    """Amplitude [rad]. Default: `amplitude_factor` times A."""
     amplitude_factor: Annotated[float, Range(0.1, 15.0)] | None = None
-    """Amplitude as a multiple of A, the steering wheel angle at 0.3 g in a slow ramp of the control-free car [-]."""
+    """Amplitude as a multiple of A, the steering wheel angle at 0.3 g in a slow ramp of the car without control [-]."""
 
     def __post_init__(self) -> None:
-        """Amplitude or factor must be known; where both are, the amplitude is what the factor once led to.
+        """Check the keys. If both amplitude and factor are given, a search has found the amplitude.
 
         Raises:
-            ManeuverError: neither of them is given, or the direction is unknown.
+            ManeuverError: neither is given.
         """
-        check_choice("direction", self.direction, SIDES)
         if self.steering_wheel_rad is None and self.amplitude_factor is None:
             raise ManeuverError(
-                "steering_wheel_deg (the amplitude) or amplitude_factor (the same as a multiple of the steering wheel "
-                "angle at 0.3 g) is needed"
+                "steering_wheel_deg (the amplitude) or amplitude_factor (the amplitude as a multiple of the steering "
+                "wheel angle at 0.3 g) is needed"
             )
 
     @property
     def completion_s(self) -> float:
-        """When the steering wheel is straight again [s]."""
+        """Time at which the steering wheel is straight again [s]."""
         return self.start_s + 1.0 / self.frequency_Hz + self.dwell_s
 
 
 @dataclass(frozen=True, kw_only=True)
 class SineWithDwell(Maneuver):
-    """A sine with dwell; the drive holds the speed until it begins, and then as well or not at all."""
+    """A sine with dwell; the drive holds the speed until the sine begins."""
 
     steer: DwellInput
     """The sine."""
-    drive: str = "coast"
-    """From the beginning of the sine on: `coast`, as FMVSS 126 asks for, or `hold_speed`."""
+    drive: DriveMode = "coast"
+    """Drive from the beginning of the sine: `coast`, which FMVSS 126 requires, or `hold_speed`."""
 
     def __post_init__(self) -> None:
-        """The sine must end within the run, and A must be one of a car that drives forwards.
+        """Check that the sine ends within the run, and that the speed suits a search for A.
 
         Raises:
-            ManeuverError: it does not, or the drive is unknown.
+            ManeuverError: it does not.
         """
-        check_choice("drive", self.drive, DRIVES)
         steer = self.steer
         if steer.completion_s > self.duration_s:
             raise ManeuverError(
@@ -91,7 +88,7 @@ class SineWithDwell(Maneuver):
 
     @property
     def search(self) -> RampAngle | None:
-        """For A, where the amplitude is a multiple of it."""
+        """Search for A, if the amplitude is given as a multiple of A."""
         factor = self.steer.amplitude_factor
         if self.steer.steering_wheel_rad is not None or factor is None:
             return None
@@ -102,7 +99,7 @@ class SineWithDwell(Maneuver):
         return RampAngle(probe, _REFERENCE_MPS2, lambda angle: self.with_amplitude(factor * angle))
 
     def with_amplitude(self, steering_wheel_rad: float) -> SineWithDwell:
-        """The same with its amplitude known [rad]; the factor that led to it stays on record."""
+        """Return the manoeuvre with an amplitude [rad]; the factor stays on record."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
     def setpoint(self, time_s: float) -> Setpoint:
@@ -114,17 +111,13 @@ class SineWithDwell(Maneuver):
         period = 1.0 / steer.frequency_Hz
         if t == 0.0 or t >= period + steer.dwell_s:
             return after
-        # Time stands still for the sine while it dwells.
+        # The phase stands still during the pause.
         peak, resumed = 0.75 * period, t - steer.dwell_s
         phase = t if t < peak else peak if resumed < peak else resumed
-        amplitude = SIDES[steer.direction] * (steer.steering_wheel_rad or 0.0)
+        amplitude = SIGNS[steer.direction] * (steer.steering_wheel_rad or 0.0)
         return self.at_speed(amplitude * math.sin(2.0 * math.pi * phase / period), after.hold_speed)
 
     @cached_property
     def _ends(self) -> tuple[Setpoint, Setpoint]:
-        """Before the sine and after it."""
+        """Setpoints before and after the sine."""
         return self.at_speed(0.0), self.at_speed(0.0, self.drive == "hold_speed")
-
-    def settling_setpoint(self) -> Setpoint:
-        """Straight ahead at the speed of the manoeuvre."""
-        return self.at_speed(0.0)

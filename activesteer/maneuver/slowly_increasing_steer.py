@@ -1,4 +1,4 @@
-"""Slowly increasing steer (ISO 4138, constant speed): the steering wheel turns so slowly that the car stays settled."""
+"""Slowly increasing steer (ISO 4138, constant speed): the car stays near its steady state."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class SlowRamp:
     """The ramp of the steering wheel."""
 
     start_s: Annotated[float, Range(0.0)] = 0.5
-    """When the steering wheel begins to turn [s]."""
+    """Time at which the steering wheel begins to turn [s]."""
     rate_radps: Annotated[float, Range(-2.0, 2.0)] = math.radians(5.0)
-    """How fast it turns [rad/s], left positive."""
+    """Steering wheel rate [rad/s], left positive."""
     end_rad: Annotated[float, Range(0.0, 15.0)] = math.radians(200.0)
-    """Angle to either side at which it stops [rad]."""
+    """Angle to either side at which the ramp stops [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class SlowlyIncreasingSteer(Maneuver):
     """The ramp."""
 
     def __post_init__(self) -> None:
-        """The ramp must begin within the run, and turn.
+        """Check that the ramp begins within the run and turns the steering wheel.
 
         Raises:
             ManeuverError: it does not.
@@ -45,9 +45,7 @@ class SlowlyIncreasingSteer(Maneuver):
                 value=ramp.start_s,
             )
         if ramp.rate_radps == 0.0 or ramp.end_rad == 0.0:
-            raise ManeuverError(
-                "rate_degps and end_deg must not be 0, or the steering wheel does not turn", key="steer"
-            )
+            raise ManeuverError("rate_degps and end_deg must not be 0: the steering wheel would not turn", key="steer")
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Steering wheel angle of the ramp; see the base class."""
@@ -58,6 +56,6 @@ class SlowlyIncreasingSteer(Maneuver):
 
 @dataclass(frozen=True)
 class RampAngle(Search):
-    """Search for the angle at which a slow ramp to the left passes a lateral acceleration."""
+    """Search for the angle at which a slow ramp to the left reaches a lateral acceleration."""
 
     probe: SlowlyIncreasingSteer

@@ -1,4 +1,4 @@
-"""Step steer (ISO 7401): the steering wheel is turned at once and then held, speed kept by the drive."""
+"""Step steer (ISO 7401): the steering wheel is turned fast and then held, while the drive holds the speed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from activesteer.maneuver.base import Maneuver, Search
 from activesteer.signals import Setpoint
 
 _SEARCH_S: Final = 4.5
-"""Time after the beginning of the step that a run of the search for the amplitude takes [s]."""
+"""Length of a run of the amplitude search after the beginning of the step [s]."""
 
 
 @dataclass(frozen=True)
@@ -24,13 +24,13 @@ class StepInput:
     OVERRULED: ClassVar = {"lateral_acceleration_mps2": {"steering_wheel_rad": None}}
 
     start_s: Annotated[float, Range(0.0)] = 0.5
-    """When the steering wheel begins to turn [s]."""
+    """Time at which the steering wheel begins to turn [s]."""
     rate_radps: Annotated[float, Range(0.1, 50.0)] = math.radians(400.0)
-    """How fast it turns [rad/s]; ISO 7401 asks for at least 200 deg/s."""
+    """Steering wheel rate [rad/s]; ISO 7401 requires at least 200 deg/s."""
     steering_wheel_rad: Annotated[float, Range(-15.0, 15.0)] | None = None
-    """Amplitude, left positive [rad]; found by a search where not given."""
+    """Amplitude, left positive [rad]. Default: found by a search."""
     lateral_acceleration_mps2: Annotated[float, Range(-12.0, 12.0)] | None = None
-    """Steady-state lateral acceleration of the control-free car that the search aims at, left positive [m/s2]."""
+    """Steady-state lateral acceleration of the car without control that the search reaches, left positive [m/s2]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,16 +41,16 @@ class StepSteer(Maneuver):
     """The step."""
 
     def __post_init__(self) -> None:
-        """Amplitude or aim must be known; where both are, the amplitude is what the aim once led to.
+        """Check the keys. If both amplitude and lateral acceleration are given, a search has found the amplitude.
 
         Raises:
-            ManeuverError: neither of them is given, or the step starts after the end.
+            ManeuverError: neither is given, or the step starts after the end of the run.
         """
         step = self.steer
         if step.steering_wheel_rad is None and step.lateral_acceleration_mps2 is None:
             raise ManeuverError(
-                "steering_wheel_deg (the amplitude) or lateral_acceleration_g (what the control-free car shall "
-                "reach) is needed",
+                "steering_wheel_deg (the amplitude) or lateral_acceleration_g (which the car without control reaches) "
+                "is needed",
                 key="steer",
             )
         if step.start_s >= self.duration_s:
@@ -71,31 +71,27 @@ class StepSteer(Maneuver):
 
     @cached_property
     def _ends(self) -> tuple[Setpoint, Setpoint]:
-        """Before the ramp and after it."""
+        """Setpoints before and after the ramp."""
         amplitude = self.steer.steering_wheel_rad or 0.0
         return self.at_speed(math.copysign(0.0, amplitude)), self.at_speed(amplitude)
 
-    def settling_setpoint(self) -> Setpoint:
-        """Straight ahead at the speed of the manoeuvre."""
-        return self.at_speed(0.0)
-
     @property
     def search(self) -> SteadyTurn | None:
-        """For the amplitude, where only the lateral acceleration is known."""
+        """Search for the amplitude, if only the lateral acceleration is given."""
         wanted = self.steer.lateral_acceleration_mps2
         if self.steer.steering_wheel_rad is not None or wanted is None:
             return None
-        # Always as long, so that the amplitude does not depend on how long the manoeuvre is.
+        # Of fixed length, so that the amplitude does not depend on the length of the manoeuvre.
         probe = dataclasses.replace(self, duration_s=self.steer.start_s + _SEARCH_S)
         return SteadyTurn(probe, wanted, self.with_amplitude)
 
     def with_amplitude(self, steering_wheel_rad: float) -> StepSteer:
-        """The same step with its amplitude known [rad]; the aim that led to it stays on record."""
+        """Return the step with an amplitude [rad]; the lateral acceleration stays on record."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
 
 @dataclass(frozen=True)
 class SteadyTurn(Search):
-    """Search for the amplitude of a step steer that leads to a steady-state lateral acceleration."""
+    """Search for the amplitude of a step steer that gives a steady-state lateral acceleration."""
 
     probe: StepSteer

@@ -1,4 +1,4 @@
-"""Braking straight ahead to rest: the whole road of one friction (ISO 21994) or each side its own (ISO 14512)."""
+"""Braking straight ahead to rest, on a road of one friction (ISO 21994) or of two sides (ISO 14512)."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from activesteer.road.path import Path
 from activesteer.signals import Setpoint
 
 _MIN_SPEED_MPS: Final = 10.0 / 3.6
-"""Slower than this there is no braking to be evaluated [m/s]."""
+"""Lowest speed from which braking can be evaluated [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StraightBraking(Maneuver):
-    """The car rolls straight ahead at its speed, then the clutch is opened and the brake pressed until it stands."""
+    """Driving straight ahead, then braking with an open clutch until the car stands."""
 
     brake: BrakeInput
     """The brake."""
     hold_line: bool = True
-    """Whether the driver keeps the car on a straight line; else the steering wheel is held straight."""
+    """Whether the driver keeps the car on a straight line; otherwise the steering wheel is held straight."""
 
     def __post_init__(self) -> None:
-        """The car drives forwards, and the brake is pressed within the run.
+        """Check that the car drives forwards and brakes within the run.
 
         Raises:
-            ManeuverError: it is not.
+            ManeuverError: it does not.
         """
         if self.speed_mps < _MIN_SPEED_MPS:
             min_kmh = 3.6 * _MIN_SPEED_MPS
@@ -51,7 +51,7 @@ class StraightBraking(Maneuver):
 
     @property
     def course(self) -> Course | None:
-        """The straight line that the driver keeps, if he does."""
+        """The straight line that the driver keeps; None if the steering wheel is held."""
         return self._course if self.hold_line else None
 
     @cached_property
@@ -68,11 +68,7 @@ class StraightBraking(Maneuver):
 
     @cached_property
     def _ends(self) -> tuple[Setpoint, Setpoint]:
-        """Before the ramp of the brake and after it."""
+        """Setpoints before and after the ramp of the brake."""
         course = self.course
         before = self.settling_setpoint()._replace(path=None if course is None else course.path)
         return before, before._replace(brake_pedal=self.brake.pedal, hold_speed=False)
-
-    def settling_setpoint(self) -> Setpoint:
-        """Straight ahead at the speed of the manoeuvre."""
-        return self.at_speed(0.0)

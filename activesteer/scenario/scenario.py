@@ -12,7 +12,7 @@ from activesteer.config import check_overruled, field_in_unit, key_hint, key_pat
 from activesteer.controllers import ControllerSetup
 from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, nearest_names
-from activesteer.maneuver import Maneuver, build_maneuver, filled_from_csv, maneuver_class
+from activesteer.maneuver import Maneuver, build_maneuver, maneuver_class
 from activesteer.resources import DEFAULT_DRIVER, find_maneuver
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
 from activesteer.scenario.driver import ChosenDriver, driver_with
@@ -112,7 +112,7 @@ def resolve(
     car = car_with(vehicle, sorted_out["vehicle"])
     if any(field.name == "vehicle_width_m" for field in fields(kind)):
         table = {"vehicle_width_m": car.config.width_m, **table}
-    table, csv_files = filled_from_csv(table, folder, source)
+    table, csv_files = kind.filled_from_csv(table, folder, source)
     who = driver_with(driver, sorted_out["driver"])
     made_from = {**files, **csv_files, **car.files, **who.files}
     built = build_maneuver(table, source)

@@ -9,7 +9,8 @@ import pytest
 
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import BrakeInTurn, build_maneuver
+from activesteer.maneuver import build_maneuver
+from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.step_steer import SteadyTurn
 from tests.raising import raises
 

@@ -9,7 +9,8 @@ import pytest
 
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import ConstantRadius, build_maneuver
+from activesteer.maneuver import build_maneuver
+from activesteer.maneuver.constant_radius import ConstantRadius
 from tests.raising import raises
 
 SOURCE = Source("mine.toml", error=ManeuverError)

@@ -11,7 +11,8 @@ import pytest
 
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import FollowPath, build_maneuver
+from activesteer.maneuver import build_maneuver
+from activesteer.maneuver.follow_path import FollowPath
 from activesteer.resources import find_vehicle
 from activesteer.scenario import describe, resolve
 from tests.raising import raises

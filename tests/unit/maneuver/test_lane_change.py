@@ -9,7 +9,8 @@ import pytest
 
 from activesteer.config import Source
 from activesteer.errors import ManeuverError, ParameterError
-from activesteer.maneuver import LaneChange, build_maneuver
+from activesteer.maneuver import build_maneuver
+from activesteer.maneuver.lane_change import LaneChange
 from activesteer.road.course import Course
 from activesteer.road.path_search import PathSearch
 from activesteer.scenario import resolve

@@ -8,7 +8,7 @@ import pytest
 
 from activesteer import simulate
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import OpenLoop
+from activesteer.maneuver.open_loop import OpenLoop
 from activesteer.scenario import describe, resolve
 from tests.raising import raises
 

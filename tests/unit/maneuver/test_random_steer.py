@@ -10,7 +10,8 @@ from scipy import signal
 
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import RandomSteer, build_maneuver
+from activesteer.maneuver import build_maneuver
+from activesteer.maneuver.random_steer import RandomSteer
 from tests.raising import raises
 
 SOURCE = Source("mine.toml", error=ManeuverError)

@@ -10,7 +10,8 @@ import pytest
 
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import SineWithDwell, build_maneuver
+from activesteer.maneuver import build_maneuver
+from activesteer.maneuver.sine_with_dwell import SineWithDwell
 from activesteer.maneuver.slowly_increasing_steer import RampAngle
 from activesteer.signals import Setpoint
 from tests.raising import raises

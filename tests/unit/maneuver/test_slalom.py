@@ -10,7 +10,8 @@ import pytest
 
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import Slalom, build_maneuver
+from activesteer.maneuver import build_maneuver
+from activesteer.maneuver.slalom import Slalom
 from tests.raising import raises
 
 SOURCE = Source("my_cones.toml", error=ManeuverError)

@@ -11,7 +11,8 @@ import pytest
 import activesteer
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import BrakeInTurn, SineWithDwell
+from activesteer.maneuver.brake_in_turn import BrakeInTurn
+from activesteer.maneuver.sine_with_dwell import SineWithDwell
 from activesteer.scenario import describe, resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
