@@ -2,8 +2,8 @@
 
 The path is a quintic B-spline y(x) between two straight sections. Its coefficients minimise the integral of y'''^2:
 the lateral jerk at constant speed is proportional to y'''. The axles of the car, ahead of and behind its
-centre, stay within bounds. This strictly convex quadratic programme is written as a least distance programme. Non-negative
-least squares solve it exactly in a finite number of steps.
+centre, stay within bounds. This strictly convex quadratic programme is written as a least distance programme.
+Non-negative least squares solve it exactly in a finite number of steps.
 
 Source: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23 (problems LSI and LDP). Minimum
 jerk for smooth motion: T. Flash, N. Hogan, The coordination of arm movements, Journal of Neuroscience 5 (1985).

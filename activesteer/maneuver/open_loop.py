@@ -30,7 +30,8 @@ class OpenLoop(Maneuver):
     steering: SteeringTable = SteeringTable()
     """Steering wheel or rack. Default: straight ahead."""
     steering_csv: str | None = None
-    """CSV file with the columns time_s and steering_wheel_rad or rack_m: a path, or a name in the manoeuvre's folder."""
+    """CSV file with the columns time_s and steering_wheel_rad or rack_m: a path, or a name in the manoeuvre's
+    folder."""
     speed: SpeedTable | None = None
     """Speed to hold. Default: the speed at the start."""
     brake: BrakeTable | None = None
