@@ -141,6 +141,7 @@ class ClosedLoop:
         vehicle, (command, asked) = self.vehicle, self.commands
         timestep_s, measurement, motion = vehicle.timestep_s, self.measurement, self.motion
         tape_address = 0 if recorder is None else recorder.tape_address
+        vehicle.follow_model()
         with engine_warnings_held():
             for first, last, step_car, angle_fails in self.faults.stretches(self.step_count, self.step_count + steps):
                 stretch = range(first, last)

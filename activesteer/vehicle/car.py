@@ -27,7 +27,7 @@ from activesteer.vehicle.chassis_heading import YAW_DOF, turn_chassis_back
 from activesteer.vehicle.divergence import raise_if_diverged
 from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.estimate_row import write_estimate
-from activesteer.vehicle.implicit_plan import drop_metric, implicit_plan
+from activesteer.vehicle.implicit_plan import ImplicitPlan, drop_metric
 from activesteer.vehicle.loading import load_model
 from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.native_forces import install_native_forces
@@ -108,7 +108,7 @@ class Vehicle:
         self._wheels = WheelSet(model, data, self.parameters.powertrain)
         self.actuators = ActuatorRecords(model)
         ratio, brakes = self.parameters.steering.ratio, (self._brake_setup, self._brake_state)
-        self._implicit = implicit_plan(model, data)
+        self._implicit = ImplicitPlan(model, data)
         self._plan = step_plan(
             model, data, self._implicit.plan, self.rows.live(), self._wheels.torques, ratio, self._sensors, brakes
         )
@@ -219,7 +219,12 @@ class Vehicle:
         Args:
             inputs: Inputs of all actuators in each step, as a run left them in `data.ctrl`; shape (steps, actuators).
         """
+        self.follow_model()
         native_step.replay(self._plan_address, inputs)
+
+    def follow_model(self) -> None:
+        """Take over changes of `model` that a plan of the step froze; see `ImplicitPlan.follow`."""
+        self._implicit.follow()
 
     @property
     def rack_per_steering_wheel_m(self) -> float | None:

@@ -1,7 +1,8 @@
 """A step of the engine with the accelerations found directly; see `implicit_plan`.
 
-All but the solution is the engine's: positions, mass matrix, tendons, forces, sensors and the integration are its own
-functions, called one by one. Where a limit of a joint is touched, or somebody pushes a body, its own step does it all.
+Everything but the solution is the engine's: its own functions for positions, mass matrix, tendons, forces, sensors and
+integration are called one by one. The engine's own step does it all while a joint touches its limit, while a force acts
+on a body, and where the matrix is not positive definite.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _flags = pointer_to(types.uint8)
 
 @intrinsic
 def _call(_typing_context, function, model, data):
-    """Calls a C function at an address with two pointers."""
+    """Call a C function at an address with two pointers."""
     signature = types.void(types.intp, types.intp, types.intp)
 
     def generate(context, builder: ir.IRBuilder, _signature, arguments):
@@ -46,7 +47,7 @@ def _engine(function, plan):
 
 @inlined
 def _engine_must(plan):
-    """Whether something acts that only the engine's own step knows: a limit of a joint, a force on a body."""
+    """Return True if only the engine's own step can act: a joint touches its limit, or a force acts on a body."""
     if plan.direct == 0:
         return True
     limited, places = _indices(plan.limited), _indices(plan.limited_qpos)
@@ -64,13 +65,16 @@ def _engine_must(plan):
 
 @inlined
 def _stiffness(a, b, c, x):
-    """Slope of the force a x + b x^2 + c x^3; no less than 0."""
+    """Return the slope of the force a x + b x^2 + c x^3, at least 0."""
     return max(0.0, a + x * (2.0 * b + x * 3.0 * c))
 
 
 @inlined
 def _assemble(plan):
-    """M + h D + h^2 K in the entries of the factor, and f - h K v in the order of elimination."""
+    """Write M + h D + h^2 K to the entries of the factor, and f - h K v in the order of elimination.
+
+    Negative damping and stiffness count as 0 in D and K, as in the engine; the forces hold them anyway.
+    """
     h = plan.timestep_s
     entries, elements, mass = f64_pointer(plan.factor), f64_pointer(plan.M), _indices(plan.mass)
     for index in range(plan.n_factor):
@@ -84,7 +88,7 @@ def _assemble(plan):
     damping = f64_pointer(plan.dof_damping)
     for dof in range(plan.n_place):
         right[place[dof]] = passive[dof] - bias[dof] + applied[dof] + actuator[dof]
-        entries[diagonal[dof]] += h * damping[dof]
+        entries[diagonal[dof]] += h * max(0.0, damping[dof])
 
     jacobian, length, rate = f64_pointer(plan.ten_J), f64_pointer(plan.ten_length), f64_pointer(plan.ten_velocity)
     a, b_and_c = f64_pointer(plan.tendon_stiffness), f64_pointer(plan.tendon_stiffnesspoly)
@@ -98,7 +102,7 @@ def _assemble(plan):
         k = 0.0
         if x != 0.0:
             k = _stiffness(a[tendon], b_and_c[2 * tendon], b_and_c[2 * tendon + 1], x)
-        scale, shift = h * (h * k + dampers[tendon]), h * k * rate[tendon]
+        scale, shift = h * (h * k + max(0.0, dampers[tendon])), h * k * rate[tendon]
         if scale != 0.0:
             for i in range(first, first + count):
                 element = jacobian[elements_of[i]]
@@ -130,12 +134,19 @@ def _assemble(plan):
 
 @inlined
 def _factorise(plan):
-    """Unit upper triangular rows times diagonal, in place; of the diagonal the reciprocals are left."""
+    """Factorise into unit upper triangular rows times diagonal, in place; store reciprocals of the diagonal.
+
+    Returns:
+        The last place whose pivot is not positive; -1 if the matrix is positive definite.
+    """
     entries, row, others = f64_pointer(plan.factor), _indices(plan.row), _indices(plan.others)
     update = _indices(plan.update)
     target = 0
+    bad = -1
     for place in range(plan.n_row):
         start, count = row[place], others[place]
+        if entries[start] <= 0.0:
+            bad = place
         reciprocal = 1.0 / entries[start]
         entries[start] = reciprocal
         for i in range(start + 1, start + 1 + count):
@@ -144,11 +155,22 @@ def _factorise(plan):
                 entries[update[target]] -= scaled * entries[j]
                 target += 1
             entries[i] = scaled
+    return bad
+
+
+@inlined
+def _warn(plan, bad):
+    """Count a warning of the engine for an indefinite matrix, with the degree of freedom at a place."""
+    place, warning = _indices(plan.place), _indices(plan.inertia_warning)
+    for dof in range(plan.n_place):
+        if place[dof] == bad:
+            warning[0] = dof
+    warning[1] += 1
 
 
 @inlined
 def _solve(plan):
-    """The accelerations, from the factor and the right side."""
+    """Solve for the accelerations, from the factor and the right side."""
     entries, row, others = f64_pointer(plan.factor), _indices(plan.row), _indices(plan.others)
     column, x = _indices(plan.column), f64_pointer(plan.right_side)
     for place in range(plan.n_row):
@@ -169,7 +191,7 @@ def _solve(plan):
 
 @inlined
 def _accelerate(plan):
-    """What accelerations the sensors will feel, gravity included; the engine takes them for found already."""
+    """Find the accelerations that the sensors feel, gravity included; the engine does not compute them again."""
     if plan.sensed_body == 0:
         _engine(plan.mj_rnePostConstraint, plan)
         return
@@ -184,7 +206,7 @@ def _accelerate(plan):
 
 @inlined
 def advance(plan):
-    """One step of the engine.
+    """Make one step of the engine.
 
     Args:
         plan: An `IMPLICIT_PLAN`.
@@ -200,9 +222,13 @@ def advance(plan):
     _engine(plan.mj_sensorVel, plan)
     _engine(plan.mj_fwdActuation, plan)
     _assemble(plan)
-    _factorise(plan)
-    _solve(plan)
-    _engine(plan.mj_checkAcc, plan)
-    _accelerate(plan)
-    _engine(plan.mj_sensorAcc, plan)
-    _engine(plan.mj_Euler, plan)
+    bad = _factorise(plan)
+    if bad >= 0:
+        _warn(plan, bad)
+        _engine(plan.mj_step, plan)
+    else:
+        _solve(plan)
+        _engine(plan.mj_checkAcc, plan)
+        _accelerate(plan)
+        _engine(plan.mj_sensorAcc, plan)
+        _engine(plan.mj_Euler, plan)

@@ -1,4 +1,4 @@
-"""The step with directly found accelerations is the engine's step, but for the error that its iteration leaves."""
+"""The step with directly found accelerations is the engine's step, except for the error that its iteration leaves."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import pytest
 from activesteer.scenario import load_car
 from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle.implicit_plan import implicit_plan, knows
+from activesteer.vehicle.direct_solution_limits import handed_over
+from activesteer.vehicle.implicit_plan import ImplicitPlan
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
-from tests.unit.vehicle.cars import dof, standing, tilted_and_moving
+from tests.unit.vehicle.cars import dof, tilted_and_moving
+from tests.unit.vehicle.random_models import STATE, differences
 
 CARS = ("compact", "sedan", "tesla_model_s")
-STATE = ("qpos", "qvel", "act", "qacc", "sensordata", "actuator_force")
 TIGHT = 1e-14
 """Tolerance at which the engine's own solution is as good as it gets."""
 
@@ -43,24 +44,15 @@ def _drive(ours: Vehicle, engine: Vehicle, steps: int, steer_rad: float = 1.0) -
         mujoco.mj_step(engine.model, engine.data)
 
 
-def _differences(ours: Vehicle, engine: Vehicle) -> dict[str, float]:
-    """Of each array the largest difference, as a share of what its numbers reach."""
-    found = {}
-    for name in STATE:
-        here, there = getattr(ours.data, name), getattr(engine.data, name)
-        found[name] = float(np.abs(here - there).max() / max(np.abs(there).max(), 1.0))
-    return found
-
-
 @pytest.mark.parametrize("name", CARS)
 def test_a_weaving_car_goes_where_the_engine_takes_it(name: str) -> None:
     """With the third-order stops, rubber that stiffens, dry friction, and servos: everything that the cars have."""
     ours, engine = _pair(name)
-    assert knows(ours.model)
+    assert not handed_over(ours.model)
     _drive(ours, engine, 150)
     assert abs(ours.data.qvel[5]) > 0.02, "it turns"
-    differences = _differences(ours, engine)
-    assert max(differences.values()) < 1e-8, differences
+    found = differences(ours.data, engine.data)
+    assert max(found.values()) < 1e-8, found
 
 
 def test_the_engine_s_iteration_converges_to_what_we_find() -> None:
@@ -70,7 +62,7 @@ def test_the_engine_s_iteration_converges_to_what_we_find() -> None:
         ours, engine = _pair("sedan")
         engine.model.opt.tolerance = tolerance
         _drive(ours, engine, 60)
-        errors.append(_differences(ours, engine)["qvel"])
+        errors.append(differences(ours.data, engine.data)["qvel"])
     assert errors[0] > 5.0 * errors[1] > 25.0 * errors[2]
 
 
@@ -81,9 +73,9 @@ def test_any_pose_gives_the_engine_s_accelerations(name: str) -> None:
 
     ours, engine = _pair(name, prepare=thrown)
     _drive(ours, engine, 1)
-    differences = _differences(ours, engine)
+    found = differences(ours.data, engine.data)
     assert np.abs(ours.data.qacc).max() > 100.0
-    assert max(differences.values()) < 1e-9, differences
+    assert max(found.values()) < 1e-9, found
 
 
 @pytest.mark.parametrize("held_Nm", [2.0, 0.05])
@@ -92,7 +84,7 @@ def test_hands_that_give_way_are_no_spring(held_Nm: float) -> None:
     _drive(ours, engine, 40)
     hands = ours.model.actuator("steering_wheel").id
     assert abs(ours.data.actuator_force[hands]) == pytest.approx(ours.model.actuator_forcerange[hands, 1])
-    assert max(_differences(ours, engine).values()) < 1e-8
+    assert max(differences(ours.data, engine.data).values()) < 1e-8
 
 
 def test_at_a_stop_of_the_rack_the_engine_steps() -> None:
@@ -110,7 +102,7 @@ def test_at_a_stop_of_the_rack_the_engine_steps() -> None:
     _drive(ours, engine, 100, steer_rad=0.0)
     assert engine.data.nefc == 0
     assert ours.data.qpos[place] < ours.model.jnt_range[joint, 1]
-    assert max(_differences(ours, engine).values()) < 1e-8
+    assert max(differences(ours.data, engine.data).values()) < 1e-8
 
 
 def test_a_push_acts_as_in_the_engine() -> None:
@@ -123,6 +115,26 @@ def test_a_push_acts_as_in_the_engine() -> None:
     assert ours.data.qpos.tobytes() == engine.data.qpos.tobytes()
 
 
+@pytest.mark.parametrize("name", CARS)
+def test_at_standstill_the_last_digit_of_a_position_matters_as_much_as_the_solution(name: str) -> None:
+    """A difference of 1e-9 is rounding times stiff links, see `implicit_plan`; from the same state it is 1e-14."""
+    ours, engine = _pair(name, speed_mps=0.0)
+    moved, _ = _pair(name, speed_mps=0.0)
+    moved.data.qpos[2] = np.nextafter(moved.data.qpos[2], 2.0)
+    largest = {"solution": 0.0, "digit": 0.0}
+    for step in range(150):
+        ours.step(DriverCommand(0.0, 200.0, 0.2), ActuatorCommand())
+        for vehicle in (engine, moved):
+            vehicle.data.ctrl[:] = ours.data.ctrl
+            mujoco.mj_step(vehicle.model, vehicle.data)
+        if step == 0:
+            assert differences(ours.data, engine.data)["qacc"] < 1e-14
+        for what, other in (("solution", ours), ("digit", moved)):
+            largest[what] = max(largest[what], differences(other.data, engine.data)["qacc"])
+    assert 0.0 < largest["solution"] < 10.0 * largest["digit"]
+    assert largest["digit"] < 1e-7
+
+
 def test_what_changes_in_the_model_counts_at_once() -> None:
     def stiffer(vehicle: Vehicle) -> None:
         vehicle.model.tendon_stiffness[:] *= 1.5
@@ -130,35 +142,14 @@ def test_what_changes_in_the_model_counts_at_once() -> None:
 
     ours, engine = _pair("compact", prepare=stiffer)
     _drive(ours, engine, 50)
-    assert max(_differences(ours, engine).values()) < 1e-8
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda model: model.jnt_stiffness.__setitem__(3, 10.0),
-        lambda model: model.dof_frictionloss.__setitem__(8, 10.0),
-        lambda model: model.tendon_limited.__setitem__(0, 1),
-        lambda model: setattr(model.opt, "viscosity", 0.1),
-        lambda model: setattr(model.opt, "integrator", int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)),
-        lambda model: setattr(model.opt, "solver", int(mujoco.mjtSolver.mjSOL_PGS)),
-        lambda model: setattr(model.opt, "enableflags", int(mujoco.mjtEnableBit.mjENBL_ENERGY)),
-        lambda model: setattr(model.opt, "disableflags", int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)),
-    ],
-    ids=["spring of a joint", "friction", "limit of a tendon", "air", "integrator", "solver", "energy", "contacts"],
-)  # fmt: skip
-def test_what_it_does_not_know_it_leaves_to_the_engine(change: Callable[[mujoco.MjModel], None]) -> None:
-    vehicle = standing()
-    change(vehicle.model)
-    assert not knows(vehicle.model)
-    assert implicit_plan(vehicle.model, vehicle.data).plan["direct"] == 0
+    assert max(differences(ours.data, engine.data).values()) < 1e-8
 
 
 def test_the_factor_of_a_car_is_hardly_larger_than_its_mass_matrix() -> None:
     """That is why it is worth its while; without an order that fits, all degrees of freedom would meet."""
     for name in CARS:
         vehicle = load_car(name).on()
-        entries = implicit_plan(vehicle.model, vehicle.data).plan["n_factor"][0]
+        entries = ImplicitPlan(vehicle.model, vehicle.data).plan["n_factor"][0]
         assert entries < 1.2 * vehicle.model.nC
 
 
