@@ -1,4 +1,4 @@
-"""Playback: recordings in the rerun viewer, from recordings alone."""
+"""Playback of recordings in the rerun viewer."""
 
 from activesteer.playback.runs import Run, runs_of
 from activesteer.playback.showing import Showing

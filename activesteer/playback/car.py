@@ -1,4 +1,4 @@
-"""The car in the world: solids in the frames of its bodies, which move, and the camera's frame behind it."""
+"""The car in the 3D view: solids attached to the moving bodies, and the frame of the chase camera."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from activesteer.road.footprint import footprint_of
 
 _GHOST_OPACITY: Final = 0.4
 _GHOST_EVERY: Final = 5
-"""Of the poses, every fifth one: the opacity changes slowly."""
+"""Every fifth pose gets a new opacity, because the opacity changes slowly."""
 _CUTAWAY_OPACITY: Final = 0.25
-"""Opacity of a body through which the suspension is to be seen."""
+"""Opacity of a body in a cutaway view."""
 
 
 def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> None:
-    """Sends bodies, their solids, and the frame `NAME/chase` that follows the car and turns with it, but stays level.
+    """Send bodies, their solids and the frame `NAME/chase`, which follows the car and its heading but stays level.
 
     Args:
-        stream: Where to.
+        stream: Target of the data.
         run: The run.
-        cutaway: Whether the body is to be seen through.
+        cutaway: Whether the body is transparent.
     """
     poses = run.recording.poses
     when = times(poses.time_s[run.poses])
@@ -59,17 +59,17 @@ def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> 
 
 
 def body_path(run: Run, body: str) -> str:
-    """Entity of a body; what stands below it moves with it."""
+    """Return the entity of a body; entities below it move with the body."""
     return f"{run.scene}/car/{body}"
 
 
 def send_ghost(stream: rr.RecordingStream, run: Run, beside: Run) -> None:
-    """Sends the body of a car as it is seen in the view of another: transparent, and the less seen the nearer it is.
+    """Send the body of a car as the view of another run shows it: transparent, and fainter the nearer the two cars are.
 
     Args:
-        stream: Where to.
-        run: The run whose car it is.
-        beside: The run in whose view it is shown.
+        stream: Target of the data.
+        run: The run whose car is drawn.
+        beside: The run whose view shows the car.
     """
     poses = run.recording.poses
     time_s = poses.time_s[run.poses][::_GHOST_EVERY]
@@ -85,12 +85,12 @@ def send_ghost(stream: rr.RecordingStream, run: Run, beside: Run) -> None:
 
 
 def ghost_path(run: Run, beside: Run) -> str:
-    """Entity of the ghost of a car in the view of another run."""
+    """Return the entity of the ghost of a car in the view of another run."""
     return f"{body_path(run, CHASSIS)}/ghost/{beside.name}"
 
 
 def _apart(run: Run, other: Run, time_s: Array) -> Array:
-    """How far the chassis of two runs are apart [m]; a run that has ended stands where it was last."""
+    """Return the distance between the chassis of two runs [m]; a run that has ended keeps its last position."""
     at = []
     for each in (run, other):
         poses = each.recording.poses

@@ -1,4 +1,4 @@
-"""The road, and what the driver follows on it: lanes, cones, path; in the world and on a flat map."""
+"""Road, lanes, cones and path, in the 3D view and on a flat map."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from activesteer.road.recorded import LIMIT_M
 from activesteer.road.road import road_of
 
 ROAD, COURSE, MAP = "road", "course", "map"
-"""Entities below which road and course stand in the world, and below which all of the map lies."""
+"""Parent entities of the road and the course in the 3D view, and of the map."""
 
 _BESIDE_M: Final = 15.0
 _BEYOND_M: Final = 60.0
-"""How far grid and patches reach beside and beyond everything that happens on the road [m]."""
+"""Margins of the grid and the friction patches beside and beyond cars and course [m]."""
 _HORIZON_M: Final = 2000.0
-"""How much further the road goes on [m]: what stands still in the picture of a camera that follows a car."""
+"""Length of road beyond the grid [m]: its edge must not be seen to move in the picture of a chase camera."""
 _MAP_MARGIN_M: Final = 8.0
 _TILE_M: Final = 10.0
 
@@ -51,12 +51,12 @@ class Extent(NamedTuple):
 
 
 def extent(runs: Sequence[Run]) -> Extent:
-    """What cars and course take up together."""
+    """Return the rectangle that cars and course take up together."""
     points = [_track(run) for run in runs]
     course = _course(runs)
     if course is not None:
         points += [_path(course), course.cones_m, *(lane.outline_m() for lane in course.lanes)]
-    # The path goes on for a while where the car has long stopped; what is of interest is where the cars are.
+    # The path may be much longer than the drive: keep only the part of the course that is near the cars.
     reach = np.concatenate([_track(run) for run in runs])
     every = np.concatenate(points)
     low, high = reach.min(axis=0) - 20.0, reach.max(axis=0) + 20.0
@@ -66,7 +66,7 @@ def extent(runs: Sequence[Run]) -> Extent:
 
 
 def send_road(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
-    """Sends the road with its grid, and its patches of other friction, as far as they reach."""
+    """Send the road with its grid and its patches of other friction."""
     around = extent(runs)
     low_x = np.floor((around.low_x_m - _BEYOND_M / 2) / _TILE_M) * _TILE_M
     high_x = np.ceil((around.high_x_m + _BEYOND_M) / _TILE_M) * _TILE_M
@@ -87,7 +87,7 @@ def send_road(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
 
 
 def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
-    """Sends lanes, cones and path, where the manoeuvre has them."""
+    """Send lanes, cones and path if the manoeuvre has them."""
     course = _course(runs)
     if course is None:
         return
@@ -116,12 +116,12 @@ def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
 
 
 def send_track(stream: rr.RecordingStream, run: Run, number: int) -> None:
-    """Sends where a car went, and its outline on the map, wheels with their angles, as it moves.
+    """Send the track of a car and, on the map, its moving outline with steered wheels.
 
     Args:
-        stream: Where to.
+        stream: Target of the data.
         run: The run.
-        number: Its place among the runs: each line lies a little above the one before.
+        number: Index of the run; the line of each run lies a little above the line of the run before.
     """
     track = _track(run)
     line = np.column_stack([track, np.full(len(track), 0.03 + 0.01 * number)])
@@ -135,7 +135,7 @@ def send_track(stream: rr.RecordingStream, run: Run, number: int) -> None:
     strokes = _outline(run).astype(np.float32)
     path = f"{MAP}/{run.name}/car"
     stream.log(path, rr.LineStrips2D.from_fields(colors=[colour], radii=_points(1.8), draw_order=5.0), static=True)
-    # An array of strokes that all have two points is sent a hundred times as fast as a list of them.
+    # Sending an array of two-point strokes is a hundred times as fast as sending a list of strokes.
     columns = rr.LineStrips2D.columns(strips=strokes.reshape(-1, 2, 2))
     stream.send_columns(
         path,
@@ -145,14 +145,14 @@ def send_track(stream: rr.RecordingStream, run: Run, number: int) -> None:
 
 
 def _outline(run: Run) -> Array:
-    """Sides of the car and a stroke for each wheel, on the map, shape (poses, strokes, 2 points, 2)."""
+    """Return the sides of the car and a stroke for each wheel on the map, shape (poses, strokes, 2 points, 2)."""
     poses, car = run.recording.poses, footprint_of(run.recording.metadata) or Footprint()
     half, front, rear = 0.5 * car.width_m, car.front_m, car.rear_m
     chassis = poses.names.index(CHASSIS)
 
     def placed(body: int, points: Sequence[tuple[float, float]], *, level: bool) -> Array:
         turn, at = poses.quaternions[run.poses, body], poses.positions_m[run.poses, body]
-        if level:  # a wheel spins: only its heading counts
+        if level:  # the wheel spins, so use its heading alone
             axis = rotated(turn, (0.0, 1.0, 0.0))
             angle = np.arctan2(-axis[:, 0], axis[:, 1])
         else:
@@ -169,7 +169,7 @@ def _outline(run: Run) -> Array:
 
 
 def _track(run: Run) -> Array:
-    """Where the centre of gravity went; the origin of the chassis where it was not recorded."""
+    """Return the track of the centre of gravity, or of the chassis origin if the former was not recorded."""
     poses = run.recording.poses
     at = poses.positions_m[run.poses, poses.names.index(CHASSIS), :2]
     if not run.has("x_m", "y_m"):
@@ -188,19 +188,19 @@ def _path(course: Course) -> Array:
 
 
 def _flat(points: Array) -> Array:
-    """World to map: there the second axis points down, and left is to be up."""
+    """Convert world to map coordinates: the second axis of the map points down, and left is shown upwards."""
     return points * (1.0, -1.0)
 
 
 def map_bounds(runs: Sequence[Run]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Ranges of both axes of the map that show everything [m]."""
+    """Return the ranges of both map axes that show everything [m]."""
     around = extent(runs)
     x = (around.low_x_m - _MAP_MARGIN_M, around.high_x_m + _MAP_MARGIN_M)
     return x, (-around.high_y_m - _MAP_MARGIN_M, -around.low_y_m + _MAP_MARGIN_M)
 
 
 def _points(radius: float) -> Any:
-    """A radius in points of the screen, so that lines are seen however far the map is zoomed out."""
+    """Return a radius in screen points, so that lines stay visible at every zoom of the map."""
     return rr.Radius.ui_points(radius)
 
 
@@ -210,7 +210,7 @@ def _plane(low_x: float, high_x: float, low_y: float, high_y: float, z: float, c
 
 
 def _cones(places: Array) -> Any:
-    """All cones as one mesh."""
+    """Return all cones as one mesh."""
     angle = np.linspace(0.0, 2.0 * np.pi, _CONE_SIDES, endpoint=False)
     ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_CONE_SIDES)])
     corners = np.vstack([ring * CONE_RADIUS_M, [[0.0, 0.0, CONE_HEIGHT_M]]])

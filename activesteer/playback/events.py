@@ -1,4 +1,4 @@
-"""What happens in a run that a viewer is warned of: faults, and actuators at their limits."""
+"""Warnings of a run: active faults, and actuators at their limits."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from activesteer.quantities import display_unit
 
 _LIMIT: Final = "_saturated"
 _SHORTEST_S: Final = 0.05
-"""A limit that an actuator leaves for less than this counts as not left [s]."""
+"""Shorter interruptions of a saturation are ignored [s]."""
 
 
 class Event(NamedTuple):
-    """Something that begins or ends.
+    """Begin or end of a fault or a saturation.
 
     Attributes:
-        time_s: When [s].
-        text: What, in words.
-        level: How it is shown.
+        time_s: Time of the event [s].
+        text: Description.
+        level: Level of the viewer's log.
     """
 
     time_s: float
@@ -33,7 +33,7 @@ class Event(NamedTuple):
 
 
 def events(run: Run) -> list[Event]:
-    """Faults, as the manoeuvre has them, and limits, as they were recorded, by time."""
+    """Return the faults of the manoeuvre and the recorded saturations, sorted by time."""
     found = [*_faults(run), *_limits(run)]
     return sorted(found, key=lambda event: event.time_s)
 
@@ -56,7 +56,7 @@ def _faults(run: Run) -> list[Event]:
 
 
 def _size(fault: Mapping[str, Any]) -> str:
-    """How much, in the unit of tables and plots."""
+    """Return the size of a fault in display units."""
     said = ""
     for key, value in fault.items():
         if key == "side":
@@ -81,7 +81,7 @@ def _limits(run: Run) -> list[Event]:
 
 
 def _spans(active: np.ndarray, time_s: np.ndarray) -> tuple[list[float], list[float]]:
-    """When a flag rises and falls, short gaps closed."""
+    """Return the times at which a flag rises and falls, with short gaps closed."""
     edges = np.diff(np.concatenate(([False], active)).astype(np.int8))
     begins, ends = list(time_s[edges > 0]), list(time_s[edges < 0])
     kept_begins, kept_ends = begins[:1], []
@@ -93,7 +93,7 @@ def _spans(active: np.ndarray, time_s: np.ndarray) -> tuple[list[float], list[fl
 
 
 def send_events(stream: rr.RecordingStream, run: Run) -> None:
-    """Sends the warnings of a run; nothing where there is none."""
+    """Send the warnings of a run, if it has any."""
     found = events(run)
     if found:
         when = times(np.array([event.time_s for event in found]))
@@ -102,7 +102,7 @@ def send_events(stream: rr.RecordingStream, run: Run) -> None:
 
 
 def view(runs: Sequence[Run]) -> list[rrb.TextLogView]:
-    """The view of the warnings of these runs, or nothing where there is none."""
+    """Return the view of the warnings of these runs, or None if there are none."""
     paths = [f"/{_path(run)}" for run in runs if events(run)]
     return [rrb.TextLogView(origin="/", contents=paths, name="Warnings")] if paths else []
 

@@ -1,4 +1,4 @@
-"""How the viewer is divided: the car from behind, the map, the car from above, plots, and what came out."""
+"""Layout of the viewer: chase view, map, plan view of the wheels, plots and summary."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from activesteer.playback.timeline import TIMELINE
 from activesteer.playback.wheel_angles import plan_view, wedges_path
 
 SUMMARY: Final = "summary"
-"""Entity of the text."""
+"""Entity of the summary text."""
 
 _PLOTS: Final = 690.0
-"""Height of a page of plots with its legend, in a window of 1280 x 800 [points]."""
+"""Height of a page of plots with its legend in a window of 1280 x 800 [points]."""
 _SKY: Final = (176, 196, 214)
 _BEHIND: Final = rrb.EyeControls3D(position=(-7.6, 0.0, 3.5), look_target=(-0.4, 0.0, 0.2), eye_up=(0.0, 0.0, 1.0))
-# Left is up in the picture, so the car drives to the right.
+# Left is up in the picture, so that the car drives to the right.
 _ABOVE: Final = rrb.EyeControls3D(position=(-1.3, 0.0, 6.5), look_target=(-1.3, 0.0, 0.0), eye_up=(0.0, 1.0, 0.0))
-"""Eyes in the frame that follows the car, whose origin is on the road below its front axle."""
+"""Eye positions in the frame that follows the car; its origin lies on the road below the front axle."""
 
 
 def blueprint(runs: Sequence[Run], *, compare: bool, page: int = 0) -> rrb.Blueprint:
-    """The layout.
+    """Return the layout of the viewer.
 
     Args:
-        runs: The runs; of several, the first page shows all of them.
-        compare: Whether to leave out the pages of the single runs.
-        page: Which page of plots is shown first.
+        runs: The runs. If there are several, the first page shows all of them.
+        compare: Whether to leave out the pages of single runs.
+        page: The page of plots that is shown first.
     """
     if len(runs) == 1:
         content = _page(runs[0], runs, page)
@@ -53,7 +53,7 @@ def blueprint(runs: Sequence[Run], *, compare: bool, page: int = 0) -> rrb.Bluep
 
 
 def _page(run: Run, runs: Sequence[Run], page: int) -> rrb.Horizontal:
-    """One run, with everything there is to see of it."""
+    """Return the page of a single run with all its views."""
     return rrb.Horizontal(
         rrb.Vertical(
             _chase(run, runs),
@@ -80,7 +80,7 @@ def _tab(name: str, shown: Sequence[plots.Plot], run: Run, *, alone: bool) -> rr
 
 
 def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
-    """All runs: one view for each car with the others as ghosts, plots over each other."""
+    """Return the page of all runs: a view for each car, with the others as ghosts, and overlaid plots."""
     loads, use = plots.WHEELS[:2]
     return rrb.Horizontal(
         rrb.Vertical(
@@ -123,7 +123,7 @@ def _car_view(run: Run, runs: Sequence[Run], name: str, eye: rrb.EyeControls3D, 
             f"+ /{COURSE}/**",
             f"+ /{run.scene}/**",
             f"+ /{wedges_path(run)}/**",
-            # In a small view the numbers would hide the car; the plan has them too.
+            # The numbers would hide the car in a small view; the plan shows them too.
             *([] if numbers else [f"- /{wedges_path(run)}/angle"]),
             f"- /{body_path(run, CHASSIS)}/ghost/**",
             *(f"+ /{ghost_path(other, run)}/**" for other in others),
@@ -146,7 +146,7 @@ def _map(runs: Sequence[Run]) -> rrb.Spatial2DView:
 
 
 def _words(runs: Sequence[Run]) -> rrb.Tabs | rrb.TextDocumentView:
-    """The summary, and behind it the warnings where there are any."""
+    """Return the view of the summary, with the warnings behind it if there are any."""
     summary = rrb.TextDocumentView(origin=f"/{SUMMARY}", name="Summary")
     warnings = events.view(runs)
     return rrb.Tabs(summary, *warnings, active_tab=0) if warnings else summary

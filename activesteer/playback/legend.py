@@ -1,4 +1,4 @@
-"""What the curves are called, beside the plots: a legend inside of one hides its curves."""
+"""Legends beside the plots: the viewer's own legend would hide curves."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ import rerun.blueprint as rrb
 from activesteer.drawing.colours import bytes_of
 
 LEGEND: Final = "legend"
-"""Entity below which they lie."""
+"""Parent entity of the legends."""
 LEGEND_OF_RUNS: Final = f"{LEGEND}/runs"
-"""Of all runs, which have the same colours in all plots."""
+"""Entity of the legend of the runs, which have the same colours in all plots."""
 _WIDTH: Final = 500.0
-"""Of a legend, about that in a window of 1280 x 800; lengths are in points of the screen there."""
+"""Width of a legend, for a window of 1280 x 800 [screen points]."""
 _ROW: Final = 26.0
 _LETTER: Final = 6.6
 _GAP: Final = 26.0
 _BELOW: Final = 12.0
-"""From a point to the middle of its text."""
+"""Distance from a marker to the middle of its text."""
 
 
 def legend(path: str, curves: Mapping[str, str]) -> rrb.Spatial2DView:
-    """The view of the names of curves in their colours.
+    """Return the view of a legend.
 
     Args:
-        path: Entity that they were sent to.
+        path: Entity of the legend.
         curves: Names and colours, `#rrggbb`.
     """
     return rrb.Spatial2DView(
@@ -39,16 +39,16 @@ def legend(path: str, curves: Mapping[str, str]) -> rrb.Spatial2DView:
 
 
 def height(curves: Mapping[str, str]) -> float:
-    """How high it is."""
+    """Return the height of the legend of some curves."""
     return _ROW * (1 + max((row for row, _ in _places(curves)), default=0))
 
 
 def send_legend(stream: rr.RecordingStream, path: str, curves: Mapping[str, str]) -> None:
-    """Sends it.
+    """Send a legend.
 
     Args:
-        stream: Where to.
-        path: Entity to send it to.
+        stream: Target of the data.
+        path: Entity of the legend.
         curves: Names and colours, `#rrggbb`.
     """
     points = rr.Points2D(
@@ -62,7 +62,7 @@ def send_legend(stream: rr.RecordingStream, path: str, curves: Mapping[str, str]
 
 
 def _places(curves: Mapping[str, str]) -> list[tuple[int, float]]:
-    """Row and middle of each name."""
+    """Return the row and the middle of each name."""
     places, row, at = [], 0, 0.0
     for name in curves:
         wide = _LETTER * len(name) + _GAP

@@ -1,4 +1,4 @@
-"""Suspension links, springs and dampers, drawn from the poses of the bodies that they connect."""
+"""Suspension links, springs and dampers, drawn between the bodies that they connect."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _WIRE_RADIUS_M: Final = 0.007
 
 
 def send_links(stream: rr.RecordingStream, run: Run) -> None:
-    """Sends every link of the scene whose bodies have poses: rods as cylinders, springs as coils that are squeezed.
+    """Send every link of the scene whose bodies have poses: rods as cylinders, springs as coils.
 
-    A recording that was made before links were kept shows none.
+    Recordings made before links were recorded show none.
     """
     names = run.recording.poses.names
     links = [
@@ -35,7 +35,7 @@ def send_links(stream: rr.RecordingStream, run: Run) -> None:
 
 
 def link_ends(run: Run, link: Link) -> list[NDArray[np.float64]]:
-    """World position of each point of a link [m], each of shape (number of shown poses, 3)."""
+    """Return the world position of each point of a link [m], each of shape (number of shown poses, 3)."""
     poses = run.recording.poses
     ends = []
     for body, point in link.points:
@@ -46,7 +46,7 @@ def link_ends(run: Run, link: Link) -> list[NDArray[np.float64]]:
 
 
 def _send_rods(stream: rr.RecordingStream, run: Run, links: list[Link]) -> None:
-    """All in one entity, since they are many and each changes at every pose."""
+    """Send all springs in one entity, because there are many and each changes at every pose."""
     parts = []
     radii: list[float] = []
     colours: list[list[int]] = []
@@ -84,7 +84,7 @@ def _send_spring(stream: rr.RecordingStream, run: Run, spring: Link) -> None:
 
 
 def _coil(radius_m: float) -> NDArray[np.float64]:
-    """A helix about z, one long, its middle at the origin."""
+    """Return a helix about z of length one, with its middle at the origin."""
     turn = np.linspace(0.0, 2.0 * np.pi * _COILS, _COILS * _POINTS_PER_COIL + 1)
     height = np.linspace(-0.5, 0.5, len(turn))
     return np.stack([radius_m * np.cos(turn), radius_m * np.sin(turn), height], axis=1)

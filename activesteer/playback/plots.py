@@ -1,4 +1,4 @@
-"""Signals over time: which are plotted, in which unit, and in which plot."""
+"""Plots over time: their signals, units and axes."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from activesteer.playback.timeline import times
 from activesteer.quantities import quantity_of
 
 _MOST_NUMBERS: Final = {1: 8.0, 2: 8.0, 3: 8.0, 4: 5.4}
-"""Plots on a page -> multiples of a power of ten that have room beside an axis, in a window of 1280 x 800."""
+"""Number of plots on a page -> number of tick labels that fit on one axis in a window of 1280 x 800."""
 _CORNER_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7")
 _LINK_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00", "#a6a6a6")
 _WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 
 
 class Series(NamedTuple):
-    """One line of a plot.
+    """A line of a plot.
 
     Attributes:
         channel: Channel of the recording.
-        name: Name in the legend, where a plot has several of a run.
-        colour: Its colour where a single run is plotted; that of the run where empty.
+        name: Name in the legend, if a plot has several lines of a run.
+        colour: Colour of the line if a single run is plotted; empty for the colour of the run.
         width: Width of the line.
     """
 
@@ -44,10 +44,10 @@ class Plot(NamedTuple):
     """A plot over time.
 
     Attributes:
-        title: What is plotted, and its unit in brackets.
+        title: Quantity, with its unit in brackets.
         series: The lines.
-        entity: Name of the entity that holds all lines together, which makes the file smaller; where empty, every line
-            is an entity of its own, and can stand in several plots.
+        entity: Name of the entity that holds all lines, which makes the file smaller. If empty, every line is an entity
+            of its own and may appear in several plots.
     """
 
     title: str
@@ -82,7 +82,7 @@ MOTION: Final = (
 )
 """Plots of the car as a whole."""
 DRIVING: Final = (_of_car("steering_wheel_rad"), _of_car("speed_mps"))
-"""Plots of what the driver does."""
+"""Plots of the driver's inputs."""
 BODY: Final = (
     Plot(
         quantity_of("ay_mps2").title,
@@ -91,7 +91,7 @@ BODY: Final = (
     _of_car("roll_rad"),
     _of_car("ax_mps2"),
 )
-"""Plots of what is felt in the car."""
+"""Plots of the accelerations and the attitude of the body."""
 OF_CAR: Final = (*MOTION, *DRIVING, *BODY)
 
 _DEMAND_OF: Final = {
@@ -100,7 +100,7 @@ _DEMAND_OF: Final = {
     "superposition_rad": "superposition_demand_rad",
     **{f"{corner}_brake_pressure_Pa": f"{corner}_brake_pressure_Pa" for corner in CORNERS},
 }
-"""Channel, and the one that is not all zero where it has something to show: a hinge gives way without being asked."""
+"""Channel -> the demand without which it is not plotted: compliance moves a hinge even if nothing is demanded."""
 
 
 def _of_wheels(channel: str, entity: str = "") -> Plot:
@@ -120,7 +120,7 @@ WHEELS: Final = (
 
 
 def links(run: Run) -> tuple[Plot, ...]:
-    """Plots of the axial forces of the links and springs, one for each corner, from the channels that there are."""
+    """Return plots of the axial forces of links and springs, one for each corner, from the recorded channels."""
     named = {
         corner: [
             channel.name[3:]
@@ -129,7 +129,7 @@ def links(run: Run) -> tuple[Plot, ...]:
         ]
         for corner in CORNERS
     }
-    # What all corners have, such as a spring, has the same colour in all of them.
+    # A part that all corners have, such as a spring, has the same colour in all of them.
     everywhere = [name for name in named[CORNERS[0]] if all(name in names for names in named.values())]
     plots = []
     for corner, names in named.items():
@@ -145,12 +145,12 @@ def links(run: Run) -> tuple[Plot, ...]:
 
 
 def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
-    """Sends the signals of every plot.
+    """Send the signals of every plot.
 
     Args:
-        stream: Where to.
+        stream: Target of the data.
         run: The run.
-        alone: Whether it is the only run: the lines of several are distinguished by the colours of the runs.
+        alone: Whether this is the only run. The lines of several runs have the colours of their runs.
     """
     when = times(run.recording.time_s)
     for plot in (*OF_CAR, *WHEELS, *links(run)):
@@ -168,7 +168,7 @@ def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
 
 
 def _factor(channel: str) -> float:
-    """From the SI value to the unit that is plotted; forces of links are plotted in N."""
+    """Return the factor from SI to the unit of the plot; forces of links are plotted in N."""
     return 1.0 if channel.endswith("_force_N") else quantity_of(channel).factor
 
 
@@ -183,7 +183,7 @@ def _paint(run: Run, line: Series, *, alone: bool) -> str:
 
 
 def _entities(run: Run, plot: Plot) -> list[tuple[str, list[Series]]]:
-    """Paths, and the lines that each of them holds, of what a run has for a plot."""
+    """Return the entities of a plot and the lines in each, for the channels that a run has."""
     lines = [line for line in plot.series if run.has(line.channel) and _is_demanded(run, line.channel)]
     if plot.entity:
         return [(f"{run.name}/plots/{plot.entity}", lines)] if lines else []
@@ -196,17 +196,17 @@ def _is_demanded(run: Run, channel: str) -> bool:
 
 
 def pages(run: Run) -> dict[str, tuple[Plot, ...]]:
-    """The plots of a run, by the name of the page on which they stand."""
+    """Return the plots of a run by page name."""
     return {"Motion": MOTION, "Driving": DRIVING, "Body": BODY, "Wheels": WHEELS, "Links": links(run)}
 
 
 def curves(plots: Sequence[Plot], run: Run, *, alone: bool) -> dict[str, str]:
-    """Names and colours of the lines of a run.
+    """Return the names and colours of the lines of a run.
 
     Args:
         plots: The plots.
         run: The run.
-        alone: Whether it is the only run; see `send_plots`.
+        alone: Whether this is the only run; see `send_plots`.
     """
     found = {}
     for plot in plots:
@@ -217,7 +217,7 @@ def curves(plots: Sequence[Plot], run: Run, *, alone: bool) -> dict[str, str]:
 
 
 def views(plots: Sequence[Plot], runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
-    """A view for each plot that has something to show, with the lines of all these runs."""
+    """Return a view for each plot that has data, with the lines of all these runs."""
     shown = []
     found = [(plot, [entity for run in runs for entity in _entities(run, plot)]) for plot in plots]
     filled = [(plot, entities) for plot, entities in found if entities]
@@ -228,12 +228,12 @@ def views(plots: Sequence[Plot], runs: Sequence[Run]) -> list[rrb.TimeSeriesView
 
 
 def _range(plot: Plot, runs: Sequence[Run], beside: int) -> tuple[float, float]:
-    """The range of the axis: one of a few, so that runs of a quantity mostly have the same.
+    """Return the range of an axis, chosen from a few so that different runs mostly share it.
 
     Args:
         plot: The plot.
         runs: The runs.
-        beside: How many plots stand on its page.
+        beside: Number of plots on the page.
     """
     values = [
         run.channel(line.channel) * _factor(line.channel)
@@ -248,19 +248,19 @@ def _range(plot: Plot, runs: Sequence[Run], beside: int) -> tuple[float, float]:
 
 
 def axis_range(low: float, high: float, least: float, most: float) -> tuple[float, float]:
-    """A range with zero in which the viewer writes at least three numbers.
+    """Return a range that contains zero and in which the viewer draws at least three tick labels.
 
-    It writes them at multiples of one power of ten, if these are 22 points apart or more.
+    The viewer labels multiples of one power of ten if they are at least 22 points apart.
 
     Args:
         low: Smallest value, at most 0.
         high: Largest value, at least 0.
         least: Smallest height of the range.
-        most: Largest height in which the numbers are so far apart, in that power.
+        most: Largest height at which the labels are that far apart, in units of that power.
     """
     reach = max(1.03 * high, -1.03 * low, 0.5 * least)
     power = 10.0 ** math.floor(math.log10(reach))
-    # Three numbers: 0 and two above it, or one to each side.
+    # Three labels: 0 and two above it, or one on each side.
     below, steps = (0.05, (2.2, 4.0, 5.2, 7.6)) if low >= -0.02 * high else (1.0, (1.1, 2.15, 2.6, 4.0))
     fitting = [step for step in steps if (1.0 + below) * step <= most]
     step = next(step for step in (*fitting, 10.0 * steps[0]) if step * power >= reach)
@@ -272,7 +272,7 @@ def _least_span(channel: str) -> float:
 
 
 def views_by_corner(plot: Plot, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
-    """A view for each wheel of a plot of the wheels, where the lines of the runs are distinguished by their colours."""
+    """Return a view for each wheel of a wheel plot; each run's lines have the colour of the run."""
     shown = []
     for line in plot.series:
         present = [run for run in runs if run.has(line.channel)]
@@ -297,7 +297,7 @@ def _view(
         contents=contents,
         name=title,
         overrides=styles,
-        # Zooming or moving one plot moves all.
+        # Zooming or panning one plot does the same to all.
         axis_y=rrb.ScalarAxis(range=limits),
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
         plot_legend=rrb.PlotLegend(visible=False),

@@ -1,4 +1,4 @@
-"""The recordings that are played back together: their names, labels and colours."""
+"""Recordings that are played back together, with names, labels and colours."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from activesteer.errors import RecordingError
 from activesteer.recording import Recording
 
 PLOT_RATE_HZ: Final = 100.0
-"""Most samples of a signal that are shown in a second; a screen cannot show more of a run."""
+"""Largest number of samples of a signal shown per second; a screen cannot show more."""
 
 
 class Run(NamedTuple):
-    """A recording as it is shown.
+    """A recording as the viewer shows it.
 
     Attributes:
-        recording: The recording, with the rows that are shown: about `PLOT_RATE_HZ` of them in a second.
-        name: What it is called in entity paths; of several, numbered, since the viewer sorts by it.
-        short: What it was called by whoever asked for it, such as `ars`.
-        label: What it is called in legends and titles.
-        colour: Its colour, `#rrggbb`.
-        poses: Sets of poses that can be shown; a run that diverged ends with some that cannot.
+        recording: The recording, with the rows that are shown: about `PLOT_RATE_HZ` per second.
+        name: Name in entity paths; several runs are numbered, because the viewer sorts by name.
+        short: Name given by the caller, such as `ars`.
+        label: Name in legends and titles.
+        colour: Colour, `#rrggbb`.
+        poses: Indices of the poses that can be shown; a run that diverged ends with poses that cannot.
     """
 
     recording: Recording
@@ -39,23 +39,23 @@ class Run(NamedTuple):
 
     @property
     def scene(self) -> str:
-        """Path below which the car stands in the world."""
+        """Parent entity of the car in the 3D view."""
         return f"{self.name}/scene"
 
     def channel(self, name: str) -> NDArray[np.float64]:
-        """A channel at the rows that are shown."""
+        """Return a channel at the rows that are shown."""
         return self.recording[name]
 
     def has(self, *names: str) -> bool:
-        """Whether the recording has all these channels."""
+        """Return True if the recording has all these channels."""
         return all(name in self.recording for name in names)
 
 
 def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
-    """The runs in the paper's order, the three systems always in the same colours.
+    """Return the runs in the paper's order; the three systems always have the same colours.
 
     Args:
-        recordings: By name, such as that of the controller.
+        recordings: Name, such as the name of the controller, to recording.
 
     Raises:
         RecordingError: there is none, or one has no rows or no poses.
@@ -78,7 +78,7 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
 
 
 def _shown(time_s: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Every n-th row, n so that a second has `PLOT_RATE_HZ` of them, and the last one."""
+    """Return every n-th row and the last one, with n such that a second has `PLOT_RATE_HZ` rows."""
     span_s = float(time_s[-1] - time_s[0])
     step = max(1, round((len(time_s) - 1) / (span_s * PLOT_RATE_HZ))) if span_s > 0.0 else 1
     rows = np.arange(0, len(time_s), step)

@@ -1,4 +1,4 @@
-"""How recordings are shown."""
+"""Display options of a playback."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 
 class Showing(NamedTuple):
-    """What can be chosen of a playback.
+    """Display options of a playback.
 
     Attributes:
-        compare: Whether to leave out the pages of the single runs.
-        cutaway: Whether bodies are to be seen through.
-        verdict: What came out, a line for each run and each claim; it stands at the top of the summary.
+        compare: Whether to leave out the pages of single runs.
+        cutaway: Whether bodies are transparent.
+        verdict: Results, a line for each run and each claim, at the top of the summary.
     """
 
     compare: bool = False

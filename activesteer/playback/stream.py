@@ -1,4 +1,4 @@
-"""Recordings into a rerun stream: all that there is to see, column by column, with the layout."""
+"""Conversion of recordings to a rerun stream with its layout."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ from activesteer.playback.wheel_angles import send_wheel_angles
 
 
 def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
-    """A stream without a target yet.
+    """Return a stream that has no target yet.
 
-    The viewer keeps one layout for each application id as long as it is open, so what needs another layout has another
-    id: another manoeuvre, other runs.
+    The viewer keeps one layout for each application id while it is open. Another manoeuvre or other runs need another
+    layout, so they have another id.
     """
     maneuver = runs[0].recording.metadata.get("maneuver", {})
     words = ["activesteer", str(maneuver.get("name", "")), *(run.name for run in runs), "compared" if compare else ""]
-    # An application id takes letters, digits, spaces, - and _ only.
+    # An application id may contain letters, digits, spaces, - and _ only.
     stream = rr.RecordingStream(re.sub(r"[^A-Za-z0-9_-]+", " ", " ".join(words)).strip())
     stream.send_recording_name(str(maneuver.get("title") or "activesteer"))
     return stream
 
 
 def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint, how: Showing) -> None:
-    """Sends everything.
+    """Send all data of the runs.
 
     Args:
-        stream: Where to; its target must be chosen before.
+        stream: Target of the data; choose its own target first.
         runs: The runs.
-        layout: The layout; it takes the place of one that a viewer remembers.
-        how: What is shown of them.
+        layout: The layout; it replaces a layout that the viewer remembers.
+        how: Display options.
     """
     stream.send_blueprint(layout, make_active=True, make_default=True)
     several = len(runs) > 1

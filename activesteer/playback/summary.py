@@ -1,4 +1,4 @@
-"""What was driven and what came out, as text."""
+"""Summary text: scenario, results and metrics."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from activesteer.playback.runs import Run
 
 
 def summary(runs: Sequence[Run], verdict: Sequence[str] = ()) -> str:
-    """A page in Markdown: scenario, what came out, metrics side by side, systems.
+    """Return a page in Markdown: scenario, results, metrics side by side, systems.
 
     Args:
         runs: The runs.
-        verdict: What came out, line by line.
+        verdict: Results, line by line.
     """
     lines: list[str] = []
     for text in dict.fromkeys(_scenario(run.recording.metadata) for run in runs):
@@ -44,7 +44,7 @@ def summary(runs: Sequence[Run], verdict: Sequence[str] = ()) -> str:
 
 
 def _emphasised(line: str) -> str:
-    """What is judged, in bold type."""
+    """Set the subject of a verdict in bold type."""
     about, colon, words = line.partition(":")
     return f"**{about}{colon}**{words}" if colon else line
 

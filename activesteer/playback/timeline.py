@@ -1,4 +1,4 @@
-"""The one timeline of a playback: simulated time."""
+"""The timeline of a playback: simulated time."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import rerun as rr
 from numpy.typing import NDArray
 
 TIMELINE: Final = "time"
-"""Its name in the viewer."""
+"""Name of the timeline in the viewer."""
 
 
 def times(time_s: NDArray[np.float64]) -> list[rr.TimeColumn]:
-    """The index of columns.
+    """Return the time index of columns.
 
     Args:
         time_s: Time of each row [s], shape (n,).

@@ -1,4 +1,4 @@
-"""Tyre forces as arrows on the road, and below each tyre a disc in the colour of how much friction it uses."""
+"""Tyre forces as arrows on the road, and a disc below each tyre coloured by its friction utilisation."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ _DISC_RADIUS_M: Final = 0.3
 
 _USE: Final = (0.0, 0.6, 0.9, 1.1)
 _USE_COLOURS: Final = ((0, 158, 115), (240, 228, 66), (230, 120, 0), (220, 20, 20))
-"""Green, yellow, orange, red."""
+"""Colours at these utilisations: green, yellow, orange, red."""
 
 _USED: Final = tuple(f"{corner}_friction_utilisation" for corner in CORNERS)
 
 
 def send_tyre_forces(stream: rr.RecordingStream, run: Run, runs: Sequence[Run]) -> None:
-    """Sends an arrow and a disc for each tyre; nothing where the recording lacks a channel that they need.
+    """Send an arrow and a disc for each tyre, unless the recording lacks a channel that they need.
 
     Args:
-        stream: Where to.
+        stream: Target of the data.
         run: The run.
-        runs: All runs that are shown together: their arrows have one scale.
+        runs: All runs that are shown together; their arrows share one scale.
     """
     if not run.has(*_USED, *CHANNELS):
         return
     origins, vectors = force_arrows(run.recording, force_scale([other.recording for other in runs]))
     colours = use_colours(np.stack([run.channel(name) for name in _USED], axis=1))
-    # A run that diverged ends with numbers that cannot be drawn.
+    # A run that diverged ends with values that cannot be drawn.
     good = np.isfinite(origins).all(axis=(1, 2)) & np.isfinite(vectors).all(axis=(1, 2))
     when, four = times(run.recording.time_s[good]), [len(CORNERS)] * int(good.sum())
     painted = colours[good].reshape(-1)
@@ -60,7 +60,7 @@ def send_tyre_forces(stream: rr.RecordingStream, run: Run, runs: Sequence[Run]) 
 
 
 def use_colours(friction_utilisation: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Colours 0xrrggbbff for fractions of the available friction."""
+    """Return colours 0xrrggbbff for fractions of the available friction."""
     red, green, blue = (
         np.interp(np.nan_to_num(friction_utilisation, nan=0.0), _USE, [colour[part] for colour in _USE_COLOURS])
         .round()

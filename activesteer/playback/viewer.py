@@ -1,4 +1,4 @@
-"""Where a playback goes: a file, the viewer on the screen, or a browser."""
+"""Targets of a playback: a file, the viewer's window, or a browser."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from activesteer.playback.stream import fill, new_stream
 
 _ELSEWHERE: Final = "--web shows it in a browser, --save out.rrd writes a file for a viewer elsewhere"
 _HOST: Final = "127.0.0.1"
-"""Where a browser's pages are served: to this machine alone."""
+"""Address of the web server: reachable from this machine alone."""
 _PLAIN: Final = Showing()
 _FOOTER: Final = b"RRF2FOOT"
 _FOOTER_BYTES: Final = 64
-"""What a whole file ends with: this word among its last bytes."""
+"""A complete file has this word among its last bytes."""
 
 
 def save(runs: Sequence[Run], path: Path, how: Showing = _PLAIN) -> None:
-    """Writes a .rrd file with its layout.
+    """Write a .rrd file with its layout.
 
     Args:
         runs: The runs.
-        path: The file; one that exists is replaced.
-        how: What is shown of them.
+        path: The file; an existing one is replaced.
+        how: Display options.
 
     Raises:
         PlaybackError: the name does not end in .rrd, or the file cannot be written.
@@ -45,7 +45,7 @@ def save(runs: Sequence[Run], path: Path, how: Showing = _PLAIN) -> None:
     with replacing(path, PlaybackError) as part:
         part.touch()
         stream = new_stream(runs, compare=how.compare)
-        # It writes in a thread of its own, which only logs what goes wrong.
+        # The stream writes in a thread of its own, which only logs errors.
         stream.save(part)
         try:
             fill(stream, runs, blueprint(runs, compare=how.compare), how)
@@ -60,14 +60,14 @@ def save(runs: Sequence[Run], path: Path, how: Showing = _PLAIN) -> None:
 
 
 def show(runs: Sequence[Run], how: Showing = _PLAIN) -> None:
-    """Opens the viewer's window, and returns when it is closed.
+    """Open the viewer's window and return when it is closed.
 
     Args:
         runs: The runs.
-        how: What is shown of them.
+        how: Display options.
 
     Raises:
-        PlaybackError: there is no viewer, or it ended with an error, as it does without a display.
+        PlaybackError: there is no viewer, or it fails, as it does without a display.
     """
     _run_viewer(["--port", "auto"], runs, how)
 
@@ -77,15 +77,15 @@ def serve(
     announce: Callable[[str], object],
     how: Showing = _PLAIN,
 ) -> None:
-    """Serves the viewer to browsers of this machine, until it is interrupted.
+    """Serve the viewer to browsers of this machine until it is interrupted.
 
     Args:
         runs: The runs.
-        announce: Called with the address to open as soon as it is served.
-        how: What is shown of them.
+        announce: Called with the address to open as soon as the server answers.
+        how: Display options.
 
     Raises:
-        PlaybackError: there is no viewer, or it ended with an error.
+        PlaybackError: there is no viewer, or it fails.
     """
     data, page = _free_port(), _free_port()
     proxy = urllib.parse.quote(f"rerun+http://{_HOST}:{data}/proxy", safe="")
@@ -102,7 +102,7 @@ def _run_viewer(
     ready: Callable[[], object] | None = None,
     port: int | None = None,
 ) -> None:
-    """Runs the viewer on a file that lives as long as it does; `ready` is called once it answers at the port."""
+    """Run the viewer on a temporary file; call `ready` once the viewer answers at the port."""
     binary = viewer_binary()
     with tempfile.TemporaryDirectory(prefix="activesteer-") as folder:
         file, log = Path(folder) / "runs.rrd", Path(folder) / "viewer.log"
@@ -126,14 +126,14 @@ def _run_viewer(
                 process.wait()
         if status != 0:
             reason = f"signal {-status}" if status < 0 else _reason(log.read_text(errors="replace"))
-            raise PlaybackError(f"the viewer ended with an error: {reason}; {_ELSEWHERE}")
+            raise PlaybackError(f"the viewer failed: {reason}; {_ELSEWHERE}")
 
 
 def viewer_binary() -> Path:
-    """The viewer that comes with rerun-sdk; the command `rerun` may be another one, or not be on the path at all.
+    """Return the viewer that rerun-sdk installs; the command `rerun` may be another version or not be on the path.
 
     Raises:
-        PlaybackError: it is not there.
+        PlaybackError: the viewer is missing.
     """
     spec = importlib.util.find_spec("rerun_cli")
     if spec is not None and spec.origin is not None:
@@ -141,18 +141,18 @@ def viewer_binary() -> Path:
         if binary.is_file():
             return binary
     raise PlaybackError(
-        f"the rerun viewer is missing, which the package rerun-sdk brings: reinstall it, or use --save; {_ELSEWHERE}",
+        f"the rerun viewer is missing; reinstall the package rerun-sdk, which contains it, or use --save; {_ELSEWHERE}",
         value="rerun-sdk",
     )
 
 
 def _reason(log: str) -> str:
-    """The last thing that a viewer said about its failure, without colours."""
+    """Return the last error message of a viewer, without colour codes."""
     lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", log).splitlines() if line.strip()]
     if any("DISPLAY is set" in line or "connection to X server" in line for line in lines):
         return "there is no display"
     reported = [line for line in lines if "error" in line.lower() or "panic" in line.lower()] or lines
-    return reported[-1] if reported else "it said nothing"
+    return reported[-1] if reported else "it printed no message"
 
 
 def _free_port() -> int:

@@ -1,4 +1,4 @@
-"""Angles of the wheels, enlarged: wedges beside the car in the world, and all cars from above in a plan."""
+"""Enlarged steer angles of the wheels: wedges beside the car in the 3D view, and a plan view of all cars."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ from activesteer.playback.timeline import times
 from activesteer.road.footprint import Footprint, footprint_of
 
 PLAN: Final = "plan"
-"""Entity below which all of the plan lies."""
+"""Parent entity of the plan."""
 _EVERY: Final = 2
-"""Of the poses, every second one: 50 a second."""
+"""Every second pose is shown: 50 per second."""
 _ABOVE_ROAD_M: Final = 0.05
 _AHEAD: Final = (245, 245, 245)
 _APART_M: Final = 4.2
-"""From the middle of a car in the plan to that of the next [m]."""
+"""Distance between the centre lines of neighbouring cars in the plan [m]."""
 _RAYS: Final = range(1, SLICES + 2, 2)
-"""Points of the arc to which the plan has a line from the tip: it can fill no area."""
+"""Points of the arc that the plan joins to the tip by lines, because a 2D view cannot fill areas."""
 
 
 def send_wheel_angles(stream: rr.RecordingStream, run: Run, runs: Sequence[Run]) -> None:
-    """Sends wedges and plan of a run; nothing where the recording has no angles of the wheels.
+    """Send the wedges and the plan of a run, unless the recording has no wheel angles.
 
     Args:
-        stream: Where to.
+        stream: Target of the data.
         run: The run.
-        runs: All runs that are shown together: their scales are the same.
+        runs: All runs that are shown together; they share one scale.
     """
     if not run.has(*CHANNELS):
         return
@@ -61,12 +61,12 @@ def send_wheel_angles(stream: rr.RecordingStream, run: Run, runs: Sequence[Run])
 
 
 def wedges_path(run: Run) -> str:
-    """Entity of the wedges beside the car of a run."""
+    """Return the entity of the wedges beside the car of a run."""
     return f"{run.name}/chase/wheel_angles"
 
 
 def plan_view(runs: Sequence[Run]) -> rrb.Spatial2DView:
-    """The view of the plans of these runs.
+    """Return the view of the plans of these runs.
 
     Args:
         runs: The runs, from left to right.
@@ -120,7 +120,7 @@ def _send_plan(
     size: Footprint,
 ) -> None:
     def placed(points_m: Array) -> Any:
-        """Nose up: the second axis of the view points down."""
+        """Convert to view coordinates with the front of the car up: the second axis of the view points down."""
         flat = np.stack([number * _APART_M - points_m[..., 1], -points_m[..., 0]], axis=-1)
         return flat.astype(np.float32)
 
@@ -141,7 +141,7 @@ def _send_plan(
         stream.log(f"{path}/{part}", rr.LineStrips2D.from_fields(colors=[paint], radii=[0.04]), static=True)
         columns = rr.LineStrips2D.columns(strips=flat.reshape(-1, 2, 2))
         stream.send_columns(f"{path}/{part}", when, columns.partition(lengths=[flat.shape[1]] * rows))
-    # One number for each axle has room: that of the left wheel.
+    # There is room for one number per axle: the angle of the left wheel.
     at = placed(wheel_centres(size)[[0, 2]] * (1.0, 0.0) + [(2.3, 0.0), (-1.2, 0.0)])
     label = rr.Points2D.from_fields(positions=at, colors=[colour], radii=[0.01], show_labels=True)
     stream.log(f"{path}/angle", label, static=True)

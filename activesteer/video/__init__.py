@@ -1,4 +1,4 @@
-"""Films of recordings, drawn with MuJoCo from recordings alone, and the scene that they are played on."""
+"""Films of recordings, drawn with MuJoCo."""
 
 from activesteer.video.film import Film, FilmInfo, Settings, make_film
 from activesteer.video.render_scene import Car, RenderScene

@@ -1,4 +1,4 @@
-"""Where the picture is taken from: behind the car, above it, or beside a wheel."""
+"""Cameras: behind the car, above it, or beside a wheel."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from activesteer.video.track import Track
 CAMERAS: Final = ("chase", "top", "wheel")
 """Names of the cameras."""
 CUTAWAY: Final = 0.12
-"""Opacity of a body through which the suspension is to be seen."""
+"""Opacity of a shell that lets the suspension be seen."""
 
 _WHEELS_SEEN: Final = 0.25
-"""Opacity of a body through which the wheels are to be seen from above."""
+"""Opacity of a shell that lets the wheels be seen from above."""
 
 
 class View(NamedTuple):
-    """A way to look at a car.
+    """A camera on a car.
 
     Attributes:
-        aim: Sets a camera for an instant [s].
-        shell_opacity: How opaque the shell of the car is to be: little, where the suspension is what is looked at.
-        marked: Whether wedges and arrows beside the car are seen from there.
+        aim: Function that aims a MuJoCo camera for an instant [s].
+        shell_opacity: Opacity of the car's shell, 0 to 1; low for a view of the suspension.
+        marked: Whether the view shows the wedges and arrows beside the car.
     """
 
     aim: Callable[[mujoco.MjvCamera, float], None]
@@ -37,11 +37,11 @@ class View(NamedTuple):
 
 
 def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
-    """The camera of a name.
+    """Return the camera of a name.
 
     Args:
         name: One of `CAMERAS`.
-        track: The car that it follows.
+        track: The car that the camera follows.
         corner: The wheel that `wheel` looks at.
 
     Raises:
@@ -58,7 +58,7 @@ def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
 
 
 def _chase(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
-    """Behind and above, looking over the roof at the road ahead."""
+    """Place the camera behind and above the car, looking over the roof at the road ahead."""
 
     def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
         heading = track.heading(time_s, steady=True)
@@ -70,7 +70,7 @@ def _chase(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
 
 
 def _top(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
-    """From above, x to the right and y up as in the plots; it does not turn, so that the car is seen to."""
+    """Place the camera above the car, x to the right and y up as in the plots; it does not rotate with the car."""
 
     def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
         camera.lookat = track.middle(time_s)
@@ -80,12 +80,12 @@ def _top(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
 
 
 def _wheel(track: Track, corner: str) -> Callable[[mujoco.MjvCamera, float], None]:
-    """At a wheel from inside, where its links are; it follows the chassis, but neither rolls nor heaves with it."""
+    """Place the camera inboard of a wheel, where its links are; it follows the chassis without roll and heave."""
     if corner not in CORNERS:
         raise ParameterError(f"there is no corner {corner!r}; {nearest_names(corner, CORNERS)}", value=corner)
     place = track.wheel_place(corner)
     side, end = (1.0 if corner[1] == "l" else -1.0), (1.0 if corner[0] == "f" else -1.0)
-    # From the end of the car towards its middle, and outwards by 28 degrees.
+    # Look from the end of the car towards its middle, and outwards by 28 degrees.
     azimuth = side * (90.0 + 62.0 * end)
 
     def aim(camera: mujoco.MjvCamera, time_s: float) -> None:

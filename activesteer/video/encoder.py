@@ -1,4 +1,4 @@
-"""Pictures into a file: MP4 by ffmpeg, GIF by Pillow."""
+"""Encoding of frames: MP4 by ffmpeg, GIF by Pillow."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from activesteer.files import passing, writing
 Pixels = NDArray[np.uint8]
 
 FORMATS: Final = (".mp4", ".gif")
-"""Endings of the files that can be written."""
+"""Suffixes of the files that can be written."""
 
 _GIF_TICKS_HZ: Final = 100.0
 _COLOURS: Final = 128
@@ -30,42 +30,42 @@ _SIDE_LIMIT: Final = 8192
 
 
 class Encoder(Protocol):
-    """What takes the pictures; the file is there, whole, once it is left without an error, and else not at all."""
+    """Writer of frames. The file appears when the context ends without an error; otherwise nothing is left."""
 
     def write(self, pixels: Pixels) -> None:
-        """Takes one picture, shape (height, width, 3)."""
+        """Append one frame, shape (height, width, 3)."""
         ...
 
     def __enter__(self) -> Self:
-        """Opens the file."""
+        """Open the file."""
         ...
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        """Ends the file, or deletes what there is of it."""
+        """Complete the file, or delete the part written so far after an error."""
         ...
 
 
 def frame_rate(path: Path, wanted_hz: float) -> float:
-    """Pictures a second that the format of a file can have: a GIF shows each for a number of hundredths of a second.
+    """Return the nearest frame rate that a format can have: a GIF shows each frame for whole hundredths of a second.
 
     Args:
         path: The file.
-        wanted_hz: What is asked for [1/s].
+        wanted_hz: Requested frame rate [1/s].
     """
     if path.suffix.lower() != ".gif":
         return wanted_hz
-    return _GIF_TICKS_HZ / max(2, round(_GIF_TICKS_HZ / wanted_hz))  # browsers show less than two ticks as ten
+    return _GIF_TICKS_HZ / max(2, round(_GIF_TICKS_HZ / wanted_hz))  # browsers show less than two hundredths as ten
 
 
 def check(path: Path, size: tuple[int, int]) -> None:
-    """Looks for what would make writing fail, before anything is drawn.
+    """Check the conditions for writing before anything is drawn.
 
     Args:
         path: The file.
-        size: Width and height of the pictures [pixels].
+        size: Width and height of the frames [pixels].
 
     Raises:
-        ParameterError: the name or the size does not go with any format.
+        ParameterError: no format has this suffix or allows this size.
         PlaybackError: there is no ffmpeg, or the folder does not exist.
     """
     if path.suffix.lower() not in FORMATS:
@@ -85,13 +85,13 @@ def check(path: Path, size: tuple[int, int]) -> None:
 
 
 def encoder(path: Path, size: tuple[int, int], rate_hz: float, samples: Iterable[Pixels]) -> Encoder:
-    """What writes a file of this name.
+    """Return the writer for a file name.
 
     Args:
-        path: The file; one that exists is replaced.
+        path: The file; an existing one is replaced.
         size: Width and height [pixels].
-        rate_hz: Pictures a second [1/s].
-        samples: Pictures from all over the video, of which the colours of a GIF are chosen; nothing else asks for them.
+        rate_hz: Frame rate [1/s].
+        samples: Frames from the whole film, from which a GIF takes its palette; called for a GIF only.
     """
     if path.suffix.lower() == ".gif":
         return _Gif(path, rate_hz, samples)
@@ -99,10 +99,10 @@ def encoder(path: Path, size: tuple[int, int], rate_hz: float, samples: Iterable
 
 
 def ffmpeg() -> str:
-    """The program that encodes: that of the package imageio-ffmpeg, else that of the system.
+    """Return the ffmpeg program of the package imageio-ffmpeg, or else of the system.
 
     Raises:
-        PlaybackError: there is none.
+        PlaybackError: neither is installed.
     """
     with suppress(ImportError, RuntimeError):
         return importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
@@ -118,7 +118,7 @@ class _Mp4:
         self._command = [
             ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}",
             "-r", f"{rate_hz:.6g}", "-i", "-", "-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20",
-            # What every player and browser takes, and starts to show before it has all of it.
+            # Every player and browser supports this, and can start before the whole file has arrived.
             "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(self._part),
         ]  # fmt: skip
 
@@ -163,7 +163,7 @@ class _Gif:
     def __init__(self, path: Path, rate_hz: float, samples: Iterable[Pixels]) -> None:
         self._path, self._part = path, path.with_name(f".{path.name}.part")
         self._duration_ms = round(1000.0 / rate_hz)
-        # One palette for all pictures: with one for each, the colours of what stands still would flicker.
+        # All frames share one palette; with a palette for each frame, the colours of still objects would flicker.
         mosaic = Image.fromarray(np.concatenate(list(samples)))
         self._palette = mosaic.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
         self._pictures: list[Image.Image] = []

@@ -1,4 +1,4 @@
-"""What is said at the end of a film, over its last picture: what was driven, and what came out."""
+"""End card of a film: title and results over the last frame."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _SHADE: Final = (*PANEL[:3], 225)
 def end_card(
     title: str, lines: Sequence[str], colours: Sequence[str], size: tuple[int, int]
 ) -> Callable[[NDArray[np.uint8]], NDArray[np.uint8]]:
-    """Draws it once.
+    """Draw the end card.
 
     Args:
-        title: What was driven.
-        lines: What came out, a line for each run, then others.
-        colours: Of the runs, `#rrggbb`.
-        size: Width and height of the pictures [pixels].
+        title: Title of the film.
+        lines: Results, a line for each run, then other lines.
+        colours: Colours of the runs, `#rrggbb`.
+        size: Width and height of the frames [pixels].
 
     Returns:
-        What lays it over a picture.
+        Function that draws the card over a frame.
     """
     scale = text_scale(size)
     margin, line, bar = (value * scale for value in (_MARGIN, _LINE, _BAR))

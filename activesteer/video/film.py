@@ -1,4 +1,4 @@
-"""A recording as a film: every picture of it, one after the other."""
+"""Films of recordings, frame by frame."""
 
 from __future__ import annotations
 
@@ -28,36 +28,36 @@ from activesteer.video.render_scene import Car, RenderScene
 from activesteer.video.track import Track
 
 LAYOUTS: Final = ("overlay", "side-by-side")
-"""How several cars are shown: in one picture, the others transparent, or each in a part of the picture of its own."""
+"""Layouts of several cars: one view with all but the first car transparent, or a pane for each car."""
 END_S: Final = 3.0
-"""How long the last picture is shown, with what came out [s]."""
+"""Duration of the end card [s]."""
 _SAMPLES: Final = 6
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a film is made."""
+    """Settings of a film."""
 
     camera: str = "chase"
     """`chase`, `top` or `wheel`."""
     corner: str = CORNERS[0]
-    """The wheel that the camera `wheel` looks at."""
+    """Wheel in the view of the camera `wheel`."""
     size: tuple[int, int] = (1280, 720)
     """Width and height [pixels]."""
     rate_hz: float = 30.0
-    """Pictures a second [1/s]."""
+    """Frame rate [1/s]."""
     speed: float = 1.0
-    """Simulated seconds that a second of film shows."""
+    """Simulated seconds per second of film."""
     layout: str = "overlay"
     """`overlay` or `side-by-side`."""
     cutaway: bool = False
-    """Whether the bodies of the cars are to be seen through; for the camera `wheel` they always are."""
+    """Whether the shells of the cars are transparent; the camera `wheel` always shows them so."""
 
     def __post_init__(self) -> None:
-        """Checks the numbers.
+        """Check the settings.
 
         Raises:
-            ParameterError: one is out of its range.
+            ParameterError: a setting is out of its range.
         """
         if self.layout not in LAYOUTS:
             raise ParameterError(
@@ -72,16 +72,16 @@ class Settings:
 
 
 class Film:
-    """The scenes with the cars of some recordings, and cameras; to be used in a `with` block."""
+    """Scenes and cameras for some recordings; use it in a `with` block."""
 
     def __init__(self, recordings: Mapping[str, Recording], settings: Settings, verdict: Sequence[str] = ()) -> None:
-        """Builds the scenes.
+        """Build the scenes.
 
         Args:
-            recordings: By what they are called. In an overlay the camera follows the car of the first; those of the
-                others are transparent.
+            recordings: Name -> recording. In an overlay, the camera follows the car of the first recording, and the
+                other cars are transparent.
             settings: Camera, size, speed.
-            verdict: What is said in the end, a line for each; in the colours of the runs as far as there are runs.
+            verdict: Lines of the end card; the first ones have the colours of the runs, one line per run.
 
         Raises:
             ParameterError: there is no recording, or no such camera or wheel.
@@ -108,7 +108,7 @@ class Film:
         self._end = end_card(title, verdict, [actor.colour for actor in actors], settings.size)
 
     def __enter__(self) -> Self:
-        """Opens the canvases.
+        """Open the canvases.
 
         Raises:
             PlaybackError: nothing can be drawn here.
@@ -118,15 +118,15 @@ class Film:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Closes the canvases."""
+        """Close the canvases."""
         for pane in self._panes:
             pane.close()
 
     def times(self, rate_hz: float) -> NDArray[np.float64]:
-        """Instants of the pictures [s]: from the first pose of any car to the last.
+        """Return the instants of the frames [s], from the first pose of any car to the last.
 
         Args:
-            rate_hz: Pictures a second of film [1/s].
+            rate_hz: Frame rate [1/s].
         """
         start = min(track.start_s for track in self._tracks)
         end = max(track.end_s for track in self._tracks)
@@ -135,16 +135,16 @@ class Film:
         return np.asarray(start + step * np.arange(count), np.float64)
 
     def picture(self, time_s: float) -> NDArray[np.uint8]:
-        """The picture of an instant, shape (height, width, 3).
+        """Return the frame of an instant, shape (height, width, 3).
 
         Args:
-            time_s: The instant [s]; a car whose recording has ended stands where it was last.
+            time_s: The instant [s]; a car whose recording has ended keeps its last position.
         """
         drawn = [pane.picture(time_s) for pane in self._panes]
         return drawn[0] if len(drawn) == 1 else np.hstack(drawn)
 
     def ending(self, time_s: float) -> NDArray[np.uint8]:
-        """The picture of an instant, and over it title and verdict.
+        """Return the frame of an instant with the end card over it.
 
         Args:
             time_s: The instant [s].
@@ -152,13 +152,13 @@ class Film:
         return self._end(self.picture(time_s))
 
     def pictures(self, times_s: Sequence[float] | NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
-        """Pictures of several instants."""
+        """Yield the frames of several instants."""
         for time_s in times_s:
             yield self.picture(float(time_s))
 
 
 class _Actor(NamedTuple):
-    """A run that is shown."""
+    """A run in a film."""
 
     recording: Recording
     track: Track
@@ -171,7 +171,7 @@ class _Actor(NamedTuple):
 
 
 class _Pane:
-    """A part of the picture with a scene and a camera of its own."""
+    """A pane of the frame with a scene and a camera of its own."""
 
     def __init__(
         self,
@@ -227,7 +227,7 @@ class _Pane:
 
 
 class FilmInfo(NamedTuple):
-    """What a film has become: pictures, and how many of them are shown in a second."""
+    """Number of frames and frame rate of a film that was written."""
 
     pictures: int
     rate_hz: float
@@ -240,14 +240,14 @@ def make_film(
     progress: Callable[[float], Any] | None = None,
     verdict: Sequence[str] = (),
 ) -> FilmInfo:
-    """Draws a film of recordings and writes it to a file.
+    """Draw a film of recordings and write it to a file.
 
     Args:
         recordings: See `Film`.
-        path: The file, ending in .mp4 or .gif; one that exists is replaced when the new one is whole.
+        path: The file, ending in .mp4 or .gif; an existing one is replaced when the new one is complete.
         settings: Camera, size, speed.
-        progress: Called after each picture with the fraction that is done, 0 to 1.
-        verdict: See `Film`; the last picture is shown for `END_S` with title and verdict.
+        progress: Called after each frame with the fraction that is done, 0 to 1.
+        verdict: See `Film`; the end card is shown for `END_S`.
 
     Raises:
         ParameterError: a setting or the file's ending is wrong.

@@ -1,4 +1,4 @@
-"""What is written over the picture: run, time, and of each car its numbers and a plan with the angles of its wheels."""
+"""Gauges over the frames: title, time, and for each car its values and a plan of its wheel angles."""
 
 from __future__ import annotations
 
@@ -19,44 +19,44 @@ from activesteer.video.lettering import GREY, LEGIBLE, PANEL, WHITE, font, text_
 
 _YELLOW: Final = (255, 205, 70, 255)
 _BODY: Final = (70, 76, 86, 255)
-# Sizes below are pixels of a picture of 640 x 480; see `text_scale`.
+# The sizes below are pixels of a frame of 640 x 480; see `text_scale`.
 _TITLE_ROW: Final = 19.0
 _ROW: Final = 17.0
 _TEXT: Final = 11.5
 _SMALL: Final = 9.5
 _GAP: Final = 7.0
 _TALLEST_PLAN: Final = 0.24
-"""Height of a plan, of that of the picture, where there is room for it."""
+"""Height of a plan as a fraction of the height of the frame, if there is room for it."""
 LARGEST_SHARE: Final = 0.1
-"""Most of the picture that gauges may cover."""
+"""Largest fraction of the frame that gauges may cover."""
 _ROWS_SHARE: Final = 0.07
-"""Most of it that title and rows may cover, so that there is room for the plans."""
+"""Largest fraction of the frame that title and rows may cover, so that there is room for the plans."""
 _SMALLEST: Final = 0.4
 _PLAN_ASPECT: Final = 0.8
-"""Width of a plan by its height."""
+"""Ratio of width to height of a plan."""
 _MIN_ANGLE_RAD: Final = math.radians(0.005)
-"""An added angle that never reaches it is not shown: the car has no such steering [rad]."""
+"""A rear or superposition angle that never reaches this limit is not shown: the car has no such steering [rad]."""
 MIN_SPEED_MPS: Final = 1.0
-"""Below it the direction of motion says nothing, and so neither does the sideslip [m/s]."""
+"""Speed below which the sideslip angle is meaningless and not shown [m/s]."""
 _SIDE: Final = 3
-"""Plans are drawn this much larger and then shrunk: Pillow's lines have hard edges."""
+"""Factor by which plans are drawn larger and then scaled down, because Pillow's lines have hard edges."""
 
 READINGS: Final = tuple(
     quantity_of(channel)
     for channel in ("speed_mps", "sideslip_rad", "steering_wheel_rad", "rear_steer_rad", "superposition_rad")
 )
-"""What is written out; in a narrow picture only the first ones."""
+"""Values in a row; a narrow frame shows the first ones only."""
 _ADDED: Final = ("rear_steer_rad", "superposition_rad")
 _WIDEST: Final = {"speed_mps": "188.8", "steering_wheel_rad": "-188", "sideslip_rad": "-18.8"}
 
 
 class Dials(NamedTuple):
-    """What the gauges show of one run.
+    """The gauges of one run.
 
     Attributes:
         recording: The run.
-        label: What it is called.
-        colour: The colour of its car, `#rrggbb`.
+        label: Name of the run.
+        colour: Colour of its car, `#rrggbb`.
     """
 
     recording: Recording
@@ -64,14 +64,14 @@ class Dials(NamedTuple):
     colour: str
 
     def value(self, channel: str, time_s: float) -> float:
-        """A channel at an instant; nan where it is not recorded."""
+        """Return a channel at an instant; nan if it is not recorded."""
         if channel not in self.recording:
             return math.nan
         return float(np.interp(time_s, self.recording.time_s, self.recording[channel]))
 
 
 class Gauges:
-    """Draws them over pictures of one size."""
+    """Gauges for frames of one size."""
 
     def __init__(
         self,
@@ -81,14 +81,14 @@ class Gauges:
         note: str = "",
         shown_with: Sequence[Recording] = (),
     ) -> None:
-        """Chooses fonts and what is to be shown.
+        """Choose fonts and values.
 
         Args:
             dials: The runs, from top to bottom.
-            title: What stands above the picture; without one, neither does the time.
-            size: Width and height of the pictures [pixels].
-            note: What stands behind the title, such as a slower speed.
-            shown_with: All runs of the film, where they are more: their plans have one scale.
+            title: Title of the frame; if empty, the time is left out too.
+            size: Width and height of the frames [pixels].
+            note: Text behind the title, such as a slower speed.
+            shown_with: All runs of the film, if there are more than in `dials`; their plans share one scale.
         """
         self._dials = list(dials)
         self._title, self._note = title, note
@@ -113,7 +113,7 @@ class Gauges:
         self._plan = int(_PLAN_ASPECT * height), int(height)
 
     def _fit(self, scale: float) -> float:
-        """Takes sizes for a scale; returns what title and rows cover with it [pixels]."""
+        """Set the sizes for a scale; return the height that title and rows cover [pixels]."""
         self._scale = scale
         self._row, self._title_row = max(1, round(_ROW * scale)), max(1, round(_TITLE_ROW * scale))
         self._text, self._small = font(_TEXT * scale), font(_SMALL * scale)
@@ -121,14 +121,14 @@ class Gauges:
         return self._columns[-1] * self._row * len(self._dials) + self._title_area()
 
     def draw(self, pixels: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
-        """Draws them over a picture.
+        """Draw the gauges over a frame.
 
         Args:
-            pixels: The picture, shape (height, width, 3); it stays as it is.
+            pixels: The frame, shape (height, width, 3); it is not changed.
             time_s: The instant [s].
 
         Returns:
-            The picture with gauges, of the same shape.
+            The frame with gauges, of the same shape.
         """
         picture = Image.fromarray(np.ascontiguousarray(pixels))
         if self._title:
@@ -147,7 +147,7 @@ class Gauges:
         return np.asarray(picture)
 
     def _places(self) -> list[int]:
-        """Where columns of a row begin, and where the last one ends [pixels]."""
+        """Return the left edges of the columns of a row, and the right edge of the last one [pixels]."""
         gap = _GAP * self._scale
         places = [max((self._text.getlength(dial.label) for dial in self._dials), default=0.0) + 2.5 * gap]
         for reading in self._readings:
@@ -168,7 +168,7 @@ class Gauges:
         while whole and self._text.getlength(title) > room:
             whole -= 1
             title = self._title[:whole].rstrip(" .,-") + "..." if whole > 2 else ""
-        # As wide as at any other time: figures of this font have all the same width.
+        # The width is the same at any other time: all figures of this font have the same width.
         ends = gap + self._text.getlength(title) + (2 * gap if title else 0)
         width = min(round(ends + self._text.getlength(right) + gap), self._size[0])
         layer = Image.new("RGBA", (width, self._title_row), PANEL)
@@ -177,7 +177,7 @@ class Gauges:
         picture.paste(layer, (0, 0), layer)
 
     def _readings_of(self, panel: Image.Image, dial: Dials, time_s: float, top: int) -> None:
-        """One run in a row: its name, then its numbers."""
+        """Draw the row of one run: its name, then its values."""
         gap, middle = _GAP * self._scale, top + self._row / 2
         bar = (*bytes_of(dial.colour), 255)
         ImageDraw.Draw(panel).rectangle((0, top, 0.6 * gap, top + self._row - 1), bar)
@@ -193,14 +193,14 @@ class Gauges:
             write(panel, (unit_at, middle), reading.unit.name, GREY, self._small)
 
     def _plan_of(self, dial: Dials, time_s: float) -> Image.Image:
-        """The car from above, nose up: wheels turned by enlarged angles, and an arrow that shows where it goes."""
+        """Draw the car from above, front up: wheels at enlarged angles, and an arrow along its velocity."""
         width, height = self._plan
         large = Image.new("RGBA", (width * _SIDE, height * _SIDE), PANEL)
         size = footprint_of(dial.recording.metadata) or Footprint()
         angles = wheel_angles.angles_at(dial.recording, time_s)
         plan = wheel_angles.plan(size, angles, self._factors)
         pen, colour = ImageDraw.Draw(large), (*bytes_of(dial.colour), 255)
-        # All of the car, and of the wedges before its front wheels.
+        # The plan holds the whole car and the wedges ahead of its front wheels.
         per_m = large.height / (size.front_m - size.rear_m + 2.0)
         middle_m = 0.5 * (size.front_m + size.rear_m) + 0.1
 
@@ -228,7 +228,7 @@ class Gauges:
 
 
 def _arrow(start: tuple[float, float], angle_rad: float) -> NDArray[np.float64]:
-    """Both ends of its shaft, then the corners of its head [m], shape (5, 2)."""
+    """Return both ends of the arrow's shaft, then the corners of its head [m], shape (5, 2)."""
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     shape = np.array([(0.0, 0.0), (1.5, 0.0), (1.9, 0.0), (1.45, 0.2), (1.45, -0.2)])
     return np.array(start) + shape @ np.array([(cos, sin), (-sin, cos)])

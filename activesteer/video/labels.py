@@ -1,4 +1,4 @@
-"""Texts that stand at places of the world: found in the picture, and written over it."""
+"""Labels at places in the world, drawn over the frame."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ _TEXT: Final = 10.5
 
 
 class Labels:
-    """Writes them over pictures of one size."""
+    """Labels for frames of one size."""
 
     def __init__(self, size: tuple[int, int]) -> None:
-        """Chooses the font.
+        """Choose the font.
 
         Args:
-            size: Width and height of the pictures [pixels].
+            size: Width and height of the frames [pixels].
         """
         self._size = size
         self._scale = text_scale(size)
         self._font = font(_TEXT * self._scale)
 
     def draw(self, pixels: NDArray[np.uint8], scene: mujoco.MjvScene, labels: Sequence[Label]) -> NDArray[np.uint8]:
-        """Writes labels over a picture.
+        """Draw labels over a frame.
 
         Args:
-            pixels: The picture, shape (height, width, 3); it stays as it is.
-            scene: What it shows, with the camera.
-            labels: The labels; one whose place is not in the picture is left out.
+            pixels: The frame, shape (height, width, 3); it is not changed.
+            scene: The scene of the frame, with its camera.
+            labels: The labels; labels outside the frame are left out.
         """
         if not labels:
             return pixels
@@ -62,23 +62,23 @@ class Labels:
         write(panel, (pad, height / 2), text, WHITE, self._font)
         left = at[0] - {"l": 0.0, "m": 0.5, "r": 1.0}[anchor[0]] * width
         top = at[1] - {"t": 0.0, "m": 0.5, "b": 1.0}[anchor[1]] * height
-        # What an edge would cut is moved to where all of it is seen.
+        # Move a label that an edge would cut until all of it is seen.
         left, top = min(max(left, 0.0), self._size[0] - width), min(max(top, 0.0), self._size[1] - height)
         picture.paste(panel, (round(left), round(top)), panel)
 
 
 def pixel_of(scene: mujoco.MjvScene, place_m: Array, size: tuple[int, int]) -> tuple[float, float] | None:
-    """Where a place of the world is in the picture.
+    """Return the position of a place of the world in the frame.
 
     Args:
         scene: The scene, with its camera.
         place_m: The place [m], shape (3,).
-        size: Width and height of the picture [pixels].
+        size: Width and height of the frame [pixels].
 
     Returns:
-        Columns from the left and rows from the top; None where it is behind the camera.
+        Columns from the left and rows from the top; None if the place is behind the camera.
     """
-    # A scene holds a camera for each eye; they differ by the width of a nose.
+    # A scene holds a camera for each eye, a few centimetres apart.
     left, right = scene.camera[0], scene.camera[1]
     eye = 0.5 * (left.pos.astype(np.float64) + right.pos)
     forward, up = left.forward.astype(np.float64), left.up.astype(np.float64)

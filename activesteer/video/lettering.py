@@ -1,4 +1,4 @@
-"""Letters over pictures: the font, its colours, and how large it is in a picture of some size."""
+"""Text over frames: font, colours and size."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ Colour = tuple[int, int, int, int]
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 
 PANEL: Final = (16, 18, 22, 190)
-"""What texts stand on."""
+"""Background colour of texts."""
 WHITE: Final = (245, 246, 248, 255)
 GREY: Final = (176, 181, 189, 255)
 
 LEGIBLE: Final = 0.85
-"""The smallest scale with which texts are read: letters of 8 pixels."""
+"""Smallest scale at which texts can be read: letters of 8 pixels."""
 
 
 def text_scale(size: tuple[int, int]) -> float:
-    """By how much what is laid out for a picture of 640 x 480 is enlarged: never so little that nobody could read it.
+    """Return the scale of texts relative to a frame of 640 x 480, at least so large that they can be read.
 
     Args:
-        size: Width and height of the pictures [pixels].
+        size: Width and height of the frames [pixels].
     """
     high = size[1] / 480.0
     return max(min(high, math.sqrt(size[0] / 640.0 * high)), LEGIBLE)
@@ -33,13 +33,13 @@ def text_scale(size: tuple[int, int]) -> float:
 def write(
     layer: Image.Image, place: tuple[float, float], text: str, colour: Colour, face: Font, anchor: str = "lm"
 ) -> None:
-    """Writes a text; most are written again in the next picture, so they are kept.
+    """Draw a text. Drawn texts are cached, because most recur in the next frame.
 
     Args:
-        layer: Where to.
-        place: Where its anchor is [pixels].
+        layer: Image to draw on.
+        place: Position of the anchor [pixels].
         text: The text.
-        colour: Its colour.
+        colour: Colour of the text.
         face: The font.
         anchor: As in Pillow.
     """
@@ -59,5 +59,5 @@ def _drawn(text: str, colour: Colour, face: Font, anchor: str) -> tuple[Image.Im
 
 @lru_cache(maxsize=100)
 def font(points: float) -> Font:
-    """The font of everything that is written over pictures, in a size [pixels]."""
+    """Return the font of all texts over frames in a size [pixels]."""
     return ImageFont.load_default(max(6.0, points))

@@ -1,4 +1,4 @@
-"""What is drawn at a car beside what is there: the angles of its wheels, enlarged, and the forces of its tyres."""
+"""Markings beside a car: enlarged wheel angles and tyre forces."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _WEDGE_OPACITY: Final = 0.75
 _ARROW_RGBA: Final = (0.83, 0.05, 0.45, 1.0)
 _ARROW_M: Final = 0.05
 _LABEL_M: Final = 0.35, 0.4
-"""Of a label from the tip of its wedge, ahead and to the outside [m]."""
+"""Distance of a label from the tip of its wedge, ahead and to the outside [m]."""
 
 
 class Label(NamedTuple):
@@ -32,8 +32,8 @@ class Label(NamedTuple):
 
     Attributes:
         text: The text.
-        place_m: Where it begins, shape (3,).
-        outside_m: A point from which it goes away from the car, shape (3,).
+        place_m: Start of the text [m], shape (3,).
+        outside_m: A point such that the text runs from `place_m` away from the car [m], shape (3,).
     """
 
     text: str
@@ -42,23 +42,23 @@ class Label(NamedTuple):
 
 
 class Markings:
-    """Those of one car.
+    """The markings of one car.
 
     Attributes:
-        note: The scale of its arrows, in words; nothing where it has none.
+        note: Scale of the arrows in words; empty if there are no arrows.
     """
 
     def __init__(
         self, recording: Recording, track: Track, size: Footprint, colour: str, shown_with: Sequence[Recording]
     ) -> None:
-        """Takes what is to be shown.
+        """Prepare the markings.
 
         Args:
             recording: The run.
-            track: Where its car is.
+            track: Poses of its car.
             size: The size of the car.
             colour: The colour of its system, `#rrggbb`.
-            shown_with: All runs of the picture: they have their scales in common.
+            shown_with: All runs of the frame; they share their scales.
         """
         self._track, self._rgb = track, shares_of(colour)
         self._tips = wheel_angles.tips_beside(size)
@@ -71,14 +71,14 @@ class Markings:
             self.note = f"force arrows: 1 m = {scale_NpM / 1000.0:.2g} kN"
 
     def add(self, scene: mujoco.MjvScene, time_s: float) -> list[Label]:
-        """Adds them to what is going to be drawn.
+        """Add the markings to a scene.
 
         Args:
             scene: The scene.
             time_s: The instant [s].
 
         Returns:
-            What is to be written over the picture.
+            Labels to draw over the frame.
         """
         labels = []
         if wheel_angles.CHANNELS[0] in self._recording:
@@ -105,7 +105,7 @@ class Markings:
         world = at + np.column_stack([points, np.zeros(len(points))]) @ turn.T
         tip, arc = world[0], world[1:]
         for first, second in pairwise(arc):
-            # The triangle has its sides along the axes of its frame, which need not be at right angles.
+            # The sides of the triangle lie along the axes of its frame, which need not be at right angles.
             frame = np.column_stack([first - tip, second - tip, (0.0, 0.0, 1.0)])
             _add(scene, mujoco.mjtGeom.mjGEOM_TRIANGLE, np.ones(3), tip, frame, (*self._rgb, _WEDGE_OPACITY))
         for end, rgba in ((arc[0], _AHEAD_RGBA), (arc[-1], (*self._rgb, 1.0))):

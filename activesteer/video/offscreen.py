@@ -1,4 +1,4 @@
-"""Pictures of a scene without a window."""
+"""Offscreen rendering of a scene."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BACKENDS: Final = {
     "egl": "libegl1 libegl-mesa0 libgl1-mesa-dri",
     "osmesa": "libosmesa6",
 }
-"""Ways to draw without a window, the one that can use a graphics card first, and the apt packages that they need."""
+"""Offscreen backends and the apt packages that they need; the backend that can use a graphics card comes first."""
 
 _LIBRARIES: Final = {"egl": ("libEGL.so.1",), "osmesa": ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")}
 _MAX_GEOMS: Final = 20000
@@ -33,16 +33,16 @@ _TRY_TIMEOUT_S: Final = 60.0
 
 @functools.cache
 def backend() -> str:
-    """The way to draw that works here: the one that MUJOCO_GL names, else the first that does.
+    """Return the backend that MUJOCO_GL names, or else the first one that works.
 
-    Each is tried in a process of its own: a broken driver may end a process, and PyOpenGL, once it has taken up one of
-    them, cannot be brought to take up another.
+    Each backend is tried in a process of its own: a broken driver may end the process, and PyOpenGL cannot change its
+    backend once it has loaded one.
 
     Raises:
-        PlaybackError: none works; the message names the packages to install.
+        PlaybackError: no backend works; the message names the packages to install.
     """
     wanted = os.environ.get("MUJOCO_GL", "").lower()
-    # `glfw` draws to hidden windows of a display; whoever names it has one.
+    # `glfw` draws to hidden windows of a display; a user who names it has a display.
     names = [wanted] if wanted in (*BACKENDS, "glfw") else list(BACKENDS)
     problems = {}
     for name in names:
@@ -57,7 +57,7 @@ def backend() -> str:
 
 
 def _problem_with(name: str) -> str | None:
-    """Why a way to draw does not work here; None where it does."""
+    """Return the reason why a backend does not work here; None if it works."""
     environment = {**os.environ, "MUJOCO_GL": name}
     environment.pop("PYOPENGL_PLATFORM", None)
     if (platform := _platform_in_use()) not in (None, name):
@@ -73,7 +73,7 @@ def _problem_with(name: str) -> str | None:
         return f"ended by signal {-tried.returncode}"
     if tried.returncode == 0:
         return None
-    # What PyOpenGL says of a missing library would not help anybody: "'NoneType' object has no attribute ...".
+    # PyOpenGL's own message about a missing library does not help: "'NoneType' object has no attribute ...".
     if name in _LIBRARIES and not any(_loads(library) for library in _LIBRARIES[name]):
         return f"{_LIBRARIES[name][0]} is missing"
     lines = [line for line in tried.stderr.splitlines() if "Error" in line and not line.startswith(" ")]
@@ -89,18 +89,18 @@ def _loads(library: str) -> bool:
 
 
 def _platform_in_use() -> str | None:
-    """What this process's PyOpenGL has taken up; it never gives it up again."""
+    """Backend that this process's PyOpenGL has loaded; it cannot be changed any more."""
     return os.environ.get("PYOPENGL_PLATFORM", "").lower() or None if "OpenGL" in sys.modules else None
 
 
 class Offscreen:
-    """A canvas in memory."""
+    """An offscreen canvas."""
 
     def __init__(self, model: mujoco.MjModel, size: tuple[int, int]) -> None:
-        """Opens it.
+        """Open the canvas.
 
         Args:
-            model: What will be drawn; the size of its offscreen buffer is at least that of the pictures.
+            model: Model to draw; its offscreen buffer must be at least as large as the frames.
             size: Width and height [pixels].
 
         Raises:
@@ -130,21 +130,21 @@ class Offscreen:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
 
     def prepare(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> mujoco.MjvScene:
-        """What the next picture will show; more can be added to it.
+        """Prepare the scene of the next frame, to which more geometry can be added.
 
         Args:
-            data: The state of the model.
-            camera: From where.
+            data: State of the model.
+            camera: The camera.
         """
         every = int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self._model, data, self._look, None, camera, every, self._scene)
         return self._scene
 
     def draw(self) -> NDArray[np.uint8]:
-        """The picture of what was prepared.
+        """Render the prepared scene.
 
         Returns:
-            Red, green and blue of each pixel, top row first, shape (height, width, 3); overwritten by the next picture.
+            Red, green and blue of each pixel, top row first, shape (height, width, 3); the next frame overwrites it.
         """
         self._context.make_current()
         mujoco.mjr_render(self._rect, self._scene, self._drawer)
@@ -158,7 +158,7 @@ class Offscreen:
         self._context.free()
 
     def __enter__(self) -> Self:
-        """The canvas, ready to be drawn on."""
+        """Return the canvas with its context current."""
         return self
 
     def __exit__(
@@ -170,7 +170,7 @@ class Offscreen:
 
 @contextmanager
 def _library(name: str) -> Iterator[None]:
-    """MuJoCo reads MUJOCO_GL when it looks up the functions of OpenGL; who starts a viewer later finds it as it was."""
+    """Set MUJOCO_GL while MuJoCo looks up its OpenGL functions; restore it for a viewer that may be started later."""
     before = os.environ.get("MUJOCO_GL")
     os.environ["MUJOCO_GL"] = name
     try:

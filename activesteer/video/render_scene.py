@@ -1,7 +1,7 @@
-"""What a camera sees, as a MuJoCo model without physics: road, sky, course, and cars whose bodies are placed by hand.
+"""Scene of a film as a MuJoCo model without physics: road, sky, course, and cars whose bodies are placed one by one.
 
-It is built from what a recording says of the looks of its car, not from the MJCF that the recording also holds: so
-nothing of a file is compiled, and a car drawn over another is no more than the same solids, transparent.
+The scene is built from the solids in a recording, not from the MJCF that the recording also holds. So no file is
+compiled, and a ghost car consists of the same solids, drawn transparent.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from activesteer.video.road import add_areas, add_course, add_road
 from activesteer.video.sky import SKY, add_sky
 
 _PAINT: Final = (0.23, 0.46, 0.72)
-"""Of a car to which no colour is given."""
+"""Colour of a car without a colour of its own."""
 _GHOST_OPACITY: Final = 0.35
-"""Opacity of a solid of a ghost, relative to that of the same solid of a car."""
+"""Opacity of a ghost's solid relative to the same solid of an opaque car."""
 _GLASS: Final = (0.1, 0.13, 0.17)
 _GLASS_OPACITY: Final = 0.85
 _SHADOW_OPACITY: Final = 0.62
 _SHADOW_FADE_M: Final = 0.3
-"""How far the edge of the shadow fades to both sides of the outline [m]. A shadow that the light casts would cost three
-times the picture, and have a hard edge."""
+"""Width of the shadow's faded edge on either side of the outline [m]. A shadow cast by the light would triple the
+rendering time and have a hard edge."""
 _SHADOW_PIXELS: Final = 64
 
 _BASE: Final = """
@@ -57,15 +57,15 @@ _BASE: Final = """
 
 
 class Car(NamedTuple):
-    """A car on the scene.
+    """A car in the scene.
 
     Attributes:
-        parts: What it looks like.
+        parts: Parts of the car.
         bodies: Names of its bodies, in the order of the poses.
-        colour: Colour of its shell, `#rrggbb`; that of the model where it is empty.
+        colour: Colour of its shell, `#rrggbb`; empty for the colour of the model.
         shell_opacity: Opacity of its shell, 0 to 1.
-        ghost: Whether it is transparent all over.
-        size: Its size, from which it gets a body and wheels; where it is not known, the solids of the model are drawn.
+        ghost: Whether all of the car is transparent.
+        size: Size of the car, which determines its bodywork and wheels; if unknown, the model's solids are drawn.
     """
 
     parts: tuple[ScenePart, ...]
@@ -77,11 +77,11 @@ class Car(NamedTuple):
 
 
 class RenderScene:
-    """Road, course and cars.
+    """Scene of road, course and cars.
 
     Attributes:
         model: The model, for a renderer or a viewer.
-        data: Its state; what is drawn.
+        data: State of the model.
     """
 
     def __init__(
@@ -91,16 +91,16 @@ class RenderScene:
         road: Road | None = None,
         size: tuple[int, int] = (640, 480),
     ) -> None:
-        """Builds it.
+        """Build the scene.
 
         Args:
             cars: The cars.
             course: Lanes, cones and path.
-            road: The road; a plain one where not given.
-            size: Largest width and height of a picture [pixels].
+            road: The road; a plain one by default.
+            size: Largest width and height of a frame [pixels].
 
         Raises:
-            PlaybackError: what the recording says of the car, the course or the road cannot be built.
+            PlaybackError: the recorded car, course or road cannot be built.
         """
         try:
             spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
@@ -126,7 +126,7 @@ class RenderScene:
         mujoco.mj_forward(self.model, self.data)
 
     def _drawn(self, car: int) -> tuple[list[int], list[int]]:
-        """Numbers of the geoms and of the tendons of a car."""
+        """Return the indices of a car's geoms and tendons."""
         model, prefix = self.model, f"{car}/"
         geoms = [index for index in range(model.ngeom) if model.body(model.geom_bodyid[index]).name.startswith(prefix)]
         return geoms, [index for index in range(model.ntendon) if model.tendon(index).name.startswith(prefix)]
@@ -135,10 +135,10 @@ class RenderScene:
         return int(self.model.body_mocapid[self.model.body(body).id])
 
     def place(self, car: int, positions_m: Array, quaternions: Array) -> None:
-        """Puts a car somewhere; `update` makes it seen.
+        """Place a car; call `update` to apply it.
 
         Args:
-            car: Its number.
+            car: Index of the car.
             positions_m: Positions of its bodies [m], shape (bodies, 3).
             quaternions: Their orientations, w x y z, shape (bodies, 4).
         """
@@ -150,7 +150,7 @@ class RenderScene:
         data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
 
     def update(self) -> None:
-        """Makes everything that hangs on the bodies follow them; a ghost fades where it is in the place of a car."""
+        """Update everything that is attached to the bodies; a ghost fades out near the car that it accompanies."""
         chassis = [self.data.mocap_pos[mocap[index]] for mocap, index in zip(self._mocap, self._chassis, strict=True)]
         for ghost, geoms, tendons in self._ghosts:
             apart = min(float(np.linalg.norm(chassis[ghost] - chassis[other])) for other in range(ghost))
@@ -187,7 +187,7 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
                 size=size,
                 pos=part.position_m,
                 quat=part.quaternion,
-                # Of a shell, what is round is the greenhouse.
+                # The round solid of a shell is the greenhouse.
                 rgba=_colour_of(part.rgba, car, shell=part.rgba[3] < SEE_THROUGH, glass=part.kind == "sphere"),
                 contype=0,
                 conaffinity=0,
@@ -198,7 +198,7 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
                 site = f"{prefix}{part.name}/{number}"
                 bodies[body].add_site(name=site, pos=point, group=4)
                 tendon.wrap_site(site)
-    # Tyres that are seen through the body would be dark on something dark.
+    # Tyres seen through the body would be dark on a dark background.
     _add_shadow(spec, prefix, solids, car.shell_opacity * (_GHOST_OPACITY if car.ghost else 1.0))
 
 
@@ -225,7 +225,7 @@ def _colour_of(
 
 
 def _add_shadow(spec: mujoco.MjSpec, prefix: str, solids: Sequence[Primitive], opacity: float) -> None:
-    """Below the chassis, as long and wide as it; it turns with it, but stays on the road."""
+    """Add the shadow below the chassis: as long and wide, with the same heading, but on the road."""
     body = spec.worldbody.add_body(name=f"{prefix}shadow", mocap=True)
     hull = [solid for solid in solids if solid.body == CHASSIS]
     if not hull:
@@ -237,14 +237,14 @@ def _add_shadow(spec: mujoco.MjSpec, prefix: str, solids: Sequence[Primitive], o
     texture = spec.add_texture(
         name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=_SHADOW_PIXELS, height=_SHADOW_PIXELS, nchannel=4
     )
-    # It only darkens: opaque in the middle, and the less the nearer to the edge.
+    # The shadow is opaque in the middle and fades towards its edge.
     pixels = np.zeros((_SHADOW_PIXELS, _SHADOW_PIXELS, 4), np.uint8)
     along, across = (_faded(float(half)) for half in half_m)
     pixels[..., 3] = np.outer(across, along) * _SHADOW_OPACITY * opacity * 255.0
     texture.data = pixels.tobytes()
     material = spec.add_material(name=name, specular=0.0)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
-    # MuJoCo mixes colours only of what is not quite opaque itself.
+    # MuJoCo blends a texture only if its material is not fully opaque.
     body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         pos=(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.03),
@@ -257,7 +257,7 @@ def _add_shadow(spec: mujoco.MjSpec, prefix: str, solids: Sequence[Primitive], o
 
 
 def _faded(half_m: float) -> Array:
-    """How dark the shadow is along one side, from the outer end of one fading edge to that of the other, 0 to 1."""
+    """Return the darkness of the shadow along one side, from the outer end of one faded edge to the other, 0 to 1."""
     away = np.linspace(-half_m - _SHADOW_FADE_M, half_m + _SHADOW_FADE_M, _SHADOW_PIXELS)
     inside = np.clip((half_m + _SHADOW_FADE_M - np.abs(away)) / (2.0 * _SHADOW_FADE_M), 0.0, 1.0)
     return inside**2 * (3.0 - 2.0 * inside)

@@ -1,4 +1,4 @@
-"""The road with a surface on which motion is seen, and what the driver follows on it: lanes, cones, path."""
+"""Road with a chequered surface that makes motion visible, lanes, cones and path."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ICE: Final = (0.62, 0.7, 0.78)
 _ICE_MU: Final = 0.1
 _DRY_MU: Final = 0.8
 _TILE_M: Final = 5.0
-"""Side of a square of the road's chequered surface [m]."""
+"""Side length of a square of the chequered surface [m]."""
 
 _LANE: Final = (0.95, 0.95, 0.93, 1.0)
 _PATH: Final = (0.98, 0.8, 0.15, 0.9)
@@ -29,17 +29,17 @@ _LINE_M: Final = 0.12
 _DASH_M: Final = 1.5
 _GAP_M: Final = 2.5
 _FAR_M: Final = 2000.0
-"""How far an area with its own friction is drawn [m]."""
+"""Distance from the origin up to which patches of other friction are drawn [m]."""
 _MAX_AREAS, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
-"""Most of each that are drawn: a renderer's scene holds a limited number of solids."""
+"""Largest numbers of patches, lanes, cones and dashes drawn: a scene holds a limited number of solids."""
 
 
 def add_road(spec: mujoco.MjSpec, road: Road) -> None:
-    """Adds the surface, the bluer the less friction there is.
+    """Add the surface; lower friction makes it bluer.
 
     Args:
         spec: The model.
-        road: The road; only its friction `mu` counts here.
+        road: The road, of which the friction `mu` is used.
     """
     colour = np.array(_colour(road.mu))
     spec.add_texture(
@@ -67,7 +67,7 @@ def add_road(spec: mujoco.MjSpec, road: Road) -> None:
 
 
 def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
-    """Adds the areas with a friction of their own; in their order the later ones hide the earlier ones.
+    """Add the patches of other friction; later ones hide earlier ones.
 
     Args:
         spec: The model.
@@ -81,7 +81,7 @@ def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
 
 
 def add_course(spec: mujoco.MjSpec, course: Course) -> None:
-    """Adds lanes, cones and the path in dashes.
+    """Add lanes, cones and the dashed path.
 
     Args:
         spec: The model.
@@ -117,7 +117,7 @@ def _add_path(spec: mujoco.MjSpec, path: Path) -> None:
 
 
 def _add_cones(spec: mujoco.MjSpec, cones: np.ndarray) -> None:
-    """A cone of three rings, the middle one white, on a foot."""
+    """Add a cone of three rings, the middle one white, on a base."""
     third = CONE_HEIGHT_M / 3.0
     rings = []
     for number, colour in enumerate((_CONE, _STRIPE, _CONE)):

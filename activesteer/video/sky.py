@@ -1,7 +1,7 @@
-"""The sky: a dome around the cars, bright at the horizon.
+"""Sky: a dome around the cars, bright at the horizon.
 
-MuJoCo's own sky fills the whole picture before the road hides nearly all of it; with a drawing in software that is a
-sixth of the time of a picture.
+MuJoCo's own sky box fills the whole frame before the road covers nearly all of it. In software rendering that takes a
+sixth of the time of a frame.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ import mujoco
 import numpy as np
 
 SKY: Final = "sky"
-"""Body that is to be moved along with the cars."""
+"""Name of the body that must move along with the cars."""
 _RADIUS_M: Final = 560.0
-"""It has to be nearer than what is the farthest that a picture shows."""
+"""Radius of the dome [m], less than the far clipping distance of a frame."""
 _ELEVATIONS_DEG: Final = (-3.0, 0.0, 1.0, 4.0, 12.0, 30.0, 60.0, 90.0)
-"""Of the rings of its corners; the lowest is below the horizon, which the road does not quite reach."""
+"""Elevations of the rings of vertices; the lowest is below the horizon, because the road does not quite reach it."""
 _SIDES: Final = 24
 _HORIZON: Final = (0.82, 0.87, 0.91)
 _ABOVE: Final = (0.36, 0.52, 0.72)
 _BRIGHT_TO: Final = 0.4
-"""Height of the place, by the radius, where the colour has come half of its way."""
+"""Height, relative to the radius, at which the colour is halfway between horizon and zenith."""
 _PIXELS: Final = 64
 _INSET: Final = 1.0 / _PIXELS
-"""Between the last two pixels of the texture and the first: it would go on with the other end of itself."""
+"""Margin that keeps texture coordinates off the last pixels, which would blend with the opposite edge."""
 
 
 def add_sky(spec: mujoco.MjSpec) -> None:
-    """Adds it.
+    """Add the sky.
 
     Args:
         spec: The model.
@@ -39,7 +39,7 @@ def add_sky(spec: mujoco.MjSpec) -> None:
     row, side = np.meshgrid(np.arange(len(_ELEVATIONS_DEG) - 1), np.arange(_SIDES), indexing="ij")
     first = (row * (_SIDES + 1) + side).ravel()
     above = first + _SIDES + 1
-    # Seen from inside.
+    # The dome is seen from inside.
     faces = np.concatenate([np.stack([first, above, first + 1], 1), np.stack([first + 1, above, above + 1], 1)])
     height = np.maximum(corners[:, 2], 0.0)
     mesh = spec.add_mesh(name=SKY, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)

@@ -1,4 +1,4 @@
-"""Where the bodies of a car are at any instant, between the poses of its recording."""
+"""Poses of a car's bodies at any instant, interpolated from a recording."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint, footprint_of
 
 _STEADY_S: Final = 0.35
-"""Standard deviation of the window over which the direction of the camera is averaged [s]: it follows the car through
-a bend, but not its every twitch, which is then seen."""
+"""Standard deviation of the window over which the camera's heading is averaged [s]. The camera follows a bend, but no
+quick yaw motion, which therefore stays visible."""
 
 
 class Track:
-    """Poses of a recording over time.
+    """Poses of a car over time.
 
     Attributes:
         bodies: Names of the bodies.
         start_s: Time of the first pose [s].
-        end_s: Time of the last one [s].
+        end_s: Time of the last pose [s].
     """
 
     def __init__(self, recording: Recording, name: str) -> None:
-        """Takes the poses that can be drawn; a run that diverged ends with some that cannot.
+        """Read the poses that can be drawn; a run that diverged ends with poses that cannot.
 
         Args:
             recording: The run.
-            name: What it is called in an error.
+            name: Name of the run in error messages.
 
         Raises:
-            PlaybackError: there are no poses of a car.
+            PlaybackError: the recording has no poses of a car.
         """
         poses = recording.poses
         self.bodies = poses.names
@@ -50,7 +50,7 @@ class Track:
         self._middle_m = -0.5 * (footprint_of(recording.metadata) or Footprint()).wheelbase_m
 
     def poses(self, time_s: float) -> tuple[Array, Array]:
-        """Poses at an instant; before the first it is the first, after the last the last.
+        """Return the poses at an instant: the first pose before the recording, the last pose after it.
 
         Args:
             time_s: The instant [s].
@@ -64,28 +64,28 @@ class Track:
         span = self._time_s[after] - self._time_s[before]
         fraction = min(max((time_s - self._time_s[before]) / span, 0.0), 1.0) if span > 0.0 else 0.0
         positions = (1.0 - fraction) * self._positions_m[before] + fraction * self._positions_m[after]
-        # Between two poses the quickest, a wheel, turns by less than a radian: the chord is as good as the arc.
+        # The fastest body, a wheel, rotates by less than a radian between two poses: the chord is as good as the arc.
         first, second = self._quaternions[before], self._quaternions[after]
         sign = np.where(np.einsum("ij,ij->i", first, second) < 0.0, -1.0, 1.0)[:, None]
         turned = (1.0 - fraction) * first + fraction * sign * second
         return positions, turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
     def heading(self, time_s: float, *, steady: bool = False) -> float:
-        """Heading of the chassis at an instant [rad], left positive, turns counted; averaged where it is `steady`."""
+        """Return the continuous heading of the chassis at an instant [rad], left positive; averaged if `steady`."""
         return float(np.interp(time_s, self._time_s, self._steady_rad if steady else self._heading_rad))
 
     def middle(self, time_s: float) -> Array:
-        """The point on the road below the middle between the axles [m], shape (3,)."""
+        """Return the point on the road below the midpoint of the axles [m], shape (3,)."""
         positions, _ = self.poses(time_s)
         heading = self.heading(time_s)
         forward = np.array([np.cos(heading), np.sin(heading), 0.0])
         return positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0) + self._middle_m * forward
 
     def wheel_place(self, corner: str) -> Array:
-        """Centre of a wheel relative to the chassis, in its heading, when the recording starts [m], shape (3,).
+        """Return the initial centre of a wheel relative to the chassis, in axes along its heading [m], shape (3,).
 
         Raises:
-            PlaybackError: there is no such wheel.
+            PlaybackError: the car has no such wheel.
         """
         body = f"{corner}_wheel"
         if body not in self.bodies:
@@ -98,20 +98,20 @@ class Track:
         return np.array([cos * x + sin * y, -sin * x + cos * y, z])
 
     def chassis(self, time_s: float) -> Array:
-        """The point on the road below the origin of the chassis [m], shape (3,)."""
+        """Return the point on the road below the chassis origin [m], shape (3,)."""
         positions, _ = self.poses(time_s)
         return positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0)
 
 
 def _smooth(time_s: Array, values: Array) -> Array:
-    """A running mean with Gaussian weights, which shifts nothing in time; at both ends the values are continued."""
+    """Return a moving average with Gaussian weights and no phase shift; the end values are continued at both ends."""
     if len(time_s) < 2:
         return values
     step = float(np.median(np.diff(time_s)))
     reach = round(4.0 * _STEADY_S / step)
     offsets = np.arange(-reach, reach + 1) * step
     weights = np.exp(-0.5 * (offsets / _STEADY_S) ** 2)
-    # Poses are evenly spaced but for the gaps of a damaged file.
+    # Poses are evenly spaced except for gaps in a damaged file.
     even = np.arange(time_s[0] - reach * step, time_s[-1] + (reach + 1) * step, step)
     averaged = np.convolve(np.interp(even, time_s, values), weights / weights.sum(), mode="same")
     return np.asarray(np.interp(time_s, even, averaged), np.float64)
