@@ -15,13 +15,15 @@ from activesteer.files import json_text
 
 GOOD: Final = 32
 BAD: Final = 31
-_KNOWN: Final = 33
+KNOWN: Final = 33
 """What makes a terminal write green, red and yellow."""
-_COLOURS: Final = {"passed": GOOD, "FAILED": BAD, "not reproduced": _KNOWN}
+_COLOURS: Final = {"passed": GOOD, "FAILED": BAD, "not reproduced": KNOWN}
 """By verdict."""
 _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
 _COLUMNS: Final = 80
+_WHOLE: Final[dict[str, Any]] = {"break_on_hyphens": False, "break_long_words": False, "replace_whitespace": False}
+"""Arguments of `textwrap` that keep words and columns as they are."""
 
 
 def print_table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
@@ -37,6 +39,14 @@ def print_table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -
     for row in rows:
         cells = ((row[key], width) for key, width in widths.items())
         print(" ".join(f"{cell:>{w}}" if isinstance(cell, str) else f"{cell:{w}.3g}" for cell, w in cells))
+
+
+def print_wrapped(text: str) -> None:
+    """Print lines in 80 columns; the continuation of a longer line is indented four columns further than the line."""
+    for line in text.splitlines():
+        indent = " " * (len(line) - len(line.lstrip()) + 4)
+        wrapped = textwrap.wrap(line, _COLUMNS, subsequent_indent=indent, **_WHOLE) if len(line) > _COLUMNS else [line]
+        print(coloured("\n".join(wrapped)))
 
 
 def print_json(value: Any) -> None:
@@ -81,10 +91,7 @@ def print_entry(head: str, text: str, hanging: int = 2, file: TextIO | None = No
         file: Where to print; standard output by default.
     """
     plain = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
-    lines = textwrap.wrap(
-        plain, _COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, break_on_hyphens=False,
-        break_long_words=False,
-    )  # fmt: skip
+    lines = textwrap.wrap(plain, _COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **_WHOLE)
     print("\n".join(lines) or head.rstrip(), file=file)
 
 

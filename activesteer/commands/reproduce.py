@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import add_json, add_output, add_vehicle, add_workers
-from activesteer.commands.output import coloured, print_json
+from activesteer.commands.output import print_entry, print_json, print_wrapped
 from activesteer.commands.progress import ProgressBar, RunCounter
 from activesteer.errors import ParameterError
 
@@ -27,6 +27,7 @@ def add_to(commands: Any) -> None:
     add_output(parser, "DIR", words)
     add_vehicle(parser)
     add_workers(parser)
+    parser.add_argument("--all", action="store_true", help="also print every claim with its numbers")
     parser.add_argument("--figures", action="store_true", help="also draw the paper's figures, or the comparison's")
     parser.add_argument(
         "--population", type=int, metavar="N",
@@ -82,13 +83,30 @@ def _reproduce(options: argparse.Namespace) -> int:
         table["report"] = None if report is None else str(report)
         print_json({**table, "failures": failures, "exit_status": result.exit_status})
         return result.exit_status
-    print(coloured(result.scorecard.to_text()))
+    if options.all:
+        print_wrapped(result.scorecard.to_text())
     print(f"recordings: {len(files)} MCAP files in {folder}")
     if report is not None:
         print(f"report: {report}")
     if figures:
         print(f"figures: {len(figures)} files in {options.output / 'figures'}")
+    _print_scenarios(result)
     return result.exit_status
+
+
+def _print_scenarios(result: Reproduction) -> None:
+    """Print a line for each scenario: how many claims are reproduced, and the verdicts of all others."""
+    from activesteer.analysis.claims import SCENARIO_OF, Verdict
+
+    width = max(map(len, result.paths), default=0)
+    for scenario in result.paths:
+        judged = [item for item in result.scorecard.judged if SCENARIO_OF[item.claim.id] == scenario]
+        passed = sum(item.claim.passed for item in judged)
+        words = f"{passed} of {len(judged)} claims reproduced" if judged else "not judged: a run failed"
+        for verdict, name in ((Verdict.FAILED, "FAILED"), (Verdict.NOT_REPRODUCED, "not")):
+            if claims := [item.claim.id for item in judged if item.verdict is verdict]:
+                words += f"; {name}: {' '.join(claims)}"
+        print_entry(f"{scenario:{width}}  ", words, hanging=width + 2)
 
 
 def _compare(options: argparse.Namespace) -> int:
@@ -112,7 +130,7 @@ def _compare(options: argparse.Namespace) -> int:
     if options.json:
         print_json({**made.to_json(), "figures": [str(path) for path in figures]})
     else:
-        print(coloured(made.to_text()))
+        print_wrapped(made.to_text())
         for path in figures:
             print(f"figure: {path}")
     return 1 if made.failures else 0
@@ -162,7 +180,7 @@ def _population(options: argparse.Namespace) -> int:
     if options.json:
         print_json(table)
         return 0
-    print(coloured(found.to_text()))
+    print_wrapped(found.to_text())
     for path in figures:
         print(f"figure: {path}")
     return 0

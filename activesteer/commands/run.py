@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands.arguments import add_controller, add_json, add_output, add_scenario, scenario_of
-from activesteer.commands.output import BAD, GOOD, coloured, painted, print_json
+from activesteer.commands.output import BAD, GOOD, painted, print_json
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError, shown
 from activesteer.files import make_folder
 
 if TYPE_CHECKING:
-    from activesteer.analysis.claims import Scorecard
     from activesteer.plugins import Plugin
 
 _OTHER_FILES: Final = frozenset((".mp4", ".gif", ".rrd", ".csv", ".mat", ".parquet", ".json", ".html", ".png", ".pdf"))
@@ -29,12 +28,14 @@ def add_to(commands: Any) -> None:
     add_controller(run, several=True)
     add_output(run, "FILE_OR_DIR", "a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap", "runs")
     run.add_argument("--replace", action="store_true", help="replace recordings that were made with other settings")
+    run.add_argument("--all", action="store_true", help="print all metrics, not only the key metrics of the manoeuvre")
     run.add_argument("--plot", action="store_true", help="also draw the runs: PNG and PDF")
     add_json(run)
     run.set_defaults(action=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
+    from activesteer.analysis.metrics import evaluation_of
     from activesteer.analysis.tables import comparison
     from activesteer.controllers import find_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
@@ -62,26 +63,30 @@ def _run(options: argparse.Namespace) -> int:
             print(f"{scenario.maneuver.name} {label}: {path}", file=sys.stderr)
         if problem := recordings[label].metadata.get("metrics_error"):
             print(f"{scenario.maneuver.name} {label}: no metrics: {problem}", file=sys.stderr)
-    claims = _claims(recordings, scenario.car.name)
     if options.json:
         runs = [
             {"controller": controller.name, "file": str(path), "metrics": recording.metrics}
             for controller, path, recording in zip(controllers, paths, recordings.values(), strict=True)
         ]
-        table = {"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs}
-        print_json({**table, "claims": claims.to_json()["claims"] if claims else []})
+        print_json({"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs})
     elif any(recording.metrics for recording in recordings.values()):
         metrics = {label: recording.metrics for label, recording in recordings.items()}
-        print(comparison(metrics, _paint))
+        names = [metric.name for metric in evaluation_of(recordings[label]).key_metrics]
+        chosen = metrics if options.all else {run: _chosen(found, names) for run, found in metrics.items()}
+        print(comparison(chosen, _paint))
         _print_outcomes(metrics)
-        for judged in claims.judged if claims else ():
-            verdict = "FAILED" if judged.verdict == "failed" else judged.verdict
-            print(coloured(f"{judged.claim.id} {verdict}: {judged.claim.text}"))
+        total = len({name for found in metrics.values() for name in found})
+        if not options.all and total > len(names):
+            print(f"{len(names)} of {total} metrics; --all prints all")
     if options.plot:
         for figure in _plot(recordings, paths[0].parent, scenario):
             if not options.json:
                 print(f"figure: {figure}")
     return 0
+
+
+def _chosen(metrics: Mapping[str, float], names: Sequence[str]) -> dict[str, float]:
+    return {name: metrics[name] for name in names if name in metrics}
 
 
 def _paint(name: str, value: float, first: float, text: str) -> str:
@@ -152,16 +157,6 @@ def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, Any]:
         else:
             flat[f"{start}{key}"] = list(value) if isinstance(value, tuple) else value
     return flat
-
-
-def _claims(recordings: Mapping[str, Any], vehicle: str) -> Scorecard | None:
-    """The paper's claims, where the runs are those that they speak of."""
-    from activesteer.analysis.claims import SYSTEMS, claims_for, scorecard
-
-    check = claims_for(next(iter(recordings.values())))
-    if check is None or not all(system in recordings and recordings[system].metrics for system in SYSTEMS):
-        return None
-    return scorecard(check(recordings), vehicle)
 
 
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,14 @@ def test_reproduce_writes_a_report_of_all_runs(
 ) -> None:
     monkeypatch.setattr(reproduction, "reproduce", lambda *_, **__: reproduced)
     main(["reproduce", "-o", str(tmp_path)])
-    assert f"report: {tmp_path / 'report.html'}" in capsys.readouterr().out
+    lines = capsys.readouterr().out.splitlines()
+    assert f"report: {tmp_path / 'report.html'}" in lines
+    assert [line.split()[0] for line in lines[-5:]] == list(reproduced.paths)
+    assert all(re.fullmatch(r"\w+ +\d of \d claims reproduced(; not: [A-Z\d ]+)?", line) for line in lines[-5:])
+    main(["reproduce", "-o", str(tmp_path), "--all"])
+    told = capsys.readouterr().out.splitlines()
+    assert all(any(line.startswith(f"{number}  ") for line in told) for number in STATEMENTS)
+    assert not [line for line in told if len(line) > 80 and str(tmp_path) not in line]
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "15 runs of 5 manoeuvres" in page
     assert "vehicle compact" in page

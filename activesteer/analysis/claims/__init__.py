@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from activesteer.analysis.claims.claim import SYSTEMS, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.scenarios import SCENARIOS, STATEMENTS, Claims
+from activesteer.analysis.claims.scenarios import SCENARIO_OF, SCENARIOS, STATEMENTS, Claims
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict, not_reproduced, scorecard
 from activesteer.analysis.source import RecordingLike
 
@@ -50,6 +50,7 @@ def _is_of_maneuver(key: str, vehicle: object) -> bool:
 
 __all__ = [
     "SCENARIOS",
+    "SCENARIO_OF",
     "STATEMENTS",
     "SYSTEMS",
     "Claim",

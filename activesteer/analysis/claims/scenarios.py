@@ -26,3 +26,5 @@ STATEMENTS: Final[dict[str, Statement]] = {
     statement.id: statement for room in _ROOMS.values() for statement in room.STATEMENTS
 }
 """Number -> statement, in the same order."""
+SCENARIO_OF: Final = {statement.id: name for name, room in _ROOMS.items() for statement in room.STATEMENTS}
+"""Number of a statement -> name of the manoeuvre that it is about."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import dataclass
 
 from activesteer.errors import ParameterError, nearest_names
@@ -92,18 +93,19 @@ class KcResult:
         return json_text({"metrics": rows})
 
     def table(self) -> str:
-        """The metrics as text, one a line, with what the bands ask."""
-        lines = [f"{'metric':32} {'axle':5} {'value':>9} {'unit':9} {'target band':>16}  {'':7} source of the band"]
+        """Return the metrics as text of 80 columns, a line each, with their target bands."""
+        lines = [f"{'metric':31} {'axle':5} {'value':>7} {'unit':9} {'target band':>14}"]
         for entry in self.metrics:
             band = f"{entry.band[0]:g} to {entry.band[1]:g}" if entry.band else ""
             verdict = "" if entry.inside is None else "inside" if entry.inside else "OUTSIDE"
             lines.append(
-                f"{entry.name:32} {entry.axle:5} {_number(entry.value):>9} {entry.unit:9} {band:>16}  {verdict:7} "
-                f"{entry.source}".rstrip()
+                f"{entry.name:31} {entry.axle:5} {_number(entry.value):>7} {entry.unit:9} {band:>14} {verdict}".rstrip()
             )
         asked = [entry for entry in self.metrics if entry.inside is not None]
         lines += ["", f"{sum(entry.inside is True for entry in asked)} of {len(asked)} target bands met"]
-        lines += [f"outside: {entry.axle} {entry.name}: {entry.remark}" for entry in self.outside if entry.remark]
+        for entry in self.outside:
+            remark = f": {entry.remark}" if entry.remark else ""
+            lines += textwrap.wrap(f"outside: {entry.axle} {entry.name}{remark}", 80, subsequent_indent="  ")
         return "\n".join(lines)
 
 
