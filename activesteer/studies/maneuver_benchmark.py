@@ -20,7 +20,7 @@ from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.metrics import EVALUATIONS, evaluation_of
 from activesteer.errors import ActiveSteerError, RecordingError
 from activesteer.files import json_text, read_text, write_text
-from activesteer.quantities import metric_label, metric_number
+from activesteer.metric_table import recorded_metric
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
 from activesteer.simulation.amplitude_store import searched_anew
@@ -101,10 +101,10 @@ class Drift(NamedTuple):
 
     def __str__(self) -> str:
         """Return one line with old and new value and the tolerance, in display units."""
-        words, unit, factor = metric_label(self.metric)
-        old, new = ("missing" if value is None else metric_number(self.metric, value) for value in (self.old, self.new))
-        tolerance = f"{self.tolerance * factor:.3g} {unit}".removesuffix(" -")
-        return f"{self.maneuver}, {self.controller}: {words} {old} -> {new} (tolerance {tolerance})"
+        metric = recorded_metric(self.metric)
+        old, new = ("missing" if value is None else metric.text(value) for value in (self.old, self.new))
+        tolerance = f"{self.tolerance * metric.unit.factor:.3g} {metric.unit.name}".removesuffix(" -")
+        return f"{self.maneuver}, {self.controller}: {metric.label} {old} -> {new} (tolerance {tolerance})"
 
 
 def bench_maneuvers() -> Benchmark:
@@ -240,8 +240,8 @@ def as_markdown(benchmark: Benchmark, found: Sequence[Drift]) -> str:
         runs = [run for run in benchmark.runs if run.maneuver == maneuver]
         rows = [["metric", "unit", *(run.controller for run in runs)], ["---"] * 2 + ["---:"] * len(runs)]
         for name in runs[0].metrics:
-            words, unit, _ = metric_label(name)
-            rows.append([words, unit, *(metric_number(name, run.metrics[name]) for run in runs)])
+            metric = recorded_metric(name)
+            rows.append([metric.label, metric.unit.name, *(metric.text(run.metrics[name]) for run in runs)])
         rows.append(["time of the run", "s", *(f"{run.wall_s:.2f}" for run in runs)])
         rows.append(["times real time", "-", *(f"{run.real_time_factor:.0f}" for run in runs)])
         table = "\n".join(f"| {' | '.join(row)} |" for row in rows)

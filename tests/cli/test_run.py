@@ -17,7 +17,7 @@ from activesteer.analysis.metrics import EVALUATIONS
 from activesteer.analysis.tables import comparison
 from activesteer.commands import run as run_command
 from activesteer.commands.output import BAD, coloured, painted
-from activesteer.quantities import metric_label
+from activesteer.metric_table import recorded_metric
 from activesteer.resources import find_vehicle
 from activesteer.version import __version__
 
@@ -41,7 +41,7 @@ def test_each_controller_makes_a_file_and_a_column(call, tmp_path):
         metrics = Recording.open(tmp_path / "out" / f"step_steer-{name}.mcap").metrics
         assert value == pytest.approx(math.degrees(metrics["yaw_rate_peak_radps"]), abs=6e-4)
     names = [metric.name for metric in EVALUATIONS["step_steer"].key_metrics]
-    assert [" ".join(line.split("  ")[:1]) for line in lines[1:11]] == [metric_label(name)[0] for name in names]
+    assert [" ".join(line.split("  ")[:1]) for line in lines[1:11]] == [recorded_metric(name).label for name in names]
     assert lines[11:] == ["10 of 28 metrics; --all prints all"]
     again = call("run", "step_steer", "-c", "none", *PAPER, "-o", "out", "--all").out.splitlines()
     assert len(again) == 29
