@@ -71,7 +71,7 @@ def _run(options: argparse.Namespace) -> int:
         print_json({"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs})
     elif any(recording.metrics for recording in recordings.values()):
         metrics = {label: recording.metrics for label, recording in recordings.items()}
-        names = [metric.name for metric in evaluation_of(recordings[label]).key_metrics]
+        names = [metric.name for metric in evaluation_of(next(iter(recordings.values()))).key_metrics]
         chosen = metrics if options.all else {run: _chosen(found, names) for run, found in metrics.items()}
         print(comparison(chosen, _paint))
         _print_outcomes(metrics)
