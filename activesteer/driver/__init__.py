@@ -1,4 +1,4 @@
-"""The driver: from what is asked (and, for a path, what is seen) to steering wheel, drive and brake."""
+"""The driver: from the setpoint, and the path ahead, to steering wheel, drive and brake."""
 
 from activesteer.driver.base import Driver, DriverSetup
 from activesteer.driver.constant_radius import ConstantRadiusDriver

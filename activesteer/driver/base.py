@@ -1,4 +1,4 @@
-"""What the simulation asks of a driver, and what a driver may know of his car."""
+"""Interface of a driver, and a driver's knowledge of the car."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from activesteer.theory.single_track import SingleTrackParameters
 
 
 class Driver(Protocol):
-    """What a driver must have: one method, called once every step of the simulation.
+    """Interface of a driver: one method, called once every step of the simulation.
 
-    A driver who acts less often counts the steps (`DriverSetup.timestep_s`) and repeats the last command in between.
+    A driver that acts less often counts the steps (`DriverSetup.timestep_s`) and repeats the last command in between.
 
     Example:
         >>> import math
@@ -27,43 +27,40 @@ class Driver(Protocol):
     """
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """What the driver does now.
+        """Return the command for the next step.
 
         Args:
-            setpoint: What the manoeuvre asks for.
-            measurement: What the car's sensors say.
-            motion: Where the car is and how it moves, as the driver sees it.
-
-        Returns:
-            The command for the next step.
+            setpoint: Setpoint of the manoeuvre.
+            measurement: Measurement of the car's sensors.
+            motion: Position and motion of the car, as the driver sees them.
         """
         ...
 
 
 class Drive(Protocol):
-    """What a driver knows of engine and gearbox."""
+    """Engine and gearbox as a driver knows them."""
 
     def speed_radps(self, wheel_speeds_radps: tuple[float, float, float, float], /) -> float:
-        """Mean speed of the driven wheels [rad/s], which is what the engine turns with."""
+        """Return the mean speed of the driven wheels, with which the engine turns [rad/s]."""
         ...
 
     def limits_Nm(self, speed_radps: float, gear: int, /) -> tuple[float, float]:
-        """Least and greatest torque at all wheels together in a gear, 1 or -1; forward positive [N m]."""
+        """Return the smallest and largest total wheel torque in a gear, 1 or -1; forward positive [N m]."""
         ...
 
 
 @dataclass(frozen=True)
 class DriverSetup:
-    """What a driver gets when he is made.
+    """Input from which a driver is made.
 
     Attributes:
-        single_track: The car as a single-track model sees it, without control.
-        parameters: The driver file: who drives; for a driver of one's own it is that of the default driver.
+        single_track: The car without control as a single-track model.
+        parameters: The driver file; a user's own driver gets the file of the default driver.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
         steering_wheel_limit_rad: Lock angle of the steering wheel [rad].
-        rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None where there is no rack.
-        drive: What engine and gearbox can give.
-        wheel_radius_m: Radius by which the engine's speed belongs to the car's [m].
+        rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None without a rack.
+        drive: Engine and gearbox.
+        wheel_radius_m: Radius that relates the speed of the driven wheels to the speed of the car [m].
         timestep_s: Time between two steps [s].
     """
 

@@ -1,4 +1,4 @@
-"""The driver on a circle: turns the steering wheel until the car's path has the curvature that is asked for."""
+"""The driver on a circle: turns the steering wheel until the path of the car has the desired curvature."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 
 _TIME_CONSTANT_S: Final = 0.5
-"""Time in which an error of the curvature is steered away [s]: slower than the car answers, faster than speed rises."""
+"""Time constant for an error of the curvature [s]: slower than the car's answer, faster than the rise of the speed."""
 _MIN_SPEED_MPS: Final = 1.0
-"""Below this speed yaw rate over speed says nothing about the path and no correction is made [m/s]."""
+"""Below this speed there is no correction: yaw rate over speed is not the curvature of the path [m/s]."""
 
 
 class ConstantRadiusDriver:
-    """Steers by curvature: Ackermann angle, and the integral of what the measured curvature lacks.
+    """Steering by curvature: Ackermann angle, and the integral of the curvature error.
 
-    The measured curvature is yaw rate over speed, which is that of the path where the sideslip angle does not change.
-    The integral stands still while the steering wheel is at its stop.
+    The measured curvature is yaw rate over speed: the curvature of the path while the sideslip angle is constant. The
+    integral stands still while the steering wheel is at its stop.
     """
 
     def __init__(self, robot: OpenLoopDriver, wheelbase_m: float, timestep_s: float) -> None:
-        """Makes the driver of one run.
+        """Make the driver of one run.
 
         Args:
             robot: Turns the steering wheel and holds the speed.
@@ -31,20 +31,11 @@ class ConstantRadiusDriver:
         self.robot = robot
         self.speed_hold = robot.speed_hold
         self._wheelbase_m = wheelbase_m
-        self._share = timestep_s / _TIME_CONSTANT_S
+        self._fraction = timestep_s / _TIME_CONSTANT_S
         self._correction_1pm = 0.0
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """What the driver does now.
-
-        Args:
-            setpoint: What is asked; without a curvature its steering wheel angle is taken.
-            measurement: What the car's sensors say.
-            motion: Not used.
-
-        Returns:
-            The command.
-        """
+        """Return the command; a setpoint without a curvature gives the steering wheel angle. See `Driver`."""
         curvature = setpoint.curvature_demand_1pm
         if curvature is None:
             return self.robot.step(setpoint, measurement, motion)
@@ -53,5 +44,5 @@ class ConstantRadiusDriver:
         command = robot.turn(angle, setpoint, measurement)
         if command.steering_wheel_demand_rad == angle and measurement.speed_mps > _MIN_SPEED_MPS:
             error = curvature - measurement.yaw_rate_radps / measurement.speed_mps
-            self._correction_1pm += self._share * error
+            self._correction_1pm += self._fraction * error
         return command

@@ -1,4 +1,4 @@
-"""Drivers by name, or a user's own."""
+"""Find a driver by name, or a user's own."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from activesteer.resources import list_drivers
 from activesteer.signals import DriverCommand, WheelTorques, made
 
 _MAX_ANGLE_RAD: Final = 50.0
-"""No steering wheel turns so far; more is taken for a mistake, such as degrees [rad]."""
+"""Largest angle of a command; a larger one is taken for a mistake, such as degrees [rad]."""
 _FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
 _MAX_TORQUE_NM: Final = 1e6
-"""No car has so much drive torque [N m]."""
+"""Largest torque of a command: more than any car has [N m]."""
 
 
 @dataclass(frozen=True)
 class _DriverKind(Kind):
-    """Drivers; their command is completed by the angle at the road wheel."""
+    """Drivers, whose command is completed by the angle at the road wheel."""
 
     def completed(self, command: Any, name: str, setup: DriverSetup, said: str) -> DriverCommand:
-        """A command as it may be carried out; see the base class."""
+        """Return a command with the angle at the road wheel; see the base class."""
         torques, front = command.wheel_torques, command.front_steer_demand_rad
         if torques is not None and not _are_torques(torques):
             needed = "an activesteer.signals.WheelTorques of finite numbers is needed"
             raise self.fail(name, f"{said} wheel_torques = {shown(torques)}; {needed}", torques)
-        ours = command.steering_wheel_demand_rad / setup.steering_ratio
+        angle = command.steering_wheel_demand_rad / setup.steering_ratio
         if math.isnan(front):
-            return made(DriverCommand, (*command[:_FRONT_STEER], ours, *command[_FRONT_STEER + 1 :]))
-        if not math.isclose(front, ours, rel_tol=1e-9, abs_tol=1e-12):
-            what = f"the steering wheel angle over the steering ratio is {ours:g}; leave it out"
+            return made(DriverCommand, (*command[:_FRONT_STEER], angle, *command[_FRONT_STEER + 1 :]))
+        if not math.isclose(front, angle, rel_tol=1e-9, abs_tol=1e-12):
+            what = f"the steering wheel angle over the steering ratio is {angle:g}; leave it out"
             raise self.fail(name, f"{said} front_steer_demand_rad = {front:g}, but {what}", front)
         return command
 
@@ -59,11 +59,11 @@ DRIVER: Final = _DriverKind(
     unchecked=("wheel_torques",),
     data=list_drivers,
 )
-"""What drivers have in common."""
+"""Rules that all drivers follow."""
 
 
 def find_driver(given: Any) -> Plugin:
-    """Finds a driver; see `activesteer.plugins.find`.
+    """Find a driver; see `activesteer.plugins.find`.
 
     Args:
         given: A name from `list_drivers`, a driver file or its table; or a user's own code:
@@ -79,7 +79,7 @@ def find_driver(given: Any) -> Plugin:
 
 
 def is_driver_file(given: Any) -> bool:
-    """Whether a driver is given as data, by name, file or table, and not as code."""
+    """Return whether a driver is given as data, by name, file or table, and not as code."""
     return isinstance(given, Mapping) or DRIVER.is_data(given)
 
 

@@ -1,4 +1,4 @@
-"""The driver of every manoeuvre: does what is asked, be it a path, a curvature or an angle of the steering wheel."""
+"""The driver of every manoeuvre: follows a path, a curvature or a steering wheel angle."""
 
 from __future__ import annotations
 
@@ -11,28 +11,22 @@ from activesteer.theory.single_track import SingleTrack
 
 
 class HumanDriver:
-    """Follows a path, keeps a curvature, or turns the steering wheel as asked; holds the speed in all of it.
+    """Driver that follows a path, a curvature or a steering wheel angle, and holds the speed.
 
-    How well is a matter of the driver file; see `DriverParameters`.
+    The driver file sets the skill; see `DriverParameters`.
     """
 
     def __init__(
         self, open_loop: OpenLoopDriver, constant_radius: ConstantRadiusDriver, path: PathPreviewDriver
     ) -> None:
-        """Joins the three.
-
-        Args:
-            open_loop: Turns the steering wheel as asked.
-            constant_radius: Keeps a curvature.
-            path: Follows a path.
-        """
+        """Combine three drivers: for a steering wheel angle, a curvature, and a path."""
         self._open_loop = open_loop
         self._constant_radius = constant_radius
         self._path = path
 
     @classmethod
     def from_vehicle(cls, setup: DriverSetup) -> HumanDriver:
-        """Makes the driver for a car."""
+        """Make the driver for a car."""
         robot, single_track = OpenLoopDriver.from_vehicle(setup), SingleTrack(setup.single_track)
         return cls(
             robot,
@@ -41,7 +35,7 @@ class HumanDriver:
         )
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """What the driver does now; see `Driver`."""
+        """Return the command; see `Driver`."""
         if setpoint.path is not None:
             return self._path.step(setpoint, measurement, motion)
         if setpoint.curvature_demand_1pm is not None:

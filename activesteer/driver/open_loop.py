@@ -1,4 +1,4 @@
-"""The open-loop driver: turns the steering wheel as asked, holds speed, presses the brake."""
+"""The open-loop driver: sets the steering wheel angle, holds the speed, presses the brake."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class OpenLoopDriver:
     Attributes:
         speed_hold: The cruise control.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
-        steering_wheel_limit_rad: Lock angle [rad]; more cannot be turned.
+        steering_wheel_limit_rad: Lock angle [rad].
     """
 
     def __init__(
@@ -24,13 +24,13 @@ class OpenLoopDriver:
         steering_wheel_limit_rad: float,
         rack_per_steering_wheel_m: float | None = None,
     ) -> None:
-        """Makes the driver of one run.
+        """Make the driver of one run.
 
         Args:
             speed_hold: The cruise control.
             steering_ratio: Steering wheel angle over road-wheel angle [-].
-            steering_wheel_limit_rad: Lock angle [rad]; more cannot be turned.
-            rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None where there is no rack.
+            steering_wheel_limit_rad: Lock angle [rad].
+            rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None without a rack.
         """
         self.speed_hold = speed_hold
         self.steering_ratio = steering_ratio
@@ -39,44 +39,27 @@ class OpenLoopDriver:
 
     @classmethod
     def from_vehicle(cls, setup: DriverSetup) -> OpenLoopDriver:
-        """Makes the driver for a car."""
+        """Make the driver for a car."""
         mass_kg = setup.single_track.mass_kg
         speed_hold = SpeedHold(setup.parameters, setup.drive, mass_kg, setup.wheel_radius_m, setup.timestep_s)
         return cls(speed_hold, setup.steering_ratio, setup.steering_wheel_limit_rad, setup.rack_per_steering_wheel_m)
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """What the driver does now.
-
-        Args:
-            setpoint: What is asked.
-            measurement: What the car's sensors say.
-            motion: Not used.
-
-        Returns:
-            The command.
+        """Return the command; see `Driver`.
 
         Raises:
-            ManeuverError: a rack position is asked for and the car has no rack.
+            ManeuverError: the setpoint is a rack position and the car has no rack.
         """
         if setpoint.rack_demand_m is None:
             return self.turn(setpoint.steering_wheel_demand_rad, setpoint, measurement)
         if self._rack_per_steering_wheel_m is None:
             raise ManeuverError(
-                "the car has no rack that its steering wheel drives; give steering_wheel_rad", key="steering.rack_m"
+                "the steering wheel of this car drives no rack; give steering_wheel_rad", key="steering.rack_m"
             )
         return self.turn(setpoint.rack_demand_m / self._rack_per_steering_wheel_m, setpoint, measurement)
 
     def turn(self, angle: float, setpoint: Setpoint, measurement: Measurement) -> DriverCommand:
-        """The same with another steering wheel angle than that of the setpoint.
-
-        Args:
-            angle: Steering wheel angle [rad].
-            setpoint: What is asked otherwise.
-            measurement: What the car's sensors say.
-
-        Returns:
-            The command.
-        """
+        """Return the command for a steering wheel angle [rad] in place of the angle of the setpoint."""
         saturated = False
         if angle > self.steering_wheel_limit_rad:
             angle, saturated = self.steering_wheel_limit_rad, True

@@ -1,4 +1,4 @@
-"""A driver: what he is able to, and how he holds a speed; the keys of a driver file."""
+"""Parameters of a driver: the keys of a driver file."""
 
 from __future__ import annotations
 
@@ -10,39 +10,41 @@ from activesteer.config import Range
 
 @dataclass(frozen=True, kw_only=True)
 class DriverParameters:
-    """How somebody steers along a path, and how he holds a speed, in whatever car."""
+    """Steering along a path, and speed control, of a driver in any car."""
 
     name: str = ""
-    """Short name, for tables; the file's name where not given."""
+    """Short name, for tables. Default: the file's name."""
     title: str = ""
     """One line for lists."""
     preview_s: Annotated[float, Range(0.2, 5.0)]
-    """How far ahead the driver looks [s]; behind it the path goes on straight, as far as he knows."""
+    """Time ahead for which the driver sees the path [s]; he takes it for straight beyond."""
     reaction_delay_s: Annotated[float, Range(0.0, 1.0)]
-    """From seeing to acting, in steps of 10 ms, the time between two looks [s]."""
+    """Delay from seeing to acting, a multiple of the 10 ms between two looks [s]."""
     neuromuscular_lag_s: Annotated[float, Range(0.0, 0.5)]
     """First-order lag of arms and hands [s]."""
     return_time_s: Annotated[float, Range(0.0, 5.0)]
-    """How he comes back to a path: drifting off it is as unwelcome as the offset that it makes in this time. Where
-    steering costs nothing, the time constant with which an offset decays [s]."""
+    """Weight of the drift off the path: a drift costs as much as the offset that it makes in this time. If steering
+    costs nothing, an offset decays with this time constant [s]."""
     steering_rate_per_metre_radps: Annotated[float, Range(0.01, 100.0)]
-    """How tightly he follows: the rate of the steering wheel that is as unwelcome as being a metre off the path
+    """Weight of the steering: steering wheel rate that costs as much as an offset of one metre from the path
     [rad/s]."""
     steering_rate_limit_radps: Annotated[float, Range(0.1, 50.0)]
-    """How fast the steering wheel is turned at most [rad/s]."""
+    """Largest steering wheel rate [rad/s]."""
     steering_torque_limit_Nm: Annotated[float, Range(0.5, 200.0)] | None = None
-    """Most torque that the hands hold at the steering wheel, as `hand_torque_Nm` is counted; any if not given [N m]."""
+    """Largest torque of the hands at the steering wheel, counted as `hand_torque_Nm` [N m]. Default: no limit."""
 
     speed_gain_1ps: Annotated[float, Range(0.0)] = 3.4
-    """Acceleration asked for per speed error [1/s]: 1 km/h off asks for about 0.9 m/s2."""
+    """Acceleration per speed error [1/s]: about 0.9 m/s2 for an error of 1 km/h."""
     speed_integral_gain_1ps2: Annotated[float, Range(0.0)] = 1.36
-    """The same per integrated speed error [1/s2]: drag is trimmed out within some seconds."""
+    """Acceleration per integrated speed error [1/s2]: it compensates drag within a few seconds."""
 
     spin_mps: Annotated[float, Range(0.1)] = 2.0
-    """How much faster than the car the driven wheels may turn before the foot goes back [m/s]; one hears the engine."""
+    """Speed of the driven wheels above the speed of the car at which the foot goes back [m/s]; the driver hears the
+    engine."""
     spin_slip: Annotated[float, Range(0.01)] = 0.2
-    """And the share of the car's speed that is added to it [-]: beyond the slip of greatest force, 0.1 to 0.15."""
+    """Fraction of the car's speed that is added to `spin_mps` [-]: beyond the slip of the largest force, 0.1 to
+    0.15."""
     foot_lag_s: Annotated[float, Range(0.01, 2.0)] = 0.15
     """Time constant with which the foot goes back [s]."""
     foot_return_per_s: Annotated[float, Range(0.01, 10.0)] = 0.5
-    """How fast it presses down again, shares of the whole way per second [1/s]."""
+    """Rate at which the foot presses down again, in pedal strokes per second [1/s]."""
