@@ -20,6 +20,8 @@ from activesteer.vehicle_builder.check.findings import Finding, Usual, judged
 
 _STEPS: Final = 500
 _STILL_MPS: Final = 0.01
+_DAMPING: Final = Usual(500.0, 20e3, 0.0, 100e3)
+"""Slope of a damper's curve [N s/m]; chosen: the dampers of our cars have 2 to 4 kN s/m, those of the `sedan` 15."""
 
 
 def standing(vehicle: Vehicle, car: Car) -> Iterator[Finding]:
@@ -145,6 +147,11 @@ def _dampers(car: Car) -> Iterator[Finding]:
         yield Finding(
             "standing", f"{axle} damper resists its motion", "error" if bad else "ok", "no" if bad else "yes", "",
             "force_N has the sign of velocity_mps, both positive in compression, and is 0 at rest" if bad else "",
+        )  # fmt: skip
+        slope = np.abs(np.diff(curve.force_N) / np.diff(curve.velocity_mps)).max()
+        yield judged(
+            "standing", f"{axle} damper, steepest slope of its curve", float(slope), "N s/m", _DAMPING,
+            "velocity_mps is in m/s and force_N in N",
         )  # fmt: skip
 
 

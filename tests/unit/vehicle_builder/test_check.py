@@ -143,6 +143,13 @@ def test_a_damper_that_pushes(damaged: Damage) -> None:
     assert report["front damper resists its motion"].level == "error"
 
 
+def test_a_damper_of_absurd_force(damaged: Damage) -> None:
+    report = damaged("car.toml", (r"(force_N = \[-1750.* 0(?:\.0)?), 60(?:\.0)?,", r"\1, 6e7,"))
+    finding = report["front damper, steepest slope of its curve"]
+    assert (finding.level, finding.value) == ("error", "1.2e+09 N s/m")
+    assert report["rear damper, steepest slope of its curve"].level == "ok"
+
+
 def test_bump_steer_of_a_tie_rod_at_the_wrong_height(tmp_path: Path) -> None:
     table = changed(
         WISHBONE, tmp_path, ("front.tie_rod_inner,   -200, 392,  320", "front.tie_rod_inner,   -200, 392,  296"),
