@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -129,8 +131,18 @@ def test_info_of_something_else_is_an_error(call, tmp_path, data, told):
 DIFFERENCES = {"estimator_lqr_us", "integrated_us", "mpc_us"}
 
 
-def test_bench_has_the_promised_keys(call, monkeypatch):
-    monkeypatch.setattr("activesteer.studies.benchmark._RUNS_PER_PROCESS", 1)
+def test_bench_has_the_promised_keys_and_ratios(call, monkeypatch):
+    """With stages that are not driven: `make test` runs the whole benchmark."""
+    times_us = itertools.count(20)
+    monkeypatch.setattr(
+        "activesteer.studies.benchmark._interleaved", lambda stages, _: {name: [next(times_us)] for name in stages}
+    )
+    driven = SimpleNamespace(vehicle=SimpleNamespace(timestep_s=0.001), replay_us=None, step_us=None)
+    for name, instead in {
+        "prepared": lambda scenario: scenario, "DrivenStop": lambda: driven, "_KeptInputs": lambda _: driven,
+        "_asked": lambda *_: [], "_runs_per_min": lambda: 100.0, "_blocks": lambda _: {},
+    }.items():  # fmt: skip
+        monkeypatch.setattr(f"activesteer.studies.benchmark.{name}", instead)
     told = call("bench", "--rounds", "1", "--json")
     assert told.status == 0
     assert told.err == ""

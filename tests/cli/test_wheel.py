@@ -60,6 +60,9 @@ def test_wheel_holds_models_and_maneuvers_and_no_tests(wheel):
         "activesteer/_data/models/mjcf/compact/compact.xml",
     ):
         assert wanted in names
+    for folder in ("maneuvers", "models", "studies"):
+        files = [path for path in (ROOT / folder).rglob("*") if path.is_file() and "__pycache__" not in path.parts]
+        assert {f"activesteer/_data/{path.relative_to(ROOT).as_posix()}" for path in files} <= set(names)
     assert not [name for name in names if name.startswith(("tests/", "tools/", "models/")) or name.endswith(".nbc")]
 
 
@@ -73,8 +76,10 @@ def test_installed_package_is_its_own(installed, tmp_path):
     )
     for path in told.split():
         assert Path(path).is_relative_to(installed.parent)
+    assert "step_steer" in call(installed / "activesteer", "list", cwd=tmp_path)
 
 
+@pytest.mark.slow
 def test_installed_package_drives_a_maneuver(installed, tmp_path):
     told = call(installed / "activesteer", "run", "step_steer", "-c", "none", "-o", "run.mcap", "--json", cwd=tmp_path)
     json.loads(told)
