@@ -43,7 +43,7 @@ def _compare(options: argparse.Namespace) -> int:
     *measured, simulated = (Recording.open(file, recover=True) for file in options.files)
     found = compare(measured, simulated, options.standard)
     if options.output is not None:
-        from activesteer.measured.page import write_page
+        from activesteer.measured.comparison_page import write_page
 
         names = [file.stem for file in options.files]
         write_page(found, names[:-1], names[-1], options.output)

@@ -35,7 +35,7 @@ def add_to(commands: Any) -> None:
 
 def _test(options: argparse.Namespace) -> int:
     from activesteer.standards.examination import examine, write_json
-    from activesteer.standards.page import write_page
+    from activesteer.standards.examination_page import write_page
 
     if options.output is not None:
         options.how_to_resume = "; the same command resumes it"

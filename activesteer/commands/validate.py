@@ -58,9 +58,9 @@ def _validate(options: argparse.Namespace) -> int:
     if measured:
         return _circle(options)
     from activesteer.validation import to_json, validate
-    from activesteer.validation.page import write_page
     from activesteer.validation.programme import write_json, write_runs
     from activesteer.validation.study import as_text
+    from activesteer.validation.validation_page import write_page
 
     with ProgressBar("validate", quiet=options.json) as bar:
         result = validate(

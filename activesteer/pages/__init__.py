@@ -9,12 +9,18 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.pages.model import Page, Section, Table, Text, failed, passed
 from activesteer.quantities import parameter_title, typeset
 from activesteer.version import __version__
 
 
+def render_page(page: Page) -> str:
+    """Return a page as HTML."""
+    return render("document.html", page=page)
+
+
 def render(template: str, **content: Any) -> str:
-    """A page.
+    """Return the HTML of a template.
 
     Args:
         template: File name of the template.
@@ -37,11 +43,18 @@ def _environment() -> Environment:
     environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "separators": (",", ":"), "allow_nan": False}
     environment.globals |= {"version": __version__, "asset": _asset}
     environment.globals |= {"run_colours": RUN_COLOURS, "run_colours_on_dark": RUN_COLOURS_ON_DARK}
-    environment.filters |= {"typeset": typeset, "label": parameter_title}
+    environment.filters |= {"typeset": _typeset, "label": parameter_title}
     return environment
+
+
+def _typeset(text: Text) -> Text:
+    return text if isinstance(text, Markup) else typeset(text)
 
 
 def _asset(name: str) -> Markup:
     """A file of ours as it is: stylesheets and scripts."""
     loader = PackageLoader("activesteer.pages")
     return Markup(loader.get_source(_environment(), name)[0])
+
+
+__all__ = ["Page", "Section", "Table", "Text", "failed", "passed", "render", "render_page"]

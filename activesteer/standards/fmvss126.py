@@ -8,7 +8,9 @@ from typing import Any, Final
 
 from activesteer.analysis.sine_with_dwell import DISPLACEMENT_TIME_S, INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.slow_ramp import FIT, REFERENCE_MPS2
-from activesteer.standards.page_parts import Curve, Panel, Picture, Table, cell
+from activesteer.pages import Table
+from activesteer.plotting import Curve, Panel, Picture
+from activesteer.standards.page_parts import cell
 from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
 
 RAMP_DEGPS: Final = 13.5
@@ -170,7 +172,7 @@ def _pictures(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> 
             Curve(
                 [row["factor"] for row in series if row["direction"] == side],
                 [factor * row[name] for row in series if row["direction"] == side],
-                f"{side} first", marked=True,
+                f"{side} first", marker="o",
             )
             for side in SIDES
         ]  # fmt: skip

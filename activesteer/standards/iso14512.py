@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.standards.page_parts import Picture, metrics_table, time_panels
+from activesteer.plotting import Picture
+from activesteer.standards.page_parts import metrics_table, time_panels
 from activesteer.standards.standard import Findings, Ground, Run, Standard
 
 AFTER_S: Final = 1.0

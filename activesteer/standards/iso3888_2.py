@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 from itertools import groupby
 from typing import Final
 
-from activesteer.standards.page_parts import Curve, Panel, Picture, Table, cell, time_panels
+from activesteer.pages import Table
+from activesteer.plotting import Curve, Panel, Picture
+from activesteer.standards.page_parts import cell, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 
 DRIVER: Final = "expert"
@@ -141,7 +143,7 @@ def _pictures(ground: Ground, speeds: dict[str, float | None], driven: dict[str,
         inside = x < course.lanes[-1].end_x_m + _BEYOND_M
         curves = [
             Curve(x[inside], y[inside], "centre of gravity"),
-            Curve(course.cones_m[:, 0], course.cones_m[:, 1], "cones", marked=True, joined=False),
+            Curve(course.cones_m[:, 0], course.cones_m[:, 1], "cones", dashes="", marker="o"),
         ]
         tracks.append(Panel("x [m]", "y [m]", curves, f"{side} first"))
     words = {

@@ -11,8 +11,9 @@ from activesteer.analysis.handling import CarGeometry, Handling, evaluate
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.metric_table import metric
+from activesteer.plotting import Curve, Panel, Picture
 from activesteer.quantities import quantity_of
-from activesteer.standards.page_parts import Curve, Panel, Picture, axis_label, metrics_table
+from activesteer.standards.page_parts import axis_label, metrics_table
 from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 
 RADIUS_M: Final = 100.0

@@ -12,8 +12,10 @@ from activesteer.analysis.frequency_response import INPUT, FrequencyResponse, HI
 from activesteer.analysis.random_response import RandomResponse, random_response
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
+from activesteer.pages import Table
+from activesteer.plotting import Curve, Panel, Picture
 from activesteer.quantities import DisplayUnit, display_unit
-from activesteer.standards.page_parts import Curve, Panel, Picture, Table, metrics_table, time_panels
+from activesteer.standards.page_parts import metrics_table, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 from activesteer.standards.steering_angle import steering_wheel_at
 
@@ -160,7 +162,7 @@ def _bode(name: str, found: Responses) -> Picture:
         label: str, shown: Callable[[FrequencyResponse], Array], limits: Sequence[tuple[float, str]] = ()
     ) -> Panel:
         curves = [Curve(each.frequency_Hz, shown(each), kind) for kind, each in found.items()]
-        return Panel("frequency [Hz]", label, curves, limits=limits, log=True)
+        return Panel("frequency [Hz]", label, curves, limits=limits, log="x")
 
     panels = [
         panel(f"gain [{unit.name}]", lambda each: unit.factor * np.abs(each.response)),

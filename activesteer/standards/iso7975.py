@@ -6,7 +6,8 @@ import math
 from typing import Final
 
 from activesteer.metric_table import metric
-from activesteer.standards.page_parts import Curve, Panel, Picture, metrics_table, time_panels
+from activesteer.plotting import Curve, Panel, Picture
+from activesteer.standards.page_parts import metrics_table, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 from activesteer.standards.steering_angle import steering_wheel_at
 
@@ -64,7 +65,7 @@ def _over_deceleration(name: str, by_side: dict[str, list[Run]]) -> Panel:
             [run.metric("mean_deceleration_mps2") for run in group],
             [shown.unit.factor * run.metric(name) for run in group],
             side,
-            marked=True,
+            marker="o",
         )
         for side, group in by_side.items()
     ]

@@ -1,87 +1,15 @@
-"""What a page of a test shows: tables, and pictures of curves in panels."""
+"""Tables and panels that the pages of several standards show."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
-
-from numpy.typing import ArrayLike
+from typing import Any, Protocol
 
 from activesteer.metric_table import metric
+from activesteer.pages import Table
+from activesteer.plotting import Curve, Panel
 from activesteer.quantities import quantity_of
-
-
-class Curve(NamedTuple):
-    """A curve in a panel, in the units of its axes.
-
-    Attributes:
-        x: Abscissa, shape (n,).
-        y: Ordinate, shape (n,).
-        label: Its name in the legend; none where empty.
-        shade: Place on a scale of colours from 0 to 1, of a curve that is one of many; None for a colour of its own.
-        marked: Whether its points are drawn.
-        joined: Whether they are joined by a line.
-    """
-
-    x: ArrayLike
-    y: ArrayLike
-    label: str = ""
-    shade: float | None = None
-    marked: bool = False
-    joined: bool = True
-
-
-class Panel(NamedTuple):
-    """A pair of axes.
-
-    Attributes:
-        x_label: Name and unit of the abscissa.
-        y_label: Name and unit of the ordinate.
-        curves: What is drawn.
-        title: What stands above.
-        limits: Values of the ordinate that a standard sets, with their names.
-        log: Whether the abscissa is logarithmic.
-        names: Names of the ordinates 0, 1, ... from above, where these are no numbers.
-    """
-
-    x_label: str
-    y_label: str
-    curves: Sequence[Curve]
-    title: str = ""
-    limits: Sequence[tuple[float, str]] = ()
-    log: bool = False
-    names: Sequence[str] = ()
-
-
-class Picture(NamedTuple):
-    """Panels beside each other.
-
-    Attributes:
-        title: What they show.
-        panels: The panels.
-        scale: What the colours of curves with a shade mean: name, least and greatest value.
-    """
-
-    title: str
-    panels: Sequence[Panel]
-    scale: tuple[str, float, float] | None = None
-
-
-class Table(NamedTuple):
-    """A table.
-
-    Attributes:
-        title: What it shows.
-        columns: Heads, with units.
-        rows: Cells, as they are read.
-        outside: Numbers of the rows that break a limit.
-    """
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    outside: frozenset[int] = frozenset()
 
 
 def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:

@@ -9,8 +9,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from activesteer.errors import SimulationDiverged
+from activesteer.pages import Table
+from activesteer.plotting import Curve, Panel, Picture
 from activesteer.quantities import display_unit
-from activesteer.standards.page_parts import Curve, Panel, Picture, Table, cell, time_panels
+from activesteer.standards.page_parts import cell, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
 from activesteer.studies.fault_figures import FIGURES
 
@@ -220,7 +222,7 @@ def _dots(faults: list[dict[str, Any]]) -> Picture:
         for side in SIDES:
             rows = [row for row in faults if row["direction"] == side]
             places = [float(names.index(row["fault"])) for row in rows]
-            curves.append(Curve([_shown(row, figure) for row in rows], places, side, marked=True, joined=False))
+            curves.append(Curve([_shown(row, figure) for row in rows], places, side, dashes="", marker="o"))
         shown = names if figure == FIGURES[0] else [""] * len(names)
         return Panel(label, "", curves, names=shown)
 

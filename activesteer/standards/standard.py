@@ -11,9 +11,10 @@ import numpy as np
 
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import ManeuverError, RecordingError
+from activesteer.pages import Table
+from activesteer.plotting import Curve, Picture
 from activesteer.quantities import quantity_of
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.standards.page_parts import Curve, Picture, Table
 
 if TYPE_CHECKING:
     from activesteer.scenario import FileOrTable, Scenario

@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from activesteer.plotting import new_figure, plain_axis, save_all, zero_line
+from activesteer.plotting import Curve, Panel, Picture, save_all
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _COLOURS: Final = ("#0072b2", "#009e73", "#e69f00", "#d55e00", "#cc79a7", "#333333", "#56b4e9")
 """Colours that colour-blind readers can tell apart (Okabe and Ito, 2008)."""
@@ -27,19 +25,19 @@ _WIDEST_SLIP: Final = 0.6
 _WIDEST_CAMBER_RAD: Final = math.radians(6.0)
 _DIRECTIONS: Final = 180
 _GRID: Final = 351
-"""Slips and slip angles each, of which the friction ellipse is the outline."""
+"""Number of slips and of slip angles whose forces the friction ellipse encloses."""
 
 
 def draw(params: TyreParameters, folder: str | os.PathLike[str]) -> list[Path]:
-    """Draw what a tyre does, as PNG files.
+    """Draw the forces of a tyre as PNG files.
 
-    The pictures: `side_force.png` (side force and aligning moment over slip angle, for loads and for cambers),
-    `longitudinal_force.png`, `friction_ellipse.png`, `combined_slip.png`, `relaxation_lengths.png`. All at the file's
-    pressure and speed of measurement, within its ranges of validity.
+    The pictures are `side_force.png` (side force and aligning moment over slip angle, for loads and for cambers),
+    `longitudinal_force.png`, `friction_ellipse.png`, `combined_slip.png` and `relaxation_lengths.png`. All of them are
+    at the file's pressure and speed of measurement and within its ranges of validity.
 
     Args:
         params: The tyre, as mounted.
-        folder: Directory for the files; created where it does not exist.
+        folder: Folder for the files; it is created if it does not exist.
 
     Returns:
         The paths written, in this order.
@@ -48,32 +46,19 @@ def draw(params: TyreParameters, folder: str | os.PathLike[str]) -> list[Path]:
         ParameterError: matplotlib is not installed, or a file cannot be written.
     """
     formula = MagicFormula(params)
-    pictures: dict[str, Callable[[MagicFormula], Figure]] = {
+    name = params.source.name if params.source else "tyre"
+    pictures: dict[str, Callable[[MagicFormula], Picture]] = {
         "side_force": _side_force,
         "longitudinal_force": _longitudinal_force,
         "friction_ellipse": _friction_ellipse,
         "combined_slip": _combined_slip,
         "relaxation_lengths": _relaxation_lengths,
     }
-    return save_all(pictures, formula, folder)
+    return save_all({file: partial(make, formula) for file, make in pictures.items()}, folder, f"{name}: ")
 
 
-def _new_figure(params: TyreParameters, title: str, width_in: float, height_in: float) -> Figure:
-    name = params.source.name if params.source else "tyre"
-    return new_figure(width_in, height_in, f"{name}: {title}")
-
-
-def _style(axis: Axes, x: str, y: str) -> None:
-    axis.set_xlabel(x)
-    axis.set_ylabel(y)
-    plain_axis(axis)
-    zero_line(axis.axhline)
-    zero_line(axis.axvline)
-    axis.margins(x=0.0)
-
-
-def _legend(axis: Axes, title: str | None = None) -> None:
-    axis.legend(title=title, loc="best", fontsize="small", title_fontsize="small", frameon=False)
+def _curve(x: ArrayLike, y: ArrayLike, colour: str, label: str = "", dashes: str = "-", width: float = 1.5) -> Curve:
+    return Curve(x, y, label, colour, dashes, width)
 
 
 def _in_degrees(angle_rad: float) -> str:
@@ -104,60 +89,50 @@ def _slips(params: TyreParameters) -> np.ndarray:
     return _within(params, "KPUMIN", "KPUMAX", _WIDEST_SLIP)
 
 
-def _side_force(formula: MagicFormula) -> Figure:
+def _side_force(formula: MagicFormula) -> Picture:
     """Side force above, aligning moment below; loads on the left, cambers on the right."""
-    params = formula.parameters
-    figure = _new_figure(params, "pure side slip", 10.0, 7.5)
-    axes = figure.subplots(2, 2, sharex=True, sharey="row")
+    params, nominal = formula.parameters, _nominal(formula.parameters)
     alpha = _angles(params)
-    nominal = _nominal(params)
     cambers = np.unique(
         [np.clip(value, params["CAMMIN"], params["CAMMAX"]) for value in np.linspace(-1, 1, 5) * _WIDEST_CAMBER_RAD]
     )
-    families = [
-        [(f"{load / 1000:g} kN", load, 0.0) for load in _loads(params)],
-        [(_in_degrees(camber), nominal, camber) for camber in cambers],
-    ]
-    for column, family in enumerate(families):
+    families = {
+        "load, no camber": [(f"{load / 1000:g} kN", load, 0.0) for load in _loads(params)],
+        f"camber, {nominal / 1000:.3g} kN": [(_in_degrees(camber), nominal, camber) for camber in cambers],
+    }
+    # A little room, or the last number of the left panel touches the first one of the right panel.
+    x_range = (1.03 * _DEGREES * alpha[0], 1.03 * _DEGREES * alpha[-1])
+    above, below = [], []
+    for title, family in families.items():
+        forces, moments = [], []
         for (label, load, camber), colour in zip(family, _COLOURS, strict=False):
-            forces = formula.evaluate(load, 0.0, alpha, camber)
-            axes[0, column].plot(_DEGREES * alpha, forces.fy_N / 1000.0, color=colour, label=label)
-            axes[1, column].plot(_DEGREES * alpha, forces.mz_Nm, color=colour, label=label)
-    for axis in axes.flat:
-        _style(axis, "", "")
-    for axis in axes[1]:
-        axis.set_xlabel("slip angle [°]")
-        # A little room, or the last number of the left panel touches the first of the right one.
-        axis.set_xlim(1.03 * _DEGREES * alpha[0], 1.03 * _DEGREES * alpha[-1])
-    axes[0, 0].set_ylabel("side force $F_y$ [kN]")
-    axes[1, 0].set_ylabel("aligning moment $M_z$ [Nm]")
-    axes[0, 0].set_title("load, no camber", fontsize="small")
-    axes[0, 1].set_title(f"camber, {nominal / 1000:.3g} kN", fontsize="small")
-    for axis in axes[0]:
-        _legend(axis)
-    return figure
+            found = formula.evaluate(load, 0.0, alpha, camber)
+            forces.append(_curve(_DEGREES * alpha, found.fy_N / 1000.0, colour, label))
+            moments.append(_curve(_DEGREES * alpha, found.mz_Nm, colour))
+        above.append(Panel("", "side force $F_y$ [kN]", forces, title, x_range=x_range, zero=True))
+        below.append(Panel("slip angle [°]", "aligning moment $M_z$ [Nm]", moments, x_range=x_range, zero=True))
+    return Picture("pure side slip", above + below, width_in=10.0, height_in=7.5)
 
 
-def _longitudinal_force(formula: MagicFormula) -> Figure:
+def _longitudinal_force(formula: MagicFormula) -> Picture:
     params = formula.parameters
-    figure = _new_figure(params, "pure longitudinal slip", 7.5, 5.0)
-    axis = figure.subplots()
     kappa = _slips(params)
-    for load, colour in zip(_loads(params), _COLOURS, strict=False):
-        fx = formula.evaluate(load, kappa, 0.0).fx_N
-        axis.plot(100.0 * kappa, fx / 1000.0, color=colour, label=f"{load / 1000:g} kN")
-    _style(axis, "longitudinal slip [%], braking negative", "longitudinal force $F_x$ [kN]")
-    _legend(axis, "load")
-    return figure
+    curves = [
+        _curve(100.0 * kappa, formula.evaluate(load, kappa, 0.0).fx_N / 1000.0, colour, f"{load / 1000:g} kN")
+        for load, colour in zip(_loads(params), _COLOURS, strict=False)
+    ]
+    x_label, y_label = "longitudinal slip [%], braking negative", "longitudinal force $F_x$ [kN]"
+    panel = Panel(x_label, y_label, curves, zero=True, legend="load")
+    return Picture("pure longitudinal slip", [panel], width_in=7.5, height_in=5.0)
 
 
 def envelope(formula: MagicFormula, load_N: float, directions: int = _DIRECTIONS) -> tuple[np.ndarray, np.ndarray]:
-    """The greatest horizontal force of a tyre in every direction.
+    """Return the greatest horizontal force of a tyre in every direction.
 
     Args:
         formula: The tyre.
         load_N: Load [N].
-        directions: Number of sectors of the plane; each gives the outermost of its points.
+        directions: Number of sectors of the plane; each gives its outermost point.
 
     Returns:
         F_x and F_y [N] at the outermost of all combinations of slips within the ranges of the file, around the plane
@@ -179,59 +154,56 @@ def envelope(formula: MagicFormula, load_N: float, directions: int = _DIRECTIONS
     return fx[outermost], fy[outermost]
 
 
-def _friction_ellipse(formula: MagicFormula) -> Figure:
-    params = formula.parameters
-    figure = _new_figure(params, "greatest forces at combined slip, over the load", 7.0, 6.0)
-    axis = figure.subplots()
-    maximum = 0.0
-    for load, colour in zip(_loads(params), _COLOURS, strict=False):
+def _friction_ellipse(formula: MagicFormula) -> Picture:
+    curves, maximum = [], 0.0
+    for load, colour in zip(_loads(formula.parameters), _COLOURS, strict=False):
         fx, fy = envelope(formula, load)
-        axis.plot(fy / load, fx / load, color=colour, label=f"{load / 1000:g} kN")
+        curves.append(_curve(fy / load, fx / load, colour, f"{load / 1000:g} kN"))
         maximum = max(maximum, float(np.abs([fx, fy]).max()) / load)
     circle = np.linspace(0.0, 2.0 * math.pi, 181)
-    axis.plot(np.sin(circle), np.cos(circle), "--", color="#999999", linewidth=0.9, label="friction 1")
-    _style(axis, "side force over load $F_y / F_z$, to the left positive", "longitudinal force over load $F_x / F_z$")
+    curves.append(_curve(np.sin(circle), np.cos(circle), "#999999", "friction 1", "--", 0.9))
     limit = 1.08 * max(maximum, 1.0)
-    axis.set(xlim=(limit, -limit), ylim=(-limit, limit), aspect="equal")
-    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="load", fontsize="small", frameon=False)
-    return figure
+    panel = Panel(
+        "side force over load $F_y / F_z$, to the left positive", "longitudinal force over load $F_x / F_z$", curves,
+        x_range=(limit, -limit), y_range=(-limit, limit), zero=True, equal=True, legend="load",
+    )  # fmt: skip
+    return Picture("greatest forces at combined slip, over the load", [panel], width_in=6.5, height_in=6.5)
 
 
-def _combined_slip(formula: MagicFormula) -> Figure:
-    """Forces over slip for slip angles, over the slip angle for slips, and against each other."""
+def _combined_slip(formula: MagicFormula) -> Picture:
+    """Forces over slip for slip angles, and forces against each other."""
     params = formula.parameters
-    figure = _new_figure(params, f"combined slip at {_nominal(params) / 1000:.3g} kN", 11.0, 4.4)
-    axes = figure.subplots(1, 3, width_ratios=(3.0, 3.0, 2.0))
     nominal, kappa = _nominal(params), _slips(params)
     angles = [math.radians(value) for value in (0, 2, 4, 8, 12)]
     angles = [value for value in angles if params["ALPMIN"] <= -value <= params["ALPMAX"]]
+    along, aside, both = [], [], []
     for angle, colour in zip(angles, _COLOURS, strict=False):
-        # Turning left: slip angles are negative, forces positive.
+        # In a left turn slip angles are negative and forces positive.
         forces = formula.evaluate(nominal, kappa, -angle)
-        label = _in_degrees(-angle)
-        axes[0].plot(100.0 * kappa, forces.fx_N / 1000.0, color=colour, label=label)
-        axes[1].plot(100.0 * kappa, forces.fy_N / 1000.0, color=colour, label=label)
-        axes[2].plot(forces.fy_N / 1000.0, forces.fx_N / 1000.0, color=colour, label=label)
-    _style(axes[0], "longitudinal slip [%]", "longitudinal force $F_x$ [kN]")
-    _style(axes[1], "longitudinal slip [%]", "side force $F_y$ [kN]")
-    _style(axes[2], "side force $F_y$ [kN]", "longitudinal force $F_x$ [kN]")
-    axes[2].set_aspect("equal")
-    axes[2].margins(0.05)
-    _legend(axes[0], "slip angle")
-    return figure
+        fx, fy = forces.fx_N / 1000.0, forces.fy_N / 1000.0
+        along.append(_curve(100.0 * kappa, fx, colour, _in_degrees(-angle)))
+        aside.append(_curve(100.0 * kappa, fy, colour))
+        both.append(_curve(fy, fx, colour))
+    panels = [
+        Panel("longitudinal slip [%]", "longitudinal force $F_x$ [kN]", along, zero=True, legend="slip angle"),
+        Panel("longitudinal slip [%]", "side force $F_y$ [kN]", aside, zero=True),
+        Panel("side force $F_y$ [kN]", "longitudinal force $F_x$ [kN]", both, zero=True, equal=True),
+    ]
+    title = f"combined slip at {nominal / 1000:.3g} kN"
+    return Picture(title, panels, width_in=11.0, height_in=4.4, widths=(3.0, 3.0, 2.0))
 
 
-def _relaxation_lengths(formula: MagicFormula) -> Figure:
+def _relaxation_lengths(formula: MagicFormula) -> Picture:
     params = formula.parameters
-    figure = _new_figure(params, "relaxation lengths", 7.5, 4.5)
-    axis = figure.subplots()
     loads = np.linspace(params["FZMIN"], min(params["FZMAX"], 2.5 * params["FNOMIN"]), 301)
     at = formula.evaluate(loads, 0.0, 0.0)
-    axis.plot(loads / 1000.0, at.relaxation_length_y_m, color=_COLOURS[0], label="lateral")
-    axis.plot(loads / 1000.0, at.relaxation_length_x_m, color=_COLOURS[3], label="longitudinal")
-    axis.plot(loads / 1000.0, at.contact_length_m, ":", color=_COLOURS[5], label="contact length")
-    _style(axis, "load [kN]", "length [m]")
-    axis.axvline(params["FNOMIN"] / 1000.0, color="#999999", linewidth=0.9, linestyle="--", label="nominal load")
-    axis.set(xlim=(0.0, None), ylim=(0.0, None))
-    _legend(axis)
-    return figure
+    longest = 1.05 * float(np.max([at.relaxation_length_y_m, at.relaxation_length_x_m, at.contact_length_m]))
+    nominal = params["FNOMIN"] / 1000.0
+    curves = [
+        _curve(loads / 1000.0, at.relaxation_length_y_m, _COLOURS[0], "lateral"),
+        _curve(loads / 1000.0, at.relaxation_length_x_m, _COLOURS[3], "longitudinal"),
+        _curve(loads / 1000.0, at.contact_length_m, _COLOURS[5], "contact length", ":"),
+        _curve([nominal, nominal], [0.0, longest], "#999999", "nominal load", "--", 0.9),
+    ]
+    panel = Panel("load [kN]", "length [m]", curves, x_range=(0.0, None), y_range=(0.0, longest), zero=True)
+    return Picture("relaxation lengths", [panel], width_in=7.5, height_in=4.5)

@@ -14,10 +14,10 @@ from activesteer.analysis.report import report_page
 from activesteer.pages import render
 from activesteer.validation.comparison import Comparison
 from activesteer.validation.kinematics import Curves
-from activesteer.validation.page import page
 from activesteer.validation.programme import Validation
 from activesteer.validation.reference import ReferenceData
 from activesteer.validation.study import Response
+from activesteer.validation.validation_page import page
 from tests.contrast import contrast
 from tests.unit.analysis.synthetic import step_steer
 from tests.unit.analysis.synthetic_files import recording_of
@@ -92,4 +92,4 @@ def test_json_in_a_page_comes_back_and_opens_nothing():
 
 def test_what_a_template_needs_must_be_given():
     with pytest.raises(UndefinedError):
-        render("validation.html")
+        render("document.html")

@@ -5,6 +5,6 @@ The plots are drawn in the browser by uPlot (https://github.com/leeoniya/uPlot, 
 """
 
 from activesteer.analysis.report.groups import open_all
-from activesteer.analysis.report.page import report_page, write_report
+from activesteer.analysis.report.run_page import report_page, write_report
 
 __all__ = ["open_all", "report_page", "write_report"]

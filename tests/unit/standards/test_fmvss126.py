@@ -15,8 +15,8 @@ from activesteer.errors import ManeuverError
 from activesteer.files import json_text
 from activesteer.standards import fmvss126
 from activesteer.standards.examination import examine
+from activesteer.standards.examination_page import page
 from activesteer.standards.fmvss126 import STANDARD, amplitudes, verdict
-from activesteer.standards.page import page
 from activesteer.standards.proving_ground import ProvingGround
 from activesteer.standards.standard import Findings, Ground
 from tests.raising import raises

@@ -6,17 +6,18 @@ import datetime
 
 import pytest
 
+from activesteer.pages import Table
+from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.examination import Examination
-from activesteer.standards.page import page
-from activesteer.standards.page_parts import Curve, Panel, Picture, Table
+from activesteer.standards.examination_page import page
 from activesteer.standards.standard import Findings, Standard
 
 EVIL = '</td><script>alert(1)</script><img src="http://example.org/x">{{ version }}'
 
 
 def examination(word: str, **values: bool) -> Examination:
-    picture = Picture(word, [Panel(word, word, [Curve([1.0, 2.0], [1.0, 2.0], word)], word, [(1.5, word)])])
-    shaded = Picture(word, [Panel("x", "y", [Curve([1.0, 2.0], [1.0, 2.0], shade=0.5)], log=True)], (word, 0.0, 1.0))
+    picture = Picture(word, [Panel(word, word, [Curve([1.0, 2.0], [1.0, 2.0], word)], word, limits=[(1.5, word)])])
+    shaded = Picture(word, [Panel("x", "y", [Curve([1.0, 2.0], [1.0, 2.0], shade=0.5)], log="x")], (word, 0.0, 1.0))
     found = Findings(dict(values), word, [Table(word, [word], [[word]], frozenset([0]))], [picture, shaded])
     standard = Standard("one", word, word, [word], [word], lambda _: found)
     return Examination(standard, word, word, {"road.mu": word}, {word: found}, {"activesteer": word}, datetime.date.min)

@@ -1,0 +1,77 @@
+"""The parts of a page that is read from the top to the end: texts, tables, pictures and points in sections."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from markupsafe import Markup
+
+Text = str | Markup
+"""Text is escaped; markup must be made by `Markup`."""
+
+
+class Table(NamedTuple):
+    """A table.
+
+    Attributes:
+        title: Its title; empty for none.
+        columns: Heads, with units.
+        rows: Cells, as they are read.
+        outside: Numbers of the rows that break a limit.
+        quiet: Numbers of the rows that nothing is asked of.
+        kind: Class of the stylesheet.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Text]]
+    outside: frozenset[int] = frozenset()
+    quiet: frozenset[int] = frozenset()
+    kind: str = "findings"
+
+
+class Section(NamedTuple):
+    """A section; its parts follow each other in the order of the attributes.
+
+    Attributes:
+        title: Its heading; empty for none.
+        texts: Paragraphs.
+        pictures: SVG elements.
+        tables: Tables.
+        points: Items of a list.
+        level: Level of its heading: 2, or 3 for a part of the section before.
+    """
+
+    title: str = ""
+    texts: Sequence[Text] = ()
+    pictures: Sequence[Markup] = ()
+    tables: Sequence[Table] = ()
+    points: Sequence[str] = ()
+    level: int = 2
+
+
+class Page(NamedTuple):
+    """A page.
+
+    Attributes:
+        title: Title of the window.
+        heading: Heading of the page.
+        lead: Paragraphs below the heading.
+        sections: The sections.
+    """
+
+    title: str
+    heading: Text
+    lead: Sequence[Text]
+    sections: Sequence[Section]
+
+
+def passed(words: str, *, chip: bool = False) -> Markup:
+    """Return words with a tick."""
+    return Markup('<b class="{}passed">\N{CHECK MARK} {}</b>').format("chip " if chip else "", words)
+
+
+def failed(words: str, *, chip: bool = False) -> Markup:
+    """Return words with a cross."""
+    return Markup('<b class="{}failed">\N{BALLOT X} {}</b>').format("chip " if chip else "", words)

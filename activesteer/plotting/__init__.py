@@ -1,0 +1,19 @@
+"""Plots: one model of a curve, a panel and a picture, drawn by matplotlib without a screen."""
+
+from activesteer.plotting.drawing import draw, save_all
+from activesteer.plotting.files import as_svg, new_figure, plain_axis, save
+from activesteer.plotting.model import Area, Curve, Heat, Panel, Picture
+
+__all__ = [
+    "Area",
+    "Curve",
+    "Heat",
+    "Panel",
+    "Picture",
+    "as_svg",
+    "draw",
+    "new_figure",
+    "plain_axis",
+    "save",
+    "save_all",
+]

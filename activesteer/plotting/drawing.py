@@ -1,0 +1,204 @@
+"""Drawing of pictures."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from activesteer.conventions import RUN_COLOURS, Array
+from activesteer.errors import ParameterError
+from activesteer.files import make_folder
+from activesteer.plotting.files import new_figure, plain_axis, save
+from activesteer.plotting.model import Heat, Panel, Picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
+
+_BESIDE: Final = 3
+"""Most panels beside each other."""
+_ROW_IN: Final = 2.7
+_NAME_IN: Final = 0.17
+"""Height of a row of panels, and of a name of an ordinate [in]."""
+_LIMIT: Final = "#b3261e"
+_ZERO: Final = "#999999"
+_SCALE: Final = "viridis"
+
+
+def draw(picture: Picture) -> Figure:
+    """Draw a picture.
+
+    Raises:
+        ParameterError: matplotlib is not installed.
+    """
+    count = len(picture.panels)
+    columns = picture.columns or (2 if count == 4 else min(count, _BESIDE))
+    rows = math.ceil(count / columns)
+    names = max(len(panel.names) if isinstance(panel, Panel) else 0 for panel in picture.panels)
+    height_in = picture.height_in or max(_ROW_IN, 0.8 + _NAME_IN * names) * rows + 0.4
+    figure = new_figure(picture.width_in, height_in, picture.title)
+    axes = figure.subplots(rows, columns, squeeze=False, width_ratios=picture.widths or None)
+    for axis in axes.flat[count:]:
+        axis.set_visible(False)
+    used: list[Axes] = list(axes.flat[:count])
+    for axis, panel in zip(used, picture.panels, strict=True):
+        if isinstance(panel, Heat):
+            _fill_heat(axis, panel)
+        else:
+            _fill(axis, panel, own_legend=not picture.shared_legend)
+    if picture.scale is not None:
+        from matplotlib.cm import ScalarMappable  # noqa: PLC0415 - an extra, and slow to import
+
+        label, low, high = picture.scale
+        colours = ScalarMappable(cmap=_SCALE)
+        colours.set_clim(low, high)
+        figure.colorbar(colours, ax=used, label=label)
+    if picture.shared_legend:
+        _share_legend(figure, used[0], picture)
+    figure.align_ylabels(axes)
+    return figure
+
+
+def save_all(
+    pictures: Mapping[str, Callable[[], Picture]], folder: str | os.PathLike[str], title: str = ""
+) -> list[Path]:
+    """Draw pictures and write them as PNG files.
+
+    Args:
+        pictures: File name without its ending -> function that makes the picture.
+        folder: Folder for the files; it is created if it does not exist.
+        title: Beginning of every picture's title.
+
+    Returns:
+        The paths written, in the order given.
+
+    Raises:
+        ParameterError: matplotlib is not installed, or a file cannot be written.
+    """
+    directory = make_folder(folder, ParameterError)
+    paths = []
+    for name, make in pictures.items():
+        picture = make()
+        paths.append(save(draw(picture._replace(title=f"{title}{picture.title}")), directory / f"{name}.png"))
+    return paths
+
+
+def _fill(axis: Axes, panel: Panel, *, own_legend: bool) -> None:
+    for area in panel.areas:
+        axis.fill_between(
+            np.asarray(area.x), area.low, area.high, facecolor=area.colour, alpha=area.alpha, label=area.label or None,
+            edgecolor=area.edge or "none", linewidth=1.0 if area.edge else 0.0,
+        )  # fmt: skip
+    _draw_curves(axis, panel)
+    for value, label in panel.limits:
+        axis.axhline(value, color=_LIMIT, lw=1.0, ls=(0, (4, 2)), label=label)
+    for x, y, text in panel.notes:
+        axis.annotate(text, (x, y), (0, -2), textcoords="offset points", ha="center", va="top", fontsize="xx-small")
+    _set_axes(axis, panel)
+    if own_legend and panel.legend is not None and axis.get_legend_handles_labels()[1]:
+        axis.legend(frameon=False, fontsize="x-small", title=panel.legend or None, title_fontsize="x-small")
+
+
+def _draw_curves(axis: Axes, panel: Panel) -> None:
+    from matplotlib import colormaps  # noqa: PLC0415 - an extra, and slow to import
+
+    own = 0
+    for curve in panel.curves:
+        colour, dashes = curve.colour, curve.dashes
+        if curve.shade is not None:
+            colour = colormaps[_SCALE](curve.shade)
+        elif not colour:
+            colour = RUN_COLOURS[own % len(RUN_COLOURS)]
+            dashes = ("--" if own % 2 else "-") if dashes is None else dashes
+            own += 1
+        axis.plot(
+            np.asarray(curve.x), np.asarray(curve.y), color=colour, ls="-" if dashes is None else dashes,
+            lw=curve.width, marker=curve.marker or None, ms=curve.size, label=curve.label or None,
+        )  # fmt: skip
+
+
+def _set_axes(axis: Axes, panel: Panel) -> None:
+    if panel.log:
+        from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter  # noqa: PLC0415 - an extra
+
+        axis.set_xscale("log")
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.xaxis.set_major_formatter(ScalarFormatter())
+        axis.xaxis.set_minor_formatter(NullFormatter())
+        if panel.log == "xy":
+            axis.set_yscale("log")
+    if panel.names:
+        axis.set_yticks(range(len(panel.names)), panel.names)
+        axis.invert_yaxis()
+    if panel.zero:
+        low, high = axis.get_ylim()
+        if low < 0.0 < high:
+            axis.axhline(0.0, color=_ZERO, linewidth=0.7, zorder=0.5)
+        axis.axvline(0.0, color=_ZERO, linewidth=0.7, zorder=0.5)
+        axis.margins(x=0.0)
+    if panel.x_range is not None:
+        axis.set_xlim(*panel.x_range)
+    if panel.y_range is not None:
+        axis.set_ylim(*panel.y_range)
+    if panel.equal:
+        axis.set_aspect("equal")
+    if panel.above is not None:
+        _add_abscissa(axis, *panel.above)
+    plain_axis(axis)
+    axis.set_title(panel.title, fontsize="small")
+    axis.set_xlabel(panel.x_label, fontsize="small")
+    axis.set_ylabel(panel.y_label, fontsize="small")
+    axis.tick_params(labelsize="small", labelbottom=bool(panel.x_label))
+
+
+def _add_abscissa(axis: Axes, label: str, first: Array, second: Array) -> None:
+    """Draw a second abscissa above a panel, whose values grow with those of the first one."""
+
+    def to_second(x: ArrayLike) -> ArrayLike:
+        return np.interp(np.asarray(x), first, second)
+
+    def to_first(x: ArrayLike) -> ArrayLike:
+        return np.interp(np.asarray(x), second, first)
+
+    above = axis.secondary_xaxis("top", functions=(to_second, to_first))
+    widest = int(min(-np.min(second), np.max(second)))
+    above.set_xticks(range(-widest, widest + 1, 2 if widest % 2 == 0 else 1))
+    above.set_xlabel(label, fontsize="small")
+    above.tick_params(labelsize="small")
+
+
+def _fill_heat(axis: Axes, heat: Heat) -> None:
+    from matplotlib.colors import LinearSegmentedColormap  # noqa: PLC0415 - an extra, and slow to import
+
+    colours = heat.colours
+    if not isinstance(colours, str):
+        colours = LinearSegmentedColormap.from_list("own", list(colours))
+    low, high = heat.span
+    axis.imshow(np.asarray(heat.values), cmap=colours, vmin=low, vmax=high, aspect="auto")
+    for row, texts in enumerate(heat.texts):
+        for column, text in enumerate(texts):
+            axis.text(column, row, text, ha="center", va="center", fontsize="x-small")
+    axis.set_xticks(range(len(heat.columns)), heat.columns, fontsize="x-small")
+    axis.set_yticks(range(len(heat.rows)), heat.rows, fontsize="x-small")
+    axis.set_title(heat.title, fontsize="small")
+    axis.set_xlabel(heat.x_label, fontsize="small")
+    for row in heat.rules:
+        axis.axhline(row - 0.5, color="black", linewidth=0.8)
+
+
+def _share_legend(figure: Figure, axis: Axes, picture: Picture) -> None:
+    from matplotlib.patches import Patch  # noqa: PLC0415 - an extra, and slow to import
+
+    handles, labels = axis.get_legend_handles_labels()
+    for label, colour in picture.legend:
+        handles.append(Patch(facecolor=colour, edgecolor="0.6"))
+        labels.append(label)
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=min(len(labels), 4), frameon=False, fontsize="x-small"
+    )

@@ -1,0 +1,64 @@
+"""Figures of matplotlib: made without a screen, written to files, or put into pages."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from markupsafe import Markup
+
+from activesteer.errors import ActiveSteerError, ParameterError, not_installed
+from activesteer.files import replacing, shown_path
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DOTS_PER_INCH: Final = 300
+"""Resolution of pictures that are saved as pixels: journals ask for it."""
+
+
+def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
+    """Return an empty figure.
+
+    Raises:
+        ParameterError: matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
+    except ImportError as error:
+        raise not_installed(ParameterError, "a plot", "matplotlib", "plot") from error
+    # A Figure of its own instead of pyplot: no backend is chosen and no global state changes for the caller.
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    if title:
+        figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def plain_axis(axis: Axes) -> None:
+    """Draw a grid, and remove the frame above and on the right."""
+    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def as_svg(figure: Figure) -> Markup:
+    """Return a figure as an SVG element for a page of any colour; matplotlib escapes its texts."""
+    text = io.StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None}, transparent=True)
+    svg = text.getvalue()
+    return Markup(svg[svg.index("<svg") :])
+
+
+def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterError) -> Path:
+    """Write a figure and return its path.
+
+    Raises:
+        ActiveSteerError: the file cannot be written; of class `error`.
+    """
+    with replacing(path, error) as part:
+        try:
+            figure.savefig(part, dpi=DOTS_PER_INCH)
+        except ValueError as reason:  # an ending that is no format of matplotlib's
+            raise error(f"cannot write {shown_path(path)}: {reason}", value=path) from reason
+    return path
