@@ -1,4 +1,4 @@
-"""Side forces of the axles from the curves of their tyres: what more slip angle still gives, and what a force needs."""
+"""Side forces of the axles from the curves of their tyres: slopes, and slip angles for a force."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from activesteer.estimation import KnownTyre
 from activesteer.signals import Estimate
 
 LEAST: Final = 0.05
-"""Slope that is left where the curve is level or falls, so that steering is never without any effect [-]."""
+"""Smallest slope, for a curve that is level or falls: steering always keeps some effect [-]."""
 
 _AY_STEP_MPS2: Final = 0.2
-"""Step of the lateral accelerations for which slip angles are kept [m/s2]."""
+"""Step of the tabulated lateral accelerations [m/s2]."""
 _ROUNDS: Final = 8
-"""Rounds in which force and load of a wheel agree to a thousandth."""
+"""Iterations after which force and load of a wheel agree to a thousandth."""
 _MOST: Final = 0.95
-"""Part of an axle's largest force up to which they are: at it one percent of force is 0.3 deg of slip
-angle by the compact's tyre, at 0.99 it is 0.7 deg, and the friction is not known to a percent [-]."""
+"""Fraction of the largest axle force up to which slip angles are tabulated [-]. There one percent of force is 0.3 deg
+of slip angle for the compact's tyre; at 0.99 it is 0.7 deg, and the friction is not known to a percent."""
 
 
 class Axle(NamedTuple):
-    """What an axle does; all to the left positive.
+    """State of an axle, left positive.
 
     Attributes:
-        slope: Slope of its curve, as a fraction of that at no slip angle [-].
+        slope: Slope of its curve, as a fraction of the slope at zero slip angle [-].
         force_rad: Side force over its stiffness [rad].
-        slip_angle_rad: Slip angle that makes it [rad].
-        secant: Force over slip angle, as a fraction of that at no slip angle [-].
+        slip_angle_rad: Slip angle [rad].
+        secant: Force over slip angle, as a fraction of its value at zero slip angle [-].
     """
 
     slope: float
@@ -41,23 +41,19 @@ class Axle(NamedTuple):
 
 
 class AxleSlopes:
-    """Slopes of both axles' side forces at a motion, as fractions of those at no slip angle.
+    """Side force curves of both axles.
 
-    The curve is that of a tyre under the load of standing still; on a road of other friction mu it is
-    mu F(alpha / mu), which leaves the slope at no slip angle as it is.
+    The curve F is that of a tyre under its static load. On a road of friction mu it is mu F(alpha / mu), with the same
+    slope at zero slip angle.
 
     Attributes:
-        loads_N: Load of one wheel of each axle, standing still [N].
+        loads_N: Static load of one wheel of each axle [N].
     """
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Reads the curves.
-
-        Args:
-            setup: What a controller may know of the car.
-        """
+        """Read the curves."""
         self._car, known = setup.single_track, setup.estimation
-        assert known is not None  # whoever asks has an estimator
+        assert known is not None  # an estimator exists
         wheelbase_m = self._car.cg_to_front_m + self._car.cg_to_rear_m
         half = 0.5 * self._car.mass_kg * GRAVITY_MPS2 / wheelbase_m
         self.loads_N = half * self._car.cg_to_rear_m, half * self._car.cg_to_front_m
@@ -67,11 +63,11 @@ class AxleSlopes:
             loads = tyre.load_step_N * np.arange(len(tyre.force_N))
             curve = np.array([np.interp(load_N, loads, column) for column in np.array(tyre.force_N).T])
             self._curves.append((curve / (curve[1] / self._step_rad)).tolist())
-        more = known.two_track
-        shares = more.front_load_transfer_fraction, 1.0 - more.front_load_transfer_fraction
+        car = known.two_track
+        fractions = car.front_load_transfer_fraction, 1.0 - car.front_load_transfer_fraction
         shifts_kg = (
-            self._car.mass_kg * more.load_height_m * share / track_m
-            for share, track_m in zip(shares, (more.front_track_m, more.rear_track_m), strict=True)
+            self._car.mass_kg * car.load_height_m * fraction / track_m
+            for fraction, track_m in zip(fractions, (car.front_track_m, car.rear_track_m), strict=True)
         )
         self._excesses = [
             _excesses(tyre, load_N, shift_kg)
@@ -79,10 +75,10 @@ class AxleSlopes:
         ]
 
     def at(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
-        """Slopes of front and rear axle [-].
+        """Return the slopes of front and rear axle [-].
 
         Args:
-            now: The motion, faster than walking.
+            now: The motion, faster than walking speed.
             front_rad: Angle of the front wheels [rad].
             rear_rad: Angle of the rear wheels [rad].
         """
@@ -90,26 +86,26 @@ class AxleSlopes:
         return front.slope, rear.slope
 
     def axles(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[Axle, Axle]:
-        """Front and rear axle at a motion; arguments as in `at`."""
+        """Return the states of front and rear axle; arguments as in `at`."""
         turning = now.yaw_rate_radps / now.speed_mps
         front = front_rad - now.sideslip_rad - self._car.cg_to_front_m * turning
         rear = rear_rad - now.sideslip_rad + self._car.cg_to_rear_m * turning
         return self._axle(0, front, now.friction), self._axle(1, rear, now.friction)
 
     def peak_rad(self, axle: int, friction: float) -> float:
-        """Slip angle of the largest force of an axle [rad]: 0 the front, 1 the rear one."""
+        """Return the slip angle of the largest force of an axle, 0 front or 1 rear [rad]."""
         curve = self._curves[axle]
         return friction * self._step_rad * curve.index(max(curve))
 
     def excess_rad(self, ay_mps2: float, friction: float) -> tuple[float, float]:
-        """Slip angles that both axles need in a steady turn beyond those of straight curves, the turn's side positive.
+        """Return the additional slip angles of a steady turn that the curvature of the axle curves requires.
 
         Args:
-            ay_mps2: Lateral acceleration; beyond what the road gives it is that [m/s2].
+            ay_mps2: Lateral acceleration, limited by the friction [m/s2].
             friction: Friction of the road [-].
 
         Returns:
-            Of the front and of the rear axle [rad].
+            Slip angles of front and rear axle, positive to the side of the turn [rad].
         """
         place = abs(ay_mps2) / friction / _AY_STEP_MPS2
         size = math.copysign(friction, ay_mps2)
@@ -127,17 +123,17 @@ class AxleSlopes:
 
 
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
-    """Slip angles of an axle beyond those of a straight curve, at lateral accelerations from 0 on [rad].
+    """Return the additional slip angles of an axle against a straight curve, at lateral accelerations from 0 on [rad].
 
     Args:
-        tyre: Of both its wheels.
-        load_N: Load of each, standing still [N].
-        shift_kg: What the outer one has more per lateral acceleration [N/(m/s2)].
+        tyre: Tyre of both wheels.
+        load_N: Static load of each wheel [N].
+        shift_kg: Load transfer to the outer wheel per lateral acceleration [N/(m/s2)].
     """
     grid, loads_N = np.array(tyre.force_N), tyre.load_step_N * np.arange(len(tyre.force_N))
-    mass_kg = 2.0 * load_N / GRAVITY_MPS2  # an axle carries as much of the side force as of the weight
+    mass_kg = 2.0 * load_N / GRAVITY_MPS2  # an axle carries the same fraction of side force and weight
     angles_rad, ay_mps2 = tyre.slip_angle_step_rad * np.arange(grid.shape[1]), np.zeros(grid.shape[1])
-    for _ in range(_ROUNDS):  # the load goes over by the force, and the force depends on it
+    for _ in range(_ROUNDS):  # load transfer and force depend on each other
         wheels_N = [
             [
                 float(np.interp(load_N + side * shift_kg * ay, loads_N, column))
@@ -153,6 +149,6 @@ def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
 
 
 def _between(values: list[float], place: float) -> float:
-    """A value between two of a row, the last one beyond its end."""
+    """Interpolate in a row at a fractional index; beyond its end the last value holds."""
     index = min(int(place), len(values) - 2)
     return values[index] + min(place - index, 1.0) * (values[index + 1] - values[index])

@@ -1,4 +1,4 @@
-"""From the yaw rate error to a steer angle: tolerance function, PID, and the decision which way to turn."""
+"""From the yaw rate error to a steer angle: tolerance function, PID, and the direction of the angle."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from activesteer.theory.tolerance import tolerance
 
 
 class Situation(Enum):
-    """What the car does compared with what the driver asks."""
+    """Behaviour of the car compared with the driver's demand."""
 
     NEUTRAL = "neutral"
     OVERSTEER = "oversteer"
@@ -19,7 +19,7 @@ class Situation(Enum):
 
 
 class Decision(NamedTuple):
-    """Which way the corrector turns the wheels: +1 left, -1 right, 0 not at all."""
+    """Directions in which the corrector turns the wheels: +1 left, -1 right, 0 not at all."""
 
     situation: Situation
     rear: int
@@ -27,7 +27,8 @@ class Decision(NamedTuple):
 
 
 _NEUTRAL: Final = Decision(Situation.NEUTRAL, rear=0, front=0)
-# Table I: oversteer turns the rear wheels the way the car turns and the front ones against it, understeer the reverse.
+# Table I: with oversteer the rear wheels turn in the direction of the yaw rate and the front wheels against it; with
+# understeer vice versa.
 _LEFT_OVERSTEER: Final = Decision(Situation.OVERSTEER, rear=1, front=-1)
 _LEFT_UNDERSTEER: Final = Decision(Situation.UNDERSTEER, rear=-1, front=1)
 _RIGHT_OVERSTEER: Final = Decision(Situation.OVERSTEER, rear=-1, front=1)
@@ -35,17 +36,14 @@ _RIGHT_UNDERSTEER: Final = Decision(Situation.UNDERSTEER, rear=1, front=-1)
 
 
 def decide(yaw_rate_radps: float, error_radps: float) -> Decision:
-    """Orientation of the additional steer angles.
+    """Return the directions of the additional steer angles.
 
-    With the error defined as desired minus actual it comes out as: rear against the error, front with it, whichever way
-    the car turns.
+    For an error of desired less actual yaw rate, the rear wheels turn against the sign of the error and the front
+    wheels with it, in turns to both sides.
 
     Args:
         yaw_rate_radps: Yaw rate, left positive [rad/s].
-        error_radps: Desired less actual yaw rate [rad/s], or the corrector's answer to it.
-
-    Returns:
-        The situation and both orientations.
+        error_radps: Desired less actual yaw rate [rad/s], or the angle of the corrector.
 
     Source: Dorsch 2012, Table I and Fig. 10.
     """
@@ -57,7 +55,7 @@ def decide(yaw_rate_radps: float, error_radps: float) -> Decision:
 
 
 def cut_off(angle_rad: float, limit_rad: float) -> tuple[float, int]:
-    """An angle within a limit to either side [rad], and which side cut it off: 1, -1, or 0 for none."""
+    """Return an angle limited to either side [rad], and the side of the active limit: 1, -1, or 0 for none."""
     if angle_rad > limit_rad:
         return limit_rad, 1
     if angle_rad < -limit_rad:
@@ -66,14 +64,14 @@ def cut_off(angle_rad: float, limit_rad: float) -> tuple[float, int]:
 
 
 class Corrector:
-    """PID on the yaw rate error behind the tolerance function; the size of the angle, without its orientation.
+    """PID on the yaw rate error behind the tolerance function.
 
-    With all gains but the proportional one at zero it is the paper's P corrector. The integral grows no further into a
-    limit that is active, and it fades with the tolerance function.
+    With the proportional gain alone it is the P corrector of the paper. The integral stops growing towards an active
+    limit, and it fades with the tolerance function.
     """
 
     def __init__(self, parameters: CorrectorParameters, timestep_s: float) -> None:
-        """Makes the feedback of one run.
+        """Make the feedback of one run.
 
         Args:
             parameters: Gains and tolerance band.
@@ -89,15 +87,12 @@ class Corrector:
         self._filtered_radps: float | None = None
 
     def step(self, error_radps: float, saturated: int = 0) -> float:
-        """Signed angle of the corrector; of the sign of the error where P acts alone.
+        """Return the angle of the corrector [rad]; with P alone it has the sign of the error.
 
         Args:
             error_radps: Desired less actual yaw rate [rad/s].
-            saturated: Whether a limit is active: 1 where a larger angle would be cut off, -1 where a smaller one would
-                be, 0 elsewhere. The integral then moves the other way only.
-
-        Returns:
-            Angle [rad].
+            saturated: Active limit: 1 if a larger angle is cut off, -1 if a smaller angle is, otherwise 0. The integral
+                then moves away from the limit only.
         """
         activity = tolerance(error_radps, self._deadband_start_radps, self._deadband_end_radps)
         angle = self._proportional_gain_s * error_radps
@@ -112,6 +107,6 @@ class Corrector:
         return activity * angle
 
     def reset(self) -> None:
-        """Forgets integral and derivative, as where active steering rests."""
+        """Reset integral and derivative, as while active steering rests."""
         self._integral_rad = 0.0
         self._filtered_radps = None

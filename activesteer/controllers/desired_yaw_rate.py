@@ -1,4 +1,4 @@
-"""The yaw rate that the driver asks for: single-track steady state, friction limit, delay."""
+"""The desired yaw rate: steady state of the single-track model, friction limit, delay."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from activesteer.controllers.parameters import DesiredYawRateParameters
 from activesteer.theory.single_track import SingleTrack
 
 MIN_SPEED_MPS: Final = 3.0
-"""Below this speed active steering rests, and the friction limit of the desired yaw rate rises no further [m/s]."""
+"""Below this speed active steering rests, and the friction limit of the desired yaw rate is constant [m/s]."""
 
 
 class DesiredYawRate:
-    """Desired yaw rate, eqs. 3 and 6, behind a first-order lag (exact for an input held between steps).
+    """Desired yaw rate, eqs. 3 and 6, behind a first-order lag, exact for an input that is held between steps.
 
     Source: Dorsch 2012, section V.
     """
 
     def __init__(self, single_track: SingleTrack, parameters: DesiredYawRateParameters, timestep_s: float) -> None:
-        """Computes the constants.
+        """Compute the constants.
 
         Args:
             single_track: The reference model.
@@ -28,26 +28,23 @@ class DesiredYawRate:
         """
         self._single_track = single_track
         self._limit_mps2 = parameters.max_lateral_acceleration_mps2
-        self._share = 1.0 - math.exp(-timestep_s / parameters.delay_s)
+        self._fraction = 1.0 - math.exp(-timestep_s / parameters.delay_s)
         self._state_radps = 0.0
 
     def step(self, front_steer_rad: float, speed_mps: float) -> float:
-        """The desired yaw rate now.
+        """Return the desired yaw rate, left positive [rad/s].
 
         Args:
             front_steer_rad: The driver's demand at the road wheel [rad].
             speed_mps: Speed [m/s]; negative backwards.
-
-        Returns:
-            Desired yaw rate [rad/s], left positive.
         """
-        wanted = self._single_track.yaw_rate_gain(speed_mps) * front_steer_rad
+        target = self._single_track.yaw_rate_gain(speed_mps) * front_steer_rad
         limit = self._limit_mps2 / (speed_mps if speed_mps > MIN_SPEED_MPS else MIN_SPEED_MPS)
-        if wanted > limit:
-            wanted = limit
-        elif wanted < -limit:
-            wanted = -limit
-        # The lag answers to what was held until now: its value at this instant, before the new demand works on it.
+        if target > limit:
+            target = limit
+        elif target < -limit:
+            target = -limit
+        # The lag has followed the input held until now; the new demand acts from this instant.
         desired = self._state_radps
-        self._state_radps += self._share * (wanted - desired)
+        self._state_radps += self._fraction * (target - desired)
         return desired

@@ -1,19 +1,19 @@
-"""Electronic stability control by the brakes of single wheels, as FMVSS 126 defines such a system.
+"""Electronic stability control by the brakes of single wheels, as defined by FMVSS 126.
 
-S4 of the standard asks for brake torques at single wheels that make a yaw moment, for yaw rate and sideslip as inputs,
-for the driver's angle, and for work over the whole range of speed above 20 km/h. Here the moment is
+S4 of the standard requires brake torques at single wheels that make a yaw moment; yaw rate, sideslip and the driver's
+angle as inputs; and operation at all speeds above 20 km/h. Here the moment is
 
     M_z = J_z / T_r (error beyond its band) + J_z / T_b^2 (sideslip beyond its limit)
 
-the error being desired less actual yaw rate. A moment against the turn (oversteer) is made by the outer front wheel,
-whose side force it lowers too; a moment with the turn (understeer) by the inner rear one:
+with the error of desired less actual yaw rate. The outer front wheel makes a moment against the turn (oversteer), which
+also lowers its side force. The inner rear wheel makes a moment with the turn (understeer):
 
     brake torque = |M_z| rolling radius / (half the track)
 
-Where it works, the drive is taken back by as much force as the brake makes. Locking is left to the anti-lock system.
+During an intervention the drive force is reduced by the brake force. The anti-lock system prevents locking.
 
-Sources: 49 CFR 571.126 S4; A. van Zanten, Bosch ESP Systems: 5 Years of Experience, SAE 2000-01-1633. Band, limit and
-times are chosen.
+Sources: 49 CFR 571.126 S4; A. van Zanten, Bosch ESP Systems: 5 Years of Experience, SAE 2000-01-1633. Band, limit
+and times are chosen.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class Esc:
-    """Yaw moments by the brakes."""
+    """Stability control by yaw moments of the brakes."""
 
     interval_s = 0.005
     reads = ("esc", "estimator")
@@ -44,11 +44,11 @@ class Esc:
         yaw_inertia_kgm2: float,
         levers: tuple[float, float],
     ) -> None:
-        """Makes the controller of one run.
+        """Make the controller of one run.
 
         Args:
             reference: Desired yaw rate.
-            estimator: Says speed, yaw rate, sideslip and friction.
+            estimator: Estimator of speed, yaw rate, sideslip and friction.
             parameters: Bands, times and limits.
             yaw_inertia_kgm2: J_z [kg m2].
             levers: Brake torque of one wheel per yaw moment, at the front and the rear axle [-].
@@ -58,18 +58,13 @@ class Esc:
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> Esc:
-        """Makes the controller for a car."""
+        """Make the controller for a car."""
         p, estimator = setup.gains.esc, setup.estimator()
         reference = TurnReference(setup.single_track, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         return cls(reference, estimator, p, setup.single_track.yaw_inertia_kgm2, brake_levers(setup))
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Brake torques now.
-
-        Args:
-            command: What the driver does.
-            measurement: What the car's sensors say.
-        """
+        """Return the brake torques."""
         p, now = self._parameters, self._estimator.step(measurement)
         if now.speed_mps < p.least_speed_mps:
             return ActuatorCommand(estimate=now)
@@ -90,14 +85,14 @@ class Esc:
 
 
 def _beyond(value: float, band: float) -> float:
-    """What of a value lies beyond a band about 0."""
+    """Return the part of a value beyond a band about 0."""
     return value - band if value > band else value + band if value < -band else 0.0
 
 
 def brake_levers(setup: ControllerSetup) -> tuple[float, float]:
-    """Brake torque of one wheel per yaw moment: rolling radius over half the track, front and rear [-]."""
+    """Return the brake torque of one wheel per yaw moment: rolling radius over half the track, front and rear [-]."""
     known = setup.estimation
-    assert known is not None  # there is an estimator
+    assert known is not None  # an estimator exists
     front_m, _, rear_m, _ = known.rolling_radius_m
     return 2.0 * front_m / known.two_track.front_track_m, 2.0 * rear_m / known.two_track.rear_track_m
 
@@ -105,16 +100,14 @@ def brake_levers(setup: ControllerSetup) -> tuple[float, float]:
 def wheel_torques(
     moment_Nm: float, yaw_rate_radps: float, levers: tuple[float, float], limit_Nm: float
 ) -> tuple[float, float, float, float]:
-    """The wheel that makes a yaw moment.
+    """Return the brake torques that make a yaw moment by one wheel, order of `CORNERS` [Nm].
 
     Args:
         moment_Nm: Yaw moment, left positive [Nm].
-        yaw_rate_radps: Yaw rate: a moment against it is for the outer front wheel, one with it for the inner rear one.
-        levers: As from `brake_levers`.
-        limit_Nm: Most torque of a wheel [Nm].
-
-    Returns:
-        Brake torques, order of `CORNERS` [Nm].
+        yaw_rate_radps: Yaw rate; the outer front wheel makes a moment against it, the inner rear wheel a moment with
+            it.
+        levers: Return value of `brake_levers`.
+        limit_Nm: Largest torque of a wheel [Nm].
     """
     front = moment_Nm * yaw_rate_radps <= 0.0
     torque = min(abs(moment_Nm) * levers[0 if front else 1], limit_Nm)

@@ -1,4 +1,4 @@
-"""Active front steering: an angle added to the driver's by the yaw rate error (Dorsch 2012, section V.B)."""
+"""Active front steering: an angle from the yaw rate error, added to the driver's angle (Dorsch 2012, section V.B)."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from activesteer.theory.single_track import SingleTrack
 
 
 class FrontSuperposition:
-    """Active front steering (AFS): the corrector of the rear system with the opposite sign, and no prediction."""
+    """Active front steering (AFS): the corrector of the rear steering with the opposite sign, without prediction."""
 
     reads = ("afs", "desired_yaw_rate")
 
     def __init__(self, desired: DesiredYawRate, parameters: FrontSuperpositionParameters, timestep_s: float) -> None:
-        """Makes the controller of one run.
+        """Make the controller of one run.
 
         Args:
-            desired: Desired yaw rate, from the driver's own angle.
+            desired: Desired yaw rate for the driver's own angle.
             parameters: Gains and limit.
             timestep_s: Time between two steps [s].
         """
@@ -29,20 +29,12 @@ class FrontSuperposition:
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> FrontSuperposition:
-        """Makes the controller for a car."""
+        """Make the controller for a car."""
         desired = DesiredYawRate(SingleTrack(setup.single_track), setup.gains.desired_yaw_rate, setup.timestep_s)
         return cls(desired, setup.gains.afs, setup.timestep_s)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Angle to add now.
-
-        Args:
-            command: What the driver does.
-            measurement: What the car's sensors say.
-
-        Returns:
-            The angle to add at the front wheels.
-        """
+        """Return the angle to add at the front wheels."""
         speed = measurement.speed_mps
         desired = self._desired.step(command.front_steer_demand_rad, speed)
         if speed < MIN_SPEED_MPS:

@@ -1,32 +1,32 @@
-"""One controller for rear steering, front superposition and four brakes: what is wished first, who does it second.
+"""One controller for rear steering, front superposition and brakes: desired forces, then their allocation.
 
-What is wished is more yaw moment and more side force than there are now, so that errors fade in given times:
+The desired changes of yaw moment and side force remove the errors in given times:
 
     M_z = J_z (r* - r) / T_r,     F_y = -m v (beta - beta*) / T_b
 
-r* being the yaw rate that `lqr` asks for; a moment is wished no further than the steering demands of `lqr` would make
-it with tyres that never saturate, and what they make beyond it is welcome. Who makes it is decided anew in every call,
-by a quadratic programme over the angle a added at the front, the rear angle delta_H and the brake forces F_i:
+where r* is the desired yaw rate of `lqr`. The moment is limited to the moment that the steering demands of `lqr` would
+make with tyres that never saturate; more moment from the steering is accepted. In every call a quadratic programme
+allocates the forces to the superposition angle a, the rear angle delta_H and the brake forces F_i:
 
     minimise    |W (B (u - u now) - (M_z, F_y))|^2 + |(a, delta_H) - (u_a, u_H)|^2 / s^2 + |F|^2 / F_0^2 + c sum F_i
     subject to  angles within their limits and within what their rates allow in a time ahead,
                 0 <= F_i <= a part of the friction under each wheel
 
-u_a and u_H are the demands of the state feedback `lqr` before any limit; s is small, so that the steering does what the
-feedback wants as long as it can. B has the slopes of the axles' curves at the present slip angles and friction, and the
-brakes' arms: where an axle slides or is at a limit, more angle gives no more force, and the brakes make what is
-missing. The cost c of a brake force is such that a moment below a threshold is not worth a brake.
+u_a and u_H are the demands of the state feedback `lqr` without limits. s is small, so that the steering follows the
+feedback while it can. B holds the slopes of the axle curves at the present slip angles and friction, and the lever arms
+of the brakes. If an axle slides or reaches a limit, more angle gives no more force, and the brakes make the rest. The
+cost c of a brake force keeps the brakes idle for a moment below a threshold.
 
-On a road with two sides the anti-lock system keeps the brakes of the better one back, for the driver's sake. Since
-the steering takes back the moment of the brakes (see `lqr`), it is told by how much more the sides may differ: by a
-limit, the less of it the further the car is off, and no more than the angles that are left can hold with the tyres as
-they are.
+On a road of two sides the anti-lock system holds back the brakes of the better side, to help the driver. Here the
+steering compensates the moment of the brakes (see `lqr`), so the sides may differ more. The controller sets this
+pressure difference: a limit that falls with the errors of the car, and at most what the remaining angles can hold with
+the tyres in their present state.
 
-An actuator that does not follow its demand (`SupervisedActuator`) is from then on where it is: the state feedback is
-that of the other one alone, about the turn that can still be had, and its bounds here are its measured position. Nobody
-tells the controller of a fault.
+If an actuator does not follow its demand (`SupervisedActuator`), its measured position becomes its bounds. The state
+feedback is then computed for the other actuator alone, about the turn that is still possible. The controller gets no
+message about a fault.
 
-Left out of B is the side force that a wheel loses while it is braked.
+B neglects the side force that a wheel loses while it brakes.
 
 Sources: T. A. Johansen and T. I. Fossen, Control allocation - A survey, Automatica 49 (2013); M. Abe, Vehicle Handling
 Dynamics, 2009, on steering and moments together; D. Arnstrom, A. Bemporad, D. Axehill, A dual active-set solver for
@@ -50,22 +50,18 @@ from activesteer.conventions import Array
 from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Measurement
 
 _KILO = 1e3
-"""Brake forces are counted in kN, so that all unknowns are of like size."""
+"""Brake forces are in kN, so that all unknowns have a similar size."""
 
 
 class Integrated:
-    """State feedback, and allocation of its corrections to steering and brakes."""
+    """State feedback, with allocation of its corrections to steering and brakes."""
 
     interval_s = 0.005
     reads = (*Lqr.reads, "integrated")
     gains = IntegratedParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Makes the controller of one run.
-
-        Args:
-            setup: What it may know of the car.
-        """
+        """Make the controller of one run."""
         self._lqr = Lqr.from_vehicle(setup)
         self._parameters, servos = (p := setup.gains.integrated), setup.gains.servos
         self._limits_rad = np.array([servos.superposition_limit_rad, servos.rear_limit_rad])
@@ -74,7 +70,7 @@ class Integrated:
         self._supervised = [SupervisedActuator(p.tolerance_rad, p.window_s, setup.timestep_s) for _ in range(2)]
         self._solve = solver()
         known = setup.estimation
-        assert known is not None  # there is an estimator
+        assert known is not None  # an estimator exists
         half_m = 0.5 * np.array([known.two_track.front_track_m, known.two_track.rear_track_m])
         # A brake on the left turns the car to the left.
         self._arms_m = np.repeat(half_m, 2) * (1.0, -1.0, 1.0, -1.0)
@@ -89,16 +85,11 @@ class Integrated:
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> Integrated:
-        """Makes the controller for a car."""
+        """Make the controller for a car."""
         return cls(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Angles and brake torques now.
-
-        Args:
-            command: What the driver does.
-            measurement: What the car's sensors say.
-        """
+        """Return angles and brake torques."""
         p, at_rad = self._parameters, np.array([measurement.superposition_rad, measurement.rear_steer_rad])
         added_works, rear_works = (
             not actuator.step(demand, position)
@@ -113,7 +104,7 @@ class Integrated:
         slopes = self._slopes.at(
             now, command.front_steer_demand_rad + measurement.superposition_rad, measurement.rear_steer_rad
         )
-        car, wished_rad = self._car, np.array(turn.demand_rad)
+        car, demand_rad = self._car, np.array(turn.demand_rad)
         moment = car.yaw_inertia_kgm2 * (turn.desired_radps - now.yaw_rate_radps) / p.yaw_rate_time_s
         force = -car.mass_kg * now.speed_mps * (now.sideslip_rad - turn.sideslip_rad) / p.sideslip_time_s
         lower = np.maximum(-self._limits_rad, at_rad - self._reach_rad)
@@ -121,29 +112,29 @@ class Integrated:
         stuck = ~np.array(works)
         lower[stuck] = upper[stuck] = at_rad[stuck]
         effects = self._effects(*slopes)
-        within_rad = np.minimum(np.maximum(wished_rad, lower), upper)
+        within_rad = np.minimum(np.maximum(demand_rad, lower), upper)
         reached = float(effects[0, :2] @ (within_rad - at_rad))
-        moment = _still_missing(moment, float(self._effects(1.0, 1.0)[0, :2] @ (wished_rad - at_rad)), reached)
+        moment = _missing_moment(moment, float(self._effects(1.0, 1.0)[0, :2] @ (demand_rad - at_rad)), reached)
         effects = self._weights[:, None] * effects
         target = self._weights * (reached + moment, force) + effects[:, :2] @ at_rad
         hessian = 2.0 * (effects.T @ effects + self._stay)
         gradient = -2.0 * (effects.T @ target)
-        gradient[:2] -= 2.0 * np.diag(self._stay)[:2] * wished_rad
+        gradient[:2] -= 2.0 * np.diag(self._stay)[:2] * demand_rad
         gradient[2:] += self._brake_cost
         most_kN = p.brake_fraction * now.friction * self._loads_N / _KILO
         bounds = np.concatenate([lower, np.zeros(4)]), np.concatenate([upper, most_kN])
-        found = self._solve(hessian, gradient, np.zeros((0, 6)), *bounds)
-        self._demand_rad = found[:2]
-        added, rear = found[:2].tolist()
+        solution = self._solve(hessian, gradient, np.zeros((0, 6)), *bounds)
+        self._demand_rad = solution[:2]
+        added, rear = solution[:2].tolist()
         self._lqr.apply(added, rear)
-        self._brakes_Nm = fl, fr, rl, rr = tuple((_KILO * found[2:] * self._radii_m).tolist())
+        self._brakes_Nm = fl, fr, rl, rr = tuple((_KILO * solution[2:] * self._radii_m).tolist())
         return ActuatorCommand(
             rear_steer_demand_rad=rear,
             superposition_demand_rad=added,
             yaw_rate_desired_radps=turn.desired_radps,
             prediction_rad=turn.steady_rad[1],
             correction_rad=rear - turn.steady_rad[1],
-            saturated=bool((np.abs(found[:2] - wished_rad) > p.tolerance_rad).any()),
+            saturated=bool((np.abs(solution[:2] - demand_rad) > p.tolerance_rad).any()),
             brake_torque_demand_Nm=(fl, fr, rl, rr),
             drive_torque_change_Nm=-min(max(command.drive_torque_demand_Nm, 0.0), fl + fr + rl + rr),
             estimate=now,
@@ -152,9 +143,9 @@ class Integrated:
             ),
         )
 
-    def _side_difference(self, turn: Turn, left_rad: Array, slopes: tuple[float, float]) -> float:
-        """By how much the brakes of one side may exceed the others, for angles that are left [Pa]."""
-        p, car, now, (front, rear) = self._parameters, self._car, turn.estimate, left_rad.tolist()
+    def _side_difference(self, turn: Turn, remaining_rad: Array, slopes: tuple[float, float]) -> float:
+        """Return the allowed pressure difference between the sides for the remaining angles [Pa]."""
+        p, car, now, (front, rear) = self._parameters, self._car, turn.estimate, remaining_rad.tolist()
         force_N = min(slopes[0] * car.front_stiffness_Nprad * front, slopes[1] * car.rear_stiffness_Nprad * rear)
         moment_Nm = (car.cg_to_front_m + car.cg_to_rear_m) * max(force_N, 0.0)
         off = abs(turn.desired_radps - now.yaw_rate_radps) / p.side_yaw_rate_radps
@@ -162,25 +153,25 @@ class Integrated:
         return min(max(1.0 - off, 0.0) * p.side_difference_Pa, moment_Nm / self._side_moment_m3)
 
     def _effects(self, front_slope: float, rear_slope: float) -> np.ndarray:
-        """Yaw moment [Nm] and side force [N] of both angles [rad] and the brake forces [kN], shape (2, 6)."""
+        """Return yaw moment [Nm] and side force [N] per angle [rad] and per brake force [kN], shape (2, 6)."""
         car = self._car
         front, rear = front_slope * car.front_stiffness_Nprad, rear_slope * car.rear_stiffness_Nprad
         moments = front * car.cg_to_front_m, -rear * car.cg_to_rear_m, *(_KILO * self._arms_m)
         return np.array([moments, (front, rear, 0.0, 0.0, 0.0, 0.0)])
 
 
-def _still_missing(wished_Nm: float, demanded_Nm: float, reached_Nm: float) -> float:
-    """What of a moment is missing.
+def _missing_moment(desired_Nm: float, demanded_Nm: float, reached_Nm: float) -> float:
+    """Return the missing part of a moment [Nm].
 
     Args:
-        wished_Nm: What fades the error.
-        demanded_Nm: What the state feedback would make with tyres that never saturate.
-        reached_Nm: What its angles make within their limits with the tyres as they are.
+        desired_Nm: Moment that removes the error.
+        demanded_Nm: Moment of the state feedback with tyres that never saturate.
+        reached_Nm: Moment of its angles within their limits, with the tyres in their present state.
 
     Returns:
-        Moment [Nm], of the sign of what is wished and demanded; 0 where they do not agree, or where it is reached.
+        Moment of the common sign of desired and demanded moment; 0 if their signs differ, or if it is reached.
     """
-    if wished_Nm * demanded_Nm <= 0.0:
+    if desired_Nm * demanded_Nm <= 0.0:
         return 0.0
-    side = math.copysign(1.0, wished_Nm)
-    return side * max(min(side * wished_Nm, side * demanded_Nm) - side * reached_Nm, 0.0)
+    side = math.copysign(1.0, desired_Nm)
+    return side * max(min(side * desired_Nm, side * demanded_Nm) - side * reached_Nm, 0.0)

@@ -1,4 +1,4 @@
-"""A controller as a linear system: what it does about driving straight, corrector fully active, no limit reached."""
+"""A controller as a linear system about driving straight, with a fully active corrector and without limits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from activesteer.conventions import Array
 from activesteer.errors import ControllerError, shown
 from activesteer.theory.single_track import SingleTrack
 
-_SYSTEMS: Final = ("none", "ars", "afs")
+_LINEAR: Final = ("none", "ars", "afs")
 
 
 @dataclass(frozen=True)
@@ -39,37 +39,37 @@ class LinearController:
 
 
 def has_linear_form(given: Any) -> bool:
-    """Whether `linear_controller` knows a controller."""
-    return isinstance(given, str) and system_of(given) in _SYSTEMS
+    """Return whether a controller has a linear form."""
+    return isinstance(given, str) and system_of(given) in _LINEAR
 
 
 def linear_controller(given: str, setup: ControllerSetup, speed_mps: float) -> LinearController:
-    """The linear form of a controller of the package.
+    """Return the linear form of a controller.
 
-    The tolerance function is taken as 1: the corrector acts at all errors. For errors within the band it does nothing,
-    and what is left is the feed-forward: with `afs` the car is then that of `none`.
+    The tolerance function is taken as 1, so that the corrector acts at all errors. Within its band only the feedforward
+    is left: the car with `afs` is then the car without control.
 
     Args:
         given: `none`, `ars`, `afs`, or a variant.
-        setup: What the controller may know of the car.
+        setup: Input of the controller.
         speed_mps: Speed [m/s].
 
     Raises:
-        ControllerError: it is a user's own code, which has no linear form.
+        ControllerError: the controller has no linear form, for instance a user's own code.
     """
     gains, system = setup.gains, given
     if is_variant(given):
         variant = read_variant(given)
         gains, system = variant.gains_in(setup), variant.system
-    if system not in _SYSTEMS:
+    if system not in _LINEAR:
         raise ControllerError(
-            f"{shown(given)} is no controller of the package or variant of one; only these have a linear form",
+            f"{shown(given)} has no linear form; only {', '.join(_LINEAR)} and their variants have one",
             value=given,
         )
-    return _made(system, gains, SingleTrack(setup.single_track), speed_mps, setup.timestep_s)
+    return _linear_form(system, gains, SingleTrack(setup.single_track), speed_mps, setup.timestep_s)
 
 
-def _made(
+def _linear_form(
     system: str, gains: ControllerParameters, car: SingleTrack, speed_mps: float, step_s: float
 ) -> LinearController:
     desired, predicted, integral, filtered = range(4)  # states
@@ -95,7 +95,7 @@ def _made(
     return LinearController(rows[:, :4], rows[:, 4:], demands[:, :4], demands[:, 4:])
 
 
-def _unit(place: int) -> Array:
+def _unit(index: int) -> Array:
     row: Any = np.zeros(6)
-    row[place] = 1.0
+    row[index] = 1.0
     return row

@@ -1,36 +1,35 @@
-"""Front and rear wheels together: a linear-quadratic regulator about the turn that the driver asks for.
+"""Front and rear wheels together: a linear-quadratic regulator about the turn that the driver demands.
 
-The model is the single-track model (eqs. 1 and 2) with tyres that answer over their relaxation length s and actuators
-with a lag T_a, whose commands take effect one call later:
+The model is the single-track model (eqs. 1 and 2), with tyres that lag by their relaxation length s and actuators that
+lag by T_a, whose commands take effect one call later:
 
-    d/dt [r, beta] = A(v) [r, beta] + B(v) [f, g]      yaw rate, sideslip; angles that the tyres answer to
+    d/dt [r, beta] = A(v) [r, beta] + B(v) [f, g]      yaw rate, sideslip; lagged front and rear angle
     s/v df/dt = delta_V + a - f                        front: driver's angle and superposition a
     s/v dg/dt = delta_H - g                            rear
     T_a da/dt = u_a - a,  T_a ddelta_H/dt = u_H - delta_H
 
-Desired is the turn with the car's own steady yaw rate at the driver's angle (eq. 3), no further than the friction gives
-(eq. 6), and without sideslip. It has the angles f*, g* that solve 0 = A [r*, 0] + B [f*, g*], and beyond that what
-the axles need of slip angle for the forces of that turn more than straight curves would (`AxleSlopes.excess_rad`):
-without it a car near its limit slides outwards by as much. While the driver brakes, both angles also take back the yaw
-moment M of the brakes, which their pressures say, without any side force:
+The desired turn has the car's own steady-state yaw rate for the driver's angle (eq. 3), limited by the friction (eq.
+6), and no sideslip. Its angles f*, g* solve 0 = A [r*, 0] + B [f*, g*]. `AxleSlopes.excess_rad` adds the slip angles
+that the axles need because their curves are not straight: without them a car near its limit slides outwards. While the
+driver brakes, both angles also compensate the yaw moment M of the brakes, known from their pressures, without a side
+force:
 
     f* - M / (l C_V),  g* + M / (l C_H)
 
-u* are those angles when a demand of now works, the lag T_a and a call ahead. The law is
+u* are the angles of the turn at the time when the present demand takes effect, a lag T_a and a call ahead. The law is
 
     u = u* - K(v) (x - x*),        x = (r, beta, f, g, a, delta_H, u before)
 
-with K from python-control's `dlqr`, which makes the sum of (x - x*)' Q (x - x*) + (u - u*)' R (u - u*) least, Q and R
-with the inverse squares of the errors and angles that are to weigh the same (Bryson's rule). K is computed for a row of
-speeds and taken linearly between. Yaw rate and sideslip are the estimator's, actuators are measured, f and g are
-followed by the model.
+with K from python-control's `dlqr`, which minimises the sum of (x - x*)' Q (x - x*) + (u - u*)' R (u - u*). Q and R
+hold the inverse squares of the errors and angles that cost the same (Bryson's rule). K is computed at several speeds
+and interpolated. The estimator gives yaw rate and sideslip, sensors give the actuators, and the model gives f and g.
 
-Where one actuator is known not to work, its angle is given: f* or g* is then where it is, and the other and the
-sideslip beta* that cannot be helped solve 0 = A [r*, beta*] + B [f*, g*]; K is that of the other actuator alone.
+If an actuator has failed, its angle is given: f* or g* is then its position. The other angle and the unavoidable
+sideslip beta* solve 0 = A [r*, beta*] + B [f*, g*], and K is computed for the other actuator alone.
 
-The model ends where body, suspensions and steering column move, at some 6 Hz. So R is chosen for a loop that is slower
-than that: its disk margin, opened at both demands, is to be 0.5 at least from 60 to 160 km/h, with the estimator behind
-ideal sensors, which it follows at once, as well as behind those of production cars (`activesteer margins -c lqr`).
+The model is valid up to about 6 Hz, where body, suspensions and steering column move. R is chosen for a slower loop:
+its disk margin, opened at both demands, is to be at least 0.5 from 60 to 160 km/h. This holds for the estimator with
+ideal sensors, which it follows at once, and with production sensors (`activesteer margins -c lqr`).
 
 Sources: B. D. O. Anderson and J. B. Moore, Optimal Control: Linear Quadratic Methods, 1989; both axles for yaw rate and
 zero sideslip: M. Abe, Vehicle Handling Dynamics, 2009, chapter 8.
@@ -58,27 +57,27 @@ from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
 SPEED_STEP_MPS: Final = 5.0
 SPEEDS_MPS: Final = tuple(SPEED_STEP_MPS * (number + 1) for number in range(14))
-"""Speeds at which the gains are computed, evenly spaced [m/s]; beyond them the nearest count."""
+"""Speeds at which the gains are computed, evenly spaced [m/s]; outside them the nearest speed counts."""
 STATES: Final = ("yaw_rate", "sideslip", "front", "rear", "superposition", "rear_actuator", "superposition_before",
                  "rear_before")  # fmt: skip
-"""Of the model; the angles in pairs, front before rear."""
+"""States of the model; the angles in pairs, front before rear."""
 BOTH: Final = (True, True)
 """Both actuators work: superposition, rear steering."""
 _STEADY: Final = 6
-"""What a row of the schedule says of the steady turn, before the rows of K."""
+"""Number of values of the steady turn in a row of the schedule, before the rows of K."""
 _FULL_MPS: Final = 8.0
-"""From here on the controller does all it does; below it fades out until `MIN_SPEED_MPS` [m/s]."""
+"""Speed from which the controller acts fully; below it fades out until `MIN_SPEED_MPS` [m/s]."""
 
 
 class Turn(NamedTuple):
-    """A turn and what leads to it; angles of superposition and rear wheels.
+    """The desired turn and the angles for it: superposition and rear angle.
 
     Attributes:
-        estimate: The motion.
-        desired_radps: Yaw rate asked for [rad/s].
-        sideslip_rad: Sideslip that belongs to it [rad].
-        steady_rad: Angles that hold it [rad].
-        demand_rad: Angles that the state feedback demands now, without any limit [rad].
+        estimate: Estimate of the motion.
+        desired_radps: Desired yaw rate [rad/s].
+        sideslip_rad: Steady-state sideslip angle [rad].
+        steady_rad: Steady-state angles [rad].
+        demand_rad: Angles that the state feedback demands, without limits [rad].
     """
 
     estimate: Estimate
@@ -96,11 +95,7 @@ class Lqr:
     gains = LqrParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Makes the controller of one run.
-
-        Args:
-            setup: What it may know of the car.
-        """
+        """Make the controller of one run."""
         p = self._parameters = setup.gains.lqr
         self._servos = setup.gains.servos
         self._estimator = setup.estimator()
@@ -111,38 +106,33 @@ class Lqr:
         self._front_rad = self._rear_rad = 0.0
         self._before = 0.0, 0.0
         known, (front, rear) = setup.estimation, brake_levers(setup)
-        assert known is not None  # there is an estimator
+        assert known is not None  # an estimator exists
         self._torque_per_pressure_NmpPa = known.brake_torque_per_pressure_NmpPa
         self._moment_per_torque = 1.0 / front, -1.0 / front, 1.0 / rear, -1.0 / rear
         wheelbase_m = self._car.cg_to_front_m + self._car.cg_to_rear_m
-        self._against_radpNm = (
+        self._compensation_radpNm = (
             -1.0 / (wheelbase_m * self._car.front_stiffness_Nprad),
             1.0 / (wheelbase_m * self._car.rear_stiffness_Nprad),
         )
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> Lqr:
-        """Makes the controller for a car."""
+        """Make the controller for a car."""
         return cls(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Both angles now.
-
-        Args:
-            command: What the driver does.
-            measurement: What the car's sensors say.
-        """
+        """Return both angles."""
         servos, turn = self._servos, self.turn(command, measurement)
         speed_mps = turn.estimate.speed_mps
         if speed_mps < MIN_SPEED_MPS:
             self.apply(0.0, 0.0)
             return ActuatorCommand(estimate=turn.estimate)
         fade = min((speed_mps - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
-        wished_added, wished_rear = (fade * angle for angle in turn.demand_rad)
-        added = min(max(wished_added, -servos.superposition_limit_rad), servos.superposition_limit_rad)
-        rear = min(max(wished_rear, -servos.rear_limit_rad), servos.rear_limit_rad)
+        added_demand, rear_demand = (fade * angle for angle in turn.demand_rad)
+        added = min(max(added_demand, -servos.superposition_limit_rad), servos.superposition_limit_rad)
+        rear = min(max(rear_demand, -servos.rear_limit_rad), servos.rear_limit_rad)
         self.apply(added, rear)
-        saturated = (added, rear) != (wished_added, wished_rear)
+        saturated = (added, rear) != (added_demand, rear_demand)
         steady = turn.steady_rad[1]
         return ActuatorCommand(
             rear, added, turn.desired_radps, steady, rear - steady, saturated, estimate=turn.estimate
@@ -155,13 +145,13 @@ class Lqr:
         works: tuple[bool, bool] = BOTH,
         own_brakes_Nm: tuple[float, float, float, float] = NO_BRAKES,
     ) -> Turn:
-        """The turn that is asked for, and what the state feedback demands for it; at walking speed none.
+        """Return the desired turn and the demands of the state feedback, all zero below walking speed.
 
         Args:
-            command: What the driver does.
-            measurement: What the car's sensors say.
-            works: Whether superposition and rear steering do.
-            own_brakes_Nm: What is asked of the brakes on purpose, order of `CORNERS` [Nm].
+            command: Command of the driver.
+            measurement: Measurement of the car's sensors.
+            works: Whether superposition and rear steering work.
+            own_brakes_Nm: Brake torques demanded by the controller itself, order of `CORNERS` [Nm].
         """
         p, now = self._parameters, self._estimator.step(measurement)
         speed, driver = now.speed_mps, command.front_steer_demand_rad
@@ -169,23 +159,23 @@ class Lqr:
             return Turn(now, 0.0, 0.0, (0.0, 0.0), (0.0, 0.0))
         desired = self._reference.step(driver, speed, now.friction)
         added, turned = measurement.superposition_rad, measurement.rear_steer_rad
-        # What the tyres answer to follows the angles over their relaxation length.
-        share = -math.expm1(-self._interval_s * speed / p.relaxation_length_m)
-        self._front_rad += share * (driver + added - self._front_rad)
-        self._rear_rad += share * (turned - self._rear_rad)
+        # The tyres follow the angles over their relaxation length.
+        fraction = -math.expm1(-self._interval_s * speed / p.relaxation_length_m)
+        self._front_rad += fraction * (driver + added - self._front_rad)
+        self._rear_rad += fraction * (turned - self._rear_rad)
         row = self._gains(works, speed)
         given = 0.0 if works[0] and works[1] else driver + added if works[1] else turned
         front, rear, sideslip = self._steady(row, works, given, desired, now)
-        # What is demanded now works a call and a lag later.
+        # The present demand takes effect a call and a lag later.
         coming = self._reference.ahead(self._servos.lag_s + self._interval_s)
         next_front, next_rear, _ = self._steady(row, works, given, coming, now)
-        against_front, against_rear = 0.0, 0.0
+        brake_front, brake_rear = 0.0, 0.0
         if command.brake_pedal > 0.0 and works[0] and works[1]:
             moment_Nm = self._brakes_moment(measurement, own_brakes_Nm)
-            against_front, against_rear = (moment_Nm * angle for angle in self._against_radpNm)
-        front, rear = front + against_front, rear + against_rear
+            brake_front, brake_rear = (moment_Nm * angle for angle in self._compensation_radpNm)
+        front, rear = front + brake_front, rear + brake_rear
         steady = front - driver, rear
-        held = next_front + against_front - driver, next_rear + against_rear
+        held = next_front + brake_front - driver, next_rear + brake_rear
         errors = (
             now.yaw_rate_radps - desired,
             now.sideslip_rad - sideslip,
@@ -206,18 +196,18 @@ class Lqr:
     def _steady(
         self, row: list[float], works: tuple[bool, bool], given_rad: float, yaw_rate_radps: float, now: Estimate
     ) -> tuple[float, float, float]:
-        """Front angle, rear angle and sideslip of a steady turn [rad]; arguments as of `turn`, and a row of gains."""
+        """Return front angle, rear angle and sideslip of a steady turn, for a row of the schedule [rad]."""
         front_r, front_g, rear_r, rear_g, sideslip_r, sideslip_g = row[:_STEADY]
         ay_mps2 = now.speed_mps * yaw_rate_radps
         front_more, rear_more = self._curves.excess_rad(ay_mps2, now.friction)
-        # An axle whose angle is given gets what it needs from the sideslip, and the other one follows.
+        # An axle with a given angle gets its additional slip angle from the sideslip, and the other axle follows.
         less = 0.0 if works[0] and works[1] else rear_more if works[0] else front_more
         front = front_r * yaw_rate_radps + front_g * given_rad + front_more - less
         rear = rear_r * yaw_rate_radps + rear_g * given_rad + rear_more - less
         return front, rear, sideslip_r * yaw_rate_radps + sideslip_g * given_rad - less
 
     def _brakes_moment(self, measurement: Measurement, own_Nm: tuple[float, float, float, float]) -> float:
-        """Yaw moment of the driver's brakes by their pressures [Nm]."""
+        """Return the yaw moment of the driver's brakes from their pressures [Nm]."""
         moment_Nm = 0.0
         for arm, per_pressure, pressure, own in zip(
             self._moment_per_torque, self._torque_per_pressure_NmpPa, measurement.brake_pressure_Pa, own_Nm, strict=True
@@ -226,11 +216,11 @@ class Lqr:
         return moment_Nm
 
     def apply(self, superposition_rad: float, rear_rad: float) -> None:
-        """Says what was demanded of the actuators in the end; where one does not work, where it is."""
+        """Store the final demands of the actuators; for a failed actuator its position."""
         self._before = superposition_rad, rear_rad
 
     def _gains(self, works: tuple[bool, bool], speed_mps: float) -> list[float]:
-        """The row of the schedule at a speed."""
+        """Interpolate the schedule at a speed."""
         if (lines := self._schedules.get(works)) is None:
             rows = schedule(self._car, self._parameters, self._servos.lag_s, self._interval_s, works)
             lines = [[(a, b - a) for a, b in zip(*ends, strict=True)] for ends in itertools.pairwise(rows)]
@@ -249,18 +239,18 @@ def schedule(
     interval_s: float,
     works: tuple[bool, bool] = BOTH,
 ) -> tuple[tuple[float, ...], ...]:
-    """Gains at `SPEEDS_MPS`.
+    """Return the gains at `SPEEDS_MPS`.
 
     Args:
-        car: The car as it is known.
+        car: The known car.
         parameters: Weights and relaxation length.
         servo_lag_s: Lag of both servos [s].
         interval_s: Time between two calls [s].
-        works: Whether superposition and rear steering do.
+        works: Whether superposition and rear steering work.
 
     Returns:
-        For each speed: front angle per desired yaw rate [s] and per given angle [-], the same of the rear angle and of
-        the sideslip; then the rows of K for superposition and rear angle, in the order of `STATES`.
+        For each speed: front angle, rear angle and sideslip, each per desired yaw rate [s] and per given angle [-];
+        then the rows of K for superposition and rear angle, in the order of `STATES`.
     """
     return tuple(
         (
@@ -272,29 +262,28 @@ def schedule(
 
 
 def steady_turn(car: SingleTrackParameters, speed_mps: float, works: tuple[bool, bool] = BOTH) -> Array:
-    """What belongs to a steady turn.
+    """Return front angle, rear angle and sideslip of a steady turn; with both actuators there is no sideslip.
 
     Returns:
-        Shape (3, 2): front angle, rear angle, sideslip, per yaw rate and per angle of an axle that is given; without
-        sideslip where both actuators work.
+        Shape (3, 2): each per yaw rate and per given angle of an axle.
     """
     a, b = SingleTrack(car).matrices(speed_mps)
-    found = np.zeros((3, 2))
+    turn = np.zeros((3, 2))
     if works == BOTH:
-        found[:2, 0] = np.linalg.solve(b, -a[:, 0])
-        return found
+        turn[:2, 0] = np.linalg.solve(b, -a[:, 0])
+        return turn
     axle = 0 if works[0] else 1
-    # Unknown are the angle of the axle that can still be steered, and the sideslip.
+    # The unknowns are the angle of the axle that can still be steered, and the sideslip.
     system = np.column_stack([b[:, axle], a[:, 1]])
-    found[[axle, 2]] = np.linalg.solve(system, -np.column_stack([a[:, 0], b[:, 1 - axle]]))
-    found[1 - axle, 1] = 1.0
-    return found
+    turn[[axle, 2]] = np.linalg.solve(system, -np.column_stack([a[:, 0], b[:, 1 - axle]]))
+    turn[1 - axle, 1] = 1.0
+    return turn
 
 
 def model(
     car: SingleTrackParameters, parameters: LqrParameters, servo_lag_s: float, speed_mps: float, interval_s: float
 ) -> tuple[Array, Array]:
-    """The model from one call to the next, for inputs that are held.
+    """Return the model from one call to the next, for constant inputs.
 
     Returns:
         System matrix, shape (8, 8) over `STATES`; input matrix, shape (8, 2), inputs superposition and rear angle.
@@ -307,7 +296,7 @@ def model(
     from scipy.linalg import expm  # noqa: PLC0415 - slow to import, and not every run needs it
 
     a, b = np.array(expm(interval_s * inner), dtype=np.float64), np.zeros((8, 2))
-    # The command of this call works in the next interval: now it only takes the place of the one before.
+    # The command of this call acts in the next interval: in this one it only replaces the command before.
     a[6:] = 0.0
     b[6:] = both
     return a, b
@@ -321,14 +310,14 @@ def feedback(
     interval_s: float,
     works: tuple[bool, bool] = BOTH,
 ) -> Array:
-    """K at a speed, shape (2, 8): superposition and rear angle per deviation of `STATES`; 0 for what does not work."""
+    """Return K at a speed, shape (2, 8): superposition and rear angle per deviation of `STATES`; 0 if failed."""
     import control  # noqa: PLC0415 - takes longer to import than a run takes to start
 
     a, b = model(car, parameters, servo_lag_s, speed_mps, interval_s)
     q = np.zeros((8, 8))
     q[0, 0], q[1, 1] = parameters.yaw_rate_scale_radps**-2, parameters.sideslip_scale_rad**-2
     weights = np.array([parameters.superposition_scale_rad**-2, parameters.rear_scale_rad**-2])
-    found, used = np.zeros((2, 8)), [axle for axle in range(2) if works[axle]]
+    gains, used = np.zeros((2, 8)), [axle for axle in range(2) if works[axle]]
     if used:
-        found[used], _, _ = control.dlqr(a, b[:, used], q, np.diag(weights[used]))
-    return found
+        gains[used], _, _ = control.dlqr(a, b[:, used], q, np.diag(weights[used]))
+    return gains

@@ -1,13 +1,13 @@
 """Envelope control: both axles by model predictive control within bounds on yaw rate and rear slip angle.
 
-The car may do what the driver asks as long as it stays in an envelope in which it can be steered back:
+The car follows the driver within an envelope from which it can be steered back:
 
     |r| <= mu g / v                  no more yaw rate than the friction can hold
     |alpha_H| <= alpha_peak(mu)      the rear axle below the slip angle of its largest force
 
-The model is that of `lqr`. For an axle that slides C alpha becomes s C_0 alpha + C_0 e, s being force over slip angle
-as they are now, kept over the horizon: steered back, the axle gives as much less force as it has less slip angle, where
-a tangent would say that steering changes nothing.
+The model is that of `lqr`. For an axle that slides, C alpha becomes s C_0 alpha + C_0 e, where s is the present ratio
+of force to slip angle, constant over the horizon: an axle that is steered back loses force in proportion to its slip
+angle. With the tangent, steering would have no effect.
 
 In every call the programme
 
@@ -16,8 +16,8 @@ In every call the programme
     subject to  the envelope, softened by a slack, angles within their limits, and the first ones within what the rates
     allow
 
-is solved for angles in blocks that are held, and the first angles are demanded. r* and u* are the turn of `lqr`. The
-matrices depend on speed and slopes alone; they are made once for each of a grid of these.
+is solved for angles that are constant in blocks, and the first angles are demanded. r* and u* are the turn of `lqr`.
+The matrices depend only on speed and slopes; they are computed once for each point of a grid.
 
 Sources: C. E. Beal and J. C. Gerdes, Model Predictive Control for Vehicle Stabilization at the Limits of Handling, IEEE
 Transactions on Control Systems Technology 21 (4), 2013, and C. G. Bobier, J. C. Gerdes, Staying within the nullcline
@@ -47,27 +47,27 @@ from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 STATES: Final = ("yaw_rate", "sideslip", "front", "rear", "superposition", "rear_actuator")
 GIVEN: Final = ("front_intercept", "rear_intercept", "driver", "desired", "superposition_steady", "rear_steady",
                 "superposition_before", "rear_before")  # fmt: skip
-"""What does not change over the horizon, behind the states."""
+"""Given values behind the states, constant over the horizon."""
 _SPEED_STEP_MPS: Final = 2.5
 _SLOPES: Final = tuple(0.1 * tenth for tenth in range(1, 11))
-"""Grid of s; e makes up for what lies between [-]."""
+"""Grid of s; e corrects the difference to the grid [-]."""
 _BLOCKS: Final = (1, 2, 3, 6, 12)
-"""Steps for which angles are held; their sum is the horizon."""
-_LOOKED_AT: Final = (2, 4, 7, 10, 13, 19, 25)
-"""Steps at which the envelope is to hold."""
+"""Steps for which angles are constant; their sum is the horizon."""
+_CHECKED_STEPS: Final = (2, 4, 7, 10, 13, 19, 25)
+"""Steps at which the envelope holds."""
 _SLACK_WEIGHT: Final = 1e7
-"""Cost of leaving the envelope by a rad/s or a rad, squared: that of a yaw rate error over the whole horizon, and a
-hundred times more."""
+"""Cost of leaving the envelope by a rad/s or a rad, squared: a hundred times that of a yaw rate error over the whole
+horizon."""
 
 
 class Problem(NamedTuple):
-    """The programme at a speed and slopes, but for what is known in a call; z is states and given values.
+    """The programme at a speed and slopes; a call adds z, the states and given values.
 
     Attributes:
         hessian: Shape (n, n); the unknowns are the blocks' angles in pairs, then the two slacks.
         gradient: Gradient per z, shape (n, len(z)).
-        rows: What is bounded, per unknown, shape (m, n): envelope from above and from below.
-        offsets: What z adds to it, shape (m, len(z)).
+        rows: Bounded values per unknown, shape (m, n): envelope from above and from below.
+        offsets: Bounded values per z, shape (m, len(z)).
     """
 
     hessian: Array
@@ -84,11 +84,7 @@ class Mpc:
     gains = MpcParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Makes the controller of one run.
-
-        Args:
-            setup: What it may know of the car.
-        """
+        """Make the controller of one run."""
         p, servos = setup.gains.mpc, setup.gains.servos
         self._parameters, self._servo_lag_s = p, servos.lag_s
         self._estimator, self._car, self._interval_s = setup.estimator(), setup.single_track, setup.timestep_s
@@ -101,16 +97,11 @@ class Mpc:
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> Mpc:
-        """Makes the controller for a car."""
+        """Make the controller for a car."""
         return cls(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Both angles now.
-
-        Args:
-            command: What the driver does.
-            measurement: What the car's sensors say.
-        """
+        """Return both angles."""
         p, now = self._parameters, self._estimator.step(measurement)
         speed, driver = now.speed_mps, command.front_steer_demand_rad
         if speed < MIN_SPEED_MPS:
@@ -118,9 +109,9 @@ class Mpc:
             return ActuatorCommand(estimate=now)
         desired = self._reference.step(driver, speed, now.friction)
         added, turned = measurement.superposition_rad, measurement.rear_steer_rad
-        share = -np.expm1(-self._interval_s * speed / p.relaxation_length_m)
-        self._front_rad += share * (driver + added - self._front_rad)
-        self._rear_rad += share * (turned - self._rear_rad)
+        fraction = -np.expm1(-self._interval_s * speed / p.relaxation_length_m)
+        self._front_rad += fraction * (driver + added - self._front_rad)
+        self._rear_rad += fraction * (turned - self._rear_rad)
         axles = self._slopes.axles(now, self._front_rad, self._rear_rad)
         slopes = [min(_SLOPES, key=lambda known, axle=axle: abs(known - axle.secant)) for axle in axles]
         cuts = [axle.force_rad - slope * axle.slip_angle_rad for axle, slope in zip(axles, slopes, strict=True)]
@@ -138,15 +129,15 @@ class Mpc:
         least[:2] = np.clip(self._before_rad - self._reach_rad, -self._limits_rad, self._limits_rad)
         most[:2] = np.clip(self._before_rad + self._reach_rad, -self._limits_rad, self._limits_rad)
         bounds = np.array([now.friction * GRAVITY_MPS2 / speed, self._slopes.peak_rad(1, now.friction)])
-        envelope = np.repeat(bounds, len(_LOOKED_AT))
+        envelope = np.repeat(bounds, len(_CHECKED_STEPS))
         offset = problem.offsets @ z
         free = np.full(len(envelope), np.inf)
         lower = np.concatenate([least, [0.0, 0.0], -free, -envelope - offset[len(envelope) :]])
         upper = np.concatenate([most, [np.inf, np.inf], envelope - offset[: len(envelope)], free])
-        found = self._solve(problem.hessian, problem.gradient @ z, problem.rows, lower, upper)
-        self._before_rad = found[:2]
-        added_demand, rear_demand = found[:2].tolist()
-        outside = bool(found[-2:].max() > 1e-6)
+        solution = self._solve(problem.hessian, problem.gradient @ z, problem.rows, lower, upper)
+        self._before_rad = solution[:2]
+        added_demand, rear_demand = solution[:2].tolist()
+        outside = bool(solution[-2:].max() > 1e-6)
         return ActuatorCommand(
             rear_demand, added_demand, desired, rear, rear_demand - rear, saturated=outside, estimate=now
         )
@@ -154,7 +145,7 @@ class Mpc:
 
 @lru_cache(maxsize=64)
 def steady_gains(car: SingleTrackParameters, speed_mps: float) -> tuple[float, float, float]:
-    """Front angle, rear angle and sideslip of a steady turn per yaw rate; see `lqr.steady_turn`."""
+    """Return front angle, rear angle and sideslip of a steady turn per yaw rate; see `lqr.steady_turn`."""
     front, rear, sideslip = steady_turn(car, speed_mps)[:, 0].tolist()
     return front, rear, sideslip
 
@@ -169,16 +160,16 @@ def envelope_problem(
     front_slope: float = 1.0,
     rear_slope: float = 1.0,
 ) -> Problem:
-    """The programme at a speed and slopes.
+    """Return the programme at a speed and slopes.
 
     Args:
-        car: The car as it is known.
+        car: The known car.
         parameters: Weights and relaxation length.
         servo_lag_s: Lag of both servos [s].
         interval_s: Time between two calls, the step of the model [s].
         speed_mps: Speed [m/s].
-        front_slope: Force over slip angle of the front axle, 1 at no slip angle [-].
-        rear_slope: The same of the rear axle [-].
+        front_slope: Force over slip angle of the front axle, 1 at zero slip angle [-].
+        rear_slope: Force over slip angle of the rear axle, likewise [-].
     """
     p, size = parameters, len(STATES) + len(GIVEN)
     a, b = model(car, p, servo_lag_s, interval_s, speed_mps, front_slope, rear_slope)
@@ -193,7 +184,7 @@ def envelope_problem(
     for step in range(1, steps + 1):
         by_z, by_u = a @ by_z, a @ by_u
         if step == 1:
-            # What is demanded now works from the next call on.
+            # The present demand acts from the next call on.
             by_z[:, before:] += b
             continue
         place = slice(2 * block_of[step - 2], 2 * block_of[step - 2] + 2)
@@ -204,7 +195,7 @@ def envelope_problem(
             own = np.zeros(unknowns)
             own[place.start + axle] = 1.0 / scale
             weighed.append((-identity[steady + axle] / scale, own))
-        if step in _LOOKED_AT:
+        if step in _CHECKED_STEPS:
             bounded["yaw_rate"].append((by_z[r], by_u[r]))
             arm = car.cg_to_rear_m / speed_mps
             by_both = [each[rear] - each[beta] + arm * each[r] for each in (by_z, by_u)]
@@ -224,7 +215,7 @@ def envelope_problem(
     gradient[:unknowns] = of_u.T @ of_z
     envelope = [*bounded["yaw_rate"], *bounded["slip"]]
     offsets, rows = (np.array(part) for part in zip(*envelope, strict=True))
-    slack = np.repeat(np.eye(2), len(_LOOKED_AT), axis=0)
+    slack = np.repeat(np.eye(2), len(_CHECKED_STEPS), axis=0)
     both = np.vstack([np.hstack([rows, -slack]), np.hstack([rows, slack])])
     return Problem(hessian, gradient, both, np.vstack([offsets, offsets]))
 
@@ -238,7 +229,7 @@ def model(
     front_slope: float,
     rear_slope: float,
 ) -> tuple[Array, Array]:
-    """States and given values from one call to the next, for angles that are held.
+    """Return the model of states and given values from one call to the next, for constant angles.
 
     Returns:
         System matrix over `STATES` and `GIVEN`; input matrix, inputs superposition and rear angle.
@@ -248,7 +239,7 @@ def model(
         car,
         front_stiffness_Nprad=front_slope * car.front_stiffness_Nprad,
         rear_stiffness_Nprad=rear_slope * car.rear_stiffness_Nprad,
-        characteristic_speed_mps=speed_mps,  # there is none where the rear axle slides, and it is not asked for
+        characteristic_speed_mps=speed_mps,  # not used; it does not exist while the rear axle slides
     )
     inner, both = np.zeros((size + 2, size + 2)), np.eye(2)
     inner[:2, :2], inner[:2, 2:4] = SingleTrack(softer).matrices(speed_mps)

@@ -1,4 +1,4 @@
-"""The car without active steering; it only works out the desired yaw rate, to compare with."""
+"""The car without active steering; only the desired yaw rate is computed, for comparison."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from activesteer.theory.single_track import SingleTrack
 
 
 class NoControl:
-    """No additional steer angles."""
+    """No superposed and no rear angle."""
 
     reads = ("desired_yaw_rate",)
 
     def __init__(self, desired: DesiredYawRate) -> None:
-        """Takes the reference model."""
+        """Take the reference model."""
         self._desired = desired
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> NoControl:
-        """Makes the controller for a car."""
+        """Make the controller for a car."""
         single_track = SingleTrack(setup.single_track)
         return cls(DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.timestep_s))
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """No angles; the desired yaw rate for the recording."""
+        """Return no angles; the desired yaw rate is recorded."""
         desired = self._desired.step(command.front_steer_demand_rad, measurement.speed_mps)
         return steering(0.0, 0.0, desired, 0.0, 0.0, False)

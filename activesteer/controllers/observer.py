@@ -1,4 +1,4 @@
-"""The car without active steering, watched by an estimator: nothing is asked for, what is estimated is recorded."""
+"""The car without active steering but with an estimator, whose estimate is recorded."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
 
 class Observer:
-    """No additional steer angles; speed, sideslip, yaw rate and friction as an estimator sees them."""
+    """No control; an estimator records speed, sideslip, yaw rate and friction."""
 
     reads = ("estimator",)
 
     def __init__(self, estimator: Estimator) -> None:
-        """Takes the estimator."""
+        """Take the estimator."""
         self._estimator = estimator
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> Observer:
-        """Makes the controller for a car; raises as `ControllerSetup.estimator` does."""
+        """Make the controller for a car; raises as `ControllerSetup.estimator` does."""
         return cls(setup.estimator())
 
     def step(self, _command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """No angles; the estimate for the recording."""
+        """Return no angles; the estimate is recorded."""
         return ActuatorCommand(estimate=self._estimator.step(measurement))

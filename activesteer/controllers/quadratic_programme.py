@@ -1,4 +1,4 @@
-"""The solver of small quadratic programmes, which is an extra of the package."""
+"""The solver of small quadratic programmes, an extra of the package."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from activesteer.conventions import Array
 from activesteer.errors import ControllerError, not_installed
 
 Solve = Callable[[Array, Array, Array, Array, Array], Array]
-"""x that makes x' H x / 2 + f' x least; H, f, A, lower, upper: the first bounds are those of x, the rest those of A
-x."""
+"""Function from H, f, A, lower and upper to the x that minimises x' H x / 2 + f' x; the bounds are first those of x,
+then those of A x."""
 
 
 def solver() -> Solve:
-    """DAQP's dual active-set method, cold in every call, so that a controller has no state in it.
+    """Return the dual active-set method of DAQP, with a cold start in every call so that it has no state.
 
     Raises:
-        ControllerError: it is not installed.
+        ControllerError: DAQP is not installed.
     """
     try:
         import daqp  # noqa: PLC0415 - an extra

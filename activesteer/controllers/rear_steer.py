@@ -1,4 +1,4 @@
-"""Active rear steering: predicted angle for zero sideslip, corrected by the yaw rate error (Dorsch 2012, Fig. 8)."""
+"""Active rear steering: a predicted angle for zero sideslip, corrected by the yaw rate error (Dorsch 2012, Fig. 8)."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from activesteer.theory.single_track import SingleTrack
 
 
 class RearPrediction:
-    """The transfer function G(s) of eq. 5 in the time domain, its coefficients those of the present speed.
+    """The transfer function G(s) of eq. 5 in the time domain, with coefficients of the present speed.
 
     State form: T_1 dx/dt = delta_V - x, delta_H = K_H x + K_H T_z dx/dt; exact for an input held between steps.
     """
 
     def __init__(self, single_track: SingleTrack, timestep_s: float) -> None:
-        """Takes the model.
+        """Take the model.
 
         Args:
-            single_track: The model that gives the coefficients.
+            single_track: Model for the coefficients.
             timestep_s: Time between two steps [s].
         """
         self._single_track = single_track
@@ -29,14 +29,11 @@ class RearPrediction:
         self._state_rad = 0.0
 
     def step(self, front_steer_rad: float, speed_mps: float) -> float:
-        """Predicted rear angle now.
+        """Return the predicted rear angle, left positive [rad].
 
         Args:
             front_steer_rad: The driver's demand at the road wheel [rad].
             speed_mps: Speed > 0 [m/s].
-
-        Returns:
-            Rear angle [rad], left positive.
         """
         gain, lead_s, lag_s = self._single_track.rear_prediction(speed_mps)
         difference = front_steer_rad - self._state_rad
@@ -48,7 +45,7 @@ class RearPrediction:
 class RearSteer:
     """Active rear steering (ARS): prediction less correction, limited.
 
-    The lag and the rate limit that follow are the actuator's, in the vehicle.
+    Lag and rate limit belong to the actuator, in the vehicle.
     """
 
     reads = ("ars", "desired_yaw_rate")
@@ -60,11 +57,11 @@ class RearSteer:
         parameters: RearSteerParameters,
         timestep_s: float,
     ) -> None:
-        """Makes the controller of one run.
+        """Make the controller of one run.
 
         Args:
             desired: Desired yaw rate.
-            prediction: Feed-forward.
+            prediction: Feedforward.
             parameters: Gains and limit.
             timestep_s: Time between two steps [s].
         """
@@ -77,7 +74,7 @@ class RearSteer:
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> RearSteer:
-        """Makes the controller for a car."""
+        """Make the controller for a car."""
         single_track = SingleTrack(setup.single_track)
         return cls(
             DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.timestep_s),
@@ -87,15 +84,7 @@ class RearSteer:
         )
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Rear angle now.
-
-        Args:
-            command: What the driver does.
-            measurement: What the car's sensors say.
-
-        Returns:
-            The rear angle demanded, with its parts.
-        """
+        """Return the demanded rear angle and its parts."""
         front_steer, speed = command.front_steer_demand_rad, measurement.speed_mps
         desired = self._desired.step(front_steer, speed)
         if speed < MIN_SPEED_MPS:
@@ -104,7 +93,7 @@ class RearSteer:
             return steering(0.0, 0.0, desired, 0.0, 0.0, False)
         yaw_rate = measurement.yaw_rate_radps
         prediction = self._prediction_gain * self._prediction.step(front_steer, speed)
-        # The rear wheels turn against the corrector's angle, and so does their limit.
+        # The rear wheels turn against the angle of the corrector, so the limit changes its sign too.
         feedback = self._corrector.step(desired - yaw_rate, -self._saturated)
         correction = decide(yaw_rate, feedback).rear * abs(feedback)
         angle, self._saturated = cut_off(prediction + correction, self._limit_rad)

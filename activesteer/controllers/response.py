@@ -1,9 +1,9 @@
-"""What a controller answers, as a frequency response about driving straight on, whatever it is made of.
+"""Frequency response of any controller about driving straight ahead.
 
-A controller is driven with the measurements of a car that rolls straight on until it has settled, and then gets a small
-pulse in one of them. What it answers beyond what it answers without the pulse is its impulse response, whose Fourier
-sum is its frequency response, exact for a controller that is linear about that point. So an observer, a programme with
-limits that are not reached, and a user's own code have one as well as a written-down transfer function.
+A controller gets the measurements of a car that drives straight ahead until it has settled, and then a small pulse in
+one of them. The difference to its answer without the pulse is its impulse response. The Fourier sum of that is its
+frequency response, exact for a controller that is linear about this point. An observer, a programme without active
+limits and a user's own code thus have a frequency response like a transfer function.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from activesteer.errors import ControllerError
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 
 SIGNALS: Final = ("yaw_rate_radps", "ay_mps2", "rear_steer_rad", "superposition_rad")
-"""Measurements that move with the lateral motion."""
+"""Measurements of the lateral motion."""
 COMMANDS: Final = ("rear_steer_demand_rad", "superposition_demand_rad")
-"""Members of a command that steer."""
+"""Fields of a command that steer."""
 
 _PULSE: Final = {"yaw_rate_radps": 1e-4, "ay_mps2": 1e-3, "rear_steer_rad": 1e-5, "superposition_rad": 1e-5}
-"""Heights of the pulses: a hundredth of what a sensor resolves, so that no limit is reached."""
+"""Heights of the pulses: a hundredth of the resolution of a sensor, so that no limit is reached."""
 _SETTLE_S: Final = 2.0
 _LENGTH_S: Final = 8.0
 _LEFT: Final = 0.02
-"""Part of the largest answer that may be left at the end: an estimator learns the offset of a sensor slowly [-]."""
+"""Fraction of the largest answer that may remain at the end: an estimator learns the offset of a sensor slowly [-]."""
 _LINEAR: Final = 0.01
-"""By how much half a pulse may be answered otherwise than by half [-]."""
+"""Tolerated error when half a pulse must give half the answer [-]."""
 
 
 def pulse_responses(
@@ -41,32 +41,31 @@ def pulse_responses(
     name: str = "it",
     held: Mapping[str, tuple[int, int]] | None = None,
 ) -> Array:
-    """Impulse responses of a controller to its measurements.
+    """Return the impulse responses of a controller to its measurements.
 
     Args:
-        controller: The controller, as made for a run; it is copied.
-        rolling: What the sensors say of a car that rolls straight on, at its speed.
+        controller: The controller of a run; it is copied.
+        rolling: Measurement of a car that drives straight ahead at its speed.
         interval_s: Time between two calls [s].
-        name: What the controller is called, for the message.
-        held: Signal -> calls for which a sample of its sensor is held, and calls after a multiple of that in which it
-            is first seen. An estimator that takes each sample once answers to the whole sample, not to one call of it.
+        name: Name of the controller, for the message.
+        held: Signal to two numbers of calls: for how long a sample of its sensor is held, and the offset of the first
+            call that sees it. An estimator that takes each sample once answers the whole sample, not one call of it.
 
     Returns:
-        Shape (calls, len(COMMANDS), len(SIGNALS)): answer per unit of a sample, the first in the call that sees it.
+        Shape (calls, len(COMMANDS), len(SIGNALS)): answer per unit of a sample, from the call that sees it on.
 
     Raises:
-        ControllerError: it does not answer a small pulse in proportion, or its answer does not end, so that it has no
-            such response.
+        ControllerError: the answer to a small pulse is not proportional to it, or does not end.
     """
     held = held or {}
     settled = copy.deepcopy(controller)
     _answers(settled, rolling, interval_s, round(_SETTLE_S / interval_s))
     rolling = rolling._replace(time_s=rolling.time_s + _SETTLE_S)
     count, period = round(_LENGTH_S / interval_s), max([1, *(calls for calls, _ in held.values())])
-    found = np.zeros((count, len(COMMANDS), len(SIGNALS)))
+    result = np.zeros((count, len(COMMANDS), len(SIGNALS)))
     for column, signal in enumerate(SIGNALS):
         calls, first = held.get(signal, (1, 0))
-        # What takes in something else only every so many calls may answer otherwise in those between.
+        # A controller that works only every few calls may answer differently in the calls between.
         starts = range(first, first + period, calls)
         for start in starts:
             before = copy.deepcopy(settled)
@@ -80,25 +79,25 @@ def pulse_responses(
             largest = np.abs(whole).max()
             if np.abs(whole - half).max() > _LINEAR * largest:
                 raise ControllerError(
-                    f"does not answer {signal} in proportion, so that it has no linear form", key=name, value=signal
+                    f"does not answer {signal} in proportion and has no linear form", key=name, value=signal
                 )
             if np.abs(whole[-count // 10 :]).max() > _LEFT * largest:
                 raise ControllerError(
                     f"still answers a pulse of {signal} after {_LENGTH_S:g} s", key=name, value=signal
                 )
-            found[:, :, column] += whole / len(starts)
-    return found
+            result[:, :, column] += whole / len(starts)
+    return result
 
 
 def response_of(pulses: Array, interval_s: float) -> Callable[[Array], NDArray[np.complex128]]:
-    """The frequency response that belongs to impulse responses.
+    """Return the frequency response of impulse responses.
 
     Args:
-        pulses: As from `pulse_responses`, shape (calls, outputs, inputs).
+        pulses: Return value of `pulse_responses`, shape (calls, outputs, inputs).
         interval_s: Time between two calls [s].
 
     Returns:
-        Function of frequencies [rad/s], shape (m,), to responses, shape (m, outputs, inputs).
+        Function from frequencies [rad/s], shape (m,), to responses, shape (m, outputs, inputs).
     """
     times_s = interval_s * np.arange(len(pulses))
 
@@ -118,13 +117,13 @@ def _answers(
     height: float = 0.0,
     calls: int = 1,
 ) -> Array:
-    """What is demanded in so many calls, the first of which get a pulse; shape (count, len(COMMANDS))."""
+    """Return the commands of `count` calls, the first `calls` of them with a pulse; shape (count, len(COMMANDS))."""
     straight = DriverCommand(front_steer_demand_rad=0.0)
-    found = np.empty((count, len(COMMANDS)))
+    commands = np.empty((count, len(COMMANDS)))
     for call in range(count):
         seen = rolling._replace(time_s=rolling.time_s + call * interval_s)
         if call < calls and signal:
             seen = seen._replace(**{signal: getattr(seen, signal) + height})
         answer: ActuatorCommand = controller.step(straight, seen)
-        found[call] = answer.rear_steer_demand_rad, answer.superposition_demand_rad
-    return found
+        commands[call] = answer.rear_steer_demand_rad, answer.superposition_demand_rad
+    return commands

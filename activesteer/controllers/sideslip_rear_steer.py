@@ -1,10 +1,10 @@
-"""Active rear steering with the sideslip angle in its law, which the paper (Dorsch 2012) names as the next step.
+"""Active rear steering with a sideslip term, the next step according to the paper (Dorsch 2012).
 
     delta_H = prediction - correction(desired - actual yaw rate) - k beta
 
-The first two parts are the paper's, without change. For the rear axle's force, C_H (delta_H - beta + l_H r / v), the
-third makes the axle stiffer against sideslip by the share k: a car that slides outwards (beta < 0 in a left turn) gets
-its rear wheels turned with the front ones. Yaw rate, speed and sideslip are the estimator's.
+The first two terms are those of the paper. The rear axle has the force C_H (delta_H - beta + l_H r / v), so the third
+term makes it stiffer against sideslip by the fraction k. If the car slides outwards (beta < 0 in a left turn), the rear
+wheels turn in the direction of the front wheels. Yaw rate, speed and sideslip come from the estimator.
 """
 
 from __future__ import annotations
@@ -22,47 +22,42 @@ if TYPE_CHECKING:
 
 
 class SideslipRearSteer:
-    """The paper's rear steering less a share of the sideslip angle."""
+    """The paper's rear steering with a sideslip term."""
 
     interval_s = 0.005
     reads = (*RearSteer.reads, "ars_sideslip", "estimator")
     gains = SideslipRearSteerParameters
 
     def __init__(self, paper: RearSteer, estimator: Estimator, sideslip_gain: float, limit_rad: float) -> None:
-        """Makes the controller of one run.
+        """Make the controller of one run.
 
         Args:
             paper: Prediction and correction.
-            estimator: Says yaw rate, speed and sideslip.
+            estimator: Estimator of yaw rate, speed and sideslip.
             sideslip_gain: k [rad/rad].
-            limit_rad: Most rear angle demanded [rad].
+            limit_rad: Largest rear angle demanded [rad].
         """
         self._paper, self._estimator = paper, estimator
         self._sideslip_gain, self._limit_rad = sideslip_gain, limit_rad
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> SideslipRearSteer:
-        """Makes the controller for a car."""
+        """Make the controller for a car."""
         gains = setup.gains
         return cls(
             RearSteer.from_vehicle(setup), setup.estimator(), gains.ars_sideslip.sideslip_gain, gains.ars.limit_rad
         )
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Rear angle now.
-
-        Args:
-            command: What the driver does.
-            measurement: What the car's sensors say.
-        """
+        """Return the demanded rear angle and its parts."""
         now = self._estimator.step(measurement)
         known = measurement._replace(speed_mps=now.speed_mps, yaw_rate_radps=now.yaw_rate_radps)
-        asked = self._paper.step(command, known)
+        result = self._paper.step(command, known)
         if now.speed_mps < MIN_SPEED_MPS:
-            return asked._replace(estimate=now)
-        correction = asked.correction_rad - self._sideslip_gain * now.sideslip_rad
-        wanted = asked.prediction_rad + correction
-        angle = min(max(wanted, -self._limit_rad), self._limit_rad)
-        return asked._replace(
-            rear_steer_demand_rad=angle, correction_rad=correction, saturated=angle != wanted, estimate=now
+            return result._replace(estimate=now)
+        correction = result.correction_rad - self._sideslip_gain * now.sideslip_rad
+        demand = result.prediction_rad + correction
+        angle = min(max(demand, -self._limit_rad), self._limit_rad)
+        return result._replace(
+            rear_steer_demand_rad=angle, correction_rad=correction, saturated=angle != demand, estimate=now
         )

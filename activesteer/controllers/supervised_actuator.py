@@ -1,4 +1,4 @@
-"""Whether an actuator does what it is asked to, told from its positions alone."""
+"""Detection of a failed actuator from its positions."""
 
 from __future__ import annotations
 
@@ -6,22 +6,23 @@ from collections import deque
 
 
 class SupervisedActuator:
-    """An actuator that is to come nearer to its demand.
+    """An actuator that must approach its demand.
 
-    Where it was further from its demand than a tolerance, and has not come nearer by a tenth of that within a window,
-    it is suspected; suspected for as long as the window, it counts as failed, until the end of the run. A slow
-    actuator, a weak supply, a delayed bus move all the same; one that is stuck, floats or runs away does not.
+    An actuator is suspected if its distance from the demand was larger than a tolerance and it has not approached by a
+    tenth of this distance within a window. It counts as failed, until the end of the run, once it is suspected for as
+    long as the window. A slow actuator, a weak supply or a delayed bus still approach; an actuator that is stuck,
+    floats or runs away does not.
 
     Attributes:
-        failed: Whether it has.
+        failed: Whether the actuator has failed.
     """
 
     def __init__(self, tolerance_rad: float, window_s: float, interval_s: float) -> None:
-        """Begins with a sound actuator.
+        """Begin with a sound actuator.
 
         Args:
-            tolerance_rad: Distance from the demand that does not count [rad].
-            window_s: Time in which something must be seen of a demand [s].
+            tolerance_rad: Distance from the demand that is tolerated [rad].
+            window_s: Time in which the actuator must approach its demand [s].
             interval_s: Time between two steps [s].
         """
         self._tolerance_rad = tolerance_rad
@@ -31,15 +32,7 @@ class SupervisedActuator:
         self.failed = False
 
     def step(self, demand_rad: float, position_rad: float) -> bool:
-        """Looks once more.
-
-        Args:
-            demand_rad: What is asked of it now [rad].
-            position_rad: Where it is [rad].
-
-        Returns:
-            Whether it has failed.
-        """
+        """Add a sample of demand and position [rad], and return whether the actuator has failed."""
         self._seen.append((demand_rad, position_rad))
         if len(self._seen) <= self._steps:
             return self.failed
