@@ -1,4 +1,4 @@
-"""From what the sensors say to how the car moves over the road, and how far that can be trusted."""
+"""Estimation of the motion of the car from its sensors, with standard deviations."""
 
 from activesteer.estimation.parameters import EstimatorParameters
 from activesteer.estimation.setup import EstimatorSetup, KnownTyre

@@ -1,7 +1,8 @@
-"""One step of the estimator, compiled: what is new goes into the filters, and they say what is now.
+"""One step of the estimator, compiled: new samples go into the filters, and the estimate comes from them.
 
-The inertial sensors say what was a while ago (their delay and low-pass). The filters live at that time: angles, wheel
-speeds and pressures are kept until it. From there the model alone goes on to the present, with the angles since.
+The inertial sensors are late by their delay and low-pass. The filters run at the time of the measurement: a buffer
+holds angles, wheel speeds and pressures until then. From there the model alone runs to the present, with the later
+angles.
 """
 
 from __future__ import annotations
@@ -30,23 +31,23 @@ from activesteer.estimation.two_track_model import SLOWEST_MPS, follow, follow_r
 from activesteer.estimation.wheels import read_wheels
 
 _SHORTEST_S: Final = 0.004
-"""What is new is not taken in more often than this, and the model goes to the present in such steps [s]."""
+"""Shortest time between two steps of the filters, and step of the model on its way to the present [s]."""
 _USED_FRACTION: Final = 0.85
-"""Fraction of the acceleration, in g, that the friction is not below ..."""
+"""Lower bound of the friction, as a fraction of the acceleration in g."""
 _USED_S: Final = 0.2
-"""... and the time constant with which it is smoothed: a car rocks when it stops [s]."""
+"""Time constant of this acceleration: a car rocks when it stops [s]."""
 
 
 @inlined
 def _steer(known, memory, steering, actuators):
-    """Takes the angles of the wheels from what was said of them."""
+    """Set the angles of the wheels from measured angles."""
     memory.front_angle_rad = steering[SAID_WHEEL] / known.steering_ratio + actuators[SAID_SUPERPOSITION]
     memory.rear_angle_rad = actuators[SAID_REAR]
 
 
 @compiled
 def _start(known, memory, said, line):
-    """The first call: the car drives straight on, at the speed that its wheels say."""
+    """Start in the first call: the car drives straight ahead at the speed of its wheels."""
     rolled_mps = 0.0
     for wheel in range(4):
         memory.last_spin_radps[wheel] = said[SAID_SPINS + wheel]
@@ -59,7 +60,7 @@ def _start(known, memory, said, line):
 
 @compiled
 def _filter(known, tyres, memory, said, line):
-    """Steps both filters to the time of what the inertial sensors say."""
+    """Advance both filters to the time of the inertial measurement."""
     duration_s, state, count, length = memory.waited_s, memory.state, memory.calls, len(line)
     _steer(known, memory, line[(count - known.steering_age) % length], line[(count - known.actuator_age) % length])
     memory.ax_mps2 = (said[SAID_AX] - memory.ax_offset_mps2) / (1.0 + known.pitch_gain)
@@ -77,8 +78,8 @@ def _filter(known, tyres, memory, said, line):
 
 
 @compiled
-def _go_to_now(known, tyres, memory, line):
-    """The model alone from the filters' time to now, with the angles that came since."""
+def _predict_present(known, tyres, memory, line):
+    """Advance the model alone from the time of the filters to the present, with the later angles."""
     now, count, length = memory.now, memory.calls, len(line)
     for index in range(N_STATES):
         now[index] = memory.state[index]
@@ -91,12 +92,12 @@ def _go_to_now(known, tyres, memory, line):
 
 
 @compiled
-def _say(known, memory):
-    """Writes the members of `Estimate`."""
+def _write_estimate(known, memory):
+    """Write the fields of `Estimate`."""
     now, covariance, out = memory.now, memory.covariance, memory.estimate
     ahead_s = known.age_s + memory.waited_s
     speed = memory.speed_mps + ahead_s * (memory.ax_mps2 + now[YAW_RATE] * now[LATERAL_SPEED])
-    # On the way from the filters' time to now the error of the forces is added.
+    # The way from the time of the filters to the present adds the error of the forces.
     wrong_N = known.force_std_N + known.force_fraction * known.mass_kg * abs(memory.loading_mps2)
     lever_m = 0.5 * (known.cg_to_front_m + known.cg_to_rear_m)
     lateral_std = math.hypot(math.sqrt(covariance[LATERAL_SPEED, LATERAL_SPEED]), wrong_N / known.mass_kg * ahead_s)
@@ -114,14 +115,14 @@ def _say(known, memory):
 
 @compiled
 def advance(known, tyres, memory, said, line):
-    """Takes in what the sensors say now, and makes the estimate.
+    """Process the present measurement, and make the estimate.
 
     Args:
         known: A record of `KNOWN`, shape (1,).
         tyres: Grids of front and rear tyres' lateral force, shape (2, loads, slip angles) [N].
         memory: A record of `MEMORY`, shape (1,); changed.
-        said: What the sensors say; see `SAID`.
-        line: What they said in the last calls, one behind the other in a ring; changed.
+        said: Measurement; see `SAID`.
+        line: Measurements of the last calls, a ring buffer; changed.
     """
     k, m = known[0], memory[0]
     first = m.calls == 0
@@ -134,9 +135,9 @@ def advance(known, tyres, memory, said, line):
         m.last[0], m.last[1], m.last[2] = said[SAID_RATE], said[SAID_AY], said[SAID_AX]
         _filter(k, tyres, m, said, line)
         m.waited_s = 0.0
-        _go_to_now(k, tyres, m, line)
+        _predict_present(k, tyres, m, line)
     else:
         _steer(k, m, said, said)
         follow(k, tyres, m, m.now, k.call_s, m.now)
-    _say(k, m)
+    _write_estimate(k, m)
     m.calls += 1

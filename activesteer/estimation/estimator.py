@@ -1,4 +1,4 @@
-"""The estimator of a car's motion, called at the rate of the controller that it serves."""
+"""The estimator of a car's motion, called at the rate of its controller."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _pack_into = struct.Struct(f"{len(SAID)}d").pack_into
 
 
 class Estimator:
-    """Speed, sideslip, yaw rate and friction from what the sensors say.
+    """Estimator of speed, sideslip, yaw rate and friction from the sensors.
 
     Example:
         >>> import activesteer
@@ -32,11 +32,11 @@ class Estimator:
     """
 
     def __init__(self, setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> None:
-        """Makes the estimator of one run.
+        """Make the estimator of one run.
 
         Args:
-            setup: What it knows of the car and its sensors.
-            parameters: How far it trusts its model.
+            setup: The known car and its sensors.
+            parameters: Uncertainties of the model.
             timestep_s: Time between two steps [s].
         """
         self._known = known_of(setup, parameters, timestep_s)
@@ -44,20 +44,16 @@ class Estimator:
         self._memory, self._said = np.zeros(1, MEMORY), np.zeros(len(SAID))
         self._row = self._said.data
         self._estimate = self._memory["estimate"][0]
-        # As many calls as what the inertial sensors say is old, and this one.
+        # One row for each call within the delay of the inertial sensors, and this call.
         self._line = np.zeros((round(float(self._known["age_s"][0]) / timestep_s) + 2, len(SAID)))
 
     @property
     def innovation(self) -> float:
-        """Squared error of yaw rate and lateral acceleration as last measured, over its expected covariance."""
+        """Squared error of the last measured yaw rate and lateral acceleration, over its expected covariance."""
         return float(self._memory["innovation"][0])
 
     def step(self, measurement: Measurement) -> Estimate:
-        """What the car does now.
-
-        Args:
-            measurement: What the car's sensors say.
-        """
+        """Process a measurement, and return the estimate."""
         _, _, yaw_rate, ay, ax, steering_wheel, rear, superposition, spins, pressures = measurement
         _pack_into(self._row, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
         advance(self._known, self._tyres, self._memory, self._said, self._line)

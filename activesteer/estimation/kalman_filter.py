@@ -1,13 +1,13 @@
 """The filter of the lateral motion: an extended Kalman filter on the two-track model, compiled.
 
 It measures the yaw rate r + b_r and the lateral acceleration a_y + g p + b_y with the roll angle p: an accelerometer
-leans with the body. The derivatives of the model are differences. What the model does not know are
+leans with the body. Differences give the derivatives of the model. The unknowns of the model are
 
     e_i     slip angle errors: Gauss-Markov processes of the size `slip_angle_std_rad` + `slip_angle_fraction` |a_i|
     b_y     offset of the sensor and inclination of the road, likewise
-    u       friction, likewise, about what it is taken for until it shows; nothing but forces near the limit shows it
-    b_r     offset of the yaw rate's sensor, a random walk
-    forces  wrong by `force_std_N` + `force_fraction` |F| for `force_s`, longitudinal ones by `along_fraction` |X|
+    u       friction, likewise, about its assumed value; it is observable only from forces near the limit
+    b_r     offset of the yaw rate sensor, a random walk
+    forces  errors of `force_std_N` + `force_fraction` |F| for `force_s`, longitudinal errors of `along_fraction` |X|
     noise   of lateral and yaw acceleration
 
 Sources:
@@ -48,17 +48,17 @@ from activesteer.estimation.two_track_model import (
 _DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 0.01])
 """Steps of the differences, in the units of the states."""
 _MOST_BRAKED: Final = 0.25
-"""Fraction of the front axle's friction beyond which lateral forces say nothing of the friction: brakes then take more
-of them, by a circle of friction that is itself not exact, than `force_fraction`."""
+"""Fraction of the front axle's friction force above which lateral forces give no information on the friction: brakes
+then reduce them by more than `force_fraction`, by a friction circle that is itself not exact."""
 _CREEP_MPS: Final = 0.05
-"""Standard deviation of the lateral speed of a car that hardly moves [m/s]."""
+"""Standard deviation of the lateral speed of an almost standing car [m/s]."""
 _CREEP_DENSITY: Final = 0.05
-"""Spectral density of its yaw acceleration [rad2/s3]: 0.5 rad/s2 for 0.1 s, when brakes bring it to a stop."""
+"""Spectral density of its yaw acceleration [rad2/s3]: 0.5 rad/s2 for 0.1 s, when brakes stop the car."""
 
 
 @compiled
 def begin(known, memory):
-    """A car that drives straight on.
+    """Start with a car that drives straight ahead.
 
     Args:
         known: Record of `KNOWN`.
@@ -78,7 +78,7 @@ def begin(known, memory):
 
 @inlined
 def _step_of(state, place):
-    """Step of a difference, outwards: what is mirrored has mirrored derivatives."""
+    """Step of a difference, outwards, so that mirrored states have mirrored derivatives."""
     return math.copysign(_DIFFERENCES[place], state[place])
 
 
@@ -89,7 +89,7 @@ def _is_braked(known, memory):
 
 @inlined
 def _force_errors(known, front_N, rear_N):
-    """Variances of what is wrong with the forces of both axles [N2]."""
+    """Variances of the force errors of both axles [N2]."""
     front = known.force_std_N + known.force_fraction * abs(front_N)
     rear = known.force_std_N + known.force_fraction * abs(rear_N)
     return front * front, rear * rear
@@ -97,7 +97,7 @@ def _force_errors(known, front_N, rear_N):
 
 @compiled
 def _differentiate(known, tyres, memory, duration_s, moved, slope):
-    """The state after a while, and its derivatives by the state now."""
+    """Compute the state after an interval, and its derivatives by the present state."""
     state = memory.state
     start, other = state.copy(), np.empty(N_STATES)
     follow(known, tyres, memory, start, duration_s, moved)
@@ -116,7 +116,7 @@ def _differentiate(known, tyres, memory, duration_s, moved, slope):
 
 @compiled
 def _forget(known, memory, duration_s, moved, slope, added):
-    """Gauss-Markov processes go back to their mean, and are made uncertain anew."""
+    """Return the Gauss-Markov processes towards their means, and add their process noise."""
     vx_mps = max(memory.speed_mps, SLOWEST_MPS)
     front_rad, rear_rad = slip_angles(known, memory, memory.state, vx_mps)
     front = known.slip_angle_std_rad + known.slip_angle_fraction * abs(front_rad)
@@ -135,10 +135,10 @@ def _forget(known, memory, duration_s, moved, slope, added):
 
 @compiled
 def _add_noise(known, tyres, memory, duration_s, added):
-    """What comes to the covariance of the motion in a while."""
+    """Process noise covariance of the motion over an interval."""
     front_N, rear_N = forces_of(known, tyres, memory, memory.state)
     front, rear = _force_errors(known, front_N, rear_N)
-    # What is wrong for a time does what white noise of twice that time does.
+    # An error that lasts for a time acts like white noise of twice this time.
     density = 2.0 * known.force_s * duration_s
     mass, inertia = known.mass_kg, known.yaw_inertia_kgm2
     to_front, to_rear = known.cg_to_front_m, known.cg_to_rear_m
@@ -149,8 +149,8 @@ def _add_noise(known, tyres, memory, duration_s, added):
         known.lateral_density_m2ps3 * duration_s + density * (front + rear) / mass / mass
     )
     added[YAW_RATE, YAW_RATE] = known.yaw_density_rad2ps3 * duration_s + density * turning / inertia / inertia
-    both = density * (to_front * front - to_rear * rear) / mass / inertia
-    added[LATERAL_SPEED, YAW_RATE] = added[YAW_RATE, LATERAL_SPEED] = both
+    cross = density * (to_front * front - to_rear * rear) / mass / inertia
+    added[LATERAL_SPEED, YAW_RATE] = added[YAW_RATE, LATERAL_SPEED] = cross
     added[RATE_OFFSET, RATE_OFFSET] = known.rate_walk_rad2ps3 * duration_s
     if memory.speed_mps < SLOWEST_MPS:
         added[LATERAL_SPEED, LATERAL_SPEED] = _CREEP_MPS * _CREEP_MPS
@@ -160,13 +160,13 @@ def _add_noise(known, tyres, memory, duration_s, added):
 
 @compiled
 def predict(known, tyres, memory, duration_s):
-    """The state and its covariance after a while.
+    """Advance the state and its covariance by an interval.
 
     Args:
         known: Record of `KNOWN`.
         tyres: Grids of front and rear tyres' lateral force [N].
         memory: Record of `MEMORY`; state and covariance are changed.
-        duration_s: Time to go on [s].
+        duration_s: Length of the interval [s].
     """
     n, covariance = N_STATES, memory.covariance
     moved, slope, half, added = np.empty(n), np.empty((n, n)), np.empty((n, n)), np.zeros((n, n))
@@ -187,7 +187,7 @@ def predict(known, tyres, memory, duration_s):
                 total += half[row, k] * slope[column, k]
             covariance[row, column] = covariance[column, row] = total
     if _is_braked(known, memory):
-        # What is not learned must not follow what is: it would be drawn along by what both had in common before.
+        # The friction is not estimated while braking, so it must not follow the other states by old correlations.
         variance = covariance[FRICTION, FRICTION]
         covariance[FRICTION, :] = covariance[:, FRICTION] = 0.0
         covariance[FRICTION, FRICTION] = variance
@@ -195,7 +195,7 @@ def predict(known, tyres, memory, duration_s):
 
 @inlined
 def _take_in(state, covariance, row, error, variance):
-    """Takes in one measured number; returns the variance of the error that was expected."""
+    """Process one measured value, and return the expected variance of its error."""
     n = len(state)
     spread, expected = np.zeros(n), variance
     for i in range(n):
@@ -213,24 +213,24 @@ def _take_in(state, covariance, row, error, variance):
 
 @compiled
 def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
-    """Takes in what the sensors said.
+    """Process a measurement.
 
     Args:
         known: Record of `KNOWN`.
         tyres: Grids of front and rear tyres' lateral force [N].
         memory: Record of `MEMORY`; state and covariance are changed.
-        yaw_rate_radps: Yaw rate as measured [rad/s].
-        ay_mps2: Lateral acceleration as measured [m/s2].
-        duration_s: Time since they were last taken in [s].
+        yaw_rate_radps: Measured yaw rate [rad/s].
+        ay_mps2: Measured lateral acceleration [m/s2].
+        duration_s: Time since the last measurement [s].
 
     Returns:
-        Squared error of both over its expected covariance: of the chi-square distribution with two degrees of freedom.
+        Squared error of both values over its expected covariance: chi-square distributed with two degrees of freedom.
     """
     state, covariance, row = memory.state, memory.covariance, np.zeros(N_STATES)
     row[YAW_RATE] = row[RATE_OFFSET] = 1.0
     error = yaw_rate_radps - state[YAW_RATE] - state[RATE_OFFSET]
     variance = known.rate_variance_rad2ps2 + (known.rate_fraction * yaw_rate_radps) ** 2
-    # One after the other: the second is expected as the first leaves it.
+    # One value after the other: the first changes the expectation of the second.
     innovation = error * error / _take_in(state, covariance, row, error, variance)
     row[YAW_RATE] = row[RATE_OFFSET] = 0.0
     mass = known.mass_kg
@@ -252,7 +252,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     expected = (front_N * cos_f + rear_N * cos_r + memory.front_along_N * sin_f) / mass
     error = ay_mps2 - expected - GRAVITY_MPS2 * memory.roll_rad - state[AY_OFFSET]
     front, rear = _force_errors(known, front_N, rear_N)
-    # A force that is wrong stays so: in all that time it counts as one measurement.
+    # A force error lasts: during this time all samples count as one measurement.
     repeated = 1.0 + 2.0 * known.force_s / duration_s
     variance = known.ay_variance_m2ps4 + (known.ay_fraction * ay_mps2) ** 2 + repeated * (front + rear) / (mass * mass)
     innovation += error * error / _take_in(state, covariance, row, error, variance)

@@ -1,4 +1,4 @@
-"""What an estimator knows and remembers, as records that compiled code reads."""
+"""Knowledge and memory of an estimator, as records for compiled code."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from activesteer.estimation.setup import EstimatorSetup
 from activesteer.sensors.sensor_kinds import Sensor
 
 LATERAL_SPEED, YAW_RATE, FRONT_SLIP, REAR_SLIP, FRONT_ERROR, REAR_ERROR, RATE_OFFSET, AY_OFFSET, FRICTION = range(9)
-"""Places of the states: v_y, r, a_f, a_r, e_f, e_r, b_r, b_y, m; see `two_track_model` and `kalman_filter`."""
+"""Indices of the states v_y, r, a_f, a_r, e_f, e_r, b_r, b_y, m; see `two_track_model` and `kalman_filter`."""
 N_STATES: Final = 9
 SAID: Final = (
     "yaw_rate_radps", "ay_mps2", "ax_mps2", "steering_wheel_rad", "rear_steer_rad", "superposition_rad",
     *(f"{corner}_spin_radps" for corner in ("fl", "fr", "rl", "rr")),
     *(f"{corner}_pressure_Pa" for corner in ("fl", "fr", "rl", "rr")),
 )  # fmt: skip
-"""What the sensors say, in the order of a row."""
+"""Measured values in the order of a row."""
 SAID_RATE, SAID_AY, SAID_AX, SAID_WHEEL, SAID_REAR, SAID_SUPERPOSITION, SAID_SPINS, SAID_PRESSURES = *range(7), 10
-"""Places in such a row; of wheel speeds and pressures the first one."""
+"""Indices in such a row; for wheel speeds and pressures the first index."""
 
 _CAR: Final = (
     "mass_kg", "yaw_inertia_kgm2", "cg_to_front_m", "cg_to_rear_m", "front_compliance_radpN", "rear_compliance_radpN",
@@ -54,11 +54,14 @@ KNOWN: Final = np.dtype(
         ],
     )
 )
-"""The car: of each axle compliance, load of a wheel, its change per lateral acceleration (and per longitudinal one),
-relaxation length, steps of the tyre's grid; the body's roll and what an accelerometer feels of its pitch. What is not
-known: the members of `EstimatorParameters` with what the data sheets say. Time between two calls, the longest that the
-filters wait for something new, and the age of what the inertial sensors say; by how many calls the others are younger.
-Of each wheel its place (left positive), rolling radius, fraction of the drive, brake and slip stiffness per load."""
+"""Knowledge of an estimator.
+
+Car: for each axle its compliance, wheel load, load transfer per lateral and longitudinal acceleration, relaxation
+    length and steps of the tyre grid; roll of the body, and effect of its pitch on an accelerometer. Uncertainties: the
+    fields of `EstimatorParameters`, with the data sheets. Times: interval between two calls, longest wait of the
+    filters for a new sample, age of an inertial sample; and the number of calls by which other samples are younger.
+    Wheels: position (left positive), rolling radius, fraction of the drive, brake, and slip stiffness per load.
+"""
 
 MEMORY: Final = np.dtype(
     (
@@ -81,27 +84,30 @@ MEMORY: Final = np.dtype(
         ],
     )
 )
-"""The estimate; how often it was made; time since the filters' last step, squared error of what was then measured over
-its expected covariance, wheels left out, smoothed use of the friction; what was new then. The filters' states and
-covariances; the state now. Inputs of the model: steer angles, longitudinal acceleration, longitudinal force of the
-front axle and moment of all, lateral acceleration that loads the wheels, lateral speed of the roll axis beside v_y;
-roll; of each wheel its longitudinal force, load, and the speed of the car that it speaks for."""
+"""Memory of an estimator.
+
+The estimate and the number of calls. The last step of the filters: time since then, squared error over its expected
+covariance, wheels left out, smoothed use of the friction, last samples. States and covariances of the filters, and the
+present state. Inputs of the model: steer angles, longitudinal acceleration, longitudinal force of the front axle,
+moment of all longitudinal forces, lateral acceleration that loads the wheels, lateral speed of the roll axis relative
+to v_y, roll; and for each wheel its longitudinal force, its load, and the speed of the car by this wheel.
+"""
 
 _RATE_FLOOR_RADPS: Final = math.radians(0.02)
 _AY_FLOOR_MPS2: Final = 0.03
-"""Least standard deviations of a measurement, where a data sheet says less."""
+"""Smallest standard deviations of a measurement, even if a data sheet gives less."""
 _ENGINE_STEP_S: Final = 0.001
-"""A controller that is called as often as this sees at once what is new [s]."""
+"""Interval of a controller that sees every new sample at once [s]."""
 _SHORTEST_WAIT_S: Final = 0.005
-"""The filters are not stepped more often, whatever the sensors do [s]: the tyres follow in some 20 ms."""
+"""Shortest time between two steps of the filters [s]: the tyres lag by about 20 ms."""
 
 
 def known_of(setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> NDArray[Any]:
-    """What an estimator knows: a record of `KNOWN`, shape (1,).
+    """Return the knowledge of an estimator: a record of `KNOWN`, shape (1,).
 
     Args:
         setup: The car and its sensors.
-        parameters: How far the model is trusted.
+        parameters: Uncertainties of the model.
         timestep_s: Time between two calls [s].
     """
     known = np.zeros(1, KNOWN)
@@ -170,7 +176,7 @@ def _times(setup: EstimatorSetup, timestep_s: float) -> dict[str, float]:
     def younger(sensor: Sensor, held_s: float = 0.0) -> int:
         return max(round((age_s - _age_s(sensor) - held_s) / timestep_s), 0)
 
-    # A wheel's speed is a mean over the time since the last one.
+    # A wheel speed is a mean over the time since the last sample.
     held_s = 0.5 * max((sensors.wheel_speed.sample_time_s or 0.0) - timestep_s, 0.0)
     return {
         "call_s": timestep_s,
@@ -183,7 +189,7 @@ def _times(setup: EstimatorSetup, timestep_s: float) -> dict[str, float]:
 
 
 def _age_s(sensor: Sensor) -> float:
-    """How old what a sensor says is when it is new: delay and low-pass [s]."""
+    """Return the age of a new sample of a sensor: delay and low-pass [s]."""
     return (sensor.delay_s or 0.0) + (0.5 / math.pi / sensor.bandwidth_Hz if sensor.bandwidth_Hz else 0.0)
 
 

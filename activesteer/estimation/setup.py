@@ -1,4 +1,4 @@
-"""What an estimator knows: the car as its file says it, unloaded and with new tyres, and the sensors' data sheets."""
+"""Knowledge of an estimator: the car of the vehicle file, unloaded and with new tyres, and the sensors' data sheets."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class KnownTyre:
-    """A tyre as an estimator knows it: new, upright, on the road of its file.
+    """Tyre as an estimator knows it: new, upright, on the road of its file.
 
     Attributes:
-        slip_angle_step_rad: Distance of the slip angles of the grid, from 0 [rad].
-        load_step_N: Distance of its loads, from 0 [N].
-        force_N: Size of the lateral force, mean of both directions, for each load at each slip angle [N].
-        relaxation_length_m: Relaxation length of the slip angle under the load of standing still [m].
-        slip_stiffness: Longitudinal force per slip and load, likewise.
-        rolling_radius_m: Effective rolling radius, likewise [m].
+        slip_angle_step_rad: Step of the slip angles of the grid, from 0 [rad].
+        load_step_N: Step of its loads, from 0 [N].
+        force_N: Lateral force for each load and slip angle, mean of both directions, without sign [N].
+        relaxation_length_m: Relaxation length of the slip angle under the static load [m].
+        slip_stiffness: Longitudinal force per slip and load, under the static load.
+        rolling_radius_m: Effective rolling radius under the static load [m].
     """
 
     slip_angle_step_rad: float
@@ -35,24 +35,24 @@ class KnownTyre:
     rolling_radius_m: float
 
     def stiffness_at(self, load_N: float) -> float:
-        """Cornering stiffness [N/rad] under a load [N]."""
+        """Return the cornering stiffness under a load [N/rad]."""
         loads_N = self.load_step_N * np.arange(len(self.force_N))
         return float(np.interp(load_N, loads_N, np.array(self.force_N)[:, 1])) / self.slip_angle_step_rad
 
 
 @dataclass(frozen=True)
 class EstimatorSetup:
-    """What an estimator gets when it is made.
+    """Input from which an estimator is made.
 
     Attributes:
         single_track: Mass, yaw inertia, axle distances and axle stiffnesses.
-        two_track: What loads the wheels and inclines the body.
+        two_track: Parameters of wheel loads and body roll.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
         tyres: Tyre of the front and of the rear axle.
-        drive_fractions: Fraction of the drive torque of each wheel, order of `CORNERS`.
-        brake_torque_per_pressure_NmpPa: Of each wheel's brake [Nm/Pa].
+        drive_fractions: Fraction of the drive torque at each wheel, order of `CORNERS`.
+        brake_torque_per_pressure_NmpPa: Brake torque per pressure of each wheel [Nm/Pa].
         drag_per_speed2_kgpm: Drag over the square of the speed [kg/m].
-        sensors: What the data sheets say of the sensors.
+        sensors: Data sheets of the sensors.
     """
 
     single_track: SingleTrackParameters

@@ -1,6 +1,6 @@
-"""The two-track model that the estimator goes by: lateral motion, axle forces, and what is not known of them; compiled.
+"""The two-track model of the estimator: lateral motion, axle forces, and their unknown parts; compiled.
 
-Per axle i = f, r where there are two:
+For the axles i = f, r:
 
     m (v_y' + r v_x) = F_f cos d_f + F_r cos d_r + X_f sin d_f
     J_z r'           = l_f (F_f cos d_f + X_f sin d_f) - l_r F_r cos d_r + M_x
@@ -9,17 +9,17 @@ Per axle i = f, r where there are two:
     p'' + 2 D w p' + w^2 p = w^2 k a_y
 
 with the steer angles d, the longitudinal forces X and their moment M_x, slip angles a that build up over the relaxation
-lengths s, the car's own tyre F_y under the wheel's load, and the friction u of the road by similarity. Beside a
-longitudinal force u is what a circle of friction leaves of it: that lowers the largest force, and hardly that at small
-slip angles, as the Magic Formula of combined slip has it (0.7 of the friction for the brake take 8 % at 2 deg). The
-body rolls by p as a mass on a spring: about an axis that lies h below the centre of gravity, so that the axles move
-sideways by h p' beside it; its springs and dampers load the wheels. The compliance c_i is what the identified cornering
-stiffness of the axle has beyond the tyres':
+lengths s, the car's own tyre F_y under the wheel's load, and the friction u of the road by similarity. With a
+longitudinal force, a friction circle reduces u. That lowers the largest force but hardly the force at small slip
+angles, as in the Magic Formula of combined slip (0.7 of the friction for the brake take 8 % at 2 deg). The body rolls
+by p as a mass on a spring, about an axis that lies h below the centre of gravity, so that the axles also move sideways
+by h p'. Springs and dampers of the body load the wheels. The compliance c_i is the difference between the identified
+cornering stiffness of the axle and the stiffness of its tyres:
 
     c_i = 1 / C_i - 1 / (2 C_tyre)
 
-Roll steer, elastokinematics and steering column are in it. The slip angle error e_i is what is not known of tyre and
-axle; like offsets of sensors and the friction it is a state of its own.
+It includes roll steer, elastokinematics and steering column. The slip angle error e_i covers the unknowns of tyre and
+axle; like the offsets of sensors and the friction it is a state.
 
 Sources:
     Kiencke and Nielsen, Automotive Control Systems, 2nd ed. 2005, chapters 8 and 9 (two-track model in observers).
@@ -47,23 +47,23 @@ from activesteer.estimation.records import (
 
 LEAST_FRICTION: Final = 0.05
 LARGEST_FRICTION: Final = 1.5
-"""Friction is not taken for less or more."""
+"""Bounds of the estimated friction [-]."""
 SLOWEST_MPS: Final = 3.0
-"""Slower than this, the car is taken to roll without slip angles [m/s]: the sensors cannot tell them."""
+"""Below this speed the car is assumed to roll without slip angles, which the sensors cannot show [m/s]."""
 _LEAST_LEFT: Final = 0.5
-"""Fraction of its friction that a wheel keeps for lateral force whatever its longitudinal force is said to be. By the
-compact's Magic Formula 0.65 to 0.72 of the lateral force are left at the slip of the largest brake force, 12 %, at 1 to
-6 deg, and 0.45 to 0.53 at 20 %, where an anti-lock system lets it go at times; the circle with one half leaves 0.92 to
+"""Smallest fraction of its friction that a wheel keeps for lateral force, for any longitudinal force. By the compact's
+Magic Formula, at 1 to 6 deg, 0.65 to 0.72 of the lateral force remain at a slip of 12 %, where the brake force is
+largest, and 0.45 to 0.53 at 20 %, which an anti-lock system allows at times. The circle with one half leaves 0.92 to
 0.51."""
 _CREEP_S: Final = 0.3
-"""Time in which a car that hardly moves turns as its wheels are steered [s]."""
+"""Time constant of the yaw rate of an almost standing car [s]."""
 _LONGEST_STEP_S: Final = 0.005
-"""Longest step of the integration [s]: the tyres follow in some 20 ms."""
+"""Longest step of the integration [s]: the tyres lag by about 20 ms."""
 
 
 @inlined
 def _between(forces_N, angle_step_rad, load_step_N, angle_rad, load_N):
-    """Lateral force of a tyre between the points of its grid, at an angle from 0 on."""
+    """Interpolate the lateral force of a tyre in its grid, at an angle from 0 on."""
     rows, columns = forces_N.shape
     across = min(angle_rad / angle_step_rad, columns - 1.000001)
     down = min(max(load_N / load_step_N, 0.0), rows - 1.000001)
@@ -76,17 +76,17 @@ def _between(forces_N, angle_step_rad, load_step_N, angle_rad, load_N):
 
 @compiled
 def axle_force(forces_N, angle_step_rad, load_step_N, angle_rad, load_N, shift_N, left_N, right_N, friction):
-    """Lateral force of both tyres of an axle [N].
+    """Return the lateral force of both tyres of an axle [N].
 
     Args:
         forces_N: The tyre's grid.
-        angle_step_rad: Its step.
-        load_step_N: Likewise.
-        angle_rad: Slip angle, positive gives a positive force.
-        load_N: Mean load of the two.
-        shift_N: What the right one has more, and the left one less.
-        left_N: Longitudinal force of the left one.
-        right_N: Of the right one.
+        angle_step_rad: Step of its slip angles.
+        load_step_N: Step of its loads.
+        angle_rad: Slip angle; a positive angle gives a positive force.
+        load_N: Mean load of both wheels.
+        shift_N: Load transfer from the left to the right wheel.
+        left_N: Longitudinal force of the left wheel.
+        right_N: Longitudinal force of the right wheel.
         friction: Friction of the road.
     """
     size_rad, total_N = abs(angle_rad) / friction, 0.0
@@ -100,7 +100,7 @@ def axle_force(forces_N, angle_step_rad, load_step_N, angle_rad, load_N, shift_N
 
 @compiled
 def forces_of(known, tyres, memory, state):
-    """Lateral forces of both axles, across their wheels [N].
+    """Return the lateral forces of both axles, across their wheels [N].
 
     Args:
         known: Record of `KNOWN`.
@@ -123,7 +123,7 @@ def forces_of(known, tyres, memory, state):
 
 @inlined
 def slip_angles(known, memory, state, vx_mps):
-    """Slip angles of both axles by the motion of the car alone [rad]."""
+    """Return the slip angles of both axles from the motion of the car alone [rad]."""
     across_mps = state[LATERAL_SPEED] + memory.rolling_mps
     front_rad = memory.front_angle_rad - (across_mps + known.cg_to_front_m * state[YAW_RATE]) / vx_mps
     rear_rad = memory.rear_angle_rad - (across_mps - known.cg_to_rear_m * state[YAW_RATE]) / vx_mps
@@ -132,22 +132,22 @@ def slip_angles(known, memory, state, vx_mps):
 
 @compiled
 def follow(known, tyres, memory, state, duration_s, out):
-    """The state after a while, the inputs staying as they are.
+    """Advance the state by an interval, for constant inputs.
 
     Args:
         known: Record of `KNOWN`.
         tyres: Grids of front and rear tyres' lateral force [N].
         memory: Record of `MEMORY`: the inputs.
         state: The states.
-        duration_s: Time to go on [s].
-        out: The states then; may be `state`.
+        duration_s: Length of the interval [s].
+        out: The new states; may be `state`.
     """
     for index in range(N_STATES):
         out[index] = state[index]
     vx = memory.speed_mps
     df, dr = memory.front_angle_rad, memory.rear_angle_rad
     if vx < SLOWEST_MPS:
-        # Rolling without slip angles: the rear axle's middle goes where its wheels point.
+        # Rolling without slip angles: the middle of the rear axle moves in the direction of its wheels.
         turned = vx * (df - dr) / (known.cg_to_front_m + known.cg_to_rear_m)
         out[YAW_RATE] += (1.0 - math.exp(-duration_s / _CREEP_S)) * (turned - out[YAW_RATE])
         out[LATERAL_SPEED] = known.cg_to_rear_m * out[YAW_RATE] + vx * dr
@@ -173,7 +173,7 @@ def follow(known, tyres, memory, state, duration_s, out):
 
 @compiled
 def follow_roll(known, memory, ay_mps2, duration_s):
-    """The body's roll after a while, and what it does to the wheels.
+    """Advance the roll of the body by an interval, with its effects on the wheels.
 
     Springs and dampers carry (p + 2 D p' / w) / k in place of a_y.
 
@@ -181,7 +181,7 @@ def follow_roll(known, memory, ay_mps2, duration_s):
         known: Record of `KNOWN`.
         memory: Record of `MEMORY`; roll, `loading_mps2` and `rolling_mps` are changed.
         ay_mps2: Lateral acceleration [m/s2].
-        duration_s: Time to go on [s].
+        duration_s: Length of the interval [s].
     """
     speed, damping, gradient = known.roll_speed_radps, known.roll_damping, known.roll_gradient_radpmps2
     steps = max(1, math.ceil(duration_s / _LONGEST_STEP_S - 1e-9))

@@ -1,10 +1,10 @@
-"""Loads and longitudinal forces of the wheels from what the sensors say, and the speed of the car by each; compiled.
+"""Loads and longitudinal forces of the wheels from the sensors, and the speed of the car by each wheel; compiled.
 
     F_z = load at rest -+ fraction of the longitudinal acceleration -+ fraction of the lateral one
     X   = (drive - brake - J w') / R
 
-The brake follows from the pressure. Nobody says what the engine does: while no brake works, the drive is what
-accelerates the car and what its drag takes, by the fractions of the driven wheels.
+The brake torque follows from the pressure. There is no measurement of the engine: while no brake works, the drive force
+is the force that accelerates the car plus its drag, distributed by the fractions of the driven wheels.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from activesteer.estimation.records import (
 )
 
 STANDING_MPS: Final = 0.5
-"""Slower than this, wheels that stand still are a car that stands still [m/s]."""
+"""Below this speed, standing wheels mean a standing car [m/s]."""
 _BRAKING_NM: Final = 100.0
-"""Brake torque of all wheels from which the engine is taken to do nothing [N m]."""
+"""Total brake torque above which the engine is assumed to give no torque [N m]."""
 
 
 @compiled
 def read_wheels(known, memory, said, duration_s):
-    """Loads, forces and speeds of the wheels.
+    """Compute loads, forces and speeds of the wheels.
 
     Args:
         known: Record of `KNOWN`.
-        memory: Record of `MEMORY`; what it has of the wheels, their forces and moment is changed.
-        said: What the sensors said at the filters' time.
-        duration_s: Time since this was last read [s].
+        memory: Record of `MEMORY`; its values of the wheels, their forces and moment are changed.
+        said: Measurement at the time of the filters.
+        duration_s: Time since the last call [s].
     """
     state, along_N = memory.state, memory.along_N
     friction, braking_Nm = state[FRICTION], 0.0
@@ -63,7 +63,7 @@ def read_wheels(known, memory, said, duration_s):
         most_N = friction * max(load_N, 0.0)
         along_N[wheel] = min(max(along_N[wheel] + known.drive_fraction[wheel] * drive_N, -most_N), most_N)
         if said[SAID_SPINS + wheel] == 0.0:
-            # Whatever holds it: it slides on a car that moves, and does nothing to one that stands.
+            # A locked wheel slides under a moving car, and has no force under a standing car.
             along_N[wheel] = -math.copysign(most_N, memory.speed_mps) if abs(memory.speed_mps) > STANDING_MPS else 0.0
         memory.moment_Nm -= known.left_m[wheel] * along_N[wheel]
         across_mps = state[LATERAL_SPEED] + known.to_axle_m[wheel] * state[YAW_RATE]
