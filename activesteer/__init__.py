@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion, Setpoint
     from activesteer.simulation.runner import simulate
     from activesteer.simulation.simulation import Simulation
-    from activesteer.studies.study import study
+    from activesteer.studies.engine.study import study
 
 __all__ = [
     "ActuatorCommand",
@@ -39,7 +39,7 @@ _HOMES = {
     "Simulation": "activesteer.simulation.simulation",
     "ActuatorCommand": "activesteer.signals",
     "simulate": "activesteer.simulation.runner",
-    "study": "activesteer.studies.study",
+    "study": "activesteer.studies.engine.study",
 }
 
 

@@ -31,12 +31,12 @@ from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.comparison import compare
-from activesteer.studies.comparison_figure import comparison_figure, comparison_population_figure
-from activesteer.studies.comparison_population import stored_comparison
-from activesteer.studies.driver_loop import FREQUENCIES_RADPS, driver_loops
-from activesteer.studies.envelope import envelope
-from activesteer.studies.envelope_figure import envelope_figure
+from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops
+from activesteer.studies.paper.comparison import compare
+from activesteer.studies.paper.comparison_figure import comparison_figure, comparison_population_figure
+from activesteer.studies.paper.comparison_population import stored_comparison
+from activesteer.studies.paper.envelope import envelope
+from activesteer.studies.paper.envelope_figure import envelope_figure
 from activesteer.tyre import MagicFormula, load_tir
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ import numpy as np
 from activesteer.config import toml_text
 from activesteer.conventions import Array
 from activesteer.resources import models_dir
-from activesteer.studies.identification import RADIUS_TEST, identify, write_single_track
+from activesteer.studies.linear.identification import RADIUS_TEST, identify, write_single_track
 from activesteer.vehicle_builder import new_vehicle
 
 SOURCE: Final = "TUMFTM/VVUQ-Framework; Danquah et al., Applied Sciences 11 (2021) 3, and Danquah's dissertation (TUM)"

@@ -23,11 +23,11 @@ from activesteer.analysis.claims.population import Change, Population, percent
 from activesteer.commands.progress import RunCounter
 from activesteer.metric_table import metric
 from activesteer.resources import find_study
-from activesteer.studies.comparison_population import compare_population, store_comparison
-from activesteer.studies.comparison_shares import ComparisonPopulation
-from activesteer.studies.comparison_targets import NONE, REFERENCES
-from activesteer.studies.population import STUDY, population
-from activesteer.studies.population_store import store_population
+from activesteer.studies.paper.comparison_population import compare_population, store_comparison
+from activesteer.studies.paper.comparison_shares import ComparisonPopulation
+from activesteer.studies.paper.comparison_targets import NONE, REFERENCES
+from activesteer.studies.paper.population import STUDY, population
+from activesteer.studies.paper.population_store import store_population
 
 DOCS: Final = Path(__file__).resolve().parent.parent / "docs"
 PAGE: Final = DOCS / "population.md"

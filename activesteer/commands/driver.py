@@ -53,7 +53,7 @@ def add_to(commands: Any) -> None:
 
 
 def _driver(options: argparse.Namespace) -> int:
-    from activesteer.studies.driver_loop import SPEEDS_KMH, driver_loops
+    from activesteer.studies.linear.driver_loop import SPEEDS_KMH, driver_loops
 
     if options.output is not None:
         make_folder(options.output, ParameterError)
@@ -73,7 +73,7 @@ def _driver(options: argparse.Namespace) -> int:
     if options.output is not None:
         from activesteer.analysis.linear_plots import driver_loops_figure
         from activesteer.plotting import save
-        from activesteer.studies.driver_loop import FREQUENCIES_RADPS
+        from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS
 
         figure = driver_loops_figure(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
         path = save(figure, options.output / "driver.png")

@@ -23,7 +23,7 @@ from activesteer.files import make_folder
 from activesteer.resources import DEFAULT_DRIVER
 
 if TYPE_CHECKING:
-    from activesteer.studies.envelope import Envelope
+    from activesteer.studies.paper.envelope import Envelope
 
 
 def add_to(commands: Any) -> None:
@@ -44,7 +44,7 @@ def add_to(commands: Any) -> None:
 
 
 def _envelope(options: argparse.Namespace) -> int:
-    from activesteer.studies.envelope import envelope
+    from activesteer.studies.paper.envelope import envelope
 
     overrides, drivers = overrides_of(options), options.driver or (DEFAULT_DRIVER,)
     speeds_kmh, lines_m = _numbers(options.speeds_kmh, "--speeds-kmh"), _numbers(options.lines_m, "--lines-m")
@@ -76,7 +76,7 @@ def _envelope(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace, overrides: Mapping[str, Any], driver: Any, *, given_lines: bool) -> None:
     """What is wrong with the last manoeuvre is said before the first is driven, which takes minutes."""
     from activesteer.scenario import resolve
-    from activesteer.studies.envelope import line_of
+    from activesteer.studies.paper.envelope import line_of
 
     scenarios = [resolve(maneuver, options.vehicle, overrides, driver) for maneuver in options.maneuvers]
     keys = list(dict.fromkeys(line_of(scenario).key for scenario in scenarios))
@@ -98,13 +98,13 @@ def _drawn(made: Envelope, folder: Path | None) -> list[str]:
     if folder is None:
         return []
     from activesteer.errors import StudyError
-    from activesteer.studies.envelope_figure import draw_envelope
+    from activesteer.studies.paper.envelope_figure import draw_envelope
 
     return [str(draw_envelope(made, make_folder(folder, StudyError) / f"envelope_{made.maneuver}.png"))]
 
 
 def _print(made: Envelope, figures: Sequence[str]) -> None:
-    from activesteer.studies.envelope import RANGE_KMH, State
+    from activesteer.studies.paper.envelope import RANGE_KMH, State
 
     tried = f"between {RANGE_KMH[0]:g} and {RANGE_KMH[1]:g} km/h"
     print(f"{made.maneuver}: highest entry speed at {made.line.key} = {made.nominal[1]:g}, {tried}")

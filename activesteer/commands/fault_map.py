@@ -57,8 +57,8 @@ def add_to(commands: Any) -> None:
 
 def _fault_map(options: argparse.Namespace) -> int:
     from activesteer.errors import nearest_names
-    from activesteer.studies.fault_map import Limits, fault_map
-    from activesteer.studies.fault_situations import PRESETS
+    from activesteer.studies.paper.fault_map import Limits, fault_map
+    from activesteer.studies.paper.fault_situations import PRESETS
 
     if options.preset not in PRESETS:
         raise ParameterError(
@@ -84,7 +84,7 @@ def _fault_map(options: argparse.Namespace) -> int:
         )
     figures = []
     if options.output is not None:
-        from activesteer.studies.fault_map_figure import draw_fault_map
+        from activesteer.studies.paper.fault_map_figure import draw_fault_map
 
         figures = draw_fault_map(made, options.output)
     if options.json:

@@ -32,7 +32,7 @@ def add_to(commands: Any) -> None:
 
 
 def _figures(options: argparse.Namespace) -> int:
-    from activesteer.studies.reproduction import recordings_in, reproduce
+    from activesteer.studies.paper.reproduction import recordings_in, reproduce
 
     if options.recordings is not None:
         if options.jobs is not None:
@@ -95,8 +95,8 @@ def models_beside(run: Recording) -> dict[str, dict[str, NDArray[np.float64]]]:
         Name of the model -> channel -> values over the time of the run.
     """
     from activesteer.controllers import SingleTrackParameters
-    from activesteer.studies.identification import single_track_response
-    from activesteer.studies.linearisation import linear_response, linearise
+    from activesteer.studies.linear.identification import single_track_response
+    from activesteer.studies.linear.linearisation import linear_response, linearise
 
     maneuver, vehicle = run.metadata["maneuver"], run.metadata["vehicle"]
     single_track = SingleTrackParameters(**vehicle["single_track"])

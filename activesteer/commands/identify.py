@@ -24,7 +24,7 @@ def add_to(commands: Any) -> None:
 
 def _identify(options: argparse.Namespace) -> int:
     from activesteer.resources import check_own, find_vehicle
-    from activesteer.studies.identification import identify, write_single_track
+    from activesteer.studies.linear.identification import identify, write_single_track
 
     def progress(test: str) -> None:
         if not options.json:

@@ -26,7 +26,7 @@ def add_to(commands: Any) -> None:
 
 def _linearise(options: argparse.Namespace) -> int:
     from activesteer.scenario import check_gains
-    from activesteer.studies.linearisation import eigenvalue_table, linear_car, linear_cars
+    from activesteer.studies.linear.linearisation import eigenvalue_table, linear_car, linear_cars
 
     overrides = overrides_of(options)
     check_gains(overrides, ())

@@ -18,7 +18,7 @@ from activesteer.commands.progress import RunCounter
 from activesteer.errors import ParameterError
 
 if TYPE_CHECKING:
-    from activesteer.studies.margins import LoopMargins
+    from activesteer.studies.linear.margins import LoopMargins
 
 _COLUMNS: Final = {
     "speed_kmh": "km/h",
@@ -70,7 +70,7 @@ def _margins(options: argparse.Namespace) -> int:
 
 
 def _found(options: argparse.Namespace) -> list[LoopMargins]:
-    from activesteer.studies.margins import SPEEDS_KMH, loop_margins
+    from activesteer.studies.linear.margins import SPEEDS_KMH, loop_margins
 
     speeds_kmh, overrides = options.speed_kmh or SPEEDS_KMH, overrides_of(options)
     controllers = options.controller or ("ars", "afs")
@@ -79,7 +79,7 @@ def _found(options: argparse.Namespace) -> list[LoopMargins]:
             if getattr(options, name) is not None:
                 raise ParameterError("belongs to --study", key=f"--{name}", value=getattr(options, name))
         return loop_margins(controllers, options.vehicle, speeds_kmh, overrides)
-    from activesteer.studies.worst_margins import worst_margins
+    from activesteer.studies.linear.worst_margins import worst_margins
 
     with RunCounter("margins", quiet=options.json) as counter:
         return worst_margins(

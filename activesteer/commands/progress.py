@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from activesteer.studies.study import StudyProgress
+    from activesteer.studies.engine.study import StudyProgress
 
 _CELLS: Final = 30
 _LINE_EVERY_S: Final = 10.0

@@ -15,7 +15,7 @@ from activesteer.commands.progress import ProgressBar, RunCounter
 from activesteer.errors import ParameterError
 
 if TYPE_CHECKING:
-    from activesteer.studies.reproduction import Reproduction
+    from activesteer.studies.paper.reproduction import Reproduction
 
 
 def add_to(commands: Any) -> None:
@@ -57,7 +57,7 @@ def _reproduce(options: argparse.Namespace) -> int:
             raise ParameterError(f"--{name} belongs to --population")
     if options.controllers is not None:
         return _compare(options)
-    from activesteer.studies.reproduction import reproduce
+    from activesteer.studies.paper.reproduction import reproduce
 
     folder = options.output
     with ProgressBar("reproduce", quiet=options.json) as bar:
@@ -110,7 +110,7 @@ def _print_scenarios(result: Reproduction) -> None:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from activesteer.studies.comparison import compare
+    from activesteer.studies.paper.comparison import compare
 
     with ProgressBar("compare", quiet=options.json) as bar:
         made = compare(
@@ -124,7 +124,7 @@ def _compare(options: argparse.Namespace) -> int:
         print(f"{scenario} {name} failed: {problem}", file=sys.stderr)
     figures = []
     if options.figures:
-        from activesteer.studies.comparison_figure import draw_comparison
+        from activesteer.studies.paper.comparison_figure import draw_comparison
 
         figures = [draw_comparison(made, options.output / "comparison.png")]
     if options.json:
@@ -154,9 +154,9 @@ def _report(result: Reproduction, folder: Path) -> Path | None:
 
 
 def _population(options: argparse.Namespace) -> int:
-    from activesteer.studies.comparison_population import compare_population
-    from activesteer.studies.comparison_shares import ComparisonPopulation
-    from activesteer.studies.population import population
+    from activesteer.studies.paper.comparison_population import compare_population
+    from activesteer.studies.paper.comparison_shares import ComparisonPopulation
+    from activesteer.studies.paper.population import population
 
     if options.figures and options.controllers is None:
         raise ParameterError("--figures draws the nominal runs; leave --population out")
@@ -173,7 +173,7 @@ def _population(options: argparse.Namespace) -> int:
         )
     table, figures = found.to_json(), []
     if options.figures and isinstance(found, ComparisonPopulation):
-        from activesteer.studies.comparison_figure import draw_comparison_population
+        from activesteer.studies.paper.comparison_figure import draw_comparison_population
 
         figures = [draw_comparison_population(found, options.output / "comparison_population.png")]
         table["figures"] = [str(path) for path in figures]

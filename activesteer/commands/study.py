@@ -29,7 +29,7 @@ def add_to(commands: Any) -> None:
 def _study(options: argparse.Namespace) -> int:
     if options.limit is not None and options.limit < 1:
         raise StudyError(f"--limit {options.limit}: at least 1 is needed")
-    from activesteer.studies.study_file import read_study
+    from activesteer.studies.engine.study_file import read_study
 
     given = Path(options.study)
     folder = options.output or (given if given.is_dir() else None)
@@ -40,8 +40,8 @@ def _study(options: argparse.Namespace) -> int:
         return _status(folder, as_json=options.json)
     if options.report:
         return _report(folder, as_json=options.json)
-    from activesteer.studies.store import RESULTS, read_environment
-    from activesteer.studies.study import study
+    from activesteer.studies.engine.store import RESULTS, read_environment
+    from activesteer.studies.engine.study import study
 
     if given.is_dir():
         read_environment(given)  # says what is wrong with a folder without a study
@@ -68,7 +68,7 @@ def _study(options: argparse.Namespace) -> int:
 
 
 def _progress_of(folder: Path) -> dict[str, Any]:
-    from activesteer.studies.store import Store
+    from activesteer.studies.engine.store import Store
 
     return {"folder": str(folder), **Store(folder, ()).progress().to_json()}
 
@@ -87,7 +87,7 @@ def _status(folder: Path, *, as_json: bool) -> int:
 
 
 def _report(folder: Path, *, as_json: bool) -> int:
-    from activesteer.studies.report import write_report
+    from activesteer.studies.engine.report import write_report
 
     path = write_report(folder)
     if as_json:

@@ -11,7 +11,7 @@ from activesteer.commands.output import print_json
 from activesteer.commands.progress import ProgressBar
 
 if TYPE_CHECKING:
-    from activesteer.studies.tuning import Tuning
+    from activesteer.studies.engine.tuning import Tuning
 
 
 def add_to(commands: Any) -> None:
@@ -26,7 +26,7 @@ def add_to(commands: Any) -> None:
 
 
 def _tune(options: argparse.Namespace) -> int:
-    from activesteer.studies.tuning import tune
+    from activesteer.studies.engine.tuning import tune
 
     options.how_to_resume = "; the same command resumes it"
     with ProgressBar("tune", quiet=options.json) as bar:

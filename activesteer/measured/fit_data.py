@@ -12,7 +12,7 @@ from activesteer.conventions import Array
 from activesteer.errors import RecordingError, nearest_names
 from activesteer.measured.fit_file import FitTable
 from activesteer.recording import Recording
-from activesteer.studies.study_file import StudyFile
+from activesteer.studies.engine.study_file import StudyFile
 
 _FEWEST: Final = 20
 """Samples of a channel in a recording that are needed at least."""

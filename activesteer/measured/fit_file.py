@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from activesteer.config import Range, build
 from activesteer.scenario import FileOrTable
 from activesteer.scenario.recorded_inputs import is_recording
-from activesteer.studies.study_file import StudyFile, read_study
+from activesteer.studies.engine.study_file import StudyFile, read_study
 
 
 @dataclass(frozen=True)

@@ -23,13 +23,13 @@ from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, resolve, value_of
 from activesteer.scenario.recorded_inputs import led, open_loop_of
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.factor_values import FactorValues, label_of
-from activesteer.studies.factors import Factor
-from activesteer.studies.plan import Plan
-from activesteer.studies.run_settings import Settings, prepare
-from activesteer.studies.study_file import StudyFile
-from activesteer.studies.task_queue import TaskQueue
-from activesteer.studies.workers import Workers, workers_for
+from activesteer.studies.engine.factor_values import FactorValues, label_of
+from activesteer.studies.engine.factors import Factor
+from activesteer.studies.engine.plan import Plan
+from activesteer.studies.engine.run_settings import Settings, prepare
+from activesteer.studies.engine.study_file import StudyFile
+from activesteer.studies.engine.task_queue import TaskQueue
+from activesteer.studies.engine.workers import Workers, workers_for
 
 _SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1ps2": 8.0}
 """Unless the study says otherwise the recorded speed is held to 0.1 %; a driver's gains leave 0.3 %, which would be

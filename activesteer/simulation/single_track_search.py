@@ -1,6 +1,6 @@
 """The single-track model that fits a car, found by driving it: two tests at constant speed, in the linear range.
 
-Mass, yaw inertia and axle distances are those of the model at static ride; see `studies.identification`.
+Mass, yaw inertia and axle distances are those of the model at static ride; see `studies.linear.identification`.
 """
 
 from __future__ import annotations

@@ -15,9 +15,9 @@ from activesteer.scenario import FileOrTable, check_gains, check_parts, resolve,
 from activesteer.standards.catalogue import standard_of
 from activesteer.standards.proving_ground import ProvingGround
 from activesteer.standards.standard import Findings, NoResult, Standard
-from activesteer.studies.factor_values import label_of
-from activesteer.studies.run_identity import versions
-from activesteer.studies.workers import workers_for
+from activesteer.studies.engine.factor_values import label_of
+from activesteer.studies.engine.run_identity import versions
+from activesteer.studies.engine.workers import workers_for
 
 
 @dataclass(frozen=True)

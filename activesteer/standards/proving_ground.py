@@ -11,11 +11,11 @@ import numpy as np
 
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.standards.standard import Run
-from activesteer.studies import run_task
-from activesteer.studies.fault_map import fault_map
-from activesteer.studies.fault_situations import PRESETS
-from activesteer.studies.study import study
-from activesteer.studies.workers import Workers
+from activesteer.studies.engine import run_task
+from activesteer.studies.engine.study import study
+from activesteer.studies.engine.workers import Workers
+from activesteer.studies.paper.fault_map import fault_map
+from activesteer.studies.paper.fault_situations import PRESETS
 
 
 @dataclass(frozen=True)

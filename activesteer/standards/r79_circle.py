@@ -14,7 +14,7 @@ from activesteer.plotting import Curve, Panel, Picture
 from activesteer.quantities import display_unit
 from activesteer.standards.page_parts import cell, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
-from activesteer.studies.fault_figures import FIGURES
+from activesteer.studies.paper.fault_figures import FIGURES
 
 
 class Effort(NamedTuple):

@@ -130,7 +130,7 @@ class Ground(Protocol):
         """Drives the faults of the controller's actuators and sensors.
 
         Args:
-            preset: Name of speeds and situations, one of `studies.fault_situations.PRESETS`.
+            preset: Name of speeds and situations, one of `studies.paper.fault_situations.PRESETS`.
 
         Returns:
             The rows of the map.

@@ -1,1 +1,1 @@
-"""Many runs, or what is found out about a car by driving it."""
+"""Many runs: the engine that makes them, linear analysis of the car, and the paper's studies."""

@@ -22,7 +22,7 @@ from activesteer.errors import ParameterError
 from activesteer.files import is_file
 from activesteer.resources import find_vehicle, models_dir
 from activesteer.simulation.runner import simulate
-from activesteer.studies.task_queue import in_parallel
+from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.validation.circle_variations import EFFECTS, READINGS
 
 DATA: Final = "measured_circle.json"

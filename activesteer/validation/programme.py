@@ -15,7 +15,7 @@ from activesteer.files import json_text, make_folder, replacing, write_text
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.simulation.runner import simulate
-from activesteer.studies.task_queue import in_parallel
+from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.validation.comparison import Comparison, to_json
 from activesteer.validation.kinematics import Curves, compare_kinematics
 from activesteer.validation.motion import reference_columns

@@ -9,7 +9,7 @@ import numpy as np
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.simulation.runner import simulate
-from activesteer.studies.task_queue import in_parallel
+from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.validation.motion import reference_columns
 from activesteer.validation.reference import ReferenceData
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from activesteer.commands.progress import RunCounter
-from activesteer.studies.study import StudyProgress
+from activesteer.studies.engine.study import StudyProgress
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"

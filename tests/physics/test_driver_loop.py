@@ -13,9 +13,9 @@ import pytest
 from activesteer import simulate
 from activesteer.analysis.metrics import metrics
 from activesteer.scenario import resolve
-from activesteer.studies.driver_loop import LoopAtSpeed, driver_loops
-from activesteer.studies.envelope import envelope
-from activesteer.studies.small_step import damping_of, small_step
+from activesteer.studies.linear.driver_loop import LoopAtSpeed, driver_loops
+from activesteer.studies.linear.small_step import damping_of, small_step
+from activesteer.studies.paper.envelope import envelope
 
 ALWAYS_ACTIVE = {
     "none": {},

@@ -15,7 +15,7 @@ from activesteer.errors import ParameterError
 from activesteer.scenario import load_car, resolve
 from activesteer.signals import ActuatorCommand
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.studies.linearisation import (
+from activesteer.studies.linear.linearisation import (
     INPUTS,
     OUTPUTS,
     LinearCar,

@@ -18,11 +18,11 @@ from activesteer.analysis.claims import SCENARIOS, STATEMENTS, SYSTEMS
 from activesteer.analysis.claims.population import Population, stored_population
 from activesteer.analysis.loss_of_control import is_lost
 from activesteer.recording import Recording
-from activesteer.studies.comparison_population import stored_comparison
-from activesteer.studies.plan import Plan
-from activesteer.studies.population import CHANGES, population_study, summarise
-from activesteer.studies.population_store import stored_runs
-from activesteer.studies.run_task import CLAIM, Row, drive
+from activesteer.studies.engine.plan import Plan
+from activesteer.studies.engine.run_task import CLAIM, Row, drive
+from activesteer.studies.paper.comparison_population import stored_comparison
+from activesteer.studies.paper.population import CHANGES, population_study, summarise
+from activesteer.studies.paper.population_store import stored_runs
 from tools.renew_population import CHASSIS_CONTROL, PAGE, comparison_page, page
 
 TOLERANCE = 1e-3

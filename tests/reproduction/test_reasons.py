@@ -13,7 +13,7 @@ from activesteer import simulate
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim
 from activesteer.conventions import CORNERS
 from activesteer.metric_table import STEER_RAD
-from activesteer.studies.fault_map import fault_map
+from activesteer.studies.paper.fault_map import fault_map
 
 pytestmark = pytest.mark.slow
 

@@ -1,6 +1,6 @@
 """How often the claims hold in a population of cars, roads and drivers, and what the systems do there.
 
-`studies.population` drives it. What came of the one that belongs to the package is stored with it, so that a nominal
+`studies.paper.population` drives it. The result of the package's own population is stored with it, so that a nominal
 verdict can be read beside its share.
 """
 

@@ -160,5 +160,5 @@ def test_the_compact_keeps_the_limits_at_3_a_and_not_without_control_at_6_5_a(mo
     def never(*_: Any) -> Any:
         raise AssertionError
 
-    monkeypatch.setattr("activesteer.studies.study.drive", never)
+    monkeypatch.setattr("activesteer.studies.engine.study.drive", never)
     assert examine("fmvss126", output=tmp_path, jobs=1).to_json() == result.to_json()

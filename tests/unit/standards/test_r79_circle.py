@@ -13,8 +13,8 @@ from activesteer.files import json_text
 from activesteer.standards.examination import examine
 from activesteer.standards.r79_circle import EFFORTS, RIM_RADIUS_M, STANDARD, reached
 from activesteer.standards.standard import Run
-from activesteer.studies.fault_figures import FIGURES
-from activesteer.studies.fault_situations import PRESETS
+from activesteer.studies.paper.fault_figures import FIGURES
+from activesteer.studies.paper.fault_situations import PRESETS
 from tests.unit.standards.grounds import WrittenGround
 from tests.unit.standards.signals import run_of, times
 
@@ -88,7 +88,7 @@ def test_a_fault_that_ends_the_run_is_a_row_and_no_verdict():
 
 
 def test_the_compact_is_steered_alike_to_both_sides_and_corrected_in_both_circles(monkeypatch):
-    monkeypatch.setattr("activesteer.studies.fault_map.usual_faults", lambda _: ["rear:offset=1deg"])
+    monkeypatch.setattr("activesteer.studies.paper.fault_map.usual_faults", lambda _: ["rear:offset=1deg"])
     found = examine("r79-circle", ["ars"], jobs=1).findings["ars"]
     efforts = {(row["steering"], row["direction"]): row["effort_N"] for row in found.values["efforts"]}
     for name in EFFORTS:

@@ -15,7 +15,7 @@ from activesteer.errors import ModelError, ParameterError
 from activesteer.rigs.kc import kinematics_compliance
 from activesteer.rigs.kc.tables import write_tables
 from activesteer.scenario import Car, load_car
-from activesteer.studies.linearisation import linear_car
+from activesteer.studies.linear.linearisation import linear_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle_builder import new_vehicle
 from activesteer.vehicle_builder.car_table import car_table

@@ -1,0 +1,230 @@
+"""Which combinations of the factors' values are driven: a grid, a list of cases, or a sample."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from activesteer.config import Range, Source, parse_value
+from activesteer.errors import ParameterError, StudyError, nearest_names, not_installed, shown
+from activesteer.files import read_csv
+from activesteer.studies.engine.factors import Factor, Value
+
+DESIGNS: Final = ("grid", "list", "sobol", "latin_hypercube", "random", "saltelli", "morris")
+"""Kinds of design."""
+FOR_INDICES: Final = ("saltelli", "morris")
+"""Designs that SALib makes for its sensitivity indices; every factor must be sampled."""
+MORRIS_LEVELS: Final = 4
+MAX_SAMPLES: Final = 10_000_000
+"""Largest number of combinations of a design."""
+
+
+@dataclass(frozen=True)
+class DesignTable:
+    """The table [design] of a study file."""
+
+    kind: str = ""
+    """One of `DESIGNS`; by itself `list` where cases are given, `grid` where every factor is one, else `sobol`."""
+    samples: Annotated[int, Range(1, MAX_SAMPLES)] = 0
+    """Size of the sample; of `saltelli` the base sample (D + 2 runs each), of `morris` trajectories (D + 1 each)."""
+    paired: bool = True
+    """Whether all controllers are driven with the same sample."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Combinations, as columns: a million of them take little memory.
+
+    Attributes:
+        columns: Key -> value in every combination; a case of a list that does not name a key has None there.
+    """
+
+    columns: dict[str, list[Value]]
+    count: int
+
+    def __len__(self) -> int:
+        """Number of combinations."""
+        return self.count
+
+    def __getitem__(self, number: int) -> dict[str, Value]:
+        """One combination as overrides."""
+        return {key: value for key, values in self.columns.items() if (value := values[number]) is not None}
+
+
+def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: int = 0) -> Samples:
+    """The combinations of a design.
+
+    The factors that are a grid are crossed with each other and with the sample of the rest, so that each of their
+    values meets the same sample.
+
+    Args:
+        factors: What is varied.
+        kind: One of `DESIGNS` but `list`.
+        count: Size of the sample; without meaning for a grid.
+        seed: Of the random numbers.
+        stream: Which of several independent samples of the same seed.
+
+    Returns:
+        The combinations.
+
+    Raises:
+        StudyError: `saltelli` or `morris` without SALib.
+    """
+    grids = [factor for factor in factors if factor.kind == "grid"]
+    sampled = [factor for factor in factors if factor.kind != "grid"]
+    if sampled:
+        unit = _unit_sample(kind, len(sampled), count, [seed, stream] if stream else [seed])
+        columns: dict[str, list[Value]] = {
+            factor.key: [*factor.from_unit(unit[:, place])] for place, factor in enumerate(sampled)
+        }
+        inner = len(unit)
+    else:
+        columns, inner = {}, 1
+    crossed = math.prod(len(factor.values) for factor in grids)
+    repeats = crossed * inner
+    for factor in grids:
+        repeats //= len(factor.values)
+        once = [value for value in factor.values for _ in range(repeats)]
+        columns[factor.key] = once * (crossed * inner // len(once))
+    for factor in sampled:
+        columns[factor.key] *= crossed
+    return Samples({factor.key: columns[factor.key] for factor in factors}, crossed * inner)
+
+
+def _unit_sample(kind: str, dimensions: int, count: int, seed: list[int]) -> NDArray[np.float64]:
+    """Points of the unit cube, shape (points, dimensions)."""
+    rng = np.random.default_rng(seed)
+    if kind == "random":
+        return rng.random((count, dimensions))
+    if kind == "latin_hypercube":
+        return qmc.LatinHypercube(dimensions, rng=rng).random(count)
+    if kind == "sobol":
+        # The whole power of 2 is drawn, since a sequence cut short is balanced all the same as far as it goes.
+        return qmc.Sobol(dimensions, rng=rng).random_base2(math.ceil(math.log2(count)))[:count]
+    problem = {
+        "num_vars": dimensions,
+        "names": [str(i) for i in range(dimensions)],
+        "bounds": [[0.0, 1.0]] * dimensions,
+    }
+    try:
+        from SALib.sample import morris, sobol  # noqa: PLC0415 - an extra
+    except ImportError as reason:
+        raise not_installed(StudyError, f"design.kind = {kind!r}", "SALib", "study") from reason
+    number = int(rng.integers(2**31))
+    if kind == "saltelli":
+        return np.asarray(sobol.sample(problem, count, calc_second_order=False, seed=number))
+    return np.asarray(morris.sample(problem, count, num_levels=MORRIS_LEVELS, seed=number))
+
+
+def cases(given: Iterable[Mapping[str, Any]]) -> Samples:
+    """A list of cases, each naming the keys that it sets."""
+    rows = list(given)
+    keys = dict.fromkeys(key for row in rows for key in row)
+    return Samples({key: [row.get(key) for row in rows] for key in keys}, len(rows))
+
+
+def read_cases(path: Path) -> Samples:
+    """A list of cases from a CSV file: its header holds the keys, an empty cell leaves a key as it is.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The cases; a cell is a number or true or false where it can be read as one, else a text.
+
+    Raises:
+        StudyError: the file cannot be read, has no rows, or a row of another length.
+    """
+
+    def fail(problem: str, line: int, key: str | None = None) -> StudyError:
+        return StudyError(problem, file=path.name, line=line, key=key)
+
+    rows = read_csv(path, StudyError, empty_cells_count=True)
+    if len(rows) < 2:
+        raise StudyError("holds no cases; a header with keys and rows of values are needed", file=path.name)
+    header, *body = rows
+    keys = header.cells
+    if len(set(keys)) != len(keys) or "" in keys:
+        raise fail(f"every column of the cases needs a key of its own, found {shown(keys)}", header.line)
+    found: list[dict[str, Value]] = []
+    for line, cells in body:
+        if len(cells) != len(keys):
+            raise fail(f"the case has {len(cells)} cells, the header {len(keys)}", line)
+        found.append({})
+        for key, cell in zip(keys, cells, strict=True):
+            if cell:
+                try:
+                    found[-1][key] = parse_value(cell)
+                except ParameterError as reason:
+                    raise fail(reason.problem, line, key) from reason
+    return cases(found)
+
+
+def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool, source: Source) -> DesignTable:
+    """The design with its kind chosen and everything about it checked.
+
+    Args:
+        table: What the study file says.
+        factors: What is varied.
+        has_cases: Whether a list of cases is given.
+        source: For error messages.
+
+    Returns:
+        The design.
+
+    Raises:
+        ActiveSteerError: parts of it do not belong together.
+    """
+    all_grids = all(factor.kind == "grid" for factor in factors)
+    kind = table.kind or ("list" if has_cases else "grid" if all_grids else "sobol")
+    where = ("design", "kind")
+    if kind not in DESIGNS:
+        raise source.fail(where, f"there is no design {shown(kind)}; {nearest_names(kind, DESIGNS)}")
+    if has_cases != (kind == "list"):
+        wanted = "needs design.cases" if kind == "list" else f"design.cases belongs to a list, not to {kind}"
+        raise source.fail(where, wanted)
+    if kind == "list" and factors:
+        raise source.fail(("factors",), "a list of cases names its keys itself; leave [factors] out")
+    if kind == "grid" and not all_grids:
+        other = next(factor for factor in factors if factor.kind != "grid")
+        raise source.fail(where, f"is grid, but {other.key} is {other.kind}; give a grid there or another design")
+    if kind in ("grid", "list"):
+        if table.samples:
+            raise source.fail(("design", "samples"), f"belongs to a sample, not to a {kind}")
+        _check_size(factors, 1, source)
+        return DesignTable(kind, 0, table.paired)
+    if all_grids:
+        raise source.fail(where, f"is {kind}, but every factor is a grid; leave it out, or give a distribution")
+    if kind in FOR_INDICES and any(factor.kind == "grid" for factor in factors):
+        raise source.fail(where, f"{kind} samples every factor; write choice in place of grid")
+    if not table.samples:
+        raise source.fail(("design", "samples"), f"{kind} needs the size of the sample")
+    if kind == "saltelli" and table.samples & (table.samples - 1):
+        raise source.fail(("design", "samples"), f"is {table.samples}; saltelli needs a power of 2")
+    points = {"saltelli": len(factors) + 2, "morris": len(factors) + 1}.get(kind, 1) * table.samples
+    _check_size(factors, points, source)
+    return DesignTable(kind, table.samples, table.paired)
+
+
+def _check_size(factors: Sequence[Factor], points: int, source: Source) -> None:
+    """Refuse a design with too many combinations before any of them is made.
+
+    Args:
+        factors: Factors of the study; its grids are crossed with each other and with the points of the sample.
+        points: Points of the sample of all other factors.
+        source: Source of the study, for the error message.
+    """
+    sizes = [len(factor.values) for factor in factors if factor.kind == "grid"]
+    count = math.prod(sizes) * points
+    if count > MAX_SAMPLES:
+        parts = " x ".join(map(str, [*sizes, *([points] if points > 1 else [])]))
+        raise source.fail(
+            ("design",), f"has {parts} = {count} combinations; at most {MAX_SAMPLES} are allowed", count, MAX_SAMPLES
+        )

@@ -1,0 +1,107 @@
+"""What a sample's values are in a manoeuvre with a vehicle: as they are, or relative to what the files say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from activesteer.errors import nearest_names, shown
+from activesteer.scenario import FileOrTable, resolve, value_of
+from activesteer.studies.engine.study_file import StudyFile
+
+
+def label_of(item: FileOrTable) -> str:
+    """The name that a manoeuvre, vehicle or controller has in the result."""
+    if isinstance(item, Mapping):
+        return str(item.get("name") or "table")
+    # Only before the parameters: the value of one may hold a colon, too.
+    named, mark, parameters = str(item).partition("?")
+    path, colon, class_name = named.rpartition(":")
+    if colon:
+        return f"{Path(path).name}:{class_name}{mark}{parameters}"
+    return Path(item).stem if str(item).endswith((".toml", ".mcap")) else str(item)
+
+
+class FactorValues:
+    """Turns the values of a sample into overrides; each pair of manoeuvre and vehicle is resolved once.
+
+    Attributes:
+        study: The study.
+    """
+
+    def __init__(self, study: StudyFile) -> None:
+        """Takes a study.
+
+        Args:
+            study: The study.
+
+        Raises:
+            StudyError: a factor is for a manoeuvre, or for a value of another factor, that the study does not have.
+        """
+        self.study = study
+        self._factors = {factor.key: factor for factor in study.factors}
+        self._nominal: dict[tuple[int, int], dict[str, Any]] = {}
+        labels = [label_of(item) for item in study.maneuvers]
+        for factor in study.factors:
+            for name in factor.maneuvers:
+                if name not in labels:
+                    place = ("factors", factor.key, "maneuvers")
+                    raise study.source.fail(place, nearest_names(name, labels), name)
+            for other, value in factor.when.items():
+                place = ("factors", factor.key, "when", other)
+                if other not in self._factors:
+                    raise study.source.fail(
+                        place, f"is no other factor; {nearest_names(other, list(self._factors))}", other
+                    )
+                if value not in self._factors[other].values:
+                    raise study.source.fail(place, f"{shown(value)} is no value of that factor", value)
+
+    def overrides(self, maneuver: int, vehicle: int, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The overrides of a run.
+
+        Args:
+            maneuver: Number of the manoeuvre in the study.
+            vehicle: Number of the vehicle.
+            values: Key -> value of the sample; None where it is as the files have it.
+
+        Returns:
+            Dotted key -> value, of the keys that are varied in this manoeuvre.
+
+        Raises:
+            ActiveSteerError: a key does not exist, or a value that others are relative to is no number.
+        """
+        label = label_of(self.study.maneuvers[maneuver])
+        found = {}
+        for key, value in values.items():
+            factor = self._factors.get(key)
+            if value is None or (factor is not None and factor.maneuvers and label not in factor.maneuvers):
+                continue
+            if factor is not None and any(values.get(other) != needed for other, needed in factor.when.items()):
+                continue
+            if factor is not None and factor.nominal:
+                nominal = self._nominal_of(maneuver, vehicle)[key]
+                found[key] = nominal * value if factor.nominal == "times" else nominal + value
+            else:
+                found[key] = value
+        return found
+
+    def _nominal_of(self, maneuver: int, vehicle: int) -> dict[str, Any]:
+        """Values of the files, by key, of the factors that are relative."""
+        place = maneuver, vehicle
+        if place not in self._nominal:
+            study = self.study
+            label = label_of(study.maneuvers[maneuver])
+            scenario = resolve(study.maneuvers[maneuver], study.vehicles[vehicle], study.overrides, study.driver)
+            relative = {
+                key: value_of(scenario, key)
+                for key, factor in self._factors.items()
+                if factor.nominal and (not factor.maneuvers or label in factor.maneuvers)
+            }
+            for key, value in relative.items():
+                if not isinstance(value, int | float) or isinstance(value, bool):
+                    raise study.source.fail(
+                        ("factors", key, "nominal"), f"is {shown(value)} in {label}: nothing can be relative to it"
+                    )
+            self._nominal[place] = relative
+        return self._nominal[place]

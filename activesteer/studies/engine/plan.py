@@ -1,0 +1,277 @@
+"""All runs of a study, in their order, and whether its keys mean what they say, before anything is driven."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from activesteer.analysis.claims import SYSTEMS
+from activesteer.controllers import keys_read, load_controller
+from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
+from activesteer.scenario import Scenario, check_gains, describe, resolve
+from activesteer.studies.engine.design import Samples
+from activesteer.studies.engine.factor_values import FactorValues, label_of
+from activesteer.studies.engine.run_identity import digest
+from activesteer.studies.engine.run_settings import Request, Settings, present_inputs
+from activesteer.studies.engine.study_file import StudyFile
+
+_LABELS: Final = ("name", "title")
+"""Keys of manoeuvres and vehicles that only words depend on."""
+
+
+class Plan:
+    """The runs: for each manoeuvre and vehicle every sample, and for each sample every controller.
+
+    Attributes:
+        study: The study.
+        settings: What all runs share.
+        samples: The combinations of factors, one set for all controllers or one for each.
+        digest: Hash of everything that decides the result of the study.
+    """
+
+    def __init__(self, study: StudyFile, folder: Path | None = None) -> None:
+        """Checks the study and lays its runs out.
+
+        Args:
+            study: The study.
+            folder: Where recordings go, where some are kept.
+
+        Raises:
+            ActiveSteerError: a manoeuvre, vehicle or controller is not found or wrong; a key does not exist, changes
+                nothing, or can take a value that is not allowed.
+        """
+        self.study = study
+        self.samples = study.samples()
+        self._values = FactorValues(study)
+        labelled = {
+            "maneuvers": _labelled(study, "maneuvers", study.maneuvers),
+            "vehicles": _labelled(study, "vehicles", study.vehicles),
+            "controllers": _labelled(study, "controllers", study.controllers),
+        }
+        self.settings = Settings(
+            **labelled,
+            driver=study.driver,
+            overrides=study.overrides,
+            seed=study.seed,
+            timestep_s=study.timestep_s,
+            metrics=study.metrics,
+            recordings=study.recordings,
+            folder=None if study.recordings == "none" else folder,
+            claims=study.claims,
+            curves=study.curves,
+            named=tuple(self._named()),
+            expected={},
+        )
+        _check(study, self.samples, self._values)
+        self.settings.expected.update(present_inputs(self.settings))
+        table = {
+            key: value for key, value in study.to_table().items() if key not in (*labelled, "title", "tune", "fit")
+        }
+        table["design"] = [samples.columns for samples in self.samples]
+        table |= {key: [label for label, _ in labelled[key]] for key in labelled}
+        self.digest = digest({"study": table, "inputs": self.settings.expected})
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        shared = self.settings
+        return len(shared.maneuvers) * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
+
+    def _named(self) -> Iterator[tuple[int, int, dict[str, Any]]]:
+        """Numbers of manoeuvre and vehicle and overrides, with every combination of texts that may be driven."""
+        study = self.study
+        places = list(itertools.product(range(len(study.maneuvers)), range(len(study.vehicles))))
+        for samples in self.samples:
+            columns = {key: values for key, values in samples.columns.items() if _has_text(values)}
+            rows: Iterable[tuple[Any, ...]] = dict.fromkeys(zip(*columns.values(), strict=True))
+            if study.tune is not None:  # which combines values as the search goes
+                columns = {factor.key: factor.values for factor in study.factors if _has_text(factor.values)}
+                rows = itertools.product(*columns.values())
+            for row in rows if columns else ():
+                sample = samples[0] | dict(zip(columns, row, strict=True))
+                for place in places:
+                    yield *place, study.overrides | self._values.overrides(*place, sample)
+
+    def request(self, run: int) -> Request:
+        """A run by its number."""
+        shared = self.settings
+        place, controller = divmod(run, len(shared.controllers))
+        place, sample = divmod(place, len(self.samples[0]))
+        maneuver, vehicle = divmod(place, len(shared.vehicles))
+        samples = self.samples[controller if len(self.samples) > 1 else 0]
+        return self.request_with(run, sample, (maneuver, vehicle, controller), samples[sample])
+
+    def request_with(self, run: int, sample: int, place: tuple[int, int, int], factors: dict[str, Any]) -> Request:
+        """A run with values of its own.
+
+        Args:
+            run: Its number.
+            sample: Number of the values.
+            place: Numbers of manoeuvre, vehicle and controller.
+            factors: The values.
+        """
+        overrides = self.study.overrides | self._values.overrides(*place[:2], factors)
+        return Request(run, sample, *place, factors, overrides)
+
+    def requests(self, runs: Iterable[int]) -> list[Request]:
+        """Several runs by their numbers."""
+        return [self.request(run) for run in runs]
+
+
+def _has_text(values: Iterable[Any]) -> bool:
+    return any(isinstance(value, str) for value in values)
+
+
+def _labelled(study: StudyFile, key: str, items: Sequence[Any]) -> tuple[tuple[str, Any], ...]:
+    """Every item with the name that it has in the result: without folders, so that it is the same on every machine."""
+    labels = [label_of(item) for item in items]
+    for label in labels:
+        if labels.count(label) > 1:
+            raise study.source.fail((key,), f"two of them have the name {label!r}, which tells runs apart")
+    return tuple(zip(labels, items, strict=True))
+
+
+def _check(study: StudyFile, samples: Sequence[Samples], factor_values: FactorValues) -> None:
+    """Every key exists in every manoeuvre and vehicle, allows its extreme values, and changes something."""
+    if study.claims and not set(SYSTEMS) <= set(study.controllers):
+        raise study.source.fail(("claims",), f"needs the controllers {', '.join(SYSTEMS)}")
+    first = samples[0][0] if len(samples[0]) else {}
+    effective: set[str] = set()
+    for place in itertools.product(range(len(study.maneuvers)), range(len(study.vehicles))):
+        base = _resolved(factor_values, place, first)
+        for controller in study.controllers:
+            load_controller(controller, base.controller_setup(study.timestep_s))
+        _check_curves(study, base)
+        for key, values in _extremes(study, samples).items():
+            if len(values) == 1:
+                if key in factor_values.overrides(*place, {key: values[0]}):
+                    effective.add(key)
+                continue
+            described = _described(factor_values, place, samples[0], key, values)
+            changed = {leaf for other in described for leaf in _differing(described[0], other)}
+            if any(_is_read(leaf, base, study.controllers) for leaf in changed):
+                effective.add(key)
+    try:
+        check_gains(study.overrides, study.controllers)
+    except ParameterError as reason:
+        raise study.source.placed(("overrides",), reason) from reason
+    for key in study.keys:
+        if key not in effective:
+            place = ("design", "cases", key) if study.case_list else ("factors", key)
+            raise study.source.fail(place, "changes nothing in any of the study's runs")
+
+
+def _resolved(
+    factor_values: FactorValues, place: tuple[int, int], sample: Mapping[str, Any], key: str = ""
+) -> Scenario:
+    study, (maneuver, vehicle) = factor_values.study, place
+    items = study.maneuvers[maneuver], study.vehicles[vehicle]
+    try:
+        return resolve(*items, study.overrides | factor_values.overrides(*place, sample), study.driver)
+    except ActiveSteerError as error:
+        error.add_note(f"in {label_of(items[0])} with {label_of(items[1])}" + (f", factor {key}" if key else ""))
+        raise
+
+
+def _described(
+    factor_values: FactorValues, place: tuple[int, int], samples: Samples, key: str, values: Sequence[Any]
+) -> list[dict[str, Any]]:
+    """What a run depends on at each value of a key, the others being as in the first sample where that is possible."""
+    study = factor_values.study
+    needed = next((factor.when for factor in study.factors if factor.key == key), {})
+    first, cases = {**samples[0], **needed}, study.case_list
+    whole = []
+    if cases is not None:
+        rows = [cases[cases.columns[key].index(value)] for value in values]
+        whole = [_leaves(_resolved(factor_values, place, row, key)) for row in rows]
+    try:
+        return [_leaves(_resolved(factor_values, place, {**first, key: value}, key)) for value in values]
+    except ActiveSteerError:
+        if not whole:
+            raise
+        return whole  # the keys of a case may go together: alone, one of them makes no sense
+
+
+def _check_curves(study: StudyFile, scenario: Scenario) -> None:
+    """Every channel of which curves are kept is recorded."""
+    if not study.curves:
+        return
+    known = [channel.name for channel in scenario.car.on(scenario.maneuver.road).channels.channels]
+    for name in study.curves:
+        if name not in known:
+            raise study.source.fail(
+                ("curves",), f"there is no channel {shown(name)}; {nearest_names(name, known)}", name
+            )
+
+
+def _extremes(study: StudyFile, samples: Sequence[Samples]) -> dict[str, list[Any]]:
+    """Key -> values that all others lie between, or all of them where they have no order; None where it is not set."""
+    if study.case_list is None:
+        return {factor.key: list(factor.extremes) for factor in study.factors}
+    found: dict[str, list[Any]] = {}
+    for key, column in samples[0].columns.items():
+        present = [value for value in column if value is not None]
+        numbers = all(isinstance(value, (int, float)) for value in present)
+        different = {str(value): value for value in present}
+        found[key] = sorted({min(present), max(present)}) if numbers else list(different.values())
+        if len(present) < len(column):
+            found[key].append(None)  # there it is as the files have it
+    return found
+
+
+def _leaves(scenario: Scenario) -> dict[str, Any]:
+    """Everything that a run depends on, by dotted key."""
+    return dict(_walk(describe(scenario) | {"overrides": {}, "files": scenario.files}, ""))
+
+
+def _walk(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _walk(item, f"{path}.{key}" if path else str(key))
+    elif isinstance(value, list):
+        for number, item in enumerate(value):
+            yield from _walk(item, f"{path}.{number}")
+    else:
+        yield path, value
+
+
+def _differing(a: Mapping[str, Any], b: Mapping[str, Any]) -> set[str]:
+    return {key for key in a.keys() | b.keys() if a.get(key) != b.get(key)}
+
+
+def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
+    """Whether a value takes part in any of the runs: gains need their controller, the view of a path needs a path."""
+    part, first, *rest = [*leaf.split("."), "", ""]
+    follows_path = scenario.maneuver.course is not None
+    if part == "files":
+        return True
+    if first in _LABELS:
+        return False
+    others = [name for name in controllers if name != "none"]
+    if part == "vehicle" and first == "controllers":
+        return any(rest[0] in keys_read(name) for name in others)
+    if part == "vehicle" and first == "single_track" and rest[0] != "mass_kg":  # which the speed hold knows too
+        return bool(others) or follows_path or scenario.maneuver.settling_setpoint().curvature_demand_1pm is not None
+    if part == "driver":
+        return not scenario.driver.plugin.ours or follows_path or first.startswith("speed_")
+    return True
+
+
+def task_size(runs: int, controllers: int, in_flight: int) -> int:
+    """How many runs a task has: 8 to 64, enough tasks that all workers end together, and whole samples.
+
+    Args:
+        runs: Runs of the study.
+        controllers: Runs of a sample.
+        in_flight: Tasks that the workers have at a time.
+
+    Returns:
+        Runs a task; fewer than 8 only where the study is small.
+    """
+    wanted = int(np.clip(runs // (8 * in_flight), 8, 64))
+    if runs < 8 * in_flight:
+        wanted = max(1, runs // in_flight)
+    return max(controllers, wanted // controllers * controllers)

@@ -1,0 +1,259 @@
+"""One page that shows a study: distributions, scatter and paired differences, sensitivities, worst and best runs."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from activesteer.conventions import Array, run_looks
+from activesteer.errors import StudyError
+from activesteer.files import write_text
+from activesteer.metric_table import recorded_metric
+from activesteer.pages import render
+from activesteer.quantities import parameter_label
+from activesteer.studies.engine.factor_values import FactorValues, label_of
+from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
+from activesteer.studies.engine.run_task import CURVE
+from activesteer.studies.engine.sensitivity import MAX_SAMPLES, indices
+from activesteer.studies.engine.store import Store
+from activesteer.studies.engine.study_file import StudyFile, read_study
+
+_SHOWN_ROWS: Final = 3000
+"""Runs whose points the page holds; whatever is counted or averaged is so over all of them."""
+_BINS: Final = 40
+_EXTREMES: Final = 5
+_MAX_INDICES: Final = 400
+"""Sets of indices that are computed: each takes some hundredths of a second."""
+
+Places = NDArray[np.int64]
+Group = tuple[str, str]
+"""Manoeuvre and vehicle."""
+
+
+def write_report(folder: str | os.PathLike[str]) -> Path:
+    """Writes report.html into a study's folder, from the rows that there are.
+
+    Args:
+        folder: Of the study.
+
+    Returns:
+        The page.
+
+    Raises:
+        StudyError: there is no study, it has no rows yet, or the page cannot be written.
+    """
+    home = Path(folder)
+    store = Store(home, ())
+    progress = store.progress()
+    study = read_study(home / "study.toml")
+    table = store.read()
+    if not table.num_rows:
+        raise StudyError(f"{home}: no run is done yet")
+    content = {
+        "title": study.title or home.resolve().name,
+        "progress": progress.to_json(),
+        "data": _data(study, table),
+        "study": study.to_toml(),
+    }
+    return write_text(home / "report.html", render("study.html", **content), StudyError)
+
+
+def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
+    """Everything that the page draws, as JSON values in the units that are shown."""
+    others = (*IDENTITY, *OUTCOME, *study.keys)
+    metrics = [name for name in table.column_names if name not in others and not name.startswith(CURVE)]
+    values = {name: table[name].to_numpy(zero_copy_only=False).astype(np.float64) for name in metrics}
+    found = [recorded_metric(name) for name, column in values.items() if np.isfinite(column).any()]
+    values = {metric.name: values[metric.name] * metric.unit.factor for metric in found}
+    who = {name: _codes(table[name]) for name in ("maneuver", "vehicle", "controller")}
+    groups = sorted(set(zip(who["maneuver"][1].tolist(), who["vehicle"][1].tolist(), strict=True)))
+    shown = _shown_rows(table)
+    return {
+        "controllers": who["controller"][0],
+        "places": [run_looks(who["controller"][0])[name].place for name in who["controller"][0]],
+        "groups": [f"{who['maneuver'][0][m]}, {who['vehicle'][0][v]}" for m, v in groups],
+        "metrics": [{"name": metric.name, "label": metric.label, "unit": metric.unit.name} for metric in found],
+        "factors": [_factor(study, key, table[key]) for key in study.keys],
+        "rows": {
+            "group": [groups.index(pair) for pair in zip(
+                who["maneuver"][1][shown].tolist(), who["vehicle"][1][shown].tolist(), strict=True)],
+            "controller": who["controller"][1][shown].tolist(),
+            "sample": table["sample"].to_numpy()[shown].tolist(),
+            "run": table["run"].to_numpy()[shown].tolist(),
+            "factors": {key: table[key].take(pa.array(shown)).to_pylist() for key in study.keys},
+            "metrics": {name: _json(column[shown]) for name, column in values.items()},
+        },
+        "all": table.num_rows,
+        "by_group": [_of_group(study, table, values, who, pair) for pair in groups],
+    }  # fmt: skip
+
+
+def _codes(column: pa.ChunkedArray) -> tuple[list[str], Places]:
+    """The different texts of a column in the order in which they occur, and the place of each row's in them."""
+    encoded = column.combine_chunks().dictionary_encode()
+    return encoded.dictionary.to_pylist(), encoded.indices.to_numpy()
+
+
+def _shown_rows(table: pa.Table) -> Places:
+    """Rows of evenly spread samples, whole, so that paired runs stay together."""
+    samples = table["sample"].to_numpy()
+    every = -(-table.num_rows // _SHOWN_ROWS)
+    return np.flatnonzero(samples % every == 0)
+
+
+_RELATIVE: Final = {"times": ", relative", "plus": ", change"}
+"""What is said of values that are relative to the files, by `Factor.nominal`."""
+
+
+def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, Any]:
+    numeric = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
+    levels = column.drop_null().unique().to_pylist()
+    few = len(levels) <= _BINS
+    ordered = (sorted(levels) if numeric else [str(level) for level in levels]) if few or not numeric else []
+    relative = next((factor.nominal for factor in study.factors if factor.key == key), "")
+    words, unit = parameter_label(key)
+    told = {"label": f"{words}{_RELATIVE.get(relative, '')}", "unit": "" if relative == "times" else unit}
+    return {"key": key, **told, "numeric": numeric, "levels": ordered}
+
+
+def _of_group(
+    study: StudyFile, table: pa.Table, values: Mapping[str, Array], who: Mapping[str, Any], group: tuple[int, int]
+) -> dict[str, Any]:
+    """What is computed from all rows of a manoeuvre with a vehicle, by metric."""
+    inside = (who["maneuver"][1] == group[0]) & (who["vehicle"][1] == group[1])
+    controllers = who["controller"][0]
+    rows = [np.flatnonzero(inside & (who["controller"][1] == place)) for place in range(len(controllers))]
+    samples = table["sample"].to_numpy()
+    indexed = len(values) * len(controllers) <= _MAX_INDICES and len({len(each) for each in rows}) == 1
+    indexed = indexed and study.case_list is None
+    points = [
+        {key: table[key].take(pa.array(each[:MAX_SAMPLES])).to_pylist() for key in study.keys} if indexed else {}
+        for each in rows
+    ]
+    driven = table.select([*IDENTITY, *study.keys]).combine_chunks()
+    pairs: list[Any] = [
+        np.intersect1d(samples[rows[0]], samples[each], assume_unique=True, return_indices=True)[1:]
+        for each in (rows[1:] if study.design.paired else ())
+    ]
+    factor_values = FactorValues(study)
+    found = {}
+    for name, column in values.items():
+        parts = [column[each] for each in rows]
+        finite = [part[np.isfinite(part)] for part in parts]
+        if not any(len(part) for part in finite):
+            continue
+        found[name] = {
+            "histogram": _histogram(finite),
+            "quantiles": [_json(np.quantile(part, [0.05, 0.5, 0.95])) if len(part) else None for part in finite],
+            "paired": _paired(pairs, parts),
+            "heat": _heat(study, table, rows, parts),
+            "indices": _indices(study, points, parts) if indexed else [],
+            "extremes": [_extremes(factor_values, driven, each, part) for each, part in zip(rows, parts, strict=True)],
+        }
+    return found
+
+
+def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
+    together = np.concatenate(parts)
+    low, high = float(together.min()), float(together.max())
+    # The page holds five digits: what differs by less is one value to it.
+    if high - low <= 1e-3 * max(abs(low), abs(high), 1e-300):
+        low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
+    edges = np.linspace(low, high, min(_BINS, max(5, int(np.sqrt(max(map(len, parts)))) + 1)) + 1)
+    return {"edges": _json(edges), "counts": [np.histogram(part, edges)[0].tolist() for part in parts]}
+
+
+def _paired(pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array]) -> list[Any]:
+    """Of each controller but the first: 5, 50 and 95 % of its difference to the first in the same sample.
+
+    `smaller` is the share of the samples in which it is smaller in magnitude.
+    """
+    found: list[Any] = []
+    for (first, second), part in zip(pairs, parts[1:], strict=False):
+        a, b = parts[0][first], part[second]
+        both = np.isfinite(a) & np.isfinite(b)
+        if not both.any():
+            found.append(None)
+            continue
+        difference = (b - a)[both]
+        smaller = float(np.mean(np.abs(b[both]) < np.abs(a[both])))
+        found.append({"quantiles": _json(np.quantile(difference, [0.05, 0.5, 0.95])), "smaller": round(smaller, 4)})
+    return found
+
+
+def _heat(study: StudyFile, table: pa.Table, rows: Sequence[Places], parts: Sequence[Array]) -> dict[str, Any] | None:
+    """Means over the first two grids, controller by controller."""
+    grids = [factor for factor in study.factors if factor.kind == "grid"]
+    if len(grids) != 2:
+        return None
+    places = []
+    for factor in grids:
+        levels = {value: place for place, value in enumerate(factor.values)}
+        places.append(np.array([levels[value] for value in table[factor.key].to_pylist()]))
+    maps = []
+    for each, part in zip(rows, parts, strict=True):
+        total, count = np.zeros([len(factor.values) for factor in grids]), np.zeros([len(f.values) for f in grids])
+        good = np.isfinite(part)
+        where = (places[0][each][good], places[1][each][good])
+        np.add.at(total, where, part[good])
+        np.add.at(count, where, 1)
+        with np.errstate(invalid="ignore"):
+            maps.append([_json(row) for row in total / count])
+    return {"keys": [factor.key for factor in grids], "levels": [list(f.values) for f in grids], "maps": maps}
+
+
+def _indices(study: StudyFile, points: Sequence[Mapping[str, Any]], parts: Sequence[Array]) -> list[list[Any]]:
+    """Of each controller, its indices as [factor, name, value, confidence, spread]."""
+    found = [
+        [
+            [index.factor, index.name, *_json(np.array([index.value, index.confidence, index.spread]))]
+            for index in indices(study.design.kind, study.factors, columns, part[:MAX_SAMPLES])
+        ]
+        for columns, part in zip(points, parts, strict=True)
+    ]
+    return found if any(found) else []
+
+
+def _extremes(values: FactorValues, table: pa.Table, rows: Places, part: Array) -> list[list[Any]]:
+    """The runs with the largest and the smallest magnitudes: run, value, and the line that drives it again."""
+    good = np.flatnonzero(np.isfinite(part))
+    if len(good) > 2 * _EXTREMES:
+        good = good[np.argpartition(np.abs(part[good]), (_EXTREMES - 1, len(good) - _EXTREMES))]
+        good = np.concatenate([good[:_EXTREMES], good[-_EXTREMES:]])
+    chosen = good[np.argsort(-np.abs(part[good]), kind="stable")]
+    return [
+        [row["run"], float(f"{part[place]:.5g}"), _command(values, row)]
+        for place, row in zip(chosen, table.take(pa.array(rows[chosen])).to_pylist(), strict=True)
+    ]
+
+
+def _command(factor_values: FactorValues, row: Mapping[str, Any]) -> str:
+    """The command line that drives a run again and replays it; empty where its manoeuvre or vehicle has no file."""
+    study = factor_values.study
+    given = {}
+    place = {}
+    for part, items in (("maneuver", study.maneuvers), ("vehicle", study.vehicles), ("controller", study.controllers)):
+        place[part] = [label_of(item) for item in items].index(row[part])
+        given[part] = items[place[part]]
+    if not all(isinstance(item, str) for item in given.values()):
+        return ""
+    sample = {key: row[key] for key in study.keys}
+    values = study.overrides | factor_values.overrides(place["maneuver"], place["vehicle"], sample)
+    words = ["activesteer", "run", given["maneuver"], "-c", given["controller"], "--vehicle", given["vehicle"]]
+    for key, value in values.items():
+        words += ["--set", f"{key}={value if isinstance(value, str) else json.dumps(value)}"]
+    file = f"run-{row['run']}.mcap"
+    return f"{shlex.join([*words, '-o', file])} && activesteer replay {file}"
+
+
+def _json(column: Array) -> list[float | None]:
+    """Numbers as the page holds them: five digits, and null where there is none."""
+    return [float(f"{value:.5g}") if np.isfinite(value) else None for value in column.tolist()]

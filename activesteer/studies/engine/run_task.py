@@ -1,0 +1,196 @@
+"""What a worker does: a few runs after each other, each of which becomes a row of the result."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import fnmatch
+import functools
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from activesteer.analysis.claims import SCENARIOS
+from activesteer.conventions import CURVE_STEP_S
+from activesteer.errors import ActiveSteerError, StudyError
+from activesteer.files import file_word
+from activesteer.recording import Recording
+from activesteer.scenario import Scenario
+from activesteer.simulation import amplitude_store
+from activesteer.simulation.preparation import prepared
+from activesteer.simulation.runner import run_scenario
+from activesteer.studies.engine.run_identity import digest, files_digest, run_id
+from activesteer.studies.engine.run_settings import Request, Settings, differences, files_key, scenario_of
+
+_ERROR_CHARACTERS: Final = 500
+"""What a row keeps of an error's text."""
+CLAIM: Final = "claim_"
+"""What the name of a column begins with that says whether a claim holds for the sample."""
+CURVE: Final = "curve_"
+"""What the name of a column begins with that holds a channel over time."""
+
+
+class Status(StrEnum):
+    """How a run ended."""
+
+    OK = "ok"
+    UNEVALUATED = "unevaluated"
+    """It was driven to its end, but there are no metrics; `error` says why."""
+    FAILED = "failed"
+    """It could not be begun, or ended early."""
+    CRASHED = "crashed"
+    """The process died that drove it, every time."""
+
+
+Row = dict[str, Any]
+
+
+def drive(settings: Settings, requests: Sequence[Request]) -> list[Row]:
+    """Makes some runs.
+
+    Args:
+        settings: What all runs of the study share.
+        requests: The runs; those of one sample stand together, so that what must be found by driving is found once.
+
+    Returns:
+        A row for each.
+    """
+    if problem := _problem(digest({"expected": settings.expected}), settings):
+        return [failed_row(settings, request, Status.FAILED, problem) for request in requests]
+    rows: list[Row] = []
+    place = 0
+    while place < len(requests):
+        group = [other for other in requests[place:] if _same_drive(other, requests[place])]
+        rows += _drive_sample(settings, group)
+        place += len(group)
+    _give_memory_back()
+    return rows
+
+
+def _give_memory_back() -> None:
+    """What is free goes back to the machine; glibc keeps it in pieces, of which a worker would touch ever more."""
+    with contextlib.suppress(OSError, AttributeError, TypeError):  # of other C libraries
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+_seen: dict[str, str] = {}
+
+
+def _problem(key: str, settings: Settings) -> str:
+    """Whether this worker has what the study began with; looked at once a process."""
+    if key not in _seen:
+        _seen[key] = differences(settings)
+    return _seen[key]
+
+
+def _same_drive(a: Request, b: Request) -> bool:
+    return (a.maneuver, a.vehicle, a.sample, a.factors) == (b.maneuver, b.vehicle, b.sample, b.factors)
+
+
+def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
+    """The runs of one sample: the same car on the same road with one controller after the other."""
+    first = requests[0]
+    place = first.maneuver, first.vehicle, first.overrides
+    try:
+        scenario, key = scenario_of(settings, *place), files_key(settings, *place)
+        if files_digest(scenario) != settings.expected[key]:
+            raise StudyError(f"{key}: changed while the study ran")
+        with amplitude_store.not_on_disk():
+            ready = prepared(scenario, settings.timestep_s)
+    except ActiveSteerError as error:
+        return [failed_row(settings, request, Status.FAILED, _words_of(error)) for request in requests]
+    rows = []
+    recordings: dict[str, Recording] = {}
+    for request in requests:
+        label, controller = settings.controllers[request.controller]
+        row = _row(settings, request)
+        row["run_id"] = run_id(scenario, controller, settings.seed, settings.timestep_s)
+        recording = _drive_one(settings, request, row, ready, controller)
+        if settings.claims and recording is not None:
+            recordings[label] = recording
+        rows.append(row)
+    if settings.claims:
+        claims = _claims(settings.maneuvers[first.maneuver][0], recordings)
+        for row in rows:
+            row.update(claims)
+    return rows
+
+
+def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, controller: str) -> Recording | None:
+    """Makes one run and fills its row; what it recorded, where it came to its end."""
+    path = _recording_path(settings, request)
+    every = settings.recordings
+    keeps = every == "all" or (isinstance(every, int) and request.sample % every == 0)
+    try:
+        recording = run_scenario(ready, controller, path=path if keeps else None, timestep_s=settings.timestep_s)
+    except ActiveSteerError as error:
+        row |= {"status": Status.FAILED.value, "error": _words_of(error)}
+        if every == "failed" and path is not None and error.recording is not None and len(error.recording):
+            try:
+                error.recording.save(path)
+            except ActiveSteerError as reason:
+                row["error"] = f"{row['error']}; {reason}"
+        return None
+    every_steps = max(1, round(CURVE_STEP_S / settings.timestep_s))
+    row.update((f"{CURVE}{name}", np.float32(recording[name][::every_steps])) for name in settings.curves)
+    if problem := recording.metadata.get("metrics_error"):
+        row |= {"status": Status.UNEVALUATED.value, "error": str(problem)[:_ERROR_CHARACTERS]}
+        return None
+    row["status"] = Status.OK.value
+    row.update((name, float(value)) for name, value in recording.metrics.items() if _is_kept(settings.metrics, name))
+    return recording
+
+
+def _recording_path(settings: Settings, request: Request) -> Path | None:
+    if settings.folder is None or settings.recordings == "none":
+        return None
+    return settings.folder / recording_name(
+        request.run, settings.maneuvers[request.maneuver][0], settings.controllers[request.controller][0]
+    )
+
+
+def recording_name(run: int, maneuver: str, controller: str) -> str:
+    """Name of the file of a run's recording."""
+    return f"{run:07d}-{maneuver}-{file_word(controller)}.mcap"
+
+
+@functools.lru_cache(maxsize=4096)
+def _is_kept(patterns: tuple[str, ...], name: str) -> bool:
+    return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _claims(maneuver: str, recordings: Mapping[str, Recording]) -> dict[str, float]:
+    """Column -> 1 where a claim of the paper holds for the sample, else 0; empty where a run is missing."""
+    try:
+        claims = SCENARIOS[maneuver](recordings)
+    except (KeyError, ActiveSteerError):
+        return {}
+    failed = sum(not claim.passed for claim in claims)
+    return {f"{CLAIM}{claim.id}": float(claim.passed) for claim in claims} | {"claims_failed": float(failed)}
+
+
+def failed_row(settings: Settings, request: Request, status: Status, problem: str) -> Row:
+    """The row of a run that was not driven to its end."""
+    return _row(settings, request) | {"status": status.value, "error": problem}
+
+
+def _row(settings: Settings, request: Request) -> Row:
+    return {
+        "run": request.run,
+        "run_id": "",
+        "sample": request.sample,
+        "maneuver": settings.maneuvers[request.maneuver][0],
+        "vehicle": settings.vehicles[request.vehicle][0],
+        "controller": settings.controllers[request.controller][0],
+        **request.factors,
+        "status": Status.FAILED.value,
+        "error": "",
+    }
+
+
+def _words_of(error: ActiveSteerError) -> str:
+    text = "; ".join([f"{type(error).__name__}: {error}", *getattr(error, "__notes__", [])])
+    return text[:_ERROR_CHARACTERS]

@@ -1,0 +1,264 @@
+"""The folder of a study: what it is, which runs are done, and in the end all of them in one file.
+
+    DIR/study.toml         the study as it is run, with absolute paths
+    DIR/environment.json   hash of everything that decides the result, versions, machine
+    DIR/parts/             FIRST-LAST.parquet of each finished task, until all are joined
+    DIR/results.parquet    one row a run
+    DIR/recordings/        what is kept of the runs
+
+A file is written aside and renamed, so that it is there as a whole or not at all.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import platform
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from activesteer.errors import StudyError
+from activesteer.files import make_folder, reading, replacing, write_text, writing
+from activesteer.studies.engine.row_table import batched, fitted, joined_schema, table_of
+from activesteer.studies.engine.run_identity import versions
+from activesteer.studies.engine.run_task import Row
+
+try:
+    import fcntl
+except ImportError:  # there is none on Windows
+    fcntl = None
+
+RESULTS: Final = "results.parquet"
+_ROW_GROUP: Final = 65536
+
+
+class Progress(NamedTuple):
+    """How far a study is.
+
+    Attributes:
+        total: Runs of the study.
+        done: Runs that have a row.
+        by_status: How they ended: status -> number.
+        errors: The most frequent errors and their numbers.
+        running: Whether a process is at work on it.
+    """
+
+    total: int
+    done: int
+    by_status: dict[str, int]
+    errors: dict[str, int]
+    running: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {**self._asdict(), "missing": self.total - self.done}
+
+
+class Store:
+    """A study's folder, held by one process at a time."""
+
+    def __init__(self, folder: Path, factors: Sequence[str]) -> None:
+        """Opens nothing; see `opened`.
+
+        Args:
+            folder: The folder.
+            factors: Keys that are varied: the columns between identity and outcome.
+        """
+        self.folder = folder
+        self._factors = tuple(factors)
+        self._parts = folder / "parts"
+
+    @contextlib.contextmanager
+    def opened(self, study_toml: str, identity: str, total: int) -> Iterator[Store]:
+        """Makes the folder, or goes on with the study that is in it.
+
+        Args:
+            study_toml: The study as it is run.
+            identity: Hash of everything that decides its result.
+            total: Number of its runs.
+
+        Raises:
+            StudyError: the folder cannot be written, another process works in it, or it holds another study.
+        """
+        make_folder(self._parts, StudyError)
+        with _locked(self.folder / ".lock"):
+            about = {"digest": identity, "runs": total, "versions": versions(), "platform": platform.platform()}
+            path = self.folder / "environment.json"
+            if path.exists():
+                _compare(read_environment(self.folder), about, self.folder)
+            else:
+                if any(self.folder.glob("*.parquet")) or any(self._parts.iterdir()):
+                    raise StudyError(f"{self.folder} holds results, but not what they are of; use a new folder")
+                write_text(self.folder / "study.toml", study_toml, StudyError)
+                write_text(path, json.dumps(about, indent=2) + "\n", StudyError)
+            for left in self._parts.glob(".*"):  # of a process that was killed while it wrote
+                left.unlink(missing_ok=True)
+            yield self
+
+    def missing(self, total: int) -> list[range]:
+        """Runs that have no row yet, as ranges of their numbers."""
+        if (self.folder / RESULTS).exists():
+            return []
+        found, begin = [], 0
+        for first, last in self._spans():
+            if first > begin:
+                found.append(range(begin, first))
+            begin = max(begin, last + 1)
+        return [*found, range(begin, total)] if begin < total else found
+
+    def write(self, rows: Sequence[Row]) -> None:
+        """Keeps the rows of a finished task, which are of consecutive runs.
+
+        Raises:
+            StudyError: they cannot be written.
+        """
+        name = f"{rows[0]['run']:09d}-{rows[-1]['run']:09d}.parquet"
+        with replacing(self._parts / name, StudyError) as path:
+            pq.write_table(table_of(rows, self._factors), path)
+
+    def join(self) -> Path:
+        """Makes one file of all parts, in the order of the runs; the parts are deleted.
+
+        Returns:
+            The file.
+
+        Raises:
+            StudyError: it cannot be written, or a part cannot be read.
+        """
+        target = self.folder / RESULTS
+        if not target.exists():
+            paths = self._paths()
+            schema = self._joined_schema(paths)
+            with replacing(target, StudyError) as path, pq.ParquetWriter(path, schema) as writer:
+                for batch in batched((fitted(table, schema) for table in _tables(paths)), _ROW_GROUP):
+                    writer.write_table(batch, row_group_size=_ROW_GROUP)
+        shutil.rmtree(self._parts, ignore_errors=True)
+        return target
+
+    def read(self) -> pa.Table:
+        """All rows so far, in the order of the runs.
+
+        Raises:
+            StudyError: a file cannot be read.
+        """
+        if (self.folder / RESULTS).exists():
+            return next(_tables([self.folder / RESULTS]))
+        paths = self._paths()
+        schema = self._joined_schema(paths)
+        return pa.concat_tables([schema.empty_table(), *(fitted(table, schema) for table in _tables(paths))])
+
+    def progress(self) -> Progress:
+        """How far the study is.
+
+        Raises:
+            StudyError: a file cannot be read.
+        """
+        about = read_environment(self.folder)
+        counts: dict[str, int] = {}
+        errors: dict[str, int] = {}
+        joined = self.folder / RESULTS
+        for table in _tables([joined] if joined.exists() else self._paths(), ["status", "error"]):
+            for column, found in (("status", counts), ("error", errors)):
+                for entry in table[column].combine_chunks().value_counts().to_pylist():
+                    if entry["values"]:
+                        found[entry["values"]] = found.get(entry["values"], 0) + entry["counts"]
+        maximum = dict(sorted(errors.items(), key=lambda item: -item[1])[:10])
+        return Progress(about["runs"], sum(counts.values()), counts, maximum, _is_locked(self.folder / ".lock"))
+
+    def _spans(self) -> list[tuple[int, int]]:
+        return sorted(
+            (int(first), int(last)) for first, _, last in (path.stem.partition("-") for path in self._paths())
+        )
+
+    def _paths(self) -> list[Path]:
+        return sorted(self._parts.glob("[0-9]*.parquet"))
+
+    def _joined_schema(self, paths: Iterable[Path]) -> pa.Schema:
+        return joined_schema(list(_schemas(paths)) or [table_of([], self._factors).schema])
+
+
+def read_environment(folder: Path) -> dict[str, Any]:
+    """What a study's folder says of itself.
+
+    Raises:
+        StudyError: there is no study in it, or it cannot be read.
+    """
+    path = folder / "environment.json"
+    if not path.is_file():
+        raise StudyError(
+            f"{folder} holds no study; make one with `activesteer study STUDY.toml -o {folder}`", value=folder
+        )
+    with reading(path, StudyError):
+        text = path.read_text(encoding="utf-8", errors="replace")
+    try:
+        about = json.loads(text)
+        return {"digest": str(about["digest"]), "runs": int(about["runs"]), "versions": dict(about["versions"])}
+    except (ValueError, KeyError, TypeError) as reason:
+        raise StudyError(f"{path}: is damaged: {reason}", value=path) from reason
+
+
+def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
+    if stored["digest"] == now["digest"]:
+        return
+    changed = [
+        f"{key} {stored['versions'].get(key)} in place of {value}"
+        for key, value in now["versions"].items()
+        if key in ("activesteer", "source", "mujoco") and stored["versions"].get(key) != value
+    ]
+    why = f" (made with {', '.join(changed)})" if changed else ": file, inputs or seed differ"
+    raise StudyError(f"{folder} holds another study{why}; use a new folder, or delete this one", value=folder)
+
+
+def _schemas(paths: Iterable[Path]) -> Iterator[pa.Schema]:
+    for path in paths:
+        with _refusing(path):
+            schema = pq.read_schema(path)
+        yield schema
+
+
+def _tables(paths: Iterable[Path], columns: list[str] | None = None) -> Iterator[pa.Table]:
+    for path in paths:
+        with _refusing(path):
+            table = pq.read_table(path, columns=columns)
+        yield table
+
+
+@contextlib.contextmanager
+def _refusing(path: Path) -> Iterator[None]:
+    try:
+        with reading(path, StudyError):
+            yield
+    except pa.ArrowException as reason:
+        raise StudyError(f"cannot read {path}: {reason}", value=path) from reason
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Holds the folder; where the file system knows no locks, nobody is kept out."""
+    with writing(path, StudyError):
+        file = path.open("w")
+    with file:
+        if fcntl is not None:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as reason:
+                raise StudyError(f"{path.parent}: another process works on this study", value=path.parent) from reason
+            except OSError:
+                pass
+        yield
+
+
+def _is_locked(path: Path) -> bool:
+    if fcntl is None or not path.exists():
+        return False
+    with contextlib.suppress(OSError), path.open("r+") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False

@@ -1,0 +1,162 @@
+"""A study from its file to its table: many runs, spread over workers, that can be interrupted and gone on with."""
+
+from __future__ import annotations
+
+import fnmatch
+import logging
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from activesteer.scenario import FileOrTable
+from activesteer.studies.engine.plan import Plan, task_size
+from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
+from activesteer.studies.engine.run_settings import Request, prepare
+from activesteer.studies.engine.run_task import Status, drive, failed_row
+from activesteer.studies.engine.store import Store
+from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.studies.engine.task_queue import TaskQueue, WorkerDied
+from activesteer.studies.engine.workers import Workers, workers_for
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+RECORDINGS: Final = "recordings"
+_logger: Final = logging.getLogger(__name__)
+
+
+class StudyProgress(NamedTuple):
+    """How far it is; given to whoever watches.
+
+    Attributes:
+        done: Runs with a row.
+        total: Runs of the study.
+        failed: Runs, of those made now, that did not come to their end.
+        here: Runs made since the study was begun or gone on with.
+    """
+
+    done: int
+    total: int
+    failed: int
+    here: int
+
+
+def study(
+    study_file: FileOrTable | StudyFile,
+    *,
+    output: str | os.PathLike[str] | None = None,
+    jobs: int | None = None,
+    client: Any = None,
+    scheduler: str | None = None,
+    workers: Workers | None = None,
+    limit: int | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
+) -> pa.Table:
+    """Drives a study, or what is missing of it.
+
+    With more than one job the runs are made in processes of their own, started afresh: a script that calls this needs
+    the usual `if __name__ == "__main__":`.
+
+    Args:
+        study_file: Name or path of a study file, its table, or what was read of it.
+        output: Folder of the study; it is gone on with where it is there. Without one nothing is kept.
+        jobs: Number of processes; that of the processors where not given. With 1 all runs are made in this process.
+        client: A `distributed.Client` whose cluster makes the runs.
+        scheduler: Address of a Dask scheduler, or its scheduler file, instead.
+        workers: Workers that make the runs of several studies, instead.
+        limit: Most runs to make now; the rest is left for another time.
+        progress: Called after every task.
+
+    Returns:
+        One row a run, in the order of the study: identity, factors, `status`, `error`, metrics. The unit of a column is
+        in its field's metadata.
+
+    Raises:
+        ActiveSteerError: an input is wrong, the folder cannot be written or holds another study, or the workers cannot
+            be reached. A run that fails ends nothing: it is a row.
+
+    Example:
+        >>> from activesteer import study
+        >>> table = study({
+        ...     "maneuvers": ["step_steer"],
+        ...     "controllers": ["none", "ars"],
+        ...     "factors": {"road.mu": {"grid": [0.8, 1.0]}},
+        ... }, jobs=1)
+        >>> table.num_rows
+        4
+    """
+    parsed = read_study(study_file)
+    with ExitStack() as stack:
+        if output is None:
+            output = stack.enter_context(tempfile.TemporaryDirectory(prefix="activesteer-study-"))
+        folder = Path(output).absolute()
+        # Wrong addresses are reported before, what is wrong with the study before a process is started.
+        plan = Plan(parsed, folder / RECORDINGS)
+        store = stack.enter_context(Store(folder, parsed.keys).opened(parsed.to_toml(), plan.digest, len(plan)))
+        missing = store.missing(len(plan))
+        if missing:
+            workers = workers or stack.enter_context(workers_for(jobs, client=client, scheduler=scheduler))
+            # What would go wrong in every run is found out before the first of them.
+            prepare(workers, plan.settings)
+            _drive_all(plan, store, workers, missing, limit, progress)
+        if not store.missing(len(plan)):
+            store.join()
+        table = store.read()
+        _warn_of_patterns(parsed, table)
+        return table
+
+
+def _warn_of_patterns(study_file: StudyFile, table: pa.Table) -> None:
+    """Log each pattern of `metrics` that matches no metric of the runs made so far."""
+    if not table.num_rows or Status.OK not in table.column("status").to_pylist():
+        return
+    metrics = set(table.column_names) - {*IDENTITY, *OUTCOME, *study_file.keys}
+    for pattern in study_file.metrics:
+        if not fnmatch.filter(metrics, pattern):
+            _logger.warning("metrics: the pattern %r matches no metric of these runs", pattern)
+
+
+def _drive_all(
+    plan: Plan,
+    store: Store,
+    workers: Workers,
+    missing: Iterable[range],
+    limit: int | None,
+    progress: Callable[[StudyProgress], None] | None,
+) -> None:
+    total = len(plan)
+    left = sum(len(span) for span in missing)
+    done, here, failed = total - left, 0, 0
+    size = task_size(left, len(plan.settings.controllers), workers.in_flight)
+    tasks = ((requests, drive, plan.settings, requests) for requests in _tasks(plan, missing, size, limit))
+    queue = TaskQueue(workers)
+    for requests, made, error in queue.outcomes(tasks):
+        rows = made
+        if error is not None and len(requests) > 1:
+            # Run by run, so that only the guilty one is lost.
+            for request in requests:
+                queue.add_alone([request], drive, plan.settings, [request])
+            continue
+        if error is not None:
+            status = Status.CRASHED if isinstance(error, WorkerDied) else Status.FAILED
+            rows = [failed_row(plan.settings, requests[0], status, f"{type(error).__name__}: {error}")]
+        store.write(rows)
+        here += len(rows)
+        failed += sum(row["status"] in (Status.FAILED, Status.CRASHED) for row in rows)
+        if progress is not None:
+            progress(StudyProgress(done + here, total, failed, here))
+
+
+def _tasks(plan: Plan, missing: Iterable[range], size: int, limit: int | None) -> Iterator[list[Request]]:
+    """Runs in groups that end at multiples of the size, so that a sample stays together."""
+    left = len(plan) if limit is None else limit
+    for span in missing:
+        begin = span.start
+        while begin < span.stop and left > 0:
+            end = min((begin // size + 1) * size, span.stop, begin + left)
+            yield plan.requests(range(begin, end))
+            left -= end - begin
+            begin = end

@@ -1,0 +1,278 @@
+"""A study file: what is driven, by whom, with which cars, what is varied, and what is kept of it."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from activesteer.config import Source, build, read_toml, toml_value
+from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.errors import StudyError, nearest_names, shown
+from activesteer.files import user_path
+from activesteer.resources import DEFAULT_DRIVER, find_study
+from activesteer.scenario import FileOrTable
+from activesteer.studies.engine.design import DesignTable, Samples, cases, choose_design, draw, read_cases
+from activesteer.studies.engine.factors import Factor, read_factor
+
+_KEYS: Final = (
+    "title", "maneuvers", "controllers", "vehicles", "driver", "overrides", "factors", "design", "seed", "metrics",
+    "recordings", "curves", "claims", "timestep_s", "tune", "fit",
+)  # fmt: skip
+_SEARCHES: Final = {
+    "tune": "it says what is to be made small",
+    "fit": "it says which channels are compared, and how noisy they are",
+}
+"""Tables of those who choose the factors' values themselves and need no sample; what to say where one is missing."""
+_KEPT: Final = ("none", "failed", "all")
+
+
+@dataclass(frozen=True)
+class StudyFile:
+    """A study as its file says, with every path absolute.
+
+    Attributes:
+        maneuvers: Names, paths or tables of manoeuvres.
+        controllers: Names or files of controllers.
+        vehicles: Names, paths or tables of vehicles.
+        driver: Name, path or table of who drives, or his code.
+        overrides: What is the same in all runs: dotted key -> value.
+        factors: What is varied.
+        design: In which combinations.
+        case_list: The cases of a list; None for other designs.
+        seed: Of the samples.
+        metrics: Patterns of the metrics that are kept, as `yaw_rate_*`; all of them where empty.
+        recordings: `none`, `failed`, `all`, or a number n: those of every n-th sample.
+        curves: Channels that are kept of every run, every `conventions.CURVE_STEP_S`.
+        claims: Whether the paper's claims are checked for every sample; needs its three systems.
+        timestep_s: Step of engine, driver and controller [s].
+        tune: The table [tune], as it is; see `tuning`.
+        fit: The table [fit], as it is; see `measured.fit_file`.
+        title: One line for the report.
+        source: For error messages.
+    """
+
+    maneuvers: tuple[FileOrTable, ...]
+    controllers: tuple[str, ...] = ("none",)
+    vehicles: tuple[FileOrTable, ...] = ("compact",)
+    driver: FileOrTable = DEFAULT_DRIVER
+    overrides: dict[str, Any] = field(default_factory=dict)
+    factors: tuple[Factor, ...] = ()
+    design: DesignTable = DesignTable()
+    case_list: Samples | None = None
+    seed: int = 0
+    metrics: tuple[str, ...] = ()
+    recordings: str | int = "none"
+    curves: tuple[str, ...] = ()
+    claims: bool = False
+    timestep_s: float = DEFAULT_TIMESTEP_S
+    tune: dict[str, Any] | None = None
+    fit: dict[str, Any] | None = None
+    title: str = ""
+    source: Source = Source("study")
+
+    def samples(self) -> tuple[Samples, ...]:
+        """The combinations: one set for all controllers where they are paired, else one for each."""
+        if self.case_list is not None:
+            return (self.case_list,)
+        # A grid is the same for everybody anyway.
+        streams = 1 if self.design.paired or self.design.kind == "grid" else len(self.controllers)
+        count = self.design.samples
+        return tuple(draw(self.factors, self.design.kind, count, self.seed, stream) for stream in range(streams))
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """What is varied, in the order of the file."""
+        return tuple(self.case_list.columns) if self.case_list else tuple(factor.key for factor in self.factors)
+
+    def to_table(self) -> dict[str, Any]:
+        """The study as the table of a study file."""
+        table: dict[str, Any] = {
+            "title": self.title,
+            "maneuvers": list(self.maneuvers),
+            "controllers": list(self.controllers),
+            "vehicles": list(self.vehicles),
+            "driver": self.driver,
+            "seed": self.seed,
+            "timestep_s": self.timestep_s,
+            "recordings": {"every": self.recordings} if isinstance(self.recordings, int) else self.recordings,
+            "claims": self.claims,
+            "overrides": dict(self.overrides),
+        }
+        design: dict[str, Any] = {"kind": self.design.kind, "paired": self.design.paired}
+        if self.design.samples:
+            design["samples"] = self.design.samples
+        if self.case_list is not None:
+            design["cases"] = [self.case_list[number] for number in range(len(self.case_list))]
+        else:
+            table["factors"] = {factor.key: factor.to_table() for factor in self.factors}
+        for key, names in (("metrics", self.metrics), ("curves", self.curves)):
+            if names:
+                table[key] = list(names)
+        table |= {key: found for key in _SEARCHES if (found := getattr(self, key)) is not None}
+        return table | {"design": design}
+
+    def to_toml(self) -> str:
+        """The study as the text of a study file."""
+        table = self.to_table()
+        lines = [f"{key} = {toml_value(value)}" for key, value in table.items() if not isinstance(value, dict)]
+        for name, inner in table.items():
+            if isinstance(inner, dict):
+                lines += [
+                    "",
+                    f"[{name}]",
+                    *(f"{json.dumps(key)} = {toml_value(value)}" for key, value in inner.items()),
+                ]
+        return "\n".join(lines) + "\n"
+
+
+def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
+    """Reads a study file and checks what can be checked without looking at manoeuvres and vehicles.
+
+    Args:
+        given: Name of a study that comes with the package, path, or table. Relative paths inside a file start at its
+            folder, those of a table at the working directory.
+        search: `tune` or `fit`, where the study must have that table.
+
+    Returns:
+        The study.
+
+    Raises:
+        StudyError: it cannot be read, or a key or value is wrong.
+    """
+    if isinstance(given, StudyFile):
+        return given
+    if isinstance(given, Mapping):
+        table, source, folder = dict(given), Source("study given as a table", error=StudyError), Path.cwd()
+    else:
+        path = find_study(given)
+        table, source = read_toml(path, StudyError)
+        folder = path.resolve().parent
+    for key in table:
+        if key not in _KEYS:
+            raise source.fail((key,), f"there is no such key; {nearest_names(key, _KEYS)}")
+    if search and search not in table:
+        raise source.fail((search,), f"the table is missing: {_SEARCHES[search]}")
+    if "maneuvers" not in table:
+        raise source.fail((), "the key maneuvers is missing: a list of names or files")
+    read = {
+        "maneuvers": lambda value: tuple(_located(item, folder) for item in _items(value, (str, Mapping))),
+        "vehicles": lambda value: tuple(_located(item, folder) for item in _items(value, (str, Mapping))),
+        "driver": lambda value: _located_code(_typed(value, (str, Mapping), "a name, a file or a table"), folder),
+        "controllers": lambda value: tuple(_located_code(item, folder) for item in _items(value, (str,))),
+        "metrics": lambda value: tuple(_items(value, (str,))),
+        "curves": lambda value: tuple(_items(value, (str,))),
+        "overrides": lambda value: dict(_typed(value, Mapping, "a table")),
+        **dict.fromkeys(_SEARCHES, lambda value: dict(_typed(value, Mapping, "a table"))),
+        "claims": lambda value: _typed(value, bool, "true or false"),
+        "title": lambda value: _typed(value, str, "a text"),
+        "seed": _seed,
+        "timestep_s": _timestep,
+        "recordings": _recordings,
+    }
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        if key in read:
+            try:
+                found[key] = read[key](value)
+            except _WrongValueError as wrong:
+                raise source.fail((key,), f"{shown(value)} is not {wrong}", value) from None
+    study = StudyFile(**found, source=source, **_varied(table, folder, source))
+    both = [key for key in study.keys if key in study.overrides]
+    if both:
+        raise source.fail(("overrides", both[0]), "is varied by the study too; give it in one place")
+    return study
+
+
+class _WrongValueError(Exception):
+    """What is needed in place of a value."""
+
+
+def _varied(table: Mapping[str, Any], folder: Path, source: Source) -> dict[str, Any]:
+    """Factors, design and cases, which must fit each other."""
+    parts = []
+    for key in ("factors", "design"):
+        if not isinstance(part := table.get(key, {}), Mapping):
+            raise source.fail((key,), f"{shown(part)} is not a table")
+        parts.append(dict(part))
+    factors = tuple(read_factor(key, value, source) for key, value in parts[0].items())
+    case_list = _cases(parts[1].pop("cases", None), folder, source)
+    if any(key in table for key in _SEARCHES) and any(factor.kind != "grid" for factor in factors):
+        parts[1].setdefault("samples", 1)
+    design = build(DesignTable, parts[1], source, ("design",))
+    return {
+        "factors": factors,
+        "design": choose_design(design, factors, case_list is not None, source),
+        "case_list": case_list,
+    }
+
+
+def _cases(given: object, folder: Path, source: Source) -> Samples | None:
+    where = ("design", "cases")
+    if given is None:
+        return None
+    if isinstance(given, str):
+        try:
+            return read_cases(folder / user_path(given, StudyError))
+        except StudyError as reason:
+            raise source.fail(where, str(reason), given) from reason
+    if not isinstance(given, Sequence) or not given or not all(isinstance(row, Mapping) and row for row in given):
+        raise source.fail(where, "is neither a CSV file nor a list of tables with at least one key each")
+    return cases(given)
+
+
+def _recordings(value: object) -> str | int:
+    if isinstance(value, str) and value in _KEPT:
+        return value
+    if isinstance(value, Mapping) and set(value) == {"every"}:
+        every = value["every"]
+        if isinstance(every, int) and not isinstance(every, bool) and every > 0:
+            return every
+    raise _WrongValueError(f"one of {', '.join(_KEPT)} or {{ every = 50 }}")
+
+
+def _seed(value: object) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise _WrongValueError("a whole number of at least 0")
+    return value
+
+
+def _timestep(value: object) -> float:
+    if not isinstance(value, float) or not (math.isfinite(value) and value > 0.0):
+        raise _WrongValueError("a time above 0 s")
+    return value
+
+
+def _typed(value: Any, kind: Any, wanted: str) -> Any:
+    if not isinstance(value, kind):
+        raise _WrongValueError(wanted)
+    return value
+
+
+def _items(value: object, kinds: tuple[type, ...]) -> list[Any]:
+    items = [value] if isinstance(value, str) else value
+    if not isinstance(items, Sequence) or not items or not all(isinstance(item, kinds) for item in items):
+        raise _WrongValueError("a list with at least one name")
+    return list(items)
+
+
+def _located(item: FileOrTable, folder: Path) -> FileOrTable:
+    """A name as it is, a path made absolute: from the study file's folder."""
+    if isinstance(item, Mapping):
+        return item
+    text = os.fspath(item)
+    is_path = text.endswith((".toml", ".mcap")) or os.sep in text
+    return str((folder / user_path(text, StudyError)).resolve()) if is_path else text
+
+
+def _located_code(item: Any, folder: Path) -> Any:
+    """The same of what may be `my_file.py:MyController?gain=2` too."""
+    name, mark, parameters = ("", "", "") if isinstance(item, Mapping) else item.partition("?")
+    path, colon, class_name = name.rpartition(":")
+    if not colon:
+        return _located(item, folder)
+    return f"{(folder / user_path(path, StudyError)).resolve()}:{class_name}{mark}{parameters}"

@@ -1,0 +1,302 @@
+"""Finds values of a study's factors that make objectives small, by Optuna; resumable, spread over workers."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from activesteer.config import Range, build
+from activesteer.errors import StudyError, nearest_names, not_installed
+from activesteer.files import make_folder, write_text
+from activesteer.scenario import FileOrTable
+from activesteer.studies.engine.factor_values import label_of
+from activesteer.studies.engine.factors import Factor
+from activesteer.studies.engine.plan import Plan
+from activesteer.studies.engine.run_settings import Request, prepare
+from activesteer.studies.engine.run_task import Row, Status, drive
+from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.studies.engine.task_queue import TaskQueue
+from activesteer.studies.engine.workers import workers_for
+
+_JOURNAL: Final = "tune.journal"
+_VIOLATION: Final = "violation"
+
+
+@dataclass(frozen=True)
+class Term:
+    """A metric of one run, as a part of an objective or as what a constraint looks at."""
+
+    metric: str
+    """Its name; `claims_failed` is the number of the paper's claims that fail, where the study checks them."""
+    controller: str
+    """Of which run."""
+    maneuver: str = ""
+    """Of which manoeuvre; may be left out where there is one."""
+    relative_to: str = ""
+    """Another controller: the magnitude is taken relative to that of its run."""
+    weight: float = 1.0
+    """Factor, negative where more is better."""
+    limit: Annotated[float, Range(0.0)] = 1e12
+    """A larger magnitude counts as this."""
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A sum that is made small."""
+
+    name: str
+    """What to call it."""
+    terms: tuple[Term, ...]
+    """What is added up, as magnitudes times their weights."""
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A bound that must be kept."""
+
+    metric: str
+    """See `Term`."""
+    controller: str
+    """See `Term`."""
+    maneuver: str = ""
+    """See `Term`."""
+    low: float = -1e12
+    """The metric is at least this."""
+    high: float = 1e12
+    """The metric is at most this."""
+
+
+@dataclass(frozen=True)
+class TuneTable:
+    """The table [tune] of a study file."""
+
+    objectives: tuple[Objective, ...]
+    """One, or several of which the Pareto front is found."""
+    constraints: tuple[Constraint, ...] = ()
+    """What must be kept."""
+    trials: Annotated[int, Range(1, 1_000_000)] = 100
+    """How many sets are tried."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A set that was tried.
+
+    Attributes:
+        number: Its number.
+        values: Factor -> value.
+        objectives: Objective -> value.
+        violation: By how much constraints are broken; 0 where all are kept.
+    """
+
+    number: int
+    values: dict[str, Any]
+    objectives: dict[str, float]
+    violation: float
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What came of it.
+
+    Attributes:
+        done: Sets that were tried, in all.
+        failed: Those of which a run failed.
+        front: Sets of which no other is better in every objective; with one objective, the best.
+        trials: All that could be judged.
+    """
+
+    done: int
+    failed: int
+    front: list[Trial]
+    trials: list[Trial]
+
+
+def tune(
+    study_file: FileOrTable,
+    output: str | os.PathLike[str],
+    *,
+    trials: int | None = None,
+    jobs: int | None = None,
+    client: Any = None,
+    scheduler: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Tuning:
+    """Tries sets of a study's factors, each in all its manoeuvres with all its controllers, and goes after the best.
+
+    Args:
+        study_file: Name or path of a study file with a table [tune], or its table.
+        output: Folder; a search that is there is gone on with.
+        trials: Sets to have tried in the end; what the file says where not given.
+        jobs: Number of processes; that of the processors where not given.
+        client: A `distributed.Client` whose cluster makes the runs.
+        scheduler: Address of a Dask scheduler, or its scheduler file, instead.
+        progress: Called after every set with how many are done, and how many there will be.
+
+    Returns:
+        The best sets.
+
+    Raises:
+        ActiveSteerError: an input is wrong, Optuna is not installed, or the folder cannot be written or holds another
+            search.
+    """
+    study = read_study(study_file, "tune")
+    table = _table(study)
+    try:
+        import optuna  # noqa: PLC0415 - an extra
+        from optuna.storages import JournalStorage, journal  # noqa: PLC0415
+    except ImportError as reason:
+        raise not_installed(StudyError, "activesteer tune", "optuna", "study") from reason
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    plan = Plan(study)
+    folder = make_folder(output, StudyError)
+    _claim_folder(folder, study, plan)
+    wanted = table.trials if trials is None else trials
+    path = str(folder / _JOURNAL)
+    storage = JournalStorage(journal.JournalFileBackend(path, lock_obj=journal.JournalFileOpenLock(path)))
+    directions: list[Any] = ["minimize"] * len(table.objectives)
+    made = optuna.create_study(storage=storage, study_name="tune", load_if_exists=True, directions=directions)
+    for left in made.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):  # of a killed process
+        made.tell(left.number, state=optuna.trial.TrialState.FAIL)
+    begun = len(made.trials)
+    made.sampler = optuna.samplers.TPESampler(seed=study.seed + begun, constant_liar=True)
+    with workers_for(jobs, client=client, scheduler=scheduler) as workers:
+        prepare(workers, plan.settings)
+
+        def tasks() -> Any:
+            for _ in range(wanted - begun):
+                trial = made.ask()
+                values = {factor.key: _suggest(trial, factor) for factor in study.factors}
+                yield trial, drive, plan.settings, _requests(plan, trial.number, values)
+
+        checked = False
+        for place, (trial, rows, error) in enumerate(TaskQueue(workers).outcomes(tasks()), begun + 1):
+            values, violation = (None, 0.0)
+            if error is None and all(row["status"] == Status.OK for row in rows):
+                if not checked:
+                    _check_metrics(study, table, rows)
+                    checked = True
+                values, violation = _judged(table, rows)
+            if values is None:
+                made.tell(trial, state=optuna.trial.TrialState.FAIL)
+            else:
+                trial.set_user_attr(_VIOLATION, violation)
+                if table.constraints:
+                    trial.set_constraint(_VIOLATION, violation)
+                made.tell(trial, values)
+            if progress is not None:
+                progress(place, wanted)
+    result = _result(optuna, made, table)
+    write_text(folder / "front.json", json.dumps([vars(trial) for trial in result.front], indent=2) + "\n", StudyError)
+    return result
+
+
+def _table(study: StudyFile) -> TuneTable:
+    if study.case_list is not None or not study.factors:
+        raise study.source.fail(("factors",), "a search needs factors")
+    table = build(TuneTable, study.tune or {}, study.source, ("tune",))
+    if not table.objectives:
+        raise study.source.fail(("tune", "objectives"), "at least one is needed")
+    names, controllers = ([label_of(item) for item in items] for items in (study.maneuvers, study.controllers))
+    for place, part in _parts(table):
+        if part.maneuver not in names and (part.maneuver or len(names) > 1):
+            raise study.source.fail((*place, "maneuver"), nearest_names(part.maneuver, names), part.maneuver)
+        for key in ("controller", "relative_to"):
+            if (name := getattr(part, key, "")) and name not in controllers:
+                raise study.source.fail((*place, key), nearest_names(name, controllers), name)
+    return table
+
+
+def _parts(table: TuneTable) -> Iterator[tuple[tuple[str, ...], Term | Constraint]]:
+    """Everything that looks at a metric, and the keys that lead to it."""
+    for number, objective in enumerate(table.objectives):
+        for place, term in enumerate(objective.terms):
+            yield ("tune", "objectives", str(number), "terms", str(place)), term
+    for number, constraint in enumerate(table.constraints):
+        yield ("tune", "constraints", str(number)), constraint
+
+
+def _check_metrics(study: StudyFile, table: TuneTable, rows: Sequence[Row]) -> None:
+    """Every metric is one that the runs have; which those are shows only in the first set of which none failed."""
+    for place, part in _parts(table):
+        for row in _rows_of(part.controller, part.maneuver, rows):
+            if part.metric not in row:
+                known = [name for name, value in row.items() if isinstance(value, float) and name not in study.keys]
+                raise study.source.fail((*place, "metric"), nearest_names(part.metric, known), part.metric)
+
+
+def _claim_folder(folder: Path, study: StudyFile, plan: Plan) -> None:
+    path = folder / "tune.toml"
+    text = f"# {plan.digest}\n{study.to_toml()}"
+    if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
+        raise StudyError(f"{folder} holds another search; use a new folder", value=folder)
+    write_text(path, text, StudyError)
+
+
+def _suggest(trial: Any, factor: Factor) -> Any:
+    if factor.values:
+        return trial.suggest_categorical(factor.key, factor.values)
+    return trial.suggest_float(factor.key, factor.low, factor.high, log=factor.kind == "log_uniform")
+
+
+def _requests(plan: Plan, number: int, values: dict[str, Any]) -> list[Request]:
+    settings = plan.settings
+    places = [
+        (maneuver, vehicle, controller)
+        for maneuver in range(len(settings.maneuvers))
+        for vehicle in range(len(settings.vehicles))
+        for controller in range(len(settings.controllers))
+    ]
+    return [plan.request_with(run, number, place, values) for run, place in enumerate(places)]
+
+
+def _judged(table: TuneTable, rows: Sequence[Row]) -> tuple[list[float] | None, float]:
+    """Objectives and by how much constraints are broken; no objectives where a run lacks a metric."""
+    values = [sum(_value(term, rows) for term in objective.terms) for objective in table.objectives]
+    broken = 0.0
+    for constraint in table.constraints:
+        for found in _found(constraint.metric, constraint.controller, constraint.maneuver, rows):
+            broken += max(0.0, constraint.low - found, found - constraint.high)
+    finite = all(map(math.isfinite, values)) and math.isfinite(broken)
+    return (values if finite else None), broken
+
+
+def _value(term: Term, rows: Sequence[Row]) -> float:
+    total = 0.0
+    found = _found(term.metric, term.controller, term.maneuver, rows)
+    others = _found(term.metric, term.relative_to, term.maneuver, rows) if term.relative_to else [1.0] * len(found)
+    for value, other in zip(found, others, strict=True):
+        total += min(abs(value) / max(abs(other), 1e-9), term.limit)
+    return term.weight * total
+
+
+def _found(metric: str, controller: str, maneuver: str, rows: Sequence[Row]) -> list[float]:
+    """A metric of every vehicle."""
+    return [float(row.get(metric, math.nan)) for row in _rows_of(controller, maneuver, rows)]
+
+
+def _rows_of(controller: str, maneuver: str, rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row["controller"] == controller and maneuver in ("", row["maneuver"])]
+
+
+def _result(optuna: Any, made: Any, table: TuneTable) -> Tuning:
+    complete = made.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
+    names = [objective.name for objective in table.objectives]
+    judged = [
+        Trial(trial.number, dict(trial.params), dict(zip(names, trial.values, strict=True)),
+              float(trial.user_attrs.get(_VIOLATION, 0.0)))
+        for trial in complete
+    ]  # fmt: skip
+    kept = [trial for trial in judged if trial.violation == 0.0]
+    front = [trial for trial in kept if not any(_dominates(other, trial) for other in kept)]
+    return Tuning(len(made.trials), len(made.trials) - len(judged), front, judged)
+
+
+def _dominates(a: Trial, b: Trial) -> bool:
+    pairs = list(zip(a.objectives.values(), b.objectives.values(), strict=True))
+    return all(x <= y for x, y in pairs) and (any(x < y for x, y in pairs))

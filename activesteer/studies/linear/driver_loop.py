@@ -1,0 +1,272 @@
+"""Driver, controller and car as one linear loop: crossover frequency, phase margin, damping.
+
+The loop is put together from the linearised car (`linearisation`), the controller's linear form with its corrector
+fully active (`controllers.linear_form`), and the driver's: his law about a straight path, decided every 10 ms, a
+reaction delay of whole decisions, which he knows, and the lag of his arms. One period of 10 ms, which is ten steps of
+the engine, becomes one matrix; nothing is approximated but the motion, which is small.
+
+The loop is opened at the steering wheel, between the driver's arms and the car. Crossover frequency and phase margin
+are those of what comes back there. Its damping is that of the oscillation that is seen after a small step of the path.
+
+Source: D. T. McRuer and E. S. Krendel, Mathematical Models of Human Pilot Behavior, AGARDograph 188 (1974).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.analysis.source import RecordingLike
+from activesteer.controllers.linear_form import LinearController, linear_controller
+from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
+from activesteer.driver import DriverParameters
+from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains, steering_gains
+from activesteer.errors import DriverError
+from activesteer.resources import DEFAULT_DRIVER
+from activesteer.scenario import FileOrTable, check_gains, resolve
+from activesteer.studies.linear.discrete_time_map import OUTPUTS
+from activesteer.studies.linear.linearisation import LinearCar, linear_cars
+from activesteer.studies.linear.small_step import DURATION_S, STEP_M, damping_of, small_step
+from activesteer.theory.single_track import SingleTrack
+
+SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0)
+"""Speeds at which the loop is looked at by itself [km/h]."""
+FREQUENCIES_RADPS: Final = np.geomspace(0.2, 60.0, 300)
+"""Frequencies of the response [rad/s]."""
+_NOTICED: Final = 0.05
+"""Share of the largest part that an oscillation must have in a step to be seen."""
+
+
+@dataclass(frozen=True)
+class DriverLoop:
+    """The loop over one period of the driver, from one decision to the next.
+
+    Opened at the steering wheel: x[k+1] = A x[k] + B w, where w are the angles that the car has at the steering wheel
+    in the steps of the period; those that the driver gives it are C x[k]. What he knows of his decisions stays in A.
+
+    Attributes:
+        a: System matrix of the open loop, shape (n, n).
+        b: What each step's angle does, shape (n, m) with m steps in a period.
+        c: The angle in each step, shape (m, n).
+        closed: System matrix of the closed loop, shape (n, n).
+        offset: Place of the lateral offset from the path in the state.
+        timestep_s: Time between two steps [s].
+    """
+
+    a: Array
+    b: Array
+    c: Array
+    closed: Array
+    offset: int
+    timestep_s: float
+
+    @cached_property
+    def response(self) -> NDArray[np.complexfloating]:
+        """What comes back of an angle at `FREQUENCIES_RADPS`, complex; at -1 is the limit of stability."""
+        from scipy.linalg import schur, solve_triangular  # noqa: PLC0415 - slow to import
+
+        steps = len(self.c)
+        z = np.exp(1j * self.timestep_s * np.outer(FREQUENCIES_RADPS, np.arange(steps + 1)))
+        # Triangular, the system is solved at once for each frequency.
+        found: Any = schur(self.a, output="complex")
+        triangle, turned = found
+        forced, seen = z[:, :steps] @ (turned.conj().T @ self.b).T, self.c @ turned
+        unit = np.eye(len(self.a))
+        answers = [
+            seen @ solve_triangular(at[-1] * unit - triangle, force) for at, force in zip(z, forced, strict=True)
+        ]
+        # Of the angle within a period, the part at the frequency itself.
+        return np.asarray(-np.mean(z[:, :steps].conj() * answers, axis=1), dtype=np.complex128)
+
+    def crossover(self) -> tuple[float, float]:
+        """Crossover frequency [rad/s] and phase margin [rad]; the smaller margin where the gain passes 1 several times.
+
+        nan where it passes it nowhere.
+        """
+        gain, phase = np.log(np.abs(self.response)), np.unwrap(np.angle(self.response))
+        # Integrators and a delay: the phase begins between -pi and -2 pi, as near to -pi as it can be.
+        phase -= 2.0 * math.pi * round((phase[0] + math.pi) / (2.0 * math.pi))
+        found = []
+        for place in np.flatnonzero((gain[:-1] > 0.0) & (gain[1:] <= 0.0)):
+            share = gain[place] / (gain[place] - gain[place + 1])
+            frequency = FREQUENCIES_RADPS[place] ** (1.0 - share) * FREQUENCIES_RADPS[place + 1] ** share
+            margin = math.pi + phase[place] + share * (phase[place + 1] - phase[place])
+            found.append((margin, frequency))
+        margin, frequency = min(found, default=(math.nan, math.nan))
+        return float(frequency), float(margin)
+
+    def damping(self) -> tuple[float, float]:
+        """Damping ratio [-] and natural frequency [rad/s] of the oscillation with the largest part in a small step.
+
+        1, and that of the largest part, where no oscillation has one that is seen.
+        """
+        from scipy.linalg import eig  # noqa: PLC0415 - slow to import
+
+        found: Any = eig(self.closed, left=True)
+        values, left, right = found
+        share = np.abs(right[self.offset] * left[self.offset].conj() / np.sum(left.conj() * right, axis=0))
+        swings = share * (values.imag > 0.0)
+        mode = int(np.argmax(swings if swings.max() > _NOTICED * share.max() else share))
+        s = np.log(complex(values[mode])) / (len(self.c) * self.timestep_s)
+        return float(-s.real / abs(s)), float(abs(s))
+
+    def step(self) -> tuple[Array, Array]:
+        """Time [s] and lateral position of the car [m] at each decision, after a step of the path by `STEP_M`."""
+        state = np.zeros(len(self.closed))
+        state[self.offset] = -STEP_M
+        period_s = len(self.c) * self.timestep_s
+        places = np.empty(round(DURATION_S / period_s))
+        for row in range(len(places)):
+            places[row] = state[self.offset] + STEP_M
+            state = self.closed @ state
+        return np.arange(len(places), dtype=np.float64) * period_s, places
+
+
+def driver_loop(
+    car: LinearCar, controller: LinearController, driver: DriverParameters, gains: SteeringGains, steering_ratio: float
+) -> DriverLoop:
+    """Puts the loop together.
+
+    Args:
+        car: The linearised car.
+        controller: The controller at its speed, with the car's step.
+        driver: The driver.
+        gains: What he steers at that speed.
+        steering_ratio: Steering wheel angle over road-wheel angle [-].
+    """
+    steps = round(PREVIEW_INTERVAL_S / car.timestep_s)
+    waiting = round(driver.reaction_delay_s / PREVIEW_INTERVAL_S)
+    n, states = len(car.a), len(controller.a)
+    heading, offset, wheel = n, n + 1, n + 2
+    first = n + 3  # of the controller's states; behind them the decisions that wait, the newest first
+    newest, size = first + states, first + states + waiting + 1
+    yaw_rate, sideslip = (
+        np.pad(car.c[OUTPUTS.index(name)], (0, size - n)) for name in ("yaw_rate_radps", "sideslip_rad")
+    )
+    # What the arms do first in a step, as the driver comes before controller and car.
+    arms = np.eye(size)
+    lag_s = driver.neuromuscular_lag_s
+    moved = -math.expm1(-car.timestep_s / lag_s) if lag_s > 0.0 else 1.0
+    arms[wheel, wheel], arms[wheel, newest + waiting] = 1.0 - moved, moved
+    rest = np.eye(size)
+    inputs = np.zeros((2, size))
+    inputs[0, wheel] = 1.0 / steering_ratio
+    inputs[1] = yaw_rate
+    own = slice(first, newest)
+    demands = controller.d @ inputs
+    demands[:, own] += controller.c
+    rest[own] = controller.b @ inputs
+    rest[own, own] += controller.a
+    rest[:n] = car.b[:, 1:] @ demands
+    rest[:n, :n] += car.a
+    rest[:n, wheel] += car.b[:, 0]
+    rest[heading] += car.timestep_s * yaw_rate
+    rest[offset] += car.timestep_s * car.speed_mps * sideslip
+    rest[offset, heading] += car.timestep_s * car.speed_mps
+    # The decisions move up by one; the new one comes in at the beginning of the period.
+    decides = np.eye(size)
+    decides[newest:] = np.eye(size, k=-1)[newest:]
+    ahead_s = PREVIEW_INTERVAL_S * np.arange(len(gains.per_path_radpm))
+    decided = gains.per_yaw_rate_s * yaw_rate + gains.per_sideslip * sideslip
+    decided[wheel], decided[newest : newest + waiting] = gains.per_angle, gains.per_waiting
+    decided[offset] = -gains.per_path_radpm.sum()
+    decided[heading] = -car.speed_mps * (gains.per_path_radpm @ ahead_s)
+    decides[newest] = decided
+    closed = np.linalg.matrix_power(rest @ arms, steps) @ decides
+    # Opened: the car has the angle w in place of that of the arms.
+    given = rest[:, wheel].copy()
+    given[wheel] = 0.0
+    rest[:, wheel] -= given
+    step = rest @ arms
+    powers = [np.linalg.matrix_power(step, count) for count in range(steps + 1)]
+    b = np.stack([power @ given for power in powers[steps - 1 :: -1]], axis=1)
+    c = np.stack([power[wheel] @ decides for power in powers[1:]])
+    return DriverLoop(powers[steps] @ decides, b, c, closed, offset, car.timestep_s)
+
+
+@dataclass(frozen=True)
+class LoopAtSpeed:
+    """A loop at one speed with one controller, and what a run of the full car says of it.
+
+    Attributes:
+        speed_kmh: Speed [km/h].
+        controller: The controller.
+        loop: The linear loop.
+        run: A small step of the path in a run, friction of the rack and tolerance band included.
+    """
+
+    speed_kmh: float
+    controller: str
+    loop: DriverLoop
+    run: RecordingLike
+
+    @property
+    def damping_in_run(self) -> float:
+        """Damping ratio that is seen after the small step in the run."""
+        return damping_of(self.run.time_s, self.run["y_m"])[0]
+
+    @property
+    def step_difference_m(self) -> float:
+        """How far the linear car and that of the run are apart at most after the small step [m]."""
+        time_s, y_m = self.loop.step()
+        return float(np.abs(np.interp(time_s, self.run.time_s, self.run["y_m"]) - y_m).max())
+
+    def to_json(self) -> dict[str, Any]:
+        """Its figures."""
+        crossover_radps, margin_rad = self.loop.crossover()
+        damping, natural_radps = self.loop.damping()
+        return {
+            "speed_kmh": self.speed_kmh,
+            "controller": self.controller,
+            "damping": damping,
+            "natural_frequency_rad_s": natural_radps,
+            "phase_margin_deg": math.degrees(margin_rad),
+            "crossover_rad_s": crossover_radps,
+            "damping_in_step": damping_of(*self.loop.step())[0],
+            "damping_in_run": self.damping_in_run,
+            "step_difference_m": self.step_difference_m,
+        }
+
+
+def driver_loops(
+    driver: Any = DEFAULT_DRIVER,
+    vehicle: FileOrTable = "compact",
+    controllers: Sequence[str] = ("none", "ars", "afs"),
+    speeds_kmh: Sequence[float] = SPEEDS_KMH,
+    overrides: Mapping[str, Any] | None = None,
+) -> list[LoopAtSpeed]:
+    """The loop with every controller at every speed.
+
+    Args:
+        driver: Name, path or table of a driver.
+        vehicle: Name, path, or table of a vehicle.
+        controllers: `none`, `ars`, `afs`, or variants.
+        speeds_kmh: Speeds [km/h].
+        overrides: Dotted key -> value, of vehicle and driver.
+
+    Raises:
+        DriverError: the driver is code of a user's own, which has no linear form.
+        ActiveSteerError: an input is wrong.
+    """
+    scenario = resolve("straight_line", vehicle, overrides, driver)
+    check_gains(overrides or {}, controllers)
+    if not scenario.driver.plugin.ours:
+        raise DriverError(f"{scenario.driver.plugin.name} is code; only a driver file has a linear form", value=driver)
+    setup, who = scenario.controller_setup(DEFAULT_TIMESTEP_S), scenario.driver.parameters
+    known = SingleTrack(setup.single_track)
+    found = []
+    of_car = {key: value for key, value in (overrides or {}).items() if not key.startswith("driver.")}
+    for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], of_car):
+        gains = steering_gains(car.speed_mps, known.matrices, who, setup.steering_ratio)
+        for name in controllers:
+            linear = linear_controller(name, setup, car.speed_mps)
+            loop = driver_loop(car, linear, who, gains, setup.steering_ratio)
+            run = small_step(car.speed_mps, name, vehicle, overrides, driver)
+            found.append(LoopAtSpeed(3.6 * car.speed_mps, name, loop, run))
+    return found

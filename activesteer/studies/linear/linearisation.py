@@ -1,0 +1,274 @@
+"""The car linearised about driving straight on: state space, modes, and how they change with speed.
+
+Method:
+
+1. Trim. The car rolls straight ahead; Newton's method on one step of the engine finds the state and the drive torque
+   at which, at the given speed, the state without its cyclic coordinates (`LocalState`) repeats itself exactly.
+2. One whole step, tyres, servos and constraints included, is differentiated by central differences of that state and
+   of the demands of the actuators: x[k+1] = A x[k] + B u[k], and the recorded channels y[k] = C x[k] + D u[k].
+   (`mujoco.mjd_transitionFD` would miss forces: it leaves out the passive callback when it perturbs activations, in
+   which the deflection of the tyres' carcass is kept.)
+3. Continuous time: the eigenvalues z of A become s = ln(z)/h, and the input matrix is inverted for an input held over a
+   step, mode by mode: the result agrees with the engine's own step at every sample.
+4. Reduction: modes slower than a cut-off are kept, of those without influence from the inputs on the outputs (heave,
+   pitch, speed) none. Of the faster modes the static part is kept, in D, so that the gain at rest is exact.
+
+Validity: small motions about straight driving on a level, even road. Dampers enter with the mean of the slopes of
+their curves on both sides of rest, friction of their seals as the road's vibration leaves it at small speeds. Friction
+of the rack is left out: about a point of rest it would hold the rack by its elasticity, while the rack of a steered car
+slides. So are friction and play of screws in the toe links.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from activesteer.analysis.source import RecordingLike
+from activesteer.config import Range
+from activesteer.conventions import Array
+from activesteer.errors import ParameterError
+from activesteer.scenario import FileOrTable, check_parts, resolve
+from activesteer.simulation.closed_loop import ClosedLoop
+from activesteer.studies.linear.discrete_time_map import INPUTS, OUTPUTS, DiscreteTimeMap
+from activesteer.vehicle.modes import Mode, find_modes
+
+if TYPE_CHECKING:
+    import control
+
+
+CUT_OFF_HZ: Final = 30.0
+"""Natural frequency above which a mode is replaced by its static part [Hz]."""
+MIN_SPEED_MPS: Final = 3.0
+"""Below this the standstill behaviour of the tyres fades in and speed is no parameter any more [m/s]."""
+
+_SETTLE_S: Final = 1.0
+_NO_INFLUENCE: Final = 1e-8
+"""Fraction of a mode in every gain of the car below which it does not appear in the state space; symmetric modes have
+1e-12, the least of the lateral ones 1e-4."""
+
+
+@dataclass(frozen=True)
+class LinearCar:
+    """The car about straight driving, as the engine steps it.
+
+    Attributes:
+        speed_mps: Speed [m/s].
+        timestep_s: Step of the engine, h [s].
+        drive_torque_Nm: Drive torque that holds the speed [N m].
+        states: Names of the states, n; see `LocalState`.
+        a: System matrix of one step, shape (n, n).
+        b: Input matrix, shape (n, len(INPUTS)).
+        c: Output matrix, shape (len(OUTPUTS), n).
+        d: Feed-through, shape (len(OUTPUTS), len(INPUTS)).
+        actuators: Where rear steering and superposition are, of the state: shape (len(ACTUATORS), n).
+    """
+
+    speed_mps: float
+    timestep_s: float
+    drive_torque_Nm: float
+    states: tuple[str, ...]
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+    actuators: Array
+
+    def modes(self) -> list[Mode]:
+        """All modes, by natural frequency; of a conjugate pair the one with positive imaginary part."""
+        return find_modes(self.a, self.states, self.timestep_s)
+
+    def state_space(self, cut_off_Hz: float = CUT_OFF_HZ) -> control.StateSpace:
+        """The lateral motion in continuous time.
+
+        Args:
+            cut_off_Hz: Natural frequency above which modes are replaced by their static part [Hz].
+
+        Returns:
+            Modal state space with real coefficients, the states of a conjugate pair named `..._re`, `..._im`;
+            inputs `INPUTS`, outputs `OUTPUTS`.
+        """
+        import control  # noqa: PLC0415 - takes longer to import than a run takes to start
+
+        modes = self.modes()
+        discrete = np.array([np.exp(mode.eigenvalue_1ps * self.timestep_s) for mode in modes])
+        outputs = np.array([self.c @ mode.shape for mode in modes])
+        inputs = np.array([mode.left @ self.b for mode in modes])
+        # A pair adds its own part and the conjugate: twice the real part.
+        twice = np.array([2.0 if mode.eigenvalue_1ps.imag > 0.0 else 1.0 for mode in modes])
+        gains = np.real(twice[:, None, None] * outputs[:, :, None] * (inputs / (1.0 - discrete)[:, None])[:, None, :])
+        # Where a gain nearly vanishes, as in sideslip at some speed, the largest part of a mode is what counts.
+        fraction = (np.abs(gains) / np.abs(gains).max(axis=0)).max(axis=(1, 2))
+        kept = [
+            index
+            for index, mode in enumerate(modes)
+            if mode.natural_frequency_Hz <= cut_off_Hz and fraction[index] > _NO_INFLUENCE
+        ]
+        fast = [index for index, mode in enumerate(modes) if mode.natural_frequency_Hz > cut_off_Hz]
+        feedthrough = self.d + gains[fast].sum(axis=0)
+        blocks: list[Array] = []
+        b_rows: list[Array] = []
+        c_columns: list[Array] = []
+        names: list[str] = []
+        for index in kept:
+            mode, s = modes[index], modes[index].eigenvalue_1ps
+            held = s / (discrete[index] - 1.0) * inputs[index]
+            name = _identifier(mode.name, names)
+            if s.imag > 0.0:
+                blocks.append(np.array([[s.real, -s.imag], [s.imag, s.real]]))
+                b_rows += [held.real, held.imag]
+                c_columns += [2.0 * outputs[index].real, -2.0 * outputs[index].imag]
+                names += [f"{name}_re", f"{name}_im"]
+            else:
+                blocks.append(np.array([[s.real]]))
+                b_rows.append(held.real)
+                c_columns.append(outputs[index].real)
+                names.append(name)
+        a = np.zeros((len(names), len(names)))
+        row = 0
+        for block in blocks:
+            a[row : row + len(block), row : row + len(block)] = block
+            row += len(block)
+        return control.StateSpace(
+            a,
+            np.array(b_rows),
+            np.array(c_columns).T,
+            feedthrough,
+            inputs=list(INPUTS),
+            outputs=list(OUTPUTS),
+            states=names,
+            name=f"car_at_{self.speed_mps * 3.6:.0f}_kmh",
+        )
+
+
+def _identifier(name: str, taken: Sequence[str]) -> str:
+    """A mode's name as a state's name, numbered where an earlier mode has the same."""
+    base = re.sub(r"\W+", "_", name)
+    used = {re.sub(r"_(re|im)$", "", other) for other in taken}
+    return next(name for name in (base, *(f"{base}_{number}" for number in range(2, 99))) if name not in used)
+
+
+def linearise(
+    vehicle: FileOrTable = "compact",
+    speed_mps: float = 80.0 / 3.6,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    cut_off_Hz: float = CUT_OFF_HZ,
+) -> control.StateSpace:
+    """The lateral motion of a car, linearised about driving straight on.
+
+    Args:
+        vehicle: Name, path, or table of a vehicle.
+        speed_mps: Speed, at least 3 m/s [m/s].
+        overrides: Dotted key -> value, as for `simulate`.
+        cut_off_Hz: Natural frequency above which modes are replaced by their static part [Hz].
+
+    Returns:
+        Inputs: demanded steering wheel angle, rear angle, superposition (at the road wheel) [rad], with their servos.
+        Outputs: yaw rate [rad/s], lateral acceleration [m/s2], roll [rad], sideslip [rad] at the centre of gravity.
+
+    Raises:
+        ParameterError: the speed is too low, or the vehicle is not found or wrong.
+        ModelError: the car cannot be built, or does not roll straight ahead at this speed.
+
+    Example:
+        >>> from activesteer.studies.linear.linearisation import linearise
+        >>> system = linearise("compact", speed_mps=25.0)
+        >>> system.ninputs, system.noutputs
+        (3, 4)
+        >>> bool(system.poles().real.max() < 0.0)
+        True
+    """
+    return linear_car(vehicle, speed_mps, overrides).state_space(cut_off_Hz)
+
+
+def linear_car(
+    vehicle: FileOrTable = "compact", speed_mps: float = 80.0 / 3.6, overrides: Mapping[str, Any] | None = None
+) -> LinearCar:
+    """The same before it is reduced, with all modes; see `linearise`."""
+    return linear_cars(vehicle, [speed_mps], overrides)[0]
+
+
+def linear_cars(
+    vehicle: FileOrTable, speeds_mps: Sequence[float], overrides: Mapping[str, Any] | None = None
+) -> list[LinearCar]:
+    """The car linearised at several speeds; see `linearise`."""
+    return [_linearised(vehicle, float(speed), overrides) for speed in speeds_mps]
+
+
+def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, Any] | None) -> LinearCar:
+    if not MIN_SPEED_MPS <= speed_mps < math.inf:
+        raise ParameterError(
+            f"is {speed_mps:g} m/s; needed are {MIN_SPEED_MPS:g} m/s ({3.6 * MIN_SPEED_MPS:g} km/h) at least",
+            key="speed_mps",
+            value=speed_mps,
+            allowed=Range(MIN_SPEED_MPS),
+        )
+    straight = {
+        "kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0, "settle_s": _SETTLE_S,
+    }  # fmt: skip
+    sliding = {**(overrides or {}), "vehicle.friction.rack_N": 0.0}
+    scenario = resolve(straight, vehicle, sliding)
+    check_parts(overrides or {}, scenario, ("vehicle",))
+    config = scenario.car.config
+    smooth = replace(
+        config,
+        rear_actuator=config.rear_actuator.smooth(),
+        superposition_actuator=config.superposition_actuator.smooth(),
+    )
+    step = DiscreteTimeMap(ClosedLoop(replace(scenario, car=replace(scenario.car, config=smooth))).vehicle)
+    step.trim(speed_mps)
+    a, c = step.derivatives("x")
+    b, d = step.derivatives("u")
+    count, names = len(OUTPUTS), step.local.names
+    return LinearCar(speed_mps, step.vehicle.timestep_s, step.torque_Nm, names, a, b, c[:count], d[:count], c[count:])
+
+
+def linear_response(recording: RecordingLike, system: control.StateSpace) -> dict[str, Array]:
+    """What the linear car does with the demands of a run, to stand beside the full one.
+
+    Args:
+        recording: A run at the speed of the linear car that begins straight ahead.
+        system: The linear car, as from `linearise`.
+
+    Returns:
+        The channels `OUTPUTS` over the time of the recording.
+    """
+    import control  # noqa: PLC0415 - takes longer to import than a run takes to start
+
+    demands = ("steering_wheel_demand_rad", "rear_steer_demand_rad", "superposition_demand_rad")
+    inputs = np.array([np.asarray(recording[name], dtype=np.float64) for name in demands])
+    response = control.forced_response(
+        system,
+        np.asarray(recording.time_s, dtype=np.float64),
+        inputs,  # type: ignore[reportArgumentType] - the type is guessed from the default 0.0
+        squeeze=False,
+    )
+    return {name: np.asarray(response.outputs[index]) for index, name in enumerate(OUTPUTS)}
+
+
+def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> str:
+    """Modes as text: name, natural frequency, damping ratio, eigenvalue, and the parts that take part.
+
+    Args:
+        modes: Modes, as from `LinearCar.modes`.
+        highest_Hz: Natural frequency above which modes are left out [Hz].
+    """
+    rows = [("mode", "f [Hz]", "damping", "eigenvalue [1/s]", "participation")]
+    for mode in modes:
+        if mode.natural_frequency_Hz > highest_Hz:
+            continue
+        s = mode.eigenvalue_1ps
+        value = f"{s.real:.2f}" + (f" +- {s.imag:.2f}i" if s.imag else "")
+        parts = ", ".join(f"{part} {fraction:.0%}" for part, fraction in list(mode.participation.items())[:3])
+        rows.append((mode.name, f"{mode.natural_frequency_Hz:.2f}", f"{mode.damping_ratio:.2f}", value, parts))
+    widths = [max(len(row[column]) for row in rows) for column in range(4)]
+    return "\n".join(
+        f"{row[0]:<{widths[0]}}  {row[1]:>{widths[1]}}  {row[2]:>{widths[2]}}  {row[3]:<{widths[3]}}  {row[4]}"
+        for row in rows
+    )

@@ -1,0 +1,368 @@
+"""How far the loops of a controller are from instability: gain, phase, delay and disk margins over speed.
+
+The loop goes from the demand of an actuator through the linearised car (`linearisation`: servo, suspensions, tyres),
+the sensors (bandwidth, delay), the control unit (its interval, the bus) and the controller back to the demand. It is
+opened at one actuator while the other stays closed, and at both at once: a bus delays the demands of both, and a
+controller that moves both actuators can bear less of that than either margin says. The controller enters with its
+linear form (`controllers.linear_form`) where it has one, its corrector fully active, and otherwise with its answers to
+small pulses (`controllers.response`).
+
+What is sampled and held for N calls of the controller enters as the mean of the N held values: a delay of (N - 1) / 2
+calls and the loss of gain that belongs to it; so do commands, held for N steps of the simulation. Samples and calls
+begin together, as in a run. What samples fold down from above half their rate is left out.
+
+The disk margin is alpha of the balanced disk, 1 / max |S - 1/2|, S being the sensitivity of the opened loop: the loop
+stays stable for every gain from (2 - alpha) / (2 + alpha) to its inverse together with every phase within
+2 atan(alpha / 2). 0.5 are 4.4 dB and 28 deg at once.
+
+Gain, phase and delay margins are those of `control.stability_margins`; `control.disk_margins` takes no frequency
+response. Source: P. Seiler, A. Packard, P. Gahinet, An introduction to disk margins, IEEE Control Systems Magazine 40
+(5), 2020.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.controllers import Controller, ControllerSetup, find_controller
+from activesteer.controllers.linear_form import has_linear_form, linear_controller
+from activesteer.controllers.response import SIGNALS, pulse_responses, response_of
+from activesteer.conventions import GRAVITY_MPS2, Array
+from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
+from activesteer.sensors.sensor_kinds import Sensor
+from activesteer.signals import Measurement
+from activesteer.simulation.closed_loop import ClosedLoop
+from activesteer.simulation.control_unit import interval_s
+from activesteer.studies.linear.discrete_time_map import OUTPUTS
+from activesteer.studies.linear.linearisation import LinearCar, linear_cars
+
+SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
+"""Speeds at which the loops are looked at by themselves [km/h]."""
+FREQUENCIES_RADPS: Final = np.geomspace(0.05, 300.0, 800)
+"""Frequencies at which they are [rad/s]: from a hundredth of the car's natural frequency to beyond its suspensions'."""
+LOOPS: Final = ("rear", "superposition")
+"""Where a loop is opened; the order of the demands."""
+BOTH: Final = "both"
+"""What is said of both, where gain, phase or delay change by the same in both."""
+
+_SENSORS: Final = ("yaw_rate", "ay", "rear_steer", "superposition")
+"""Sensors that belong to `SIGNALS`."""
+
+Response = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Margins of one loop; nan where there is none, as the gain margin of a loop that never turns by half.
+
+    Attributes:
+        gain_dB: Factor on the gain, up or down, whichever is less, that makes the loop marginal [dB].
+        phase_rad: Least phase that does [rad].
+        delay_s: Least delay that does [s].
+        disk: alpha of the balanced disk [-]; 0 where the closed loop is unstable.
+    """
+
+    gain_dB: float
+    phase_rad: float
+    delay_s: float
+    disk: float
+
+
+def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) -> Margins:
+    """Margins of a loop from its frequency response.
+
+    Args:
+        loop: L, of which 1 + L = 0 is the limit of stability, shape (m,).
+        frequencies_radps: Its frequencies, rising, shape (m,) [rad/s].
+        stable: Whether the closed loop is; where it is not, there are no margins.
+    """
+    if not stable:
+        return Margins(math.nan, math.nan, math.nan, 0.0)
+    import control  # noqa: PLC0415 - takes longer to import than a run takes to start
+
+    data = np.abs(loop), np.degrees(np.unwrap(np.angle(loop))), frequencies_radps
+    gains, phases_deg, _, _, crossings_radps, _ = control.stability_margins(data, returnall=True)
+    phases_rad = np.radians(phases_deg)
+    delays_s = np.mod(phases_rad, 2.0 * math.pi) / crossings_radps
+    sensitivity = 1.0 / (1.0 + loop)
+    return Margins(
+        gain_dB=_least(20.0 * np.abs(np.log10(gains))),
+        phase_rad=_least(np.abs(phases_rad)),
+        delay_s=_least(delays_s),
+        disk=float(1.0 / np.abs(sensitivity - 0.5).max()),
+    )
+
+
+def weakest(margins: Sequence[Margins]) -> Margins:
+    """The smallest of each; where one loop is unstable, there are none."""
+    if unstable := [each for each in margins if each.disk == 0.0]:
+        return unstable[0]
+    return Margins(*(float(np.fmin.reduce(values)) for values in zip(*map(astuple, margins), strict=True)))
+
+
+def _least(values: Array) -> float:
+    return float(values.min()) if len(values) else math.nan
+
+
+def round_trip(
+    car: LinearCar, answer: Callable[[Array], Response], scenario: Scenario, unit_s: float, frequencies_radps: Array
+) -> Response:
+    """What comes back of the demands: M, u = M u closing the loops.
+
+    Args:
+        car: The linearised car.
+        answer: The controller's frequency response, demands per measurement, shape (m, 2, len(SIGNALS)).
+        scenario: Sensors and bus.
+        unit_s: Interval of the control unit [s].
+        frequencies_radps: Frequencies, shape (m,) [rad/s].
+
+    Returns:
+        Shape (m, 2, 2), in the order of `LOOPS`.
+    """
+    h, config = car.timestep_s, scenario.car.config
+    back = np.exp(-1j * frequencies_radps * h)  # one step
+    states = np.linalg.solve(
+        (1.0 / back)[:, None, None] * np.eye(len(car.a)) - car.a, np.asarray(car.b[:, 1:], dtype=np.complex128)
+    )
+    rows = {name: car.c[index] for index, name in enumerate(OUTPUTS)}
+    # The accelerometer leans with the body. All but the yaw rate are what they were at the beginning of the step.
+    leaning = rows["ay_mps2"] + GRAVITY_MPS2 * rows["roll_rad"]
+    through = car.d[OUTPUTS.index("ay_mps2"), 1:]
+    motion = np.stack([row @ states for row in (rows["yaw_rate_radps"], leaning, *car.actuators)], axis=1)
+    motion[:, 1] += through
+    motion[:, 1:] *= back[:, None, None]
+    sensors = config.sensors.all()
+    every = round(unit_s / h)
+    seen = np.stack([_sensed(sensors[name], h, back, every) for name in _SENSORS], axis=1)
+    bus = back ** round(config.controllers.bus_delay_s / h) * _held(every, back)
+    return bus[:, None, None] * answer(frequencies_radps) @ (seen[:, :, None] * motion)
+
+
+def _held(steps: int, back: Response) -> Response:
+    return sum((back**step for step in range(steps)), np.zeros_like(back)) / steps
+
+
+def _calls(sensor: Sensor, unit_s: float) -> int:
+    """For how many calls of the control unit a sample is held."""
+    return max(1, round((sensor.sample_time_s or 0.0) / unit_s))
+
+
+def _sensed(sensor: Sensor, step_s: float, back: Response, every: int) -> Response:
+    """Frequency response of a sensor: bandwidth, samples, delay; see `sensors.signal_chain`."""
+    share = -math.expm1(-2.0 * math.pi * sensor.bandwidth_Hz * step_s) if sensor.bandwidth_Hz else 1.0
+    samples = _held(_calls(sensor, every * step_s), back**every)
+    return share / (1.0 - (1.0 - share) * back) * samples * back ** round((sensor.delay_s or 0.0) / step_s)
+
+
+def opened(returned: Response, loop: str) -> Response:
+    """The loop opened at one demand, the other closed: L, of which 1 + L = 0 is the limit.
+
+    Args:
+        returned: As from `round_trip`.
+        loop: A name of `LOOPS`.
+    """
+    own = LOOPS.index(loop)
+    other = 1 - own
+    through = returned[:, own, other] * returned[:, other, own] / (1.0 - returned[:, other, other])
+    return -(returned[:, own, own] + through)
+
+
+def opened_at_both(returned: Response) -> tuple[Response, Response]:
+    """The loops that one factor f on both demands meets: det(1 - f M) = 0 where 1 + f L = 0, -L an eigenvalue of M.
+
+    Args:
+        returned: As from `round_trip`.
+    """
+    values: Response = np.asarray(np.linalg.eigvals(returned), dtype=np.complex128)
+    for before, here in itertools.pairwise(values):
+        if np.abs(here - before).sum() > np.abs(here[::-1] - before).sum():
+            here[:] = here[::-1].copy()
+    return -values[:, 0], -values[:, 1]
+
+
+def is_stable(returned: Response) -> bool:
+    """Whether all loops closed are stable, where all that is in them is: det(1 - M) never goes round 0 (Nyquist)."""
+    determinant = np.linalg.det(np.eye(2) - returned)
+    turned = np.unwrap(np.angle(determinant))
+    # From the lowest frequency to the highest an unstable real pole turns it by half a turn, a pair by a whole one, an
+    # integrator in a stable loop by a quarter.
+    return bool(abs(turned[-1] - turned[0]) < 0.75 * math.pi)
+
+
+@dataclass(frozen=True)
+class LoopMargins:
+    """Margins of one loop of a controller at a speed.
+
+    Attributes:
+        controller: The controller.
+        loop: Where it is opened: one of `LOOPS`, or `BOTH`.
+        speed_kmh: Speed [km/h].
+        margins: What was found.
+        factors: Of many cars, what is varied in that of the smallest disk margin: key -> value.
+    """
+
+    controller: str
+    loop: str
+    speed_kmh: float
+    margins: Margins
+    factors: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Its figures."""
+        return {
+            "controller": self.controller,
+            "loop": self.loop,
+            "speed_kmh": self.speed_kmh,
+            "gain_margin_dB": self.margins.gain_dB,
+            "phase_margin_deg": math.degrees(self.margins.phase_rad),
+            "delay_margin_s": self.margins.delay_s,
+            "disk_margin": self.margins.disk,
+            **({"factors": dict(self.factors)} if self.factors else {}),
+        }
+
+
+def loop_margins(
+    controllers: Sequence[Any] = ("ars", "afs"),
+    vehicle: FileOrTable = "compact",
+    speeds_kmh: Sequence[float] = SPEEDS_KMH,
+    overrides: Mapping[str, Any] | None = None,
+) -> list[LoopMargins]:
+    """Margins of every loop of every controller at every speed; an actuator that a controller leaves alone has none.
+
+    Where a controller moves both actuators, those of both together are the last.
+
+    Args:
+        controllers: As for `simulate`.
+        vehicle: Name, path, or table of a vehicle.
+        speeds_kmh: Speeds [km/h].
+        overrides: Dotted key -> value.
+
+    Raises:
+        ControllerError: a controller has no linear form.
+        ActiveSteerError: an input is wrong.
+    """
+    check_gains(overrides or {}, controllers)
+    return next(margins_of_cars(controllers, vehicle, speeds_kmh, [overrides or {}]))
+
+
+def straight_on(speed_mps: float) -> dict[str, Any]:
+    """The table of a manoeuvre at a speed in which nobody steers [m/s]."""
+    return {"kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0}
+
+
+def margins_of_cars(
+    controllers: Sequence[Any],
+    vehicle: FileOrTable,
+    speeds_kmh: Sequence[float],
+    cars: Iterable[Mapping[str, Any]],
+) -> Iterator[list[LoopMargins]]:
+    """The same of several cars, one after the other; a controller that knows the same of them is looked at once.
+
+    Args:
+        controllers: As for `simulate`.
+        vehicle: Name, path, or table of a vehicle.
+        speeds_kmh: Speeds [km/h].
+        cars: Overrides of each: dotted key -> value.
+
+    Raises:
+        ControllerError: a controller has no linear form.
+        ActiveSteerError: an input is wrong.
+    """
+    plugins = [find_controller(given) for given in controllers]
+    answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}
+    for overrides in cars:
+        found: list[LoopMargins] = []
+        for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides):
+            scenario = resolve(straight_on(car.speed_mps), vehicle, overrides)
+            for number, plugin in enumerate(plugins):
+                unit_s = interval_s(plugin, scenario.car.config.controllers, car.timestep_s)
+                setup = _fully_active(scenario.controller_setup(unit_s))
+                key = number, car.speed_mps, setup, scenario.car.config.sensors
+                if key not in answers:
+                    answers[key] = _answer(controllers[number], plugin.label, scenario, setup, plugin.make(setup))
+                returned = round_trip(car, answers[key], scenario, unit_s, FREQUENCIES_RADPS)
+                found += _of_loops(plugin.label, 3.6 * car.speed_mps, returned)
+        yield found
+
+
+def _of_loops(controller: str, speed_kmh: float, returned: Response) -> list[LoopMargins]:
+    stable = is_stable(returned)
+    loops: dict[str, tuple[Response, ...]] = {
+        loop: (opened(returned, loop),) for index, loop in enumerate(LOOPS) if np.abs(returned[:, index]).max() > 0.0
+    }
+    if len(loops) == len(LOOPS):
+        loops[BOTH] = opened_at_both(returned)
+    return [
+        LoopMargins(
+            controller, loop, speed_kmh, weakest([margins_of(part, FREQUENCIES_RADPS, stable) for part in parts])
+        )
+        for loop, parts in loops.items()
+    ]
+
+
+def _rolling(scenario: Scenario) -> Measurement:
+    """What ideal sensors say of the car that rolls straight on, all that moves to a side taken as zero."""
+    rolling = ClosedLoop(replace(scenario, car=replace(scenario.car, config=_ideal(scenario)))).measurement
+    left, right = rolling.wheel_speed_radps[::2], rolling.wheel_speed_radps[1::2]
+    front, rear = (0.5 * (a + b) for a, b in zip(left, right, strict=True))
+    still = dict.fromkeys((*SIGNALS, "steering_wheel_rad"), 0.0)
+    return rolling._replace(**still, ax_mps2=0.0, wheel_speed_radps=(front, front, rear, rear))
+
+
+def _fully_active(setup: ControllerSetup) -> ControllerSetup:
+    """The same with correctors that act at all errors."""
+    gains = setup.gains
+    acting = {
+        name: replace(system, corrector=replace(system.corrector, deadband_start_radps=0.0, deadband_end_radps=0.0))
+        for name, system in (("ars", gains.ars), ("afs", gains.afs))
+    }
+    return replace(setup, gains=replace(gains, **acting))
+
+
+def _ideal(scenario: Scenario) -> Any:
+    config = scenario.car.config
+    return replace(config, sensors=type(config.sensors)())
+
+
+def _answer(
+    given: Any, name: str, scenario: Scenario, setup: ControllerSetup, made: Controller
+) -> Callable[[Array], Response]:
+    """The controller's frequency response, demands per measurement."""
+    rolling = _rolling(scenario)
+    if not has_linear_form(given):
+        return _answer_to_samples(scenario.car.config.sensors.all(), made, rolling, setup.timestep_s, name)
+    form = linear_controller(given, setup, rolling.speed_mps)
+
+    def response(frequencies_radps: Array) -> Response:
+        z = np.exp(1j * frequencies_radps * setup.timestep_s)[:, None, None]
+        answer = np.zeros((len(z), len(LOOPS), len(SIGNALS)), np.complex128)
+        states = np.linalg.solve(z * np.eye(len(form.a)) - form.a, np.asarray(form.b[:, 1:], dtype=np.complex128))
+        answer[:, :, :1] = form.c @ states + form.d[:, 1:]
+        return answer
+
+    return response
+
+
+def _answer_to_samples(
+    sensors: Mapping[str, Sensor], made: Controller, rolling: Measurement, unit_s: float, name: str
+) -> Callable[[Array], Response]:
+    """The frequency response of a controller that is known by its answers to samples."""
+    calls = [_calls(sensors[sensor], unit_s) for sensor in _SENSORS]
+    ages = [math.ceil((sensors[sensor].delay_s or 0.0) / unit_s - 1e-9) for sensor in _SENSORS]
+    held = {signal: (count, age % count) for signal, count, age in zip(SIGNALS, calls, ages, strict=True)}
+    to_samples = response_of(pulse_responses(made, rolling, unit_s, name, held), unit_s)
+
+    def response(frequencies_radps: Array) -> Response:
+        back = np.exp(-1j * frequencies_radps * unit_s)
+        # Of an answer to samples that are held, what belongs to the hold is in the sensor already.
+        holds = np.stack([count * _held(count, back) for count in calls], axis=1)
+        return to_samples(frequencies_radps) / holds[:, None, :]
+
+    return response

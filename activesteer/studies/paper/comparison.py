@@ -1,0 +1,216 @@
+"""Any controllers side by side: the paper's five scenarios and five harder ones, behind the sensors of production cars.
+
+All drive the same scenarios; what is compared are the metrics of their recordings, under the names that they have
+there.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from activesteer.analysis.claims import SCENARIOS
+from activesteer.controllers import find_controller
+from activesteer.errors import ParameterError
+from activesteer.files import make_folder
+from activesteer.metric_table import metric as declared
+from activesteer.recording import Recording, check_target
+from activesteer.scenario import FileOrTable, resolve
+from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.studies.paper.comparison_targets import Target, short, targets, targets_text
+from activesteer.studies.paper.envelope import LINES, entry_speed
+from activesteer.studies.paper.reproduction import Progress, drive
+
+CASES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    **{name: (name, {}) for name in SCENARIOS},
+    "step_steer_120_kmh": ("step_steer", {"speed_kmh": 120.0}),
+    "severe_lane_change": ("severe_lane_change", {}),
+    "split_mu_braking": ("split_mu_braking", {}),
+    "brake_in_turn": ("brake_in_turn", {}),
+    "mu_jump": ("mu_jump", {}),
+}
+"""Scenario -> manoeuvre and what is otherwise than in its file."""
+_STEP: Final = ("yaw_rate_response_time_s", "ay_response_time_s", "yaw_rate_overshoot", "sideslip_peak_rad")
+_ALONG_PATH: Final = ("sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps", "steering_wheel_peak_abs_rad")
+_ENTRY: Final = ("entry_speed_min_mps", "entry_speed_mps", "entry_speed_max_mps")
+SHOWN: Final[dict[str, tuple[str, ...]]] = {
+    "step_steer": _STEP,
+    "sine_with_dwell": ("yaw_rate_after_1000ms_share", "lateral_displacement_m", "sideslip_peak_abs_rad"),
+    "double_lane_change": _ALONG_PATH,
+    "slalom": ("sideslip_peak_abs_rad", "yaw_rate_rms_radps", "track_amplitude_m", "steering_wheel_peak_abs_rad"),
+    "double_lane_change_low_mu": _ALONG_PATH,
+    "step_steer_120_kmh": _STEP,
+    "severe_lane_change": (*_ALONG_PATH, "lane_overstep_m", *_ENTRY),
+    "split_mu_braking": ("stopping_distance_m", "lateral_deviation_max_m", "yaw_rate_peak_abs_radps"),
+    "brake_in_turn": (
+        "path_deviation_after_1000ms_m",
+        "yaw_rate_deviation_after_1000ms_radps",
+        "sideslip_peak_abs_rad",
+    ),
+    "mu_jump": (*_ALONG_PATH, "track_deviation_max_m"),
+}
+"""Scenario -> metrics that are printed and drawn; those of all are in the JSON."""
+SENSORS: Final = {"sensors.preset": "production", "sensors.seed": 1}
+"""What all of them see the car through."""
+ENTRY_SEEDS: Final = (1, 2, 3)
+"""Sensors with which the highest entry speed of the severe lane change is looked for."""
+ENTRY_DRIVER: Final = "expert"
+"""Who drives there, as in ISO 3888-2: the default driver leaves its lanes at every speed, whatever the controller."""
+ENTRY_LINE: Final = {"lane.margin_m": 0.15}
+"""How far his line keeps from the cones, the middle one of those in the test of ISO 3888-2."""
+_LANE_CHANGE: Final = "severe_lane_change"
+_LABEL: Final = 41
+_COLUMN: Final = 7
+"""Widths of the table: that of a label, and the least of a number."""
+
+
+class Row(NamedTuple):
+    """One number of the table.
+
+    Attributes:
+        scenario: A name of `CASES`.
+        controller: The controller.
+        metric: Name of the metric in the recording.
+        value: SI, nan where the run does not define it.
+    """
+
+    scenario: str
+    controller: str
+    metric: str
+    value: float
+
+
+@dataclass
+class Comparison:
+    """What came of it.
+
+    Attributes:
+        controllers: What was compared, in the order given.
+        rows: Every metric of every run that got to its end.
+        files: The recordings.
+        failures: (scenario, controller) -> why that run ended early.
+    """
+
+    controllers: tuple[str, ...]
+    rows: list[Row] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+    failures: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def shown(self) -> list[tuple[str, str, dict[str, float]]]:
+        """Scenario, metric and its value by controller, for the metrics of `SHOWN`."""
+        known = {(row.scenario, row.metric, row.controller): row.value for row in self.rows}
+        found = []
+        for scenario, metrics in SHOWN.items():
+            for metric in metrics:
+                values = {name: known.get((scenario, metric, name)) for name in self.controllers}
+                found.append((scenario, metric, {name: value for name, value in values.items() if value is not None}))
+        order = list(CASES)
+        return sorted((line for line in found if line[2]), key=lambda line: order.index(line[0]))
+
+    @property
+    def targets(self) -> list[Target]:
+        """What became of what the controllers beyond the paper's are asked for."""
+        return targets(self.controllers, self.rows)
+
+    def to_text(self) -> str:
+        """The metrics of `SHOWN` as a table, and the targets."""
+        columns = [max(_COLUMN, len(name) + 1) for name in self.controllers]
+        heads = "".join(f"{name:>{width}}" for name, width in zip(self.controllers, columns, strict=True))
+        lines, before = [" " * _LABEL + heads], ""
+        for scenario, metric, values in self.shown():
+            if scenario != before:
+                lines.append(scenario)
+            before = scenario
+            label = f"  {declared(metric).title}"
+            factor = declared(metric).unit.factor
+            shown = [short(values.get(name, math.nan) * factor) for name in self.controllers]
+            cells = "".join(f"{text:>{width}}" for text, width in zip(shown, columns, strict=True))
+            lines.append(f"{label:{_LABEL}}{cells}")
+        return "\n".join([*lines, *(["", targets_text(self.targets)] if self.targets else [])])
+
+    def to_json(self) -> dict[str, Any]:
+        """All numbers."""
+        return {
+            "table": [row._asdict() for row in self.rows],
+            "targets": [target._asdict() for target in self.targets],
+            "files": [str(file) for file in self.files],
+            "failures": {f"{scenario} {name}": problem for (scenario, name), problem in self.failures.items()},
+        }
+
+
+def compare(
+    controllers: Sequence[str],
+    folder: str | os.PathLike[str],
+    vehicle: FileOrTable = "compact",
+    *,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Drives `CASES` with every controller, and looks for their entry speeds in the severe lane change.
+
+    `entry_speed_mps` is the middle one over `ENTRY_SEEDS`; `entry_speed_min_mps` and `entry_speed_max_mps` are its
+    spread.
+
+    Args:
+        controllers: As for `simulate`.
+        folder: Where the recordings go, as SCENARIO-CONTROLLER.mcap; made where it does not exist.
+        vehicle: Name, path, or table of a vehicle.
+        jobs: Number of processes; that of the processors where not given.
+        progress: Called after every run.
+
+    Raises:
+        ActiveSteerError: an input is wrong. A run that fails ends no other run; it is named in `failures`.
+    """
+    labels = {find_controller(given).label: given for given in controllers}
+    if len(labels) < len(controllers):
+        raise ParameterError(f"of {', '.join(controllers)} two are called the same", value=tuple(controllers))
+    scenarios = {name: resolve(maneuver, vehicle, {**SENSORS, **other}) for name, (maneuver, other) in CASES.items()}
+    target = make_folder(folder, ParameterError)
+    paths = {name: {given: target / f"{name}-{label}.mcap" for label, given in labels.items()} for name in scenarios}
+    for systems in paths.values():
+        for path in systems.values():
+            check_target(path)
+    searches = [(given, seed) for given in controllers for seed in ENTRY_SEEDS] if _LANE_CHANGE in CASES else []
+    made, runs = Comparison(tuple(labels)), len(scenarios) * len(labels)
+
+    def tell(what: str, done: int) -> None:
+        if progress is not None:
+            progress(what, done, runs + len(searches))
+
+    named = {given: label for label, given in labels.items()}
+    for done, (scenario, given, problem) in enumerate(drive(scenarios, paths, jobs), 1):
+        if problem:
+            made.failures[scenario, named[given]] = problem
+        tell(f"{scenario} {named[given]}" + (" FAILED" if problem else ""), done)
+    for scenario, systems in paths.items():
+        for given, path in systems.items():
+            if (scenario, named[given]) not in made.failures:
+                made.files.append(path)
+                found = Recording.open(path).metrics
+                made.rows += [Row(scenario, named[given], metric, value) for metric, value in found.items()]
+    search = functools.partial(_entry_speed, vehicle)
+    speeds = in_parallel(search, searches, jobs, lambda _, done: tell("entry speeds", runs + done))
+    for given, label in named.items():
+        own = [speed for (other, _), speed in zip(searches, speeds, strict=True) if other == given]
+        made.rows += _entry_speeds(label, own)
+    return made
+
+
+def _entry_speed(vehicle: FileOrTable, controller: str, seed: int) -> float:
+    overrides = SENSORS | ENTRY_LINE | {"sensors.seed": seed}
+    found = entry_speed(_LANE_CHANGE, vehicle, overrides, LINES["lane_change"], ENTRY_DRIVER, controller)
+    return math.nan if found is None else found / 3.6
+
+
+def _entry_speeds(controller: str, speeds_mps: Sequence[float]) -> list[Row]:
+    if not speeds_mps:
+        return []
+    values = np.min(speeds_mps), np.median(speeds_mps), np.max(speeds_mps)
+    return [Row(_LANE_CHANGE, controller, name, float(value)) for name, value in zip(_ENTRY, values, strict=True)]

@@ -1,0 +1,339 @@
+"""How fast each car gets through a course: entry speeds by bisection, and a map over speed and line that checks them.
+
+A car gets through where its whole body keeps to the lanes, or, in a slalom, where it passes every cone on the right
+side and hits none. Bisection assumes that a car which gets through at one speed gets through at every lower one. The
+map does not: it is driven cell by cell, and `Envelope.exceptions` are its cells that speak against the assumption.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, StudyError
+from activesteer.resources import DEFAULT_DRIVER
+from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
+from activesteer.simulation.runner import run_scenario
+from activesteer.studies.engine.plan import label_of
+from activesteer.studies.engine.run_task import Status
+from activesteer.studies.engine.study import study
+from activesteer.studies.engine.task_queue import in_parallel
+
+RANGE_KMH: Final = (40.0, 160.0)
+"""Where the entry speed is looked for [km/h]."""
+RESOLUTION_KMH: Final = 1.0
+"""How exactly it is found [km/h]."""
+_AFTER_S: Final = 4.0
+"""How long a run goes on behind the last gate [s]: metrics look at 3 s of it."""
+_NONE: Final = "none"
+
+
+class Line(NamedTuple):
+    """What a map varies beside the speed.
+
+    Attributes:
+        key: Key of the manoeuvre.
+        label: What it is.
+        values: What is driven where nothing else is asked for [m].
+        kept: Metrics of a run -> whether it got through.
+    """
+
+    key: str
+    label: str
+    values: tuple[float, ...]
+    kept: Callable[[Mapping[str, float]], bool]
+
+
+def _stays_in_lanes(metrics: Mapping[str, float]) -> bool:
+    return metrics["stays_in_lanes"] == 1.0
+
+
+def _passes_cones(metrics: Mapping[str, float]) -> bool:
+    return metrics["cones_hit"] == 0.0 and metrics["cones_missed"] == 0.0
+
+
+LINES: Final = {
+    "lane_change": Line(
+        "lane.margin_m",
+        "margin between the car and the lanes",
+        (0.0, 0.04, 0.08, 0.12, 0.16, 0.2),
+        _stays_in_lanes,
+    ),
+    "slalom": Line(
+        "cones.offset_m",
+        "distance of the line from the cones",
+        (1.3, 1.6, 1.9, 2.2, 2.5, 2.8),
+        _passes_cones,
+    ),
+}
+"""Kind of manoeuvre -> its second axis."""
+_METRICS: Final = ("stays_in_lanes", "lane_overstep_m", "cones_*", "*_peak_abs_*", "*_gates_rms_*", "track_amplitude_m")
+
+
+def line_of(scenario: Scenario) -> Line:
+    """The second axis of a scenario's map.
+
+    Raises:
+        ParameterError: its manoeuvre has no lanes and no cones.
+    """
+    name, kind = scenario.maneuver.name, scenario.maneuver.kind
+    if kind not in LINES:
+        raise ParameterError(
+            f"{name} is a {kind}; entry speeds are those of {' and '.join(LINES)}",
+            key="maneuver",
+            value=kind,
+            allowed=tuple(LINES),
+        )
+    return LINES[kind]
+
+
+class State(StrEnum):
+    """What becomes of the cars of a cell."""
+
+    NOBODY = "nobody is lost"
+    NONE_ONLY = "only the car without control is lost"
+    SOME = "others are lost"
+    ALL = "all are lost"
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """What came out.
+
+    Attributes:
+        maneuver: Name of the manoeuvre.
+        line: What the map varies beside the speed.
+        nominal: Speed [km/h] and line [m] of the manoeuvre.
+        entry_speeds: For each driver and controller `driver`, `controller` and `entry_speed_kmh`: the highest one, on
+            the line of the manoeuvre; None where the car does not get through at the lowest speed that was tried, and
+            the highest speed where it gets through at every one.
+        rows: The map: `driver`, `controller`, `speed_kmh`, `line_m`, `kept`, and metrics of the run.
+    """
+
+    maneuver: str
+    line: Line
+    nominal: tuple[float, float]
+    entry_speeds: list[dict[str, Any]]
+    rows: list[dict[str, Any]]
+
+    @property
+    def drivers(self) -> list[str]:
+        """Who drove."""
+        return list(dict.fromkeys(entry["driver"] for entry in self.entry_speeds))
+
+    def cells(self, driver: str) -> dict[tuple[float, float], State]:
+        """Speed [km/h] and line [m] -> what becomes of the cars there."""
+        kept: dict[tuple[float, float], dict[str, bool]] = {}
+        for row in self.rows:
+            if row["driver"] == driver:
+                kept.setdefault((row["speed_kmh"], row["line_m"]), {})[row["controller"]] = row["kept"]
+        return {place: _state(cars) for place, cars in kept.items()}
+
+    def kept_by(self, driver: str, place: tuple[float, float]) -> list[str]:
+        """Controllers whose car gets through."""
+        wanted = (driver, *place)
+        return [
+            row["controller"]
+            for row in self.rows
+            if row["kept"] and (row["driver"], row["speed_kmh"], row["line_m"]) == wanted
+        ]
+
+    @property
+    def exceptions(self) -> list[dict[str, Any]]:
+        """Pairs of neighbouring cells of which the faster one is kept and the slower one is not."""
+        found = []
+        for row, faster in self._neighbours():
+            if faster["kept"] and not row["kept"]:
+                keys = ("driver", "controller", "line_m")
+                found.append(
+                    {key: row[key] for key in keys} | {"lost_kmh": row["speed_kmh"], "kept_kmh": faster["speed_kmh"]}
+                )
+        return found
+
+    def _neighbours(self) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
+        columns: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
+        for row in self.rows:
+            columns.setdefault((row["driver"], row["controller"], row["line_m"]), []).append(row)
+        for column in columns.values():
+            yield from pairwise(sorted(column, key=lambda row: row["speed_kmh"]))
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values."""
+        cells = [
+            {"driver": driver, "speed_kmh": speed, "line_m": line, "state": state.value}
+            for driver in self.drivers
+            for (speed, line), state in self.cells(driver).items()
+        ]
+        return {
+            "maneuver": self.maneuver,
+            "line": self.line.key,
+            "nominal": {"speed_kmh": self.nominal[0], "line_m": self.nominal[1]},
+            "entry_speeds": self.entry_speeds,
+            "map": self.rows,
+            "cells": cells,
+            "exceptions": self.exceptions,
+        }
+
+
+def _state(kept: Mapping[str, bool]) -> State:
+    if all(kept.values()):
+        return State.NOBODY
+    if not any(kept.values()):
+        return State.ALL
+    alone = _NONE in kept and all(value is (name != _NONE) for name, value in kept.items())
+    return State.NONE_ONLY if alone else State.SOME
+
+
+def envelope(
+    maneuver: FileOrTable,
+    controllers: Sequence[str] = (_NONE, "ars", "afs"),
+    vehicle: FileOrTable = "compact",
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    drivers: Sequence[FileOrTable] = (DEFAULT_DRIVER,),
+    speeds_kmh: Sequence[float] = (),
+    lines_m: Sequence[float] = (),
+    output: str | os.PathLike[str] | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Envelope:
+    """Looks for entry speeds and drives the map.
+
+    Args:
+        maneuver: Name, path, or table of a lane change or a slalom.
+        controllers: Controllers, as for `simulate`.
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key -> value; neither speed nor duration nor line.
+        drivers: Who drives; a map for each.
+        speeds_kmh: Speeds of the map [km/h]; from 30 below that of the manoeuvre to 30 above where not given.
+        lines_m: Values of the line of the map [m]; those of `LINES` where not given.
+        output: Folder for the studies of the maps, which can be gone on with, each below the names of the manoeuvre
+            and of who drives; they are not kept where not given.
+        jobs: Number of processes; that of the processors where not given.
+        scheduler: Address of a Dask scheduler, or its scheduler file, that does all of it instead.
+        progress: Called with what is done, how many runs or searches are, and how many there are.
+
+    Returns:
+        The envelope.
+
+    Raises:
+        ActiveSteerError: an input is wrong, the manoeuvre has no lanes and no cones, or a run failed.
+    """
+    given = dict(overrides or {})
+    scenario = resolve(maneuver, vehicle, given, drivers[0])
+    check_gains(given, controllers)
+    line = line_of(scenario)
+    nominal_kmh = 3.6 * scenario.maneuver.speed_mps
+    speeds = tuple(speeds_kmh) or tuple(nominal_kmh + step for step in range(-30, 31, 10))
+    lines = tuple(lines_m) or line.values
+    part, _, name = line.key.partition(".")
+    nominal = (round(nominal_kmh, 6), float(getattr(getattr(scenario.maneuver, part), name)))
+
+    def report(what: str) -> Callable[[int, int], None]:
+        return lambda done, total: progress(what, done, total) if progress else None
+
+    pairs = [(driver, controller) for driver in drivers for controller in controllers]
+    search = functools.partial(entry_speed, maneuver, vehicle, given, line)
+    tell = report("entry speeds")
+    found = in_parallel(search, pairs, jobs, lambda _, done: tell(done, len(pairs)), scheduler=scheduler)
+    entry_speeds = [
+        {"driver": label_of(driver), "controller": controller, "entry_speed_kmh": speed}
+        for (driver, controller), speed in zip(pairs, found, strict=True)
+    ]
+    factors = {"speed_kmh": {"grid": list(speeds)}, line.key: {"grid": list(lines)}}
+    duration_s = _duration_s(maneuver, vehicle, given, min(speeds))
+    rows: list[dict[str, Any]] = []
+    for driver in drivers:
+        tell = report(f"map of {label_of(driver)}")
+        table = study(
+            {
+                "maneuvers": [maneuver],
+                "vehicles": [vehicle],
+                "driver": driver,
+                "controllers": list(controllers),
+                "overrides": {**given, "duration_s": duration_s},
+                "metrics": list(_METRICS),
+                "factors": factors,
+            },
+            output=None if output is None else Path(output) / scenario.maneuver.name / label_of(driver),
+            jobs=jobs,
+            scheduler=scheduler,
+            progress=lambda counted, tell=tell: tell(counted.done, counted.total),
+        )
+        rows += [_map_row(label_of(driver), line, row) for row in table.to_pylist()]
+    return Envelope(scenario.maneuver.name, line, nominal, entry_speeds, rows)
+
+
+def _duration_s(maneuver: FileOrTable, vehicle: FileOrTable, overrides: Mapping[str, Any], speed_kmh: float) -> float:
+    course = resolve(maneuver, vehicle, overrides).maneuver.course
+    assert course is not None, "kinds of LINES have a course"
+    assert course.last_gate_x_m is not None, "and it has gates"
+    return round(3.6 * course.last_gate_x_m / speed_kmh + _AFTER_S, 2)
+
+
+def _map_row(driver: str, line: Line, row: Mapping[str, Any]) -> dict[str, Any]:
+    place = {"driver": driver, "controller": row["controller"], "speed_kmh": row["speed_kmh"], "line_m": row[line.key]}
+    told = {*place, line.key}
+    metrics = {name: value for name, value in row.items() if isinstance(value, float) and name not in told}
+    # Where the engine gave up a run, or the last gate was not reached, the car did not get through. Any other failure
+    # says nothing of the car.
+    status, diverged = row["status"], f"{row['error']}".startswith(SimulationDiverged.__name__)
+    if status == Status.CRASHED or (status == Status.FAILED and not diverged):
+        where = f"{driver}, {row['controller']}, {row['speed_kmh']:g} km/h, {line.key} = {row[line.key]:g}"
+        raise StudyError(f"map of {where}: {row['error']}")
+    return {**place, "kept": status == Status.OK and line.kept(row), **metrics}
+
+
+def entry_speed(
+    maneuver: FileOrTable,
+    vehicle: FileOrTable,
+    overrides: Mapping[str, Any],
+    line: Line,
+    driver: FileOrTable,
+    controller: str,
+) -> float | None:
+    """The highest speed at which a car gets through, by bisection.
+
+    Args:
+        maneuver: Name, path, or table of a lane change or a slalom.
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key -> value; neither speed nor duration.
+        line: The manoeuvre's, of `LINES`.
+        driver: Who drives.
+        controller: As for `simulate`.
+
+    Returns:
+        To `RESOLUTION_KMH` below the lowest speed at which it does not [km/h]; None where it does at none of
+        `RANGE_KMH`, the upper end where it does at all.
+
+    Raises:
+        ActiveSteerError: an input is wrong.
+    """
+
+    def keeps(speed_kmh: float) -> bool:
+        duration_s = _duration_s(maneuver, vehicle, overrides, speed_kmh)
+        changes = {**overrides, "speed_kmh": speed_kmh, "duration_s": duration_s}
+        try:
+            return line.kept(run_scenario(resolve(maneuver, vehicle, changes, driver), controller).metrics)
+        except ActiveSteerError as error:
+            if error.recording is None:  # nothing was driven: an input is wrong
+                raise
+            return False
+
+    low, high = RANGE_KMH
+    if not keeps(low):
+        return None
+    if keeps(high):
+        return high
+    for _ in range(math.ceil(math.log2((high - low) / RESOLUTION_KMH))):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if keeps(middle) else (low, middle)
+    return low

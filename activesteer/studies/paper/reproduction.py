@@ -1,0 +1,194 @@
+"""The paper, reproduced: five scenarios by three steering systems, recorded, and what is claimed of them checked.
+
+Runs are independent of each other, so they are spread over processes. Each writes its own file; the scorecard is made
+from the files, not from what the processes hold.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Scorecard, scorecard
+from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
+from activesteer.files import make_folder
+from activesteer.recording import Recording, check_target
+from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.simulation.preparation import prepared
+from activesteer.simulation.runner import run_scenario
+from activesteer.studies.engine.task_queue import TaskQueue, in_parallel
+from activesteer.studies.engine.workers import workers_for
+
+Progress = Callable[[str, int, int], None]
+"""Called with what was finished, how many runs are, and how many there are in all."""
+
+
+@dataclass
+class Reproduction:
+    """What came of it.
+
+    Attributes:
+        paths: Scenario -> system -> MCAP file.
+        failures: (scenario, system) -> why that run ended early; what it recorded until then is in its file.
+        scorecard: Claims of the scenarios whose three runs are complete.
+    """
+
+    paths: dict[str, dict[str, Path]] = field(default_factory=dict)
+    failures: dict[tuple[str, str], str] = field(default_factory=dict)
+    scorecard: Scorecard = field(default_factory=lambda: scorecard([]))
+
+    @property
+    def exit_status(self) -> int:
+        """0 where every run is complete and every claim passed or is known not to come out, else 1."""
+        return 1 if self.failures else self.scorecard.exit_status
+
+    def recordings(self) -> dict[str, dict[str, Recording]]:
+        """The complete runs, opened; scenario -> system -> recording."""
+        return {
+            scenario: {system: Recording.open(path) for system, path in systems.items()}
+            for scenario, systems in self.paths.items()
+            if all((scenario, system) not in self.failures for system in systems)
+        }
+
+
+def reproduce(
+    folder: str | os.PathLike[str],
+    vehicle: FileOrTable = "compact",
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Reproduction:
+    """Drives all five scenarios with all three systems and checks the paper's claims.
+
+    With more than one job the runs are made in processes of their own, started afresh: a script that calls this needs
+    the usual `if __name__ == "__main__":`.
+
+    Args:
+        folder: Where the recordings go, as SCENARIO-SYSTEM.mcap; made where it does not exist.
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key -> value, for all runs; see `simulate`.
+        jobs: Number of processes; that of the processors where not given.
+        progress: Called after every run.
+
+    Returns:
+        Files and scorecard.
+
+    Raises:
+        ActiveSteerError: an input is wrong. A run that fails ends no other run; it is named in `failures`.
+    """
+    scenarios = {name: resolve(name, vehicle, overrides) for name in SCENARIOS}
+    target = make_folder(folder, ParameterError)
+    result = Reproduction({name: {system: _path(target, name, system) for system in SYSTEMS} for name in scenarios})
+    for systems in result.paths.values():
+        for path in systems.values():
+            check_target(path)
+    total = len(scenarios) * len(SYSTEMS)
+    for done, (name, system, problem) in enumerate(drive(scenarios, result.paths, jobs), 1):
+        if problem:
+            result.failures[name, system] = problem
+        if progress is not None:
+            progress(f"{name} {system}" + (" FAILED" if problem else ""), done, total)
+    claims = [claim for name, runs in result.recordings().items() for claim in SCENARIOS[name](runs)]
+    result.scorecard = scorecard(claims, _name_of(scenarios))
+    return result
+
+
+def recordings_in(folder: str | os.PathLike[str]) -> dict[str, dict[str, Recording]]:
+    """The recordings that `reproduce` left in a folder; scenario -> system -> recording, where all three are there.
+
+    Raises:
+        RecordingError: there are none, or one cannot be read.
+    """
+    found: dict[str, dict[str, Recording]] = {}
+    for name in SCENARIOS:
+        paths = {system: _path(Path(folder), name, system) for system in SYSTEMS}
+        if all(path.is_file() for path in paths.values()):
+            found[name] = {system: Recording.open(path) for system, path in paths.items()}
+    if not found:
+        raise RecordingError(
+            f"{folder} holds no runs of {', '.join(SCENARIOS)}; make them with `activesteer reproduce -o {folder}`"
+        )
+    return found
+
+
+def _path(folder: Path, scenario: str, system: str) -> Path:
+    return folder / f"{scenario}-{system}.mcap"
+
+
+def _name_of(scenarios: Mapping[str, Scenario]) -> str:
+    return next(iter(scenarios.values())).car.name
+
+
+class Outcome(NamedTuple):
+    """How a run ended.
+
+    Attributes:
+        scenario: Its name.
+        system: The controller.
+        problem: Why it ended early; empty where it did not.
+    """
+
+    scenario: str
+    system: str
+    problem: str
+
+
+def drive(
+    scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
+) -> Iterator[Outcome]:
+    """Makes all runs and tells each as it ends; what a search must find first is found once for all controllers.
+
+    Args:
+        scenarios: What is driven, by name.
+        paths: Name of the scenario -> controller -> file.
+        jobs: Number of processes; that of the processors where not given.
+    """
+    with workers_for(jobs) as workers:
+        queue = TaskQueue(workers)
+        for name, scenario in scenarios.items():
+            queue.add((name, None), prepared, scenario)
+        for (name, system), value, error in queue.outcomes():
+            if error is not None and not isinstance(error, ActiveSteerError):
+                raise error
+            if system is not None:
+                yield Outcome(name, system, str(error or value))
+            elif error is not None:
+                yield from (Outcome(name, other, str(error)) for other in paths[name])
+            else:
+                for other in paths[name]:
+                    queue.add((name, other), _run, value, other, paths[name][other])
+
+
+def _run(scenario: Scenario, system: str, path: Path) -> str:
+    """One run in a process of its own; returns what went wrong."""
+    try:
+        run_scenario(scenario, system, path=path)
+    except ActiveSteerError as error:
+        return "; ".join([str(error), *getattr(error, "__notes__", [])])
+    return ""
+
+
+def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None) -> list[Claim]:
+    """The claims as they come out of the scenarios as they are, without files.
+
+    Args:
+        vehicle: Name, path, or table of a vehicle.
+        jobs: Number of processes; that of the processors where not given.
+
+    Returns:
+        All claims, in the order of the paper.
+
+    Raises:
+        ActiveSteerError: an input is wrong, or a run failed.
+    """
+    found = in_parallel(_claims_of, [(name, vehicle) for name in SCENARIOS], jobs)
+    return [claim for claims in found for claim in claims]
+
+
+def _claims_of(name: str, vehicle: FileOrTable) -> list[Claim]:
+    scenario = prepared(resolve(name, vehicle))
+    return SCENARIOS[name]({system: run_scenario(scenario, system) for system in SYSTEMS})

@@ -1,0 +1,140 @@
+"""The page of a study, and the sensitivity indices in it."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from activesteer import study
+from activesteer.cli import main
+from activesteer.errors import StudyError
+from activesteer.studies.engine.design import draw
+from activesteer.studies.engine.factors import Factor
+from activesteer.studies.engine.report import write_report
+from activesteer.studies.engine.sensitivity import indices
+from tests.raising import raises
+from tests.unit.studies.short import RATIO, short_study, write_controller
+
+ISHIGAMI = [Factor(key, "uniform", low=-np.pi, high=np.pi) for key in ("x1", "x2", "x3")]
+"""Ishigami and Homma (1990), with a = 7 and b = 0.1: S1 0.3139, 0.4424, 0; ST 0.5576, 0.4424, 0.2437."""
+
+
+def ishigami(kind: str, count: int) -> dict[tuple[str, str], tuple[float, float]]:
+    samples = draw(ISHIGAMI, kind, count, 1)
+    x1, x2, x3 = (np.array(samples.columns[factor.key]) for factor in ISHIGAMI)
+    values = np.sin(x1) + 7.0 * np.sin(x2) ** 2 + 0.1 * x3**4 * np.sin(x1)
+    found = indices(kind, ISHIGAMI, samples.columns, values)
+    return {(index.factor, index.name): (index.value, index.confidence) for index in found}
+
+
+def test_saltelli_indices_are_those_of_a_function_with_known_ones():
+    found = ishigami("saltelli", 4096)
+    known = {"S1": (0.3139, 0.4424, 0.0), "ST": (0.5576, 0.4424, 0.2437)}
+    for name, values in known.items():
+        for key, value in zip(("x1", "x2", "x3"), values, strict=True):
+            index, confidence = found[key, name]
+            assert index == pytest.approx(value, abs=0.03)
+            assert abs(index - value) < 2.0 * confidence + 1e-3
+
+
+@pytest.mark.parametrize("kind", ["sobol", "latin_hypercube", "random"])
+def test_any_sample_gives_first_order_indices(kind):
+    found = ishigami(kind, 8192)
+    for key, value in (("x1", 0.3139), ("x2", 0.4424), ("x3", 0.0)):
+        assert found[key, "S1"][0] == pytest.approx(value, abs=0.05)
+
+
+def test_elementary_effects_of_a_plane_are_its_slopes_over_the_range():
+    factors = [Factor("a", "uniform", low=0.0, high=2.0), Factor("b", "uniform", low=-1.0, high=4.0)]
+    samples = draw(factors, "morris", 8, 1)
+    values = 3.0 * np.array(samples.columns["a"]) - np.array(samples.columns["b"])
+    found = {index.factor: index for index in indices("morris", factors, samples.columns, values)}
+    assert found["a"].value == pytest.approx(6.0)
+    assert found["b"].value == pytest.approx(5.0)
+    assert found["a"].spread == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_design_that_lost_runs_gives_no_indices():
+    samples = draw(ISHIGAMI, "saltelli", 16, 1)
+    values = np.linspace(0.0, 1.0, len(samples))
+    values[3] = np.nan
+    assert indices("saltelli", ISHIGAMI, samples.columns, values) == []
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    path = write_controller(folder, 0.9)
+    controllers = ["none", "ars", f"{path}:Fails"]
+    table = short_study(0.8, 0.9, 1.0, key=RATIO, controllers=controllers, title="Ratio </script><b>")
+    table["factors"]["speed_kmh"] = {"grid": [70.0, 80.0]}
+    rows = study(table, output=folder / "s", jobs=1).to_pylist()
+    text = write_report(folder / "s").read_text(encoding="utf-8")
+    data = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    assert data is not None
+    return text, json.loads(data[1]), rows
+
+
+def test_the_page_needs_nothing_from_elsewhere_and_escapes_what_it_shows(page):
+    text, *_ = page
+    assert "http://" not in text.replace("http://www.w3.org/2000/svg", "")
+    assert "https://" not in text
+    assert "</script><b>" not in text
+    assert "16 ok" in text
+    assert "2 failed" in text
+
+
+def test_the_page_holds_what_the_rows_say(page):
+    _, data, rows = page
+    found = data["by_group"][0]["yaw_rate_peak_radps"]
+    peaks = {(row["controller"], row[RATIO], row["speed_kmh"]): row["yaw_rate_peak_radps"] for row in rows}
+    degps = {key: np.degrees(value) for key, value in peaks.items() if value is not None}
+    none = [value for key, value in degps.items() if key[0] == "none"]
+    assert found["quantiles"][0][1] == pytest.approx(np.median(none), rel=1e-4)
+    differences = [degps["ars", *key[1:]] - value for key, value in degps.items() if key[0] == "none"]
+    assert found["paired"][0]["quantiles"][1] == pytest.approx(np.median(differences), rel=1e-3, abs=1e-4)
+    assert found["heat"]["maps"][0][1][0] == pytest.approx(degps["none", 0.9, 70.0], rel=1e-4)
+    assert found["heat"]["maps"][2][1] == [None, None]
+    assert sum(found["histogram"]["counts"][0]) == 6
+    assert found["extremes"][0][0][1] == pytest.approx(max(none), rel=1e-4)
+    metric = next(metric for metric in data["metrics"] if metric["name"] == "yaw_rate_peak_radps")
+    assert metric["unit"] == "deg/s"
+
+
+def test_the_line_of_a_run_drives_it_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    given = {
+        "maneuvers": ["straight_line"],
+        "overrides": {"duration_s": 0.5},
+        "factors": {"speed_kmh": {"grid": [50.0]}},
+    }
+    [row] = study(given, output="s", jobs=1).to_pylist()
+    text = write_report("s").read_text(encoding="utf-8")
+    data = json.loads(text.split('id="data">')[1].split("</script>")[0])
+    command = data["by_group"][0]["speed_end_mps"]["extremes"][0][0][2]
+    words = command.split(" && ")[0].split()
+    assert words[0] == "activesteer"
+    assert main([*words[1:], "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["runs"][0]["metrics"]["speed_end_mps"] == row["speed_end_mps"]
+
+
+def test_a_study_without_rows_has_no_page(tmp_path):
+    with raises(StudyError, value=tmp_path):
+        write_report(tmp_path)
+
+
+def test_a_metric_that_hardly_varies_has_a_histogram_that_can_be_drawn(page):
+    _, data, _ = page
+    for group in data["by_group"]:
+        for found in group.values():
+            assert np.all(np.diff(found["histogram"]["edges"]) > 0.0)
+
+
+def test_factors_are_described_and_their_keys_can_be_read(page):
+    text, found, _ = page
+    factors = {factor["key"]: (factor["label"], factor["unit"]) for factor in found["factors"]}
+    assert factors["speed_kmh"] == ("speed", "km/h")
+    assert all(f"<code>{key}</code>" in text for key in factors)

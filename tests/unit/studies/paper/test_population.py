@@ -1,0 +1,162 @@
+"""The population: with two samples as a whole, and what is counted of more."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, cast
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from activesteer.analysis.claims import Claim
+from activesteer.analysis.claims.population import NONE, ClaimShare, Population
+from activesteer.cli import main
+from activesteer.errors import StudyError
+from activesteer.metric_table import CONES_MISSED
+from activesteer.studies.engine.plan import Plan
+from activesteer.studies.paper.population import population_study, summarise
+from activesteer.studies.engine.study import study
+from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.theory.shares import ShareVerdict
+from tests.raising import raises
+
+RESULTS = "results.parquet"
+
+
+class Nominal:
+    """A claim as far as `summarise` looks at it."""
+
+    def __init__(self, number: str, passed: bool) -> None:
+        self.id, self.passed = number, passed
+
+
+def nominal(**passed: bool) -> list[Claim]:
+    return cast(list[Claim], [Nominal(*item) for item in passed.items()])
+
+
+def shortened(samples: int) -> StudyFile:
+    """The population with the quickest of its scenarios."""
+    table = population_study(samples).to_table()
+    table["maneuvers"] = ["step_steer"]
+    table["factors"] = {
+        key: value
+        for key, value in table["factors"].items()
+        if "maneuvers" not in value and not key.startswith("driver.")
+    }
+    return read_study(table)
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("population") / "serial"
+    study(shortened(2), output=folder, jobs=1)
+    return folder
+
+
+def test_processes_and_interruptions_change_no_bit(serial: Path, tmp_path: Path) -> None:
+    study(shortened(2), output=tmp_path, jobs=1, limit=3)
+    study(shortened(2), output=tmp_path, jobs=2)
+    assert (tmp_path / RESULTS).read_bytes() == (serial / RESULTS).read_bytes()
+
+
+def test_all_three_systems_meet_the_same_samples(serial: Path) -> None:
+    rows = pq.read_table(serial / RESULTS).to_pylist()
+    keys = shortened(2).keys
+    assert {row["status"] for row in rows} == {"ok"}
+    by_sample: dict[int, list[dict[str, Any]]] = {}
+    for row in rows:
+        by_sample.setdefault(row["sample"], []).append({key: row[key] for key in keys})
+    assert len(by_sample) == 2
+    assert all(len(cars) == 3 and cars[1:] == cars[:2] for cars in by_sample.values())
+    assert by_sample[0][0] != by_sample[1][0]
+
+
+def test_every_factor_of_the_population_has_an_effect_and_stays_within_what_is_allowed() -> None:
+    # A plan refuses keys without effect and extremes that are out of range.
+    assert len(Plan(population_study(4))) == 4 * 15
+
+
+def test_fewer_samples_are_the_first_of_more() -> None:
+    few, many = (population_study(samples).samples()[0] for samples in (8, 16))
+    assert [few[number] for number in range(8)] == [many[number] for number in range(8)]
+    assert few[0] != population_study(8, seed=2).samples()[0][0]
+
+
+def made_up(planned: StudyFile, outcomes: dict[str, list[tuple[float | None, float]]]) -> pa.Table:
+    """Runs of a slalom: by system, of each sample the peak of the sideslip [rad] and the number of missed cones."""
+    rows = []
+    samples = planned.samples()[0]
+    for sample in range(len(outcomes["none"])):
+        for system, values in outcomes.items():
+            peak_rad, missed = values[sample]
+            rows.append({
+                "run": len(rows), "sample": sample, "maneuver": "slalom", "vehicle": "compact", "controller": system,
+                **samples[sample], "sideslip_peak_abs_rad": peak_rad, CONES_MISSED: missed,
+                "claim_Z1": 1.0 if samples[sample]["speed_kmh"] > 1.0 else 0.0, "claim_Z2": 1.0,
+                "claim_Z3": 1.0 if samples[sample]["sensors.preset"] == "ideal" else 0.0,
+            })  # fmt: skip
+    return pa.Table.from_pylist(rows)
+
+
+def test_saved_and_spoiled_are_counted_in_pairs() -> None:
+    planned = population_study(4)
+    spin_rad = math.radians(60.0)
+    table = made_up(
+        planned,
+        {
+            "none": [(spin_rad, 0.0), (0.1, 2.0), (0.1, 0.0), (0.05, 0.0)],
+            "ars": [(0.1, 0.0), (0.1, 1.0), (0.05, 0.0), (0.05, 0.0)],
+            "afs": [(spin_rad, 0.0), (0.1, 0.0), (None, 0.0), (0.05, 1.0)],
+        },
+    )
+    found = summarise(table, planned, nominal(Z1=True, Z2=False))
+    ars, afs = found.systems
+    assert (ars.lost_without, ars.saved, ars.fine_without, ars.spoiled) == (2, 1, 2, 0)
+    assert (afs.lost_without, afs.saved, afs.fine_without, afs.spoiled) == (2, 1, 2, 2)
+    assert (ars.spun_without, ars.spun, afs.spun) == (1, 0, 2)
+    [change] = ars.changes
+    assert (change.metric, change.number) == ("sideslip_peak_abs_rad", 4)
+    assert change.median == pytest.approx(-0.025)
+    assert afs.changes[0].number == 3
+    assert [(claim.id, claim.passed, claim.share) for claim in found.claims][1] == ("Z2", False, 1.0)
+
+
+def test_the_factor_that_decides_is_named() -> None:
+    planned = population_study(128)
+    table = made_up(planned, dict.fromkeys(("none", "ars", "afs"), [(0.1, 0.0)] * 128))
+    speed, always = summarise(table, planned, nominal(Z1=True, Z2=True)).claims
+    assert (speed.depends_on, speed.direction, speed.verdict) == ("speed_kmh", 1, ShareVerdict.DEPENDS)
+    assert (always.depends_on, always.verdict) == (NONE, ShareVerdict.HOLDS)
+    assert speed.words == "with more speed_kmh"
+
+
+def test_a_choice_that_decides_is_named_with_its_value_and_shares() -> None:
+    planned = population_study(128)
+    table = made_up(planned, dict.fromkeys(("none", "ars", "afs"), [(0.1, 0.0)] * 128))
+    [ideal] = summarise(table, planned, nominal(Z3=True)).claims
+    assert ideal.share == 0.5
+    assert ideal.at == {"sensors.preset = ideal": 1.0, "sensors.preset = production": 0.0}
+    assert ideal.words == "with sensors.preset = ideal"
+
+
+def test_what_is_stored_is_what_was_found(serial: Path) -> None:
+    found = summarise(pq.read_table(serial / RESULTS), shortened(2), nominal(S1=True))
+    assert Population.from_json(found.to_json()) == found
+    assert found.to_json()["claims"][0]["verdict"] == "depends"
+    assert "S1   passed" in found.to_text()
+    with raises(StudyError, cause=KeyError):
+        Population.from_json({"claims": []})
+
+
+def test_a_share_is_whole_only_where_it_is() -> None:
+    for share, shown in ((1.0, " 100 %"), (0.999, " 99.9 %"), (0.001, " 0.1 %"), (0.0, " 0 %")):
+        claim = ClaimShare("S1", True, 1000, share, 0.0, 1.0)
+        assert shown in Population(1000, 1, "compact", {}, (claim,), ()).to_text()
+
+
+@pytest.mark.parametrize("arguments", [["--seed", "2"], ["--scheduler", "tcp://nowhere:1"], ["--population", "0"]])
+def test_options_that_cannot_be_are_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reproduce", *arguments]) == 1
+    assert ("samples" if "0" in arguments else "belongs to --population") in capsys.readouterr().err
