@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
 
+import activesteer
 from activesteer.controllers import is_variant, read_variant
 from activesteer.plugins.file import source_of
 from activesteer.scenario import Scenario, describe
@@ -36,7 +37,7 @@ def _of_bytes(value: object) -> str:
 @functools.cache
 def source_digest() -> str:
     """Hash of the package's sources as far as a result depends on them: a version number does not follow every edit."""
-    package = Path(__file__).parents[1]
+    package = Path(activesteer.__file__).parent
     found = {}
     for part in _DECIDING:
         for path in [package / part] if part.endswith(".py") else sorted((package / part).rglob("*.py")):

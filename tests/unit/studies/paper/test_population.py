@@ -16,9 +16,9 @@ from activesteer.cli import main
 from activesteer.errors import StudyError
 from activesteer.metric_table import CONES_MISSED
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.paper.population import population_study, summarise
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.studies.paper.population import population_study, summarise
 from activesteer.theory.shares import ShareVerdict
 from tests.raising import raises
 
