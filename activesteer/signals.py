@@ -1,14 +1,19 @@
-"""The messages that the blocks hand to each other, once every step. Immutable; SI units; signs of `conventions`.
+"""The messages that the blocks exchange in every step. Immutable; SI units; signs of `conventions`.
 
-They are named tuples because they are made every millisecond: a frozen dataclass costs several times as much to build.
-Where even the call of the class is too slow, `made` makes them.
+Messages are named tuples because the loop creates them every millisecond, and a frozen dataclass takes several times
+as long to create. Where even the call of the class takes too long, use `new_message`.
+
+The fields of a message are the one description of it. The channels of a recording and the memory layout of native code
+are derived from them; see `numbers_of` and `native_messages`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, Protocol, TypeAlias, TypeVar, cast, get_type_hints
+
+from activesteer.conventions import CORNERS
 
 if TYPE_CHECKING:
     from activesteer.road.path import Path
@@ -20,20 +25,24 @@ class _Make(Protocol):
     def __call__(self, kind: type[_Message], members: Iterable[Any], /) -> _Message: ...
 
 
-made: Final = cast(_Make, tuple.__new__)
-"""`made(Motion, (x_m, y_m, ...))` is a message of these members, all of them, in half the time of `Motion(x_m, ...)`:
-for what is made every step."""
+new_message: Final = cast(_Make, tuple.__new__)
+"""`new_message(Motion, (x_m, ...))` takes half the time of `Motion(x_m, ...)`. It needs a value for every field."""
+
+CORNERS_IN_WORDS: Final = dict(zip(CORNERS, ("front left", "front right", "rear left", "rear right"), strict=True))
+"""Corner -> its name in a sentence."""
+PerWheel: TypeAlias = tuple[float, float, float, float]
+"""One number for each wheel, order of `CORNERS`."""
 
 
 class Channel(NamedTuple):
-    """What a recorded signal is called and means.
+    """Name and description of a recorded signal.
 
     Attributes:
         name: Channel name, ending in its unit (`yaw_rate_radps`).
         unit: Unit as printed in tables and plots (`rad/s`), empty for a pure number.
         meaning: One line, with the sign convention where it matters.
-        group: Name of the topic that carries it in a file (`vehicle`, `control`, `fl` ...).
-        single: True where 32 bit are enough in a file.
+        group: Name of the topic that carries the channel in a file (`vehicle`, `control`, `fl` ...).
+        single: Whether a file stores the channel with 32 bits.
     """
 
     name: str
@@ -43,32 +52,85 @@ class Channel(NamedTuple):
     single: bool = True
 
 
+class Recorded(NamedTuple):
+    """Annotation of a field of a message that is recorded.
+
+    Attributes:
+        unit: Unit of its channel.
+        meaning: Meaning of its channel.
+        acts: Whether the car acts on the field; otherwise it is for the recording only.
+    """
+
+    unit: str
+    meaning: str
+    acts: bool = True
+
+
+class Number(NamedTuple):
+    """A number within a message.
+
+    Attributes:
+        name: Name of the field; for a number of a wheel with its corner in front (`fl_wheel_speed_radps`).
+        field: Name of the field.
+        recorded: Unit and meaning; None if the number is not recorded as part of this message.
+    """
+
+    name: str
+    field: str
+    recorded: Recorded | None
+
+
+def numbers_of(message: type[tuple[Any, ...]]) -> tuple[Number, ...]:
+    """Numbers of a message, in the order of its fields.
+
+    Args:
+        message: A message class. Fields of type float, int or bool hold one number; `PerWheel` holds four. Fields of
+            other types, such as messages within the message, hold none.
+    """
+    numbers = []
+    for field, hint in get_type_hints(message, include_extras=True).items():
+        recorded = next((about for about in getattr(hint, "__metadata__", ()) if isinstance(about, Recorded)), None)
+        kind = hint.__origin__ if hasattr(hint, "__metadata__") else hint
+        if kind in (float, int, bool):
+            numbers.append(Number(field, field, recorded))
+        elif kind == PerWheel:
+            for corner, place in CORNERS_IN_WORDS.items():
+                of_wheel = recorded and recorded._replace(meaning=f"{recorded.meaning}, {place}")
+                numbers.append(Number(f"{corner}_{field}", field, of_wheel))
+    return tuple(numbers)
+
+
+def widths_of(message: type[tuple[Any, ...]]) -> tuple[int, ...]:
+    """How many numbers each field of a message holds; see `numbers_of`."""
+    fields = [number.field for number in numbers_of(message)]
+    return tuple(fields.count(field) for field in get_type_hints(message))
+
+
 class WheelTorques(NamedTuple):
-    """Torques of the wheels, given one by one; order of `CORNERS`.
+    """Torques of the individual wheels, order of `CORNERS`.
 
     Attributes:
         drive_Nm: Drive torques, forward positive [Nm].
         brake_Nm: Brake torques, against the rotation [Nm].
     """
 
-    drive_Nm: tuple[float, float, float, float]
-    brake_Nm: tuple[float, float, float, float]
+    drive_Nm: PerWheel
+    brake_Nm: PerWheel
 
 
 class Setpoint(NamedTuple):
-    """What the manoeuvre asks of the driver at one instant.
+    """Demand of the manoeuvre on the driver at one instant.
 
     Attributes:
-        steering_wheel_demand_rad: Steering wheel angle asked for [rad], left positive.
+        steering_wheel_demand_rad: Steering wheel angle [rad], left positive.
         speed_demand_mps: Speed to hold [m/s].
         brake_pedal: Brake pedal position, 0 to 1.
-        hold_speed: Whether the drive holds `speed_demand_mps`; where False the car coasts.
-        curvature_demand_1pm: Curvature to drive [1/m], left positive; where given, the driver finds the
-            steering wheel angle.
-        rack_demand_m: Rack position asked for [m], positive steers left; where given, it stands for the steering wheel
+        hold_speed: Whether the drive holds `speed_demand_mps`; otherwise the car coasts.
+        curvature_demand_1pm: Curvature to drive [1/m], left positive. If given, the driver finds the steering wheel
             angle.
-        wheel_torques: Torques of the wheels; where given, they stand for drive and brake.
-        path: Path of the centre of gravity to follow; where given, the driver finds the steering wheel angle.
+        rack_demand_m: Rack position [m], positive steers left. If given, it replaces the steering wheel angle.
+        wheel_torques: Torques of the wheels. If given, they replace drive and brake.
+        path: Path for the centre of gravity. If given, the driver finds the steering wheel angle.
         parking_brake: Parking brake, 0 released to 1 fully applied.
     """
 
@@ -84,33 +146,39 @@ class Setpoint(NamedTuple):
 
 
 class DriverCommand(NamedTuple):
-    """What the driver does.
+    """Command of the driver.
 
     Attributes:
-        steering_wheel_demand_rad: Steering wheel angle demanded [rad], left positive.
-        drive_torque_demand_Nm: Torque at the driven wheels together [Nm]; negative is engine braking.
+        steering_wheel_demand_rad: Steering wheel angle [rad], left positive.
+        drive_torque_demand_Nm: Torque of all driven wheels together [Nm]; negative is engine braking.
         brake_pedal: Brake pedal position, 0 to 1.
-        saturated: Whether the lock of the steering or a limit of the engine is active.
-        wheel_torques: Torques of the wheels; where given, they stand for drive and brake.
-        gear: 1 forward; -1 reverse: the engine then drives backwards and brakes forwards; 0 with the clutch open,
-            whatever torque is demanded.
-        front_steer_demand_rad: Steering wheel angle demanded, divided by the overall steering ratio: the angle at the
-            road wheel [rad]. A driver of one's own leaves it out; the simulation fills it in.
+        saturated: Whether the steering lock or a limit of the engine is active.
+        wheel_torques: Torques of the wheels. If given, they replace drive and brake.
+        gear: 1 forward; -1 reverse, in which the engine drives backwards and brakes forwards; 0 with the clutch open,
+            which transmits no torque.
+        front_steer_demand_rad: Steering wheel angle divided by the overall steering ratio: the angle at the road
+            wheels [rad]. Your own driver leaves it out; the simulation fills it in.
         parking_brake: Parking brake, 0 released to 1 fully applied.
     """
 
-    steering_wheel_demand_rad: float = 0.0
-    drive_torque_demand_Nm: float = 0.0
-    brake_pedal: float = 0.0
-    saturated: bool = False
+    steering_wheel_demand_rad: float = 0.0  # recorded as an input of the engine
+    drive_torque_demand_Nm: Annotated[float, Recorded("Nm", "drive torque demand, all wheels together")] = 0.0
+    brake_pedal: Annotated[float, Recorded("", "brake pedal position, 0 to 1")] = 0.0
+    saturated: Annotated[
+        bool, Recorded("", "1 if the steering is at its lock or the engine at its limit", acts=False)
+    ] = False
     wheel_torques: WheelTorques | None = None
     gear: int = 1
-    front_steer_demand_rad: float = math.nan
-    parking_brake: float = 0.0
+    front_steer_demand_rad: Annotated[
+        float, Recorded("rad", "driver's steering demand at the road wheels", acts=False)
+    ] = math.nan
+    parking_brake: Annotated[float, Recorded("", "parking brake, 0 to 1")] = 0.0
 
 
 class Measurement(NamedTuple):
-    """What the sensors of a real car deliver, and nothing else.
+    """Signals of the sensors of a real car.
+
+    The field of a sensor has the name of the sensor in a vehicle file, followed by the unit.
 
     Attributes:
         time_s: Time of the measurement [s].
@@ -120,29 +188,29 @@ class Measurement(NamedTuple):
         ax_mps2: Longitudinal acceleration [m/s2].
         steering_wheel_rad: Steering wheel angle [rad], left positive.
         rear_steer_rad: Angle of the rear steering actuators, mean of both [rad], left positive.
-        superposition_rad: Angle added by the front superposition, at the road wheel [rad].
+        superposition_rad: Angle added by the front superposition, at the road wheels [rad].
         wheel_speed_radps: Rotational speeds of the four wheels [rad/s], order of `CORNERS`.
-        brake_pressure_Pa: Pressures in the four wheel brakes [Pa], same order.
+        brake_pressure_Pa: Pressures in the four wheel brakes [Pa], order of `CORNERS`.
     """
 
     time_s: float
-    speed_mps: float
-    yaw_rate_radps: float
-    ay_mps2: float
-    ax_mps2: float
-    steering_wheel_rad: float
-    rear_steer_rad: float
-    superposition_rad: float
-    wheel_speed_radps: tuple[float, float, float, float]
-    brake_pressure_Pa: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    speed_mps: Annotated[float, Recorded("m/s", "longitudinal speed")]
+    yaw_rate_radps: Annotated[float, Recorded("rad/s", "yaw rate")]
+    ay_mps2: Annotated[float, Recorded("m/s2", "lateral acceleration")]
+    ax_mps2: Annotated[float, Recorded("m/s2", "longitudinal acceleration")]
+    steering_wheel_rad: Annotated[float, Recorded("rad", "steering wheel angle")]
+    rear_steer_rad: Annotated[float, Recorded("rad", "position of the rear steering actuators")]
+    superposition_rad: Annotated[float, Recorded("rad", "position of the front superposition, at the road wheels")]
+    wheel_speed_radps: Annotated[PerWheel, Recorded("rad/s", "wheel speed")]
+    brake_pressure_Pa: Annotated[PerWheel, Recorded("Pa", "brake pressure")] = (0.0, 0.0, 0.0, 0.0)
 
 
 class Motion(NamedTuple):
-    """Where the car is and how it moves over the ground: what the driver sees and feels; no controller gets it.
+    """Position and motion of the car over the ground, as the driver sees and feels them; no controller gets it.
 
     Attributes:
         x_m: Position of the centre of gravity, world x [m].
-        y_m: The same, world y [m].
+        y_m: Position of the centre of gravity, world y [m].
         yaw_rad: Heading [rad], left positive, within half a turn.
         speed_mps: Speed along the heading [m/s].
         lateral_speed_mps: Speed across the heading, left positive [m/s].
@@ -158,33 +226,33 @@ class Motion(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """What an estimator makes of what the sensors say: the motion of the centre of gravity over the road.
+    """Motion of the centre of gravity over the road as an estimator derives it from the sensors.
 
-    A standard deviation is that of the error as the estimator itself expects it.
+    A standard deviation is that of the error which the estimator itself expects.
 
     Attributes:
         speed_mps: Speed along the car's longitudinal axis [m/s].
-        lateral_speed_mps: Speed across it, left positive [m/s].
+        lateral_speed_mps: Speed across the longitudinal axis, left positive [m/s].
         sideslip_rad: Sideslip angle [rad], left positive; 0 at walking speed.
-        yaw_rate_radps: Yaw rate [rad/s], left positive, without the sensor's offset and age.
-        friction: Friction of the road relative to that of the tyres' files.
+        yaw_rate_radps: Yaw rate [rad/s], left positive, without the sensor's offset and delay.
+        friction: Friction of the road relative to the friction in the tyre files.
         speed_std_mps: Standard deviation of the speed [m/s].
-        lateral_speed_std_mps: Of the lateral speed [m/s].
-        sideslip_std_rad: Of the sideslip angle [rad].
-        yaw_rate_std_radps: Of the yaw rate [rad/s].
-        friction_std: Of the friction.
+        lateral_speed_std_mps: Standard deviation of the lateral speed [m/s].
+        sideslip_std_rad: Standard deviation of the sideslip angle [rad].
+        yaw_rate_std_radps: Standard deviation of the yaw rate [rad/s].
+        friction_std: Standard deviation of the friction.
     """
 
-    speed_mps: float
-    lateral_speed_mps: float
-    sideslip_rad: float
-    yaw_rate_radps: float
-    friction: float
-    speed_std_mps: float
-    lateral_speed_std_mps: float
-    sideslip_std_rad: float
-    yaw_rate_std_radps: float
-    friction_std: float
+    speed_mps: Annotated[float, Recorded("m/s", "speed along the car")]
+    lateral_speed_mps: Annotated[float, Recorded("m/s", "speed across the car, left positive")]
+    sideslip_rad: Annotated[float, Recorded("rad", "sideslip angle")]
+    yaw_rate_radps: Annotated[float, Recorded("rad/s", "yaw rate")]
+    friction: Annotated[float, Recorded("", "friction of the road relative to the friction in the tyre files")]
+    speed_std_mps: Annotated[float, Recorded("m/s", "standard deviation of the speed")]
+    lateral_speed_std_mps: Annotated[float, Recorded("m/s", "standard deviation of the lateral speed")]
+    sideslip_std_rad: Annotated[float, Recorded("rad", "standard deviation of the sideslip angle")]
+    yaw_rate_std_radps: Annotated[float, Recorded("rad/s", "standard deviation of the yaw rate")]
+    friction_std: Annotated[float, Recorded("", "standard deviation of the friction")]
 
 
 NO_BRAKES: Final = (0.0, 0.0, 0.0, 0.0)
@@ -192,41 +260,49 @@ NO_BRAKES: Final = (0.0, 0.0, 0.0, 0.0)
 
 
 class ActuatorCommand(NamedTuple):
-    """What a controller asks of the actuators, with its intermediate results for the recording.
+    """Command of a controller to the actuators, with intermediate results for the recording.
 
     Attributes:
-        rear_steer_demand_rad: Rear wheel angle demanded [rad], left positive.
+        rear_steer_demand_rad: Rear wheel angle [rad], left positive.
         superposition_demand_rad: Angle to add at the front road wheels [rad], left positive.
-        yaw_rate_desired_radps: Yaw rate that the controller steers for [rad/s].
-        prediction_rad: Feed-forward part [rad].
+        yaw_rate_desired_radps: Yaw rate that the controller aims for [rad/s].
+        prediction_rad: Feedforward part [rad].
         correction_rad: Feedback part [rad].
         saturated: Whether a limit of the controller is active.
-        brake_torque_demand_Nm: Brake torques of the wheels beside the driver's, against the rotation, order of
-            `CORNERS` [Nm]; below 0 they release what the pedal asks for.
-        drive_torque_change_Nm: Change of the torque that the driver demands at the driven wheels together, forward
-            positive [Nm].
-        estimate: What the controller takes the motion of the car for, where it uses an estimator.
-        side_difference_Pa: Brake pressure by which one side may exceed the other beyond what the anti-lock system
-            leaves to the driver, since the controller steers against the moment [Pa].
+        brake_torque_demand_Nm: Brake torques of the wheels in addition to the driver's, against the rotation, order of
+            `CORNERS` [Nm]; negative torques release what the pedal applies.
+        drive_torque_change_Nm: Change of the driver's torque demand, all driven wheels together, forward positive
+            [Nm].
+        estimate: Estimated motion of the car, if the controller uses an estimator.
+        side_difference_Pa: Additional difference of the brake pressure between left and right that the anti-lock
+            system may allow, because the controller steers against the yaw moment [Pa].
     """
 
-    rear_steer_demand_rad: float = 0.0
-    superposition_demand_rad: float = 0.0
-    yaw_rate_desired_radps: float = 0.0
-    prediction_rad: float = 0.0
-    correction_rad: float = 0.0
-    saturated: bool = False
-    brake_torque_demand_Nm: tuple[float, float, float, float] = NO_BRAKES
-    drive_torque_change_Nm: float = 0.0
+    rear_steer_demand_rad: Annotated[float, Recorded("rad", "rear angle demand of the controller")] = 0.0
+    superposition_demand_rad: Annotated[
+        float, Recorded("rad", "angle that the controller adds at the front wheels")
+    ] = 0.0
+    yaw_rate_desired_radps: Annotated[float, Recorded("rad/s", "yaw rate that the controller aims for", acts=False)] = (
+        0.0
+    )
+    prediction_rad: Annotated[float, Recorded("rad", "feedforward part of the controller's angle", acts=False)] = 0.0
+    correction_rad: Annotated[float, Recorded("rad", "feedback part of the controller's angle", acts=False)] = 0.0
+    saturated: Annotated[bool, Recorded("", "1 if a limit of the controller is active", acts=False)] = False
+    brake_torque_demand_Nm: Annotated[PerWheel, Recorded("Nm", "brake torque that the controller adds")] = NO_BRAKES
+    drive_torque_change_Nm: Annotated[float, Recorded("Nm", "change of the drive torque demand by the controller")] = (
+        0.0
+    )
     estimate: Estimate | None = None
-    side_difference_Pa: float = 0.0
+    side_difference_Pa: Annotated[
+        float, Recorded("Pa", "additional brake pressure difference between the sides that the controller allows")
+    ] = 0.0
 
 
 def steering(
     rear_rad: float, front_rad: float, desired_radps: float, prediction_rad: float, correction_rad: float, limited: bool
 ) -> ActuatorCommand:
-    """An `ActuatorCommand` of its first six members, by which a controller steers and does nothing else."""
-    return made(
+    """Return the `ActuatorCommand` of a controller that only steers, from the first six fields."""
+    return new_message(
         ActuatorCommand,
         (rear_rad, front_rad, desired_radps, prediction_rad, correction_rad, limited, NO_BRAKES, 0.0, None, 0.0),
     )

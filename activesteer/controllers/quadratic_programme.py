@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -25,12 +26,11 @@ def solver() -> Solve:
         import daqp  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise not_installed(ControllerError, "this controller", "daqp", "control") from error
-    solve_once: Any = daqp.solve
+    return functools.partial(_solve, daqp.solve)
 
-    def solve(h: Array, f: Array, a: Array, lower: Array, upper: Array) -> Array:
-        x, _, flag, _ = solve_once(h, f, a, upper, lower, np.zeros(len(upper), dtype=np.int32))
-        if flag <= 0:
-            raise ControllerError(f"DAQP finds no solution (exit flag {flag})")
-        return x
 
-    return solve
+def _solve(solve_once: Any, h: Array, f: Array, a: Array, lower: Array, upper: Array) -> Array:
+    x, _, flag, _ = solve_once(h, f, a, upper, lower, np.zeros(len(upper), dtype=np.int32))
+    if flag <= 0:
+        raise ControllerError(f"DAQP finds no solution (exit flag {flag})")
+    return x

@@ -14,7 +14,7 @@ from activesteer.driver.human import HumanDriver
 from activesteer.errors import DriverError, shown
 from activesteer.plugins import Kind, Plugin, find
 from activesteer.resources import list_drivers
-from activesteer.signals import DriverCommand, WheelTorques, made
+from activesteer.signals import DriverCommand, WheelTorques, new_message
 
 _MAX_ANGLE_RAD: Final = 50.0
 """Largest angle of a command; a larger one is taken for a mistake, such as degrees [rad]."""
@@ -35,7 +35,7 @@ class _DriverKind(Kind):
             raise self.fail(name, f"{said} wheel_torques = {shown(torques)}; {needed}", torques)
         angle = command.steering_wheel_demand_rad / setup.steering_ratio
         if math.isnan(front):
-            return made(DriverCommand, (*command[:_FRONT_STEER], angle, *command[_FRONT_STEER + 1 :]))
+            return new_message(DriverCommand, (*command[:_FRONT_STEER], angle, *command[_FRONT_STEER + 1 :]))
         if not math.isclose(front, angle, rel_tol=1e-9, abs_tol=1e-12):
             what = f"the steering wheel angle over the steering ratio is {angle:g}; leave it out"
             raise self.fail(name, f"{said} front_steer_demand_rad = {front:g}, but {what}", front)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from activesteer.driver.base import DriverSetup
 from activesteer.driver.speed_hold import SpeedHold
 from activesteer.errors import ManeuverError
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, made
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, new_message
 
 
 class OpenLoopDriver:
@@ -73,7 +73,7 @@ class OpenLoopDriver:
         else:
             self.speed_hold.reset()
             torque, gear = 0.0, 0
-        return made(DriverCommand, (
+        return new_message(DriverCommand, (
             angle, torque, setpoint.brake_pedal, saturated, setpoint.wheel_torques, gear,
             angle / self.steering_ratio, setpoint.parking_brake,
         ))  # fmt: skip

@@ -10,7 +10,7 @@ from activesteer.estimation.advance import advance
 from activesteer.estimation.parameters import EstimatorParameters
 from activesteer.estimation.records import MEMORY, SAID, known_of
 from activesteer.estimation.setup import EstimatorSetup
-from activesteer.signals import Estimate, Measurement, made
+from activesteer.signals import Estimate, Measurement, new_message
 
 _pack_into = struct.Struct(f"{len(SAID)}d").pack_into
 
@@ -57,11 +57,13 @@ class Estimator:
         _, _, yaw_rate, ay, ax, steering_wheel, rear, superposition, spins, pressures = measurement
         _pack_into(self._row, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
         advance(self._known, self._tyres, self._memory, self._said, self._line)
-        return made(Estimate, self._estimate.tolist())
+        return new_message(Estimate, self._estimate.tolist())
 
-    def __deepcopy__(self, memo: dict[int, object]) -> Estimator:
-        other = object.__new__(Estimator)
-        other._known, other._tyres = self._known, self._tyres
-        other._memory, other._said, other._line = self._memory.copy(), self._said.copy(), self._line.copy()
-        other._row, other._estimate = other._said.data, other._memory["estimate"][0]
-        return other
+    def __getstate__(self) -> dict[str, object]:
+        """The arrays, without the views of them."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("_row", "_estimate")}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Take over the arrays of a copy, and look at them."""
+        self.__dict__.update(state)
+        self._row, self._estimate = self._said.data, self._memory["estimate"][0]

@@ -13,7 +13,7 @@ from activesteer.errors import ManeuverError
 from activesteer.faults import Fault
 from activesteer.road.course import Course
 from activesteer.road.road import Road
-from activesteer.signals import Setpoint, made
+from activesteer.signals import Setpoint, new_message
 
 Speed = Annotated[float, Range(-20.0, 100.0)]
 Side = Literal["left", "right"]
@@ -108,7 +108,7 @@ class Maneuver(ABC):
             steering_wheel_rad: Steering wheel angle, left positive [rad].
             hold_speed: Whether the drive holds the speed; otherwise there is no drive torque.
         """
-        return made(Setpoint, (steering_wheel_rad, self.speed_mps, 0.0, hold_speed, None, None, None, None, 0.0))
+        return new_message(Setpoint, (steering_wheel_rad, self.speed_mps, 0.0, hold_speed, None, None, None, None, 0.0))
 
 
 @dataclass(frozen=True)

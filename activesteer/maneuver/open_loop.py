@@ -20,7 +20,7 @@ from activesteer.maneuver.open_loop_tables import (
     check_table,
     with_tables,
 )
-from activesteer.signals import Setpoint, WheelTorques, made
+from activesteer.signals import Setpoint, WheelTorques, new_message
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +104,7 @@ class OpenLoop(Maneuver):
         parking = self.parking_brake
         applied = 0.0 if parking is None else _interpolate(time_s, parking.time_s, parking.applied)
         drives = self.drive == "hold_speed" and pedal == 0.0 and applied == 0.0
-        return made(Setpoint, (angle, speed, pedal, drives, None, rack, None, None, applied))
+        return new_message(Setpoint, (angle, speed, pedal, drives, None, rack, None, None, applied))
 
     def settling_setpoint(self) -> Setpoint:
         """Setpoint of the start, but without wheel torques: the car drives at its speed."""

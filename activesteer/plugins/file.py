@@ -15,6 +15,8 @@ from activesteer.files import is_file, read_bytes, shown_path, user_path, why_no
 from activesteer.plugins.kind import Kind, in_one_line
 
 _FORM: Final = re.compile(r"(?P<path>.+?):(?P<name>[^:?]+)(?:\?(?P<parameters>.*))?", re.DOTALL)
+USER_MODULE: Final = "activesteer_user_"
+"""Beginning of the names of modules loaded from a user's file."""
 _PARAMETER: Final = re.compile(r"([A-Za-z_]\w*)=(.*)", re.DOTALL)
 
 
@@ -62,7 +64,7 @@ def from_file(text: str, kind: Kind) -> FromFile:
     path = user_path(form["path"], kind.error)
     if not is_file(path):
         raise fail(f"there is no file {shown_path(path)}: it {why_no_file(path)}")
-    name = f"activesteer_user_{path.stem}"
+    name = f"{USER_MODULE}{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise fail(f"{shown_path(path)} is no Python file")

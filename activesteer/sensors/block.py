@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -11,31 +12,19 @@ from numpy.typing import NDArray
 
 from activesteer.compilation import inlined
 from activesteer.conventions import CORNERS
+from activesteer.native_messages import load_numbers, store_numbers
 from activesteer.sensors.parameters import RANDOM, Sensors
 from activesteer.sensors.sensor_kinds import Sensor
 from activesteer.sensors.signal_chain import CHAIN, FILTERED, HELD, LINE, PHASE, SPEED, passed_on
-from activesteer.signals import Measurement
+from activesteer.signals import Measurement, numbers_of, widths_of
 
-_SCALARS: Final = ("yaw_rate", "ay", "ax", "steering_wheel", "rear_steer", "superposition")
-"""Sensors in the order of the members of `Measurement` behind time and speed; those of the wheels and of their brakes
-follow."""
-_N_SCALARS: Final = len(_SCALARS)
-_N_WHEELS: Final = len(CORNERS)
-MEASURED: Final = (
-    ("speed_mps", "m/s", "longitudinal speed"),
-    ("yaw_rate_radps", "rad/s", "yaw rate"),
-    ("ay_mps2", "m/s2", "lateral acceleration"),
-    ("ax_mps2", "m/s2", "longitudinal acceleration"),
-    ("steering_wheel_rad", "rad", "steering wheel angle"),
-    ("rear_steer_rad", "rad", "position of the rear steering actuators"),
-    ("superposition_rad", "rad", "position of the front superposition, at the road wheels,"),
-    *((f"{corner}_wheel_speed_radps", "rad/s", f"rotational speed of the wheel {corner}") for corner in CORNERS),
-    *((f"{corner}_brake_pressure_Pa", "Pa", f"brake pressure of the wheel {corner}") for corner in CORNERS),
-)
-"""Name, unit and meaning of the outputs, in their order: the members of `Measurement` without its time."""
-_NAMES: Final = [name for name, _, _ in MEASURED]
+MEASURED: Final = numbers_of(Measurement)[1:]
+"""Outputs, in their order: the numbers of a `Measurement` without its time."""
+_N_OUTPUTS: Final = len(MEASURED)
+_NAMES: Final = [number.name for number in MEASURED]
 AX, WHEEL_SPEEDS = _NAMES.index("ax_mps2"), _NAMES.index("fl_wheel_speed_radps")
 """Places of the longitudinal acceleration and of the first wheel's speed among the outputs."""
+_N_WHEELS: Final = len(CORNERS)
 _MINUTE_S: Final = 60.0
 
 
@@ -55,9 +44,8 @@ class SensorBlock:
             sensors: What the vehicle file says.
             timestep_s: Step of the simulation [s].
         """
-        every = [
-            sensors.all()[name] for name in (*_SCALARS, *["wheel_speed"] * _N_WHEELS, *["brake_pressure"] * _N_WHEELS)
-        ]
+        # The speed comes from the wheels; every other number has the sensor that its field is named after.
+        every = [sensors.all()[number.field.rpartition("_")[0]] for number in MEASURED[1:]]
         self.chains = np.zeros(len(every), CHAIN)
         place = len(MEASURED)
         for index, sensor in enumerate(every):
@@ -82,8 +70,8 @@ class SensorBlock:
 
     def say(self, measurement: Measurement) -> None:
         """Has them say something else until the next step, as where a fault acts on what they say."""
-        *scalars, wheel_speeds_radps, brake_pressures_Pa = measurement[1:]
-        self.outputs[:] = (*scalars, *wheel_speeds_radps, *brake_pressures_Pa)
+        parts = (part if isinstance(part, tuple) else (part,) for part in measurement[1:])
+        self.outputs[:] = [number for part in parts for number in part]
 
     def measurement(self, time_s: float) -> Measurement:
         """What they now say.
@@ -91,9 +79,9 @@ class SensorBlock:
         Args:
             time_s: Time of the measurement [s].
         """
-        values = self.outputs.tolist()
-        speeds, pressures = tuple(values[-2 * _N_WHEELS : -_N_WHEELS]), tuple(values[-_N_WHEELS:])
-        return Measurement._make((time_s, *values[: -2 * _N_WHEELS], speeds, pressures))
+        values = iter(self.outputs.tolist())
+        parts = (next(values) if width == 1 else tuple(islice(values, width)) for width in widths_of(Measurement)[1:])
+        return Measurement(time_s, *parts)
 
 
 def speed_radii(front_fraction: float, rolling_radii_m: Sequence[float]) -> tuple[float, ...]:
@@ -150,20 +138,14 @@ def measured(chains, memory, wheel_radii_m, timestep_s, truth):
     Returns:
         The members of `Measurement`; they stand in the outputs too.
     """
-    time_s, speed, yaw_rate, ay, ax, steering_wheel, rear_steer, superposition, wheels, pressures = truth
-    for index, value in enumerate((yaw_rate, ay, ax, steering_wheel, rear_steer, superposition)):
-        memory[1 + index] = passed_on(chains[index], memory, value, timestep_s)
+    outputs = truth[1:]
+    store_numbers(memory.ctypes.data, outputs)
+    for index in range(1, _N_OUTPUTS):
+        memory[index] = passed_on(chains[index - 1], memory, memory[index], timestep_s)
     from_wheels, counted = 0.0, 0.0
     for wheel in range(_N_WHEELS):
-        index = _N_SCALARS + wheel
-        spin = passed_on(chains[index], memory, wheels[wheel], timestep_s)
-        memory[1 + index] = spin
-        from_wheels += wheel_radii_m[wheel] * spin
+        from_wheels += wheel_radii_m[wheel] * memory[WHEEL_SPEEDS + wheel]
         counted += wheel_radii_m[wheel]
-        index += _N_WHEELS
-        memory[1 + index] = passed_on(chains[index], memory, pressures[wheel], timestep_s)
-    memory[0] = from_wheels if counted > 0.0 else speed
-    return (
-        time_s, memory[0], memory[1], memory[2], memory[3], memory[4], memory[5], memory[6],
-        (memory[7], memory[8], memory[9], memory[10]), (memory[11], memory[12], memory[13], memory[14]),
-    )  # fmt: skip
+    if counted > 0.0:
+        memory[0] = from_wheels
+    return truth[:1] + load_numbers(memory.ctypes.data, outputs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import threading
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -12,20 +13,22 @@ from numpy.typing import NDArray
 from activesteer.controllers import Controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import Driver
+from activesteer.errors import ManeuverError, ParameterError, shown
 from activesteer.faults import Fault
 from activesteer.scenario import Scenario
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
-from activesteer.simulation.control_unit import control_unit, told_by_sensor
+from activesteer.simulation.control_unit import ControlUnit, control_unit, told_by_sensor
 from activesteer.simulation.recorder import Recorder
-from activesteer.vehicle import engine_warnings_held
+from activesteer.vehicle import Uncopyable, engine_warnings_held
 from activesteer.vehicle.faults import Faults
 
 
 class LoopState(NamedTuple):
-    """Everything that a loop continues from."""
+    """State from which a loop continues bit-identically."""
 
     engine: NDArray[np.float64]
-    faults: list[Any]
+    faults: tuple[Fault, ...]
+    fault_memories: list[Any]
     driver: Any
     controller: Any
     measurement: Measurement
@@ -34,21 +37,46 @@ class LoopState(NamedTuple):
     step: int
 
 
-class ClosedLoop:
+class OneAtATime:
+    """A context that a second caller cannot enter while the first is inside."""
+
+    def __init__(self) -> None:
+        """Nobody is inside."""
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        """Enter, or refuse.
+
+        Raises:
+            ManeuverError: another thread, or the same one further up, is inside.
+        """
+        if not self._lock.acquire(False):
+            raise ManeuverError(
+                "this simulation is already being driven, by another thread or by the caller of its own block; use a "
+                "copy of it (Simulation.copy) for each thread"
+            )
+
+    def __exit__(self, *_: object) -> None:
+        """Leave."""
+        self._lock.release()
+
+
+class ClosedLoop(Uncopyable):
     """A manoeuvre, a driver, a controller and a car.
 
     Attributes:
-        maneuver: What is asked of the driver.
-        driver: Who drives.
-        controller: The active steering.
+        maneuver: Source of the setpoints.
+        driver: The driver.
+        controller: The active steering, inside a control unit if it needs one.
         vehicle: The car.
-        faults: What goes wrong with its actuators and sensors; see `fail`.
-        driver_setup: What a driver may know of the car.
-        controller_setup: What a controller may know of it.
-        measurement: What the sensors say.
-        motion: Where the car is and how it moves.
-        commands: What driver and controller last asked for.
-        step_count: How many steps of the manoeuvre were made.
+        faults: Faults of its actuators and sensors; see `fail`.
+        driver_setup: Properties of the car that a driver may know.
+        controller_setup: Properties of the car that a controller may know.
+        measurement: Present signals of the sensors.
+        motion: Present position and motion of the car.
+        commands: Last commands of driver and controller.
+        step_count: Steps of the manoeuvre driven so far.
+        in_use: Context of whoever drives the loop.
     """
 
     def __init__(
@@ -57,7 +85,7 @@ class ClosedLoop:
         controller: Any = "none",
         timestep_s: float = DEFAULT_TIMESTEP_S,
     ) -> None:
-        """Builds the blocks and lets the car settle at the speed of the manoeuvre, at the origin of the road.
+        """Build the blocks and let the car settle at the speed of the manoeuvre, at the origin of the road.
 
         Args:
             scenario: Manoeuvre, car and driver.
@@ -66,8 +94,8 @@ class ClosedLoop:
 
         Raises:
             ModelError: the car cannot be built.
-            ControllerError: the controller cannot be made, or returns nonsense while the car settles.
-            DriverError: the driver, likewise.
+            ControllerError: the controller cannot be created, or fails while the car settles.
+            DriverError: the driver cannot be created, or fails while the car settles.
             SimulationDiverged: the car does not settle.
         """
         self.maneuver = maneuver = scenario.maneuver
@@ -76,12 +104,13 @@ class ClosedLoop:
         self.driver_setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
         self.driver: Driver = scenario.driver.plugin.make(self.driver_setup)
         self.controller_setup, self.controller = control_unit(controller, scenario, vehicle)
+        self.in_use = OneAtATime()
         settling, steps = maneuver.settling_setpoint(), round(maneuver.settle_s / timestep_s)
         self.measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
         self.motion, self.step_count = vehicle.motion(), 0
         self.commands = DriverCommand(front_steer_demand_rad=0.0), ActuatorCommand()
-        self.faults = Faults(vehicle)
-        self._advance(lambda _: settling, self.driver, self.controller, steps, None)
+        self.faults, self._fault_list = Faults(vehicle), ()
+        self._drive(lambda _: settling, self.driver, self.controller, steps, None)
         if (estimate := self.commands[1].estimate) is not None:
             vehicle.record_estimate(estimate)
         vehicle.rebase()
@@ -95,16 +124,16 @@ class ClosedLoop:
         return round(self.maneuver.duration_s / self.vehicle.timestep_s)
 
     def fail(self, faults: Sequence[Fault]) -> None:
-        """From now on these faults act, each at its time, and no others.
+        """Replace the faults by these, each of which acts at its time.
 
         Raises:
-            ManeuverError: one is of a part that this car does not have.
+            ManeuverError: a fault concerns a part that this car does not have.
         """
         self.faults.release()
-        self.faults = Faults(self.vehicle, faults)
+        self.faults, self._fault_list = Faults(self.vehicle, faults), tuple(faults)
 
     def run(self, recorder: Recorder | None = None) -> None:
-        """Drives the manoeuvre to its end; see `advance`."""
+        """Drive the manoeuvre to its end; see `advance`."""
         self.advance(self.steps - self.step_count, recorder)
 
     def advance(
@@ -115,22 +144,30 @@ class ClosedLoop:
         driver: Driver | None = None,
         controller: Controller | None = None,
     ) -> None:
-        """Drives on for some steps.
+        """Drive some steps.
 
         Args:
-            steps: How many.
-            recorder: Where every step is recorded.
-            driver: Who drives in these steps; the loop's own where not given.
-            controller: What steers in them, likewise.
+            steps: Number of steps.
+            recorder: Recorder of every step.
+            driver: Driver of these steps; by default the loop's own.
+            controller: Controller of these steps; by default the loop's own.
 
         Raises:
-            ControllerError: the controller returned nonsense.
-            DriverError: the driver did.
+            ControllerError: the controller failed.
+            DriverError: the driver failed.
+            ManeuverError: the loop is already being driven.
             SimulationDiverged: the state became non-finite, or the engine raised a warning.
         """
-        self._advance(self.maneuver.setpoint, driver or self.driver, controller or self.controller, steps, recorder)
+        with self.in_use:
+            self.drive(steps, recorder, driver, controller)
 
-    def _advance(
+    def drive(
+        self, steps: int, recorder: Recorder | None, driver: Driver | None, controller: Controller | None
+    ) -> None:
+        """Drive some steps inside `in_use`; see `advance`."""
+        self._drive(self.maneuver.setpoint, driver or self.driver, controller or self.controller, steps, recorder)
+
+    def _drive(
         self,
         setpoint_at: Callable[[float], Setpoint],
         driver: Driver,
@@ -138,27 +175,33 @@ class ClosedLoop:
         steps: int,
         recorder: Recorder | None,
     ) -> None:
-        vehicle, (command, asked) = self.vehicle, self.commands
-        timestep_s, measurement, motion = vehicle.timestep_s, self.measurement, self.motion
-        tape_address = 0 if recorder is None else recorder.tape_address
+        vehicle, timestep_s = self.vehicle, self.vehicle.timestep_s
         vehicle.follow_model()
         with engine_warnings_held():
-            for first, last, step_car, angle_fails in self.faults.stretches(self.step_count, self.step_count + steps):
-                stretch = range(first, last)
-                unit = told_by_sensor(controller, vehicle.parameters.steering.ratio) if angle_fails else controller
-                for block in (stretch,) if recorder is None else recorder.blocks(stretch):
-                    for step in block:
-                        setpoint = setpoint_at(step * timestep_s)
-                        command = driver.step(setpoint, measurement, motion)
-                        asked = unit.step(command, measurement)
-                        measurement, motion = step_car(command, asked, tape_address)
-        self.step_count, self.commands = self.step_count + steps, (command, asked)
-        self.measurement, self.motion = measurement, motion
+            (driver_command, actuator_command), measurement, motion = self.commands, self.measurement, self.motion
+            vehicle.record_on(None if recorder is None else recorder.tape)
+            try:
+                for first, last, step_car, angle_fails in self.faults.stretches(
+                    self.step_count, self.step_count + steps
+                ):
+                    stretch = range(first, last)
+                    unit = told_by_sensor(controller, vehicle.parameters.steering.ratio) if angle_fails else controller
+                    for block in (stretch,) if recorder is None else recorder.blocks(stretch):
+                        for step in block:
+                            setpoint = setpoint_at(step * timestep_s)
+                            driver_command = driver.step(setpoint, measurement, motion)
+                            actuator_command = unit.step(driver_command, measurement)
+                            measurement, motion = step_car(driver_command, actuator_command)
+            finally:
+                vehicle.record_on(None)
+            self.step_count, self.commands = self.step_count + steps, (driver_command, actuator_command)
+            self.measurement, self.motion = measurement, motion
 
     def save_state(self) -> LoopState:
-        """Everything that the loop continues from."""
+        """Return the state from which the loop continues bit-identically."""
         return LoopState(
             self.vehicle.save_state(),
+            self._fault_list,
             self.faults.save_state(),
             copy.deepcopy(self.driver),
             copy.deepcopy(self.controller),
@@ -169,9 +212,37 @@ class ClosedLoop:
         )
 
     def restore_state(self, state: LoopState) -> None:
-        """Goes back to a saved state; what follows is bit-identical to what followed then."""
+        """Go back to a saved state, from which the loop continues bit-identically.
+
+        Args:
+            state: A state of this loop, or of another one with the same inputs.
+
+        Raises:
+            ParameterError: `state` is something else.
+        """
+        if not isinstance(state, LoopState) or not _is_sound(state):
+            raise ParameterError(f"is {shown(state)}; a state of this loop is needed", key="state", value=state)
+        if state.faults != self._fault_list:
+            self.fail(state.faults)
         self.vehicle.restore_state(state.engine)
-        self.faults.restore_state(state.faults)
+        self.faults.restore_state(state.fault_memories)
         self.driver, self.controller = copy.deepcopy(state.driver), copy.deepcopy(state.controller)
+        if isinstance(self.controller, ControlUnit):
+            self.controller.read_truth_of(self.vehicle)
         self.measurement, self.motion = state.measurement, state.motion
         self.commands, self.step_count = state.commands, state.step
+
+
+def _is_sound(state: LoopState) -> bool:
+    """Whether the parts of a state are what they must be; the vehicle checks its own part."""
+    commands = state.commands if isinstance(state.commands, tuple) else ()
+    return (
+        isinstance(state.faults, tuple)
+        and all(isinstance(fault, Fault) for fault in state.faults)
+        and isinstance(state.fault_memories, list)
+        and all(callable(getattr(block, "step", None)) for block in (state.driver, state.controller))
+        and isinstance(state.measurement, Measurement)
+        and isinstance(state.motion, Motion)
+        and [type(command) for command in commands] == [DriverCommand, ActuatorCommand]
+        and isinstance(state.step, int)
+    )

@@ -1,8 +1,7 @@
-"""The control unit around a controller: its own rate, the bus behind it, and what it is told of the driver."""
+"""The control unit around a controller: sampling rate, delay of the bus, source of the driver's demand."""
 
 from __future__ import annotations
 
-import copy
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Final
@@ -11,7 +10,7 @@ from activesteer.controllers import Controller, ControllerParameters, Controller
 from activesteer.errors import ParameterError
 from activesteer.plugins import Plugin
 from activesteer.scenario import Scenario
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, made
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, new_message
 from activesteer.vehicle import Vehicle
 
 _STEERING_WHEEL: Final = DriverCommand._fields.index("steering_wheel_demand_rad")
@@ -19,7 +18,7 @@ _FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
 
 
 class ControlUnit:
-    """Calls a controller at its own rate; its command is held in between and comes out behind the delay of the bus.
+    """A controller that is called at its own rate, and whose held command arrives after the delay of the bus.
 
     Attributes:
         inner: The controller.
@@ -34,16 +33,16 @@ class ControlUnit:
         steering_ratio: float | None = None,
         truth: Callable[[], tuple[Measurement, Motion]] | None = None,
     ) -> None:
-        """Puts a controller on its rate and its bus.
+        """Connect a controller to its bus.
 
         Args:
             inner: The controller.
             every: Steps of the simulation between two calls.
-            delay: Steps that a command takes.
-            steering_ratio: Where given, the driver's demand is what the steering angle sensor says; by this ratio at
-                the road wheels.
-            truth: Where given, the controller gets what this says in place of the measurement, and the motion as a
-                third argument.
+            delay: Steps that a command takes to arrive.
+            steering_ratio: If given, the controller reads the driver's demand from the steering angle sensor; this
+                overall ratio converts it to the road wheels.
+            truth: If given, the controller gets this true measurement instead of the sensors' signals, and the motion
+                as a third argument.
         """
         self.inner = inner
         self._every, self._steps = every, 0
@@ -53,11 +52,11 @@ class ControlUnit:
         self._on_bus: deque[ActuatorCommand] = deque([self._held] * delay, maxlen=delay + 1)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """What reaches the actuators now.
+        """Return the command that reaches the actuators now.
 
         Args:
-            command: What the driver does.
-            measurement: What the sensors say.
+            command: Command of the driver.
+            measurement: Signals of the sensors.
         """
         if self._steps % self._every == 0:
             if self._truth is not None:
@@ -70,8 +69,17 @@ class ControlUnit:
 
     @property
     def uses_truth(self) -> bool:
-        """Whether the controller gets the truth in place of what sensors say."""
+        """Whether the controller gets the truth instead of the sensors' signals."""
         return self._truth is not None
+
+    def read_truth_of(self, vehicle: Vehicle) -> None:
+        """Read the truth, if the controller uses it, from this car."""
+        if self._truth is not None:
+            self._truth = vehicle.truth
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The state without the car; a copy gets its car by `read_truth_of`."""
+        return {**self.__dict__, "_truth": None if self._truth is None else _no_truth}
 
     def _seen(self, command: DriverCommand, measurement: Measurement) -> DriverCommand:
         if self._steering_ratio is None:
@@ -80,25 +88,25 @@ class ControlUnit:
         seen: list[Any] = [*command]
         seen[_STEERING_WHEEL] = angle = measurement.steering_wheel_rad
         seen[_FRONT_STEER] = angle / self._steering_ratio
-        return made(DriverCommand, seen)
+        return new_message(DriverCommand, seen)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> ControlUnit:
-        # The truth is the car's, which is no part of it.
-        other = copy.copy(self)
-        other.inner, other._on_bus = copy.deepcopy(self.inner, memo), self._on_bus.copy()
-        return other
+
+def _no_truth() -> tuple[Measurement, Motion]:
+    raise AssertionError("a copied control unit has no car yet")
 
 
 def interval_s(plugin: Plugin, parameters: ControllerParameters, timestep_s: float) -> float:
-    """Time between two calls of a controller: `controllers.interval_s`, else what it says itself, else the step [s].
+    """Time between two calls of a controller [s].
+
+    It is `controllers.interval_s` of the vehicle file, else the controller's attribute `interval_s`, else the step.
 
     Args:
-        plugin: The controller, which may have an attribute `interval_s`.
-        parameters: What the vehicle file says.
+        plugin: The controller.
+        parameters: The table [controllers] of the vehicle file.
         timestep_s: Step of the simulation [s].
 
     Raises:
-        ParameterError: it is no whole number of steps.
+        ParameterError: the interval is not a whole number of steps.
     """
     given = parameters.interval_s
     own = getattr(plugin.origin, "interval_s", None)
@@ -108,7 +116,7 @@ def interval_s(plugin: Plugin, parameters: ControllerParameters, timestep_s: flo
 
 
 def control_unit(controller: Any, scenario: Scenario, vehicle: Vehicle) -> tuple[ControllerSetup, Controller]:
-    """A controller as the loop calls it, every step.
+    """Create a controller as the loop calls it in every step.
 
     Args:
         controller: The controller; see `activesteer.plugins.find`.
@@ -116,30 +124,30 @@ def control_unit(controller: Any, scenario: Scenario, vehicle: Vehicle) -> tuple
         vehicle: The car in the engine.
 
     Returns:
-        What the controller may know of the car; and the controller, inside a control unit where it does not work in
-        every step, at once, and on the driver's own demand.
+        The properties of the car that the controller may know; and the controller. It is inside a control unit unless
+        it works in every step, without delay, and on the driver's own demand.
 
     Raises:
-        ParameterError: its interval or the delay of the bus is no whole number of steps.
-        ControllerError: there is no such controller, or it cannot be made.
+        ParameterError: its interval or the delay of the bus is not a whole number of steps.
+        ControllerError: there is no such controller, or it cannot be created.
     """
     plugin, car, timestep_s = find_controller(controller), scenario.car.config, vehicle.timestep_s
     setup = scenario.controller_setup(interval_s(plugin, car.controllers, timestep_s))
     every = round(setup.timestep_s / timestep_s)
     delay = _steps("controllers.bus_delay_s", car.controllers.bus_delay_s, timestep_s, 0)
     ratio = None if car.sensors.steering_wheel.is_ideal else car.steering.ratio
-    made = plugin.make(setup)
+    block = plugin.make(setup)
     if every == 1 and delay == 0 and ratio is None and not plugin.uses_truth:
-        return setup, made
+        return setup, block
     truth = vehicle.truth if plugin.uses_truth else None
-    return setup, ControlUnit(made, every, delay, steering_ratio=ratio, truth=truth)
+    return setup, ControlUnit(block, every, delay, steering_ratio=ratio, truth=truth)
 
 
 def told_by_sensor(controller: Any, steering_ratio: float) -> ControlUnit:
-    """A controller that knows the driver's demand through the steering angle sensor, whatever it did before.
+    """Wrap a controller so that it reads the driver's demand from the steering angle sensor.
 
     Args:
-        controller: As `control_unit` returns it; what it remembers stays in it.
+        controller: As `control_unit` returns it; it keeps its memory.
         steering_ratio: Overall steering ratio.
     """
     by_truth = isinstance(controller, ControlUnit) and controller.uses_truth
@@ -147,10 +155,10 @@ def told_by_sensor(controller: Any, steering_ratio: float) -> ControlUnit:
 
 
 def about(plugin: Plugin, parameters: ControllerParameters, timestep_s: float) -> dict[str, Any]:
-    """What a recording says of a controller beside its name: whether it uses the truth, and its own rate."""
-    found: dict[str, Any] = {"controller_uses_truth": True} if plugin.uses_truth else {}
+    """Metadata of a controller in a recording: whether it uses the truth, and its own interval."""
+    uses_truth = {"controller_uses_truth": True} if plugin.uses_truth else {}
     own_s = interval_s(plugin, parameters, timestep_s)
-    return found | ({"controller_interval_s": own_s} if own_s != timestep_s else {})
+    return uses_truth | ({"controller_interval_s": own_s} if own_s != timestep_s else {})
 
 
 def _steps(key: str, value: Any, timestep_s: float, minimum: int) -> int:
@@ -158,7 +166,7 @@ def _steps(key: str, value: Any, timestep_s: float, minimum: int) -> int:
     steps = round(value / timestep_s) if number and 0.0 <= value <= 0.1 else -1
     if steps < minimum or abs(steps * timestep_s - value) > 1e-9:
         raise ParameterError(
-            f"is {value!r} s; 0.1 s at most, and whole steps of the simulation ({timestep_s:g} s), are needed",
+            f"is {value!r} s; a whole number of steps ({timestep_s:g} s), 0.1 s at most, is needed",
             key=key,
             value=value,
         )

@@ -1,4 +1,4 @@
-"""Collects what a run does, step by step, and turns it into channels block by block."""
+"""The recorder of a run: collects raw rows step by step, and turns them into channels block by block."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from typing import Final, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.errors import RecordingError, SimulationDiverged
+from activesteer.errors import ParameterError, RecordingError, SimulationDiverged, shown
 from activesteer.recording import McapWriter, Poses
 from activesteer.signals import ActuatorCommand, DriverCommand
-from activesteer.vehicle import MAX_VALUE, TAPE, RawRows, Vehicle
+from activesteer.vehicle import MAX_VALUE, RawRows, Tape, Uncopyable, Vehicle
 
 BLOCK_INTERVAL_S: Final = 0.5
-"""How much of a run is turned into channels and written at once [s].
+"""Length of a block, which is turned into channels and written at once [s].
 
-A killed process loses less than two blocks, a second: the one that it fills, and the one that is being written.
+A killed process loses less than two blocks (1 s): the block being filled, and the block being written.
 """
 MEMORY_BLOCK_INTERVAL_S: Final = 2.0
-"""The same where nothing is written [s]: longer, because every block begins with cold caches, some 0.2 ms."""
+"""Length of a block without a file [s]: longer, because every block starts with cold caches, which costs 0.2 ms."""
 POSE_INTERVAL_S: Final = 0.01
 """Time between two recorded poses of all bodies [s]."""
 _TAPE_ROWS: Final = 125
-"""How many rows the vehicle records until they are taken: so few that they are still in the processor's caches then."""
+"""Rows on the tape: few enough that they are still in the processor's caches when they are taken."""
 
 
 @dataclass
 class _Kept:
-    """Rows and poses in memory; those that somebody refers to are never written again."""
+    """Rows and poses in memory. The first `referred_rows` are in use elsewhere and are never overwritten."""
 
     values: NDArray[np.float64]
     positions_m: NDArray[np.float64]
@@ -38,11 +38,11 @@ class _Kept:
 
     @classmethod
     def empty(cls, rows: int, poses: int, channels: int, bodies: int) -> Self:
-        # By column, because that is how it is filled and read.
+        # By column, because rows are filled and read by column.
         return cls(np.empty((rows, channels), order="F"), np.empty((poses, bodies, 3)), np.empty((poses, bodies, 4)))
 
     def copied(self, rows: int, poses: int) -> Self:
-        """The first rows and poses again, with as much room behind them."""
+        """Copy the first rows and poses, with the same capacity."""
         new = self.empty(len(self.values), len(self.positions_m), self.values.shape[1], self.positions_m.shape[1])
         new.values[:rows] = self.values[:rows]
         new.positions_m[:poses], new.quaternions[:poses] = self.positions_m[:poses], self.quaternions[:poses]
@@ -50,30 +50,30 @@ class _Kept:
 
 
 class RecordedRows(NamedTuple):
-    """What a recorder had taken when its state was saved."""
+    """Rows of a recorder at the time when its state was saved."""
 
     kept: _Kept
     rows: int
     yaw_rad: float
 
 
-class Recorder:
-    """Rows of one run, in memory and, where a writer is given, in a file as the run goes on.
+class Recorder(Uncopyable):
+    """Rows of one run, in memory and, if a writer is given, in a file that grows with the run.
 
     Attributes:
         channels: The table of channels.
-        tape_address: Where the vehicle records its steps.
+        tape: Tape on which the vehicle records its steps.
         keeps_all: Whether all rows stay in memory.
     """
 
     def __init__(self, vehicle: Vehicle, steps: int, writer: McapWriter | None = None, *, keep: bool = True) -> None:
-        """Allocates everything.
+        """Allocate the memory of the run.
 
         Args:
-            vehicle: What is recorded.
-            steps: Most steps that will come.
+            vehicle: The car to record.
+            steps: Maximum number of steps.
             writer: File to write to.
-            keep: Whether all rows stay in memory; else only the block that is being filled does.
+            keep: Whether all rows stay in memory; otherwise only the block being filled does.
         """
         self.channels = vehicle.channels.channels
         self._vehicle = vehicle
@@ -90,21 +90,22 @@ class Recorder:
         self._pose_every = max(1, round(POSE_INTERVAL_S / vehicle.timestep_s))
         bodies = len(vehicle.body_names)
         self._kept = _Kept.empty(capacity, self._poses_before(capacity) + 1, len(self.channels), bodies)
-        self._tape = np.zeros(1, TAPE)
+        self.tape = Tape()
+        self._tape = self.tape.record
         self._tape["row_bytes"], self._tape["pose_every"] = self._raw.sensordata.strides[0], self._pose_every
-        self.tape_address, self._tape_start = self._tape.ctypes.data, self._raw.sensordata.ctypes.data
-        # Rows that were taken from the tape, those that are channels already, and the first one in memory.
+        self._tape_start = self._raw.sensordata.ctypes.data
+        # Rows taken from the tape, rows turned into channels, and the number of the first row in memory.
         self._taken = self._flushed = self._first = 0
         self._usable = True
         self._rewind()
 
     @property
     def rows(self) -> int:
-        """How many were taken. Their values are those of the instants at which the steps began."""
+        """Number of recorded rows. A row holds the values at the start of its step."""
         return int(self._tape["rows"][0])
 
     def blocks(self, steps: range) -> Iterator[range]:
-        """The steps, divided where the tape is full, and flushed where a block is.
+        """Divide steps where the tape is full; take its rows there, and flush full blocks.
 
         Args:
             steps: Steps that the vehicle is going to record.
@@ -120,7 +121,7 @@ class Recorder:
                 self._take()
 
     def _rewind(self) -> None:
-        """Lets the next row go to the start of the tape, and poses behind those that are kept."""
+        """Direct the next row to the start of the tape, and the next pose behind the kept ones."""
         tape, kept = self._tape, self._kept
         pose = self._poses_before(self._taken) - self._poses_before(self._first)
         tape["position"] = kept.positions_m.ctypes.data + pose * kept.positions_m.strides[0]
@@ -133,7 +134,7 @@ class Recorder:
         self._tape["row"] = self._tape_start
 
     def _take(self) -> None:
-        """Takes the rows from the tape."""
+        """Take the rows from the tape."""
         taken, last = self._taken, self.rows
         if taken < last:
             values = self._kept.values[taken - self._first : last - self._first]
@@ -147,10 +148,10 @@ class Recorder:
         return raw if count == len(raw.sensordata) else type(raw)(*(array[:count] for array in raw))
 
     def flush(self, *, checked: bool = True) -> None:
-        """Turns the rows since the last flush into channels, and writes them.
+        """Turn the rows since the last flush into channels, and write them.
 
         Args:
-            checked: Whether a value that is not finite is an error; it is recorded in any case.
+            checked: Whether to raise an error for a value that is not finite; it is recorded in any case.
 
         Raises:
             SimulationDiverged: a channel or a pose is not finite, or larger than a file can hold.
@@ -174,23 +175,23 @@ class Recorder:
             raise self._complaint(first, values, poses)
 
     def result(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Poses]:
-        """Times, values and poses of all rows that are kept; see `flush`."""
+        """Return times, values and poses of all rows in memory; see `flush`."""
         self.flush()
         first, last = self._first, self.rows
         self._kept.referred_rows = max(self._kept.referred_rows, last)
         return self._times(first, last), self._kept.values[: last - first], self._poses_between(first, last)
 
-    def present(self, command: DriverCommand, asked: ActuatorCommand) -> dict[str, float]:
-        """What would be recorded of the present instant, by channel name; nothing is recorded.
+    def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> dict[str, float]:
+        """Return the values of all channels at the present instant, by name, without recording them.
 
         Args:
-            command: What the driver last did.
-            asked: What the controller last asked for.
+            driver_command: Last command of the driver.
+            actuator_command: Last command of the controller.
         """
         self._take()
-        for raw, now in zip(self._raw, self._vehicle.rows.present(command, asked), strict=True):
+        for raw, now in zip(self._raw, self._vehicle.rows.present(driver_command, actuator_command), strict=True):
             raw[0] = now[0]
-        # Behind the rows of the block, which its yaw angle continues from.
+        # After the rows of the block, because the yaw angle continues from them.
         row = self.rows - self._flushed
         values = np.empty((row + 1, len(self.channels)), order="F")
         channels, inputs = self._vehicle.channels, self._inputs
@@ -199,19 +200,33 @@ class Recorder:
         return {channel.name: float(value) for channel, value in zip(self.channels, values[row], strict=True)}
 
     def save_state(self) -> RecordedRows:
-        """What was recorded so far, which stays as it is whatever is recorded afterwards."""
+        """Return the rows recorded so far, which later rows do not change."""
         self.flush()
         self._kept.referred_rows = max(self._kept.referred_rows, self.rows)
         return RecordedRows(self._kept, self.rows, self._yaw_rad)
 
-    def restore_state(self, state: RecordedRows) -> None:
-        """Goes back to the rows of a saved state.
+    def check_state(self, state: RecordedRows) -> None:
+        """Check that this recorder can go back to the rows of a saved state.
 
         Raises:
-            RecordingError: they are in a file already.
+            RecordingError: the rows are already in a file.
+            ParameterError: `state` is not a state of a recorder of this run.
         """
         if self._writer is not None:
-            raise RecordingError("a run that is written to a file while it is made cannot go back to a saved state")
+            raise RecordingError("a run that is being written to a file cannot go back to a saved state")
+        if not (
+            isinstance(state, RecordedRows)
+            and isinstance(state.kept, _Kept)
+            and state.kept.values.shape == self._kept.values.shape
+            and isinstance(state.rows, int)
+            and 0 <= state.rows <= len(state.kept.values)
+            and isinstance(state.yaw_rad, float)
+        ):
+            raise ParameterError(f"is {shown(state)}; the rows of this run are needed", key="state", value=state)
+
+    def restore_state(self, state: RecordedRows) -> None:
+        """Go back to the rows of a saved state; see `check_state`."""
+        self.check_state(state)
         if state.kept is not self._kept or state.kept.referred_rows > state.rows:
             self._kept = state.kept.copied(state.rows, self._poses_before(state.rows))
             self._kept.referred_rows = state.rows
@@ -221,7 +236,7 @@ class Recorder:
         self._rewind()
 
     def _complaint(self, first: int, values: NDArray[np.float64], poses: Poses) -> SimulationDiverged:
-        """What is wrong in a block."""
+        """The error for a block with a value that is not finite."""
         wrong = ~(np.abs(values) <= MAX_VALUE)
         if wrong.any():
             row = int(np.argmax(wrong.any(axis=1)))

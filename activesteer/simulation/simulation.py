@@ -1,4 +1,4 @@
-"""A run that is driven step by step, by the blocks of the loop or by commands from outside, and recorded."""
+"""A recorded run, driven step by step, by the blocks of the loop or by your commands."""
 
 from __future__ import annotations
 
@@ -7,35 +7,49 @@ from contextlib import contextmanager
 from functools import cached_property
 from numbers import Integral
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Self
+
+import mujoco
 
 from activesteer.analysis.metrics import metrics
 from activesteer.controllers import CONTROLLER, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
+from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Recording
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop, LoopState
+from activesteer.simulation.pickling import pickled, unpickled
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.recorder import RecordedRows, Recorder
 from activesteer.simulation.run_context import RunContext
 
 MAX_KEPT_VALUES: Final = 2**25
-"""Values of a run that stay in memory beside its file, 256 MiB: some three minutes. Those of a longer run are read from
-the file where they are needed, so that its memory does not grow with its length."""
-_SAID: Final = "Simulation.step was given"
+"""Most values of a run with a file that stay in memory: 256 MiB, about three minutes. The values of a longer run are
+read from the file when needed, so that memory does not grow with the run."""
+_GIVEN: Final = "Simulation.step was given"
 
 
 class SavedState(NamedTuple):
-    """Everything that a simulation continues from, and what it had recorded."""
+    """State from which a simulation continues bit-identically, with the rows recorded so far."""
 
     loop: LoopState
     rows: RecordedRows
     given: dict[str, int]
     metadata: dict[str, Any]
+
+
+class Portable(NamedTuple):
+    """A simulation without its native memory: inputs, state, and the engine's model with changes made at run time."""
+
+    scenario: Scenario
+    controller: Plugin
+    timestep_s: float
+    state: SavedState
+    model: mujoco.MjModel
 
 
 class _Given(NamedTuple):
@@ -48,12 +62,15 @@ class _Given(NamedTuple):
 
 
 class Simulation:
-    """A manoeuvre that is driven as far as one asks: `simulate`, step by step.
+    """`simulate`, step by step.
+
+    `copy()`, `copy.deepcopy` and `pickle` return an independent simulation that continues bit-identically. One thread
+    at a time can drive a simulation.
 
     Attributes:
         scenario: Manoeuvre, car and driver.
-        loop: The blocks: `loop.driver`, `loop.controller`, `loop.vehicle`, and what they may know of the car.
-        context: What its recording holds beside the rows.
+        loop: The blocks: `loop.driver`, `loop.controller`, `loop.vehicle`, and the properties of the car they may know.
+        context: Contents of the recording apart from its rows.
 
     Example:
         >>> import activesteer
@@ -74,28 +91,27 @@ class Simulation:
         driver: Any = DEFAULT_DRIVER,
         timestep_s: float = DEFAULT_TIMESTEP_S,
     ) -> None:
-        """Builds the car and lets it settle, as `simulate` does; the arguments are the same.
+        """Build the car and let it settle, with the arguments of `simulate`.
 
         Args:
-            maneuver: Name, path, or table of a manoeuvre; or a `Scenario`, which holds vehicle, driver and overrides
-                already.
-            controller: Name of a controller, or a user's own.
+            maneuver: Name, path, or table of a manoeuvre; or a `Scenario`, which includes the three other inputs.
+            controller: Name of a controller, or your own.
             vehicle: Name, path, or table of a vehicle.
             overrides: Dotted key -> value.
-            driver: Name, path or table of a driver, or a user's own code.
+            driver: Name, path or table of a driver, or your own code.
             timestep_s: Step of engine, driver and controller [s].
 
         Raises:
             ActiveSteerError: an input is wrong, or the car does not settle.
         """
-        controller = find_controller(controller)
+        self._controller = controller = find_controller(controller)
         if not isinstance(maneuver, Scenario):
             maneuver = resolve(maneuver, vehicle, overrides, driver)
         elif overrides or vehicle != "compact" or driver != DEFAULT_DRIVER:
             raise ParameterError(
-                "a Scenario has its vehicle, driver and overrides already", key="vehicle, overrides, driver"
+                "a Scenario already includes vehicle, driver and overrides", key="vehicle, overrides, driver"
             )
-        # Does nothing where everything is known already.
+        # Does nothing if nothing has to be searched for.
         self.scenario = prepared(maneuver, timestep_s)
         self.loop = ClosedLoop(self.scenario, controller, timestep_s)
         self.context = RunContext.of(self.scenario, self.loop.vehicle, controller)
@@ -114,82 +130,90 @@ class Simulation:
 
     @property
     def time_s(self) -> float:
-        """The present instant, from the start of the recording [s]."""
+        """Present time, from the start of the recording [s]."""
         return self.loop.step_count * self.loop.vehicle.timestep_s
 
     @property
     def done(self) -> bool:
-        """Whether the manoeuvre was driven to its end."""
+        """Whether the manoeuvre has been driven to its end."""
         return self.loop.step_count >= self.steps
 
     @property
     def setpoint(self) -> Setpoint:
-        """What the manoeuvre now asks of the driver."""
+        """Present demand of the manoeuvre on the driver."""
         return self.scenario.maneuver.setpoint(self.time_s)
 
     @property
     def measurement(self) -> Measurement:
-        """What the sensors say: all that a controller gets to see."""
+        """Present signals of the sensors: everything that a controller sees."""
         return self.loop.measurement
 
     @property
     def motion(self) -> Motion:
-        """Where the car is and how it moves, as a driver sees it."""
+        """Present position and motion of the car, as a driver sees them."""
         return self.loop.motion
 
     @property
     def truth(self) -> dict[str, float]:
-        """Every recorded channel at the present instant, by name.
+        """Current values of all recorded channels, by name.
 
-        It is what the next row of the recording will hold, but for what depends on the commands of the next step; these
-        are the last ones. It is worked out whenever it is asked for, which takes as long as some ten steps.
+        Quantities that depend on the next command (demands, drive torque) are not yet updated. Each access computes all
+        channels again, which takes as long as about ten steps.
         """
-        return self._recorder.present(*self.loop.commands)
+        with self.loop.in_use:
+            return self._recorder.present(*self.loop.commands)
 
     def step(
         self, driver_command: DriverCommand | None = None, actuator_command: ActuatorCommand | None = None
     ) -> Measurement:
-        """Drives one step; see `advance`."""
+        """Drive one step; see `advance`."""
         return self.advance(1, driver_command, actuator_command)
 
     def advance(
         self, steps: int, driver_command: DriverCommand | None = None, actuator_command: ActuatorCommand | None = None
     ) -> Measurement:
-        """Drives on for some steps.
+        """Drive some steps.
+
+        If you supply a command, the block it replaces is not called and its state is frozen.
 
         Args:
-            steps: How many, at most to the end of the manoeuvre.
-            driver_command: What the driver does in all of them. The driver is then not asked, and his state stands
-                still until he is.
-            actuator_command: What the controller asks for, likewise.
+            steps: Number of steps, at most to the end of the manoeuvre.
+            driver_command: Command that replaces the driver in all of these steps.
+            actuator_command: Command that replaces the controller in all of these steps.
 
         Returns:
-            What the sensors say afterwards.
+            The measurement after these steps.
 
         Raises:
-            ManeuverError: the manoeuvre ends before; nothing was driven.
-            DriverError: the driver command is none, or the driver returned nonsense.
-            ControllerError: the same of the actuator command and the controller.
+            ManeuverError: fewer steps are left, or the simulation is already being driven; nothing was driven.
+            DriverError: the driver command is invalid, or the driver failed.
+            ControllerError: the actuator command is invalid, or the controller failed.
             SimulationDiverged: the state became non-finite, or the engine raised a warning.
         """
+        with self.loop.in_use:
+            return self._advance(steps, driver_command, actuator_command)
+
+    def _advance(
+        self, steps: int, driver_command: DriverCommand | None, actuator_command: ActuatorCommand | None
+    ) -> Measurement:
         loop, left = self.loop, self.steps - self.loop.step_count
         if self._failure is not None:
-            problem = f"the run failed ({type(self._failure).__name__}); it goes on from a saved state only"
+            problem = f"the run failed ({type(self._failure).__name__}); it can continue only from a saved state"
             raise ManeuverError(f"{problem}: {self._failure}") from self._failure
         if isinstance(steps, bool) or not isinstance(steps, Integral) or steps < 0:
             raise ParameterError(f"is {shown(steps)}; a whole number of steps, 0 or more, is needed", key="steps")
         if steps > left:
             end = f"{self.scenario.maneuver.name} ends at {self.scenario.maneuver.duration_s:g} s (duration_s)"
-            raise ManeuverError(f"{end}; {steps} more steps are asked for, {left} are left", value=steps, allowed=left)
+            raise ManeuverError(f"{end}; {steps} more steps were requested, {left} are left", value=steps, allowed=left)
         driver = controller = None
         if driver_command is not None:
-            driver = _Given(DRIVER.checked(driver_command, "", loop.driver_setup, _SAID))
+            driver = _Given(DRIVER.checked(driver_command, "", loop.driver_setup, _GIVEN))
         if actuator_command is not None:
-            controller = _Given(CONTROLLER.checked(actuator_command, "", loop.controller_setup, _SAID))
+            controller = _Given(CONTROLLER.checked(actuator_command, "", loop.controller_setup, _GIVEN))
         rows = self._recorder.rows
         with self._watched():
             try:
-                loop.advance(int(steps), self._recorder, driver=driver, controller=controller)
+                loop.drive(int(steps), self._recorder, driver, controller)
             finally:
                 for word, given in (("driver", driver), ("controller", controller)):
                     if given is not None:
@@ -199,47 +223,96 @@ class Simulation:
         return loop.measurement
 
     def run(self) -> None:
-        """Drives the manoeuvre to its end; see `advance`."""
+        """Drive the manoeuvre to its end; see `advance`."""
         self.advance(self.steps - self.loop.step_count)
 
     def save_state(self) -> SavedState:
-        """Everything that the simulation continues from, and what was recorded so far.
+        """Return the state from which the simulation continues bit-identically, with the rows recorded so far.
 
         Raises:
-            SimulationDiverged: something recorded is not finite.
+            SimulationDiverged: a recorded value is not finite.
+            ManeuverError: the simulation is being driven.
         """
-        with self._watched():
-            rows = self._recorder.save_state()
-        return SavedState(self.loop.save_state(), rows, dict(self._given), self.context.metadata)
+        with self.loop.in_use:
+            with self._watched():
+                rows = self._recorder.save_state()
+            return SavedState(self.loop.save_state(), rows, dict(self._given), self.context.metadata)
 
     def restore_state(self, state: SavedState) -> None:
-        """Goes back to a saved state; what follows is bit-identical to what followed then.
+        """Go back to a saved state, from which the simulation continues bit-identically.
 
-        The recording goes back too: it then holds what led to this state. Recordings taken before stay as they are.
+        The recording then holds the rows that led to this state. Recordings taken before are not changed.
 
         Args:
-            state: A state of this simulation, or of another one that was made with the same inputs.
+            state: A state of this simulation, or of another one with the same inputs.
 
         Raises:
-            ParameterError: it is the state of a simulation of something else.
+            ParameterError: `state` is something else.
+            RecordingError: the run is being written to a file.
+            ManeuverError: the simulation is being driven.
         """
+        if not isinstance(state, SavedState) or not isinstance(state.given, dict):
+            raise ParameterError(f"is {shown(state)}; a state of this simulation is needed", key="state", value=state)
         if state.metadata is not self.context.metadata and state.metadata != self.context.metadata:
             raise ParameterError("was saved by a simulation with other inputs", key="state")
-        self.loop.restore_state(state.loop)
-        self._recorder.restore_state(state.rows)
-        self._given, self._failure = dict(state.given), None
+        with self.loop.in_use:
+            self._recorder.check_state(state.rows)
+            self.loop.restore_state(state.loop)
+            self._recorder.restore_state(state.rows)
+            self._given, self._failure = dict(state.given), None
 
-    def recording(self) -> Recording:
-        """What was driven so far.
+    def copy(self) -> Self:
+        """Return an independent simulation that continues bit-identically.
 
-        Returns:
-            The recording; at the end of the manoeuvre that of `simulate`. Before, and after a failure, it has no
-            metrics, `complete` is false, and `error` says why. Where commands came from outside, `commands_given` has
-            the number of these steps by `driver` and `controller`.
+        The copy builds the car and lets it settle again, which takes as long as creating a `Simulation`.
 
         Raises:
-            SimulationDiverged: something recorded is not finite; calling it again returns the recording.
+            ManeuverError: the run failed, or is being driven.
+            RecordingError: the run is being written to a file.
+            ActiveSteerError: your own driver or controller cannot be copied.
         """
+        return self._rebuilt(self._portable())
+
+    def __copy__(self) -> Self:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self.copy()
+
+    def __reduce_ex__(self, _protocol: Any) -> tuple[Any, ...]:
+        return unpickled, (type(self), pickled(self._portable()))
+
+    def _portable(self) -> Portable:
+        if self._writer is not None:
+            raise RecordingError("a run that is being written to a file can be neither copied nor pickled")
+        if self._failure is not None:
+            raise ManeuverError(f"a run that failed can be neither copied nor pickled: {self._failure}")
+        vehicle = self.loop.vehicle
+        return Portable(self.scenario, self._controller, vehicle.timestep_s, self.save_state(), vehicle.model)
+
+    @classmethod
+    def _rebuilt(cls, portable: Portable) -> Self:
+        other = cls.__new__(cls)
+        Simulation.__init__(other, portable.scenario, portable.controller, timestep_s=portable.timestep_s)
+        other.loop.vehicle.adopt_model(portable.model)
+        other.restore_state(portable.state)
+        return other
+
+    def recording(self) -> Recording:
+        """Return the recording of the steps driven so far.
+
+        At the end of the manoeuvre it equals the recording of `simulate`. Before the end, and after a failure, it has
+        no metrics, its metadata `complete` is false, and `error` gives the reason. If you supplied commands,
+        `commands_given` holds the number of these steps by `driver` and `controller`.
+
+        Raises:
+            SimulationDiverged: a recorded value is not finite; a second call returns the recording.
+            ManeuverError: the simulation is being driven.
+        """
+        with self.loop.in_use:
+            return self._recording()
+
+    def _recording(self) -> Recording:
         recorder, failure = self._recorder, self._failure
         if failure is None:
             with self._watched():
@@ -264,10 +337,10 @@ class Simulation:
 
     @contextmanager
     def recorded_to(self, path: Path) -> Iterator[None]:
-        """While this lasts, a file is written as the run goes on; it has to begin before the first step.
+        """Write a file while the context lasts and the run proceeds; enter it before the first step.
 
         Args:
-            path: MCAP file to write. It is ended in every case, marked as incomplete after an exception.
+            path: MCAP file to write. It is completed in every case, and marked as incomplete after an exception.
 
         Raises:
             RecordingError: the file cannot be written.
@@ -279,7 +352,7 @@ class Simulation:
             yield
 
     def end_file(self, recording: Recording) -> None:
-        """Writes how the run ended and its metrics behind the rows of its file, if there is one."""
+        """Write outcome and metrics of the run behind the rows of its file, if there is a file."""
         if self._writer is not None:
             known = self.context.metadata
             outcome = {key: value for key, value in recording.metadata.items() if key not in known}
@@ -287,7 +360,7 @@ class Simulation:
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Notes a failure, after which the blocks do not agree on where they are; what was recorded is kept."""
+        """Note a failure, after which the states of the blocks do not match; the recorded rows are kept."""
         try:
             yield
         except BaseException as failure:

@@ -285,10 +285,11 @@ def _blocks(scenario: Scenario) -> dict[str, float]:
     }
     found = {name: _per_step_us(lambda block=block: _call(block, _CALLS), _CALLS) for name, block in blocks.items()}
     recorder = Recorder(vehicle, _CALLS)
+    vehicle.record_on(recorder.tape)
     parts = recorder.blocks(range(_CALLS))
 
     def step() -> None:
-        vehicle.step(command, steer, recorder.tape_address)
+        vehicle.step(command, steer)
 
     found |= {"vehicle_us": 0.0, "recorder_us": 0.0}
     while recorder.rows < _CALLS:

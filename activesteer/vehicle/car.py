@@ -1,4 +1,4 @@
-"""The car in the engine: commands in, one step, measurements out. Binds MuJoCo's arrays once, by name."""
+"""The car in the engine: commands in, one step, measurements out. MuJoCo's arrays are bound once, by name."""
 
 from __future__ import annotations
 
@@ -13,11 +13,18 @@ from numpy.typing import NDArray
 
 from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE, brake_setup, reset
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
-from activesteer.errors import ModelError
+from activesteer.errors import ActiveSteerError, ModelError, ParameterError, shown
 from activesteer.road.road import Road
 from activesteer.sensors import SensorBlock
 from activesteer.sensors.block import speed_radii
-from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion, made
+from activesteer.signals import (
+    ActuatorCommand,
+    DriverCommand,
+    Estimate,
+    Measurement,
+    Motion,
+    new_message,
+)
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_step
@@ -34,22 +41,25 @@ from activesteer.vehicle.native_forces import install_native_forces
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.vehicle.recorded_arrays import RecordedArrays
-from activesteer.vehicle.step_plan import read_through, record_from, step_plan
+from activesteer.vehicle.step_bindings import Tape, bind_step, read_through, record_from
+from activesteer.vehicle.uncopyable import Uncopyable
 from activesteer.vehicle.wheel_set import WheelSet
 
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+_N_DRIVER, _N_ACTUATOR = len(DriverCommand._fields), len(ActuatorCommand._fields)
+_GEARS: Final = (-1, CLUTCH_OPEN, 1)
 
 
-class Vehicle:
+class Vehicle(Uncopyable):
     """A car with its tyres on a road.
 
     Attributes:
         model: The engine's model.
         data: The engine's state.
-        parameters: What the vehicle file says.
+        parameters: Contents of the vehicle file.
         channels: Map from raw rows to recorded channels.
-        actuators: What the native forces know of the actuators.
-        rows: What the row of a step is copied from.
+        actuators: Parameters of the actuators in the native forces.
+        rows: Arrays that the row of a step is copied from.
     """
 
     def __init__(
@@ -61,11 +71,11 @@ class Vehicle:
         timestep_s: float = DEFAULT_TIMESTEP_S,
         content: Mapping[str, bytes] | None = None,
     ) -> None:
-        """Compiles the car, puts it at rest in static equilibrium and installs the native forces.
+        """Compile the car, put it at rest in static equilibrium and install the native forces.
 
         Args:
             mjcf: The model file.
-            parameters: What the vehicle file says.
+            parameters: Contents of the vehicle file.
             tyres: Tyres of the front and of the rear axle.
             road: Friction and grade.
             timestep_s: Step of the engine [s].
@@ -95,12 +105,12 @@ class Vehicle:
             self._brake_setup[:] = brake_setup(parameters.brakes, timestep_s, radii_m, fractions, inertias_kgm2)
             reset(self._brake_state, self._brake_setup, 0.0)
             if parameters.sensors.speed_from_wheels:
-                self._plan["wheel_radii_m"] = speed_radii(parameters.powertrain.front_fraction, radii_m)
+                self._bindings["wheel_radii_m"] = speed_radii(parameters.powertrain.front_fraction, radii_m)
         except ModelError as reason:
             raise ModelError(str(reason), file=str(mjcf), value=reason.value, allowed=reason.allowed) from reason
 
     def _bind(self) -> None:
-        """Looks up addresses once; the step uses nothing but integers and views."""
+        """Look up all addresses, so that the step uses nothing but integers and views."""
         model, data = self.model, self.data
         root = model.joint(find(model, mujoco.mjtObj.mjOBJ_JOINT, "root"))
         if root.qposadr[0] or root.dofadr[0]:
@@ -109,32 +119,34 @@ class Vehicle:
         self.actuators = ActuatorRecords(model)
         ratio, brakes = self.parameters.steering.ratio, (self._brake_setup, self._brake_state)
         self._implicit = ImplicitPlan(model, data)
-        self._plan = step_plan(
+        self._bindings = bind_step(
             model, data, self._implicit.plan, self.rows.live(), self._wheels.torques, ratio, self._sensors, brakes
         )
-        self._plan_address = self._plan.ctypes.data
+        self._address = self._bindings.ctypes.data
+        self._tape: Tape | None = None
+        self._tape_address = self._bindings["tape"]
         self._forces = fb.header_of(model)
         self._hands = model.actuator("steering_wheel").id
         self._velocimeter = data.sensor("cg_velocimeter").data
         self._gear: float = CLUTCH_OPEN
 
     def _place(self) -> None:
-        """Static equilibrium at the origin of the world, heading along x."""
+        """Put the car into static equilibrium at the origin of the world, heading along x."""
         mujoco.mj_resetData(self.model, self.data)
         plays = [link["backlash_m"] for link, _ in self.actuators.rear_screws()]
-        given = [play.copy() for play in plays]
+        originals = [play.copy() for play in plays]
         for play in plays:
-            play[:] = 0.0  # the search finds its way by slopes, and within a play there is none
+            play[:] = 0.0  # the search follows slopes, and within the play the slope is zero
         static_ride(self.model, self.data, np.array([0, 1, YAW_DOF, *self._wheels.spins]))
-        for play, value in zip(plays, given, strict=True):
+        for play, value in zip(plays, originals, strict=True):
             play[:] = value
 
     def start(self, speed_mps: float, time_s: float = 0.0) -> Measurement:
-        """Sets the car rolling straight ahead at a speed, from static ride.
+        """Set the car rolling straight ahead at a speed, from static ride.
 
         Args:
             speed_mps: Speed along world x [m/s].
-            time_s: Time from which it counts; below 0 before a recording [s].
+            time_s: Time at which the car starts; negative before a recording [s].
 
         Returns:
             The first measurement.
@@ -155,17 +167,17 @@ class Vehicle:
 
     @property
     def wheel_radius_m(self) -> float:
-        """Mean height of the driven wheels' centres where the car now is, by their fractions of the torque [m]."""
+        """Present height of the driven wheels' centres, mean weighted by their fractions of the torque [m]."""
         fractions = self.parameters.powertrain.wheel_fractions
         return sum(part * height for part, height in zip(fractions, self._wheels.heights_m().tolist(), strict=True))
 
     def rebase(self) -> None:
-        """Makes where the car is the origin of road and time, its heading along x; its motion goes on unchanged.
+        """Make the present position and heading the origin of the road, and the present instant the origin of time.
 
-        From here on the wheels feel the areas of the road; before, there is only the road's `mu`.
+        The motion continues unchanged. From here on the friction of the road's areas counts; before, the road's `mu`.
         """
         data = self.data
-        # The step leaves positions of its beginning beside the state of its end.
+        # After a step the positions are those of its start, the state is that of its end.
         mujoco.mj_kinematics(self.model, data)
         half = math.atan2(data.qpos[6], data.qpos[3])
         cos, sin = math.cos(2 * half), math.sin(2 * half)
@@ -178,49 +190,82 @@ class Vehicle:
         mujoco.mj_forward(self.model, data)
         drop_metric(self.model, data)
 
-    def step(self, command: DriverCommand, asked: ActuatorCommand, tape_address: int = 0) -> tuple[Measurement, Motion]:
-        """Applies the commands and advances the engine by one step.
+    def step(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> tuple[Measurement, Motion]:
+        """Apply the commands and advance the engine by one step, which is recorded on the tape; see `record_on`.
 
         Args:
-            command: What the driver does.
-            asked: What the controller asks for.
-            tape_address: Address of the `TAPE` that the step is recorded on; 0 where none is wanted.
+            driver_command: Command of the driver.
+            actuator_command: Command of the controller.
 
         Returns:
-            What the sensors then say, and where the car is; see `measure` and `motion`.
+            Measurement and motion after the step; see `measure` and `motion`.
 
         Raises:
-            TypeError: `command` or `asked` is something else, or holds what is no number.
-            SimulationDiverged: the engine warns, or something recorded is not finite or beyond all reason.
+            ParameterError: a command is not exactly such a message, or holds something that is not a number.
+            SimulationDiverged: the engine warns, or a recorded value is not finite or beyond all reason.
         """
-        # Native code takes the messages apart without a look: what is no message would end the process.
-        if command.__class__ is not DriverCommand or asked.__class__ is not ActuatorCommand:
-            raise TypeError(f"a DriverCommand and an ActuatorCommand are needed, not {command!r} and {asked!r}")
-        if self._estimate_memory is not None:
-            write_estimate(self._estimate_memory, asked.estimate)
-        torques = command.wheel_torques
-        gear = command.gear if torques is None else CLUTCH_OPEN
-        if gear != self._gear:
-            self._gear = gear
-            self._forces["gear"] = gear
-            self._wheels.engage(gear)
-        if torques is not None:
-            self._wheels.apply(torques)
-        sane, measurement, motion = native_step.step(
-            self._plan_address, command, asked, tape_address, torques is not None
-        )
+        # Native code reads a fixed number of fields; an incomplete message would end the process.
+        if (
+            type(driver_command) is not DriverCommand
+            or type(actuator_command) is not ActuatorCommand
+            or len(driver_command) != _N_DRIVER
+            or len(actuator_command) != _N_ACTUATOR
+        ):
+            raise _refused(driver_command, actuator_command)
+        try:
+            if self._estimate_memory is not None and (estimate := actuator_command.estimate) is not None:
+                write_estimate(self._estimate_memory, 0, *estimate)
+            torques = driver_command.wheel_torques
+            gear = driver_command.gear if torques is None else CLUTCH_OPEN
+            if gear != self._gear:
+                self._engage(gear)
+            if torques is not None:
+                self._wheels.apply(torques)
+            sane, measurement, motion = native_step.step(
+                self._address, driver_command, actuator_command, torques is not None
+            )
+        except Exception as reason:
+            raise _refused(driver_command, actuator_command, reason) from reason
         if not sane:
             self.check()
-        return made(Measurement, measurement), made(Motion, motion)
+        return new_message(Measurement, measurement), new_message(Motion, motion)
+
+    def record_on(self, tape: Tape | None) -> None:
+        """Record the following steps on a tape; None stops recording.
+
+        Raises:
+            ParameterError: `tape` is something else.
+        """
+        if tape is not None and type(tape) is not Tape:
+            raise ParameterError(f"is {shown(tape)}; a Tape is needed", key="tape", value=tape)
+        self._tape, self._tape_address[0] = tape, 0 if tape is None else tape.address
+
+    def _engage(self, gear: Any) -> None:
+        if gear not in _GEARS:
+            raise ValueError(f"gear {gear!r} is not one of {_GEARS}")
+        self._gear = self._forces["gear"] = gear
+        self._wheels.engage(gear)
 
     def replay(self, inputs: NDArray[np.float64]) -> None:
-        """Makes steps of the engine alone, in one native call: nothing is looked at, asked or recorded.
+        """Advance the engine alone by several steps in one native call, without commands, checks or recording.
 
         Args:
             inputs: Inputs of all actuators in each step, as a run left them in `data.ctrl`; shape (steps, actuators).
+
+        Raises:
+            ParameterError: `inputs` is not a C-contiguous array of float64 of this shape.
         """
+        if (
+            not isinstance(inputs, np.ndarray)
+            or inputs.dtype != np.float64
+            or inputs.ndim != 2
+            or inputs.shape[1] != self.model.nu
+            or not (inputs.flags.c_contiguous and inputs.flags.aligned)
+        ):
+            needed = f"a C-contiguous array of float64, shape (steps, {self.model.nu}), is needed"
+            raise ParameterError(f"is {shown(inputs)}; {needed}", key="inputs", value=inputs)
         self.follow_model()
-        native_step.replay(self._plan_address, inputs)
+        native_step.replay(self._address, inputs)
 
     def follow_model(self) -> None:
         """Take over changes of `model` that a plan of the step froze; see `ImplicitPlan.follow`."""
@@ -236,19 +281,19 @@ class Vehicle:
 
     @property
     def steering_lag_s(self) -> float:
-        """Time by which the recorded steering wheel follows a steady turning of the demanded one [s].
+        """Lag of the recorded steering wheel angle behind a demand that grows steadily [s].
 
-        One step, and damping over stiffness of the hands.
+        The lag is one step plus damping over stiffness of the hands.
         """
         hands = self._hands
         stiffness, damping = self.model.actuator_gainprm[hands, 0], -self.model.actuator_biasprm[hands, 2]
         return float(self.model.opt.timestep + damping / stiffness)
 
     def measure(self) -> Measurement:
-        """What the car's sensors say of the instant at which the last step began, and the yaw rate at its end.
+        """Return the sensors' signals at the start of the last step, with the yaw rate at its end.
 
-        The yaw rate goes straight into the corrector's loop, where a step of age would shift the response with the
-        step's length: it is taken from the state (the gyro's third axis is that of the chassis).
+        The yaw rate feeds the corrector's loop directly. With a delay of one step, the response would depend on the
+        length of the step, so the yaw rate is read from the state (the gyro's third axis is the chassis' axis).
 
         Raises:
             SimulationDiverged: see `check`.
@@ -257,56 +302,90 @@ class Vehicle:
         return truth if self._sensors is None else self._sensors.measurement(truth.time_s)
 
     def motion(self) -> Motion:
-        """Where the car is and how it moves, at the instant at which the last step began; the yaw rate at its end."""
+        """Return position and motion at the start of the last step, with the yaw rate at its end."""
         return self.truth()[1]
 
     def truth(self) -> tuple[Measurement, Motion]:
-        """What ideal sensors would say, and `motion`."""
-        sane, measurement, motion = native_step.sense(self._plan_address)
+        """Return the signals of ideal sensors, and `motion`."""
+        sane, measurement, motion = native_step.sense(self._address)
         if not sane:
             self.check()
-        return made(Measurement, measurement), made(Motion, motion)
+        return new_message(Measurement, measurement), new_message(Motion, motion)
 
     def check(self) -> None:
-        """Looks for warnings of the engine and for what is not finite, commands first.
+        """Check for warnings of the engine and for values that are not finite, commands first.
 
         Raises:
-            SimulationDiverged: there is one.
+            SimulationDiverged: there is a warning or such a value.
         """
         speed_mps = float(self._velocimeter[0])
         raise_if_diverged(self.model, self.data, self.rows.commands, speed_mps)
 
     def record_estimate(self, estimate: Estimate) -> None:
-        """From now on what the controller estimates is recorded too.
+        """Record the controller's estimate from now on.
 
         Args:
-            estimate: What it estimates now.
+            estimate: The present estimate.
+
+        Raises:
+            ParameterError: `estimate` is not an `Estimate` of numbers.
         """
-        self.rows.estimate = np.array(estimate, np.float64)
+        numbers = np.zeros(len(Estimate._fields))
+        try:
+            write_estimate(numbers.data, 0, *Estimate(*estimate))
+        except Exception as reason:
+            problem = f"is {shown(estimate)}; an Estimate is needed"
+            raise ParameterError(problem, key="estimate", value=estimate) from reason
+        self.rows.estimate = numbers
         self._estimate_memory = self.rows.estimate.data
-        record_from(self._plan, self.rows.live())
+        record_from(self._bindings, self.rows.live())
         self.channels.add_estimate()
 
     def save_state(self) -> NDArray[np.float64]:
-        """The state of engine, brakes and sensors, complete: what continues from it is bit-identical."""
+        """Return the complete state of engine, brakes, sensors and gear, from which a run continues bit-identically."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        sensors = () if self._sensors is None else (self._sensors.memory,)
-        return np.concatenate((state, self._brake_row, *sensors))
+        return np.concatenate((state, *self._memory(), (self._gear,)))
 
     def restore_state(self, state: NDArray[np.float64]) -> None:
-        """Puts a saved state back."""
-        size = mujoco.mj_stateSize(self.model, _STATE)
-        brakes = size + len(self._brake_row)
+        """Restore a saved state.
+
+        Raises:
+            ParameterError: `state` is not a state of this car.
+        """
+        size, memory = mujoco.mj_stateSize(self.model, _STATE), self._memory()
+        length = size + sum(part.size for part in memory) + 1
+        if not isinstance(state, np.ndarray) or state.dtype != np.float64 or state.shape != (length,):
+            raise ParameterError(f"is {shown(state)}; a state of this car is needed", key="state", value=state)
         mujoco.mj_setState(self.model, self.data, state[:size], _STATE)
-        self._brake_row[:] = state[size:brakes]
-        if self._sensors is not None:
-            self._sensors.memory[:] = state[brakes:]
-        # The step engages a gear only where it changes; this one never occurs, so it does so now.
-        self._gear = math.nan
+        for part in memory:
+            part[:] = state[size : size + part.size]
+            size += part.size
+        self._engage(state[-1])
+
+    def _memory(self) -> list[NDArray[np.float64]]:
+        """Memory apart from the engine's state: brakes, sensors, the estimate, and the engine's present sensor data."""
+        sensors = [] if self._sensors is None else [self._sensors.memory]
+        return [self._brake_row, self.data.sensordata, self.rows.estimate, *sensors]
+
+    def adopt_model(self, model: mujoco.MjModel) -> None:
+        """Take over all numbers of another model of the same car, such as a mass changed at run time.
+
+        Raises:
+            ParameterError: `model` belongs to another car.
+        """
+        for own, other in ((self.model, model), (self.model.opt, model.opt)):
+            for name in _changeable(own):
+                present, value = getattr(own, name), getattr(other, name)
+                if not isinstance(value, np.ndarray):
+                    setattr(own, name, value)
+                elif value.shape == present.shape:
+                    present[...] = value
+                else:
+                    raise ParameterError(f"belongs to another car: {name} has another size", key="model")
 
     def limit_hands(self, torque_Nm: float | None) -> None:
-        """Lets the hands on the steering wheel hold no more than a torque [N m]; any where not given."""
+        """Limit the torque of the hands on the steering wheel [N m]; None for no limit."""
         hands, felt = self._hands, 1.0 - self.parameters.steering.assist_fraction
         self.model.actuator_forcelimited[hands] = torque_Nm is not None
         maximum = 0.0 if torque_Nm is None else torque_Nm / felt
@@ -314,12 +393,12 @@ class Vehicle:
 
     @property
     def brakes(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """`BRAKE_SETUP` and `BRAKE_STATE` of the car, shape (1,) each; views, for looking at."""
+        """`BRAKE_SETUP` and `BRAKE_STATE` of the car, shape (1,) each, as views to read."""
         return self._brake_setup, self._brake_state
 
     @property
     def sensors(self) -> SensorBlock | None:
-        """What is between the truth and the measurement; None where nothing is."""
+        """Sensors between the truth and the measurement; None for ideal sensors."""
         return self._sensors
 
     def put_sensors_between(self, *, wanted: bool) -> None:
@@ -330,21 +409,21 @@ class Vehicle:
         """
         if self.parameters.sensors.is_ideal and wanted is (self._sensors is None):
             self._sensors = SensorBlock(self.parameters.sensors, float(self.model.opt.timestep)) if wanted else None
-            read_through(self._plan, self._sensors)
+            read_through(self._bindings, self._sensors)
             if self._sensors is not None:
                 self._sensors.reset(self.truth()[0])
 
     def note_measurement(self, measurement: Measurement) -> None:
-        """Has recorded what faulty sensors say, where the measurement is recorded at all, and tells it the brakes."""
+        """Pass the measurement of faulty sensors to the brakes, and to the recording if it holds measurements."""
         if self._sensors is not None:
             self._sensors.say(measurement)
 
     def note_faults(self, count: int) -> None:
-        """Has it recorded from now on how many faults act."""
+        """Record this number of active faults from now on."""
         self.data.userdata[-1] = count
 
     def dimensions(self) -> dict[str, float | list[float]]:
-        """What an evaluation needs of the car's outline [m]: width, wheelbase, tracks and tyre widths, as designed."""
+        """Return width, wheelbase, tracks and tyre widths in the design position [m], for evaluations."""
         at_rest = mujoco.MjData(self.model)
         mujoco.mj_kinematics(self.model, at_rest)
         fl, fr, rl, rr = (at_rest.xpos[self.model.body(f"{corner}_wheel").id] for corner in CORNERS)
@@ -358,5 +437,24 @@ class Vehicle:
 
     @property
     def body_names(self) -> tuple[str, ...]:
-        """All bodies but the world, in the engine's order."""
+        """Names of all bodies but the world, in the engine's order."""
         return tuple(self.model.body(index).name for index in range(1, self.model.nbody))
+
+
+def _changeable(part: mujoco.MjModel | mujoco.MjOption) -> list[str]:
+    """Names of the numbers of a model, or of its options, that can change at run time."""
+    kinds = (np.ndarray, int, float) if isinstance(part, mujoco.MjOption) else (np.ndarray,)
+    return [name for name in dir(part) if not name.startswith("_") and isinstance(getattr(part, name), kinds)]
+
+
+def _refused(driver_command: object, actuator_command: object, reason: Exception | None = None) -> ActiveSteerError:
+    """The error for commands that the vehicle cannot carry out."""
+    if isinstance(reason, ActiveSteerError):
+        return reason
+    for key, given, kind in (
+        ("driver_command", driver_command, DriverCommand),
+        ("actuator_command", actuator_command, ActuatorCommand),
+    ):
+        if type(given) is not kind or len(given) != len(kind._fields):
+            return ParameterError(f"is {shown(given)}; a complete {kind.__name__} is needed", key=key, value=given)
+    return ParameterError(f"cannot carry out {shown(driver_command)} and {shown(actuator_command)}: {reason}")

@@ -2,85 +2,76 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, Final
 
 import numpy as np
 from numba import types
 
 from activesteer.compilation import compiled_call, inlined
-from activesteer.signals import Channel
-from activesteer.vehicle.native_memory import f64_pointer
+from activesteer.native_messages import native_type, store_numbers
+from activesteer.signals import ActuatorCommand, Channel, DriverCommand, Number, numbers_of
 
-_NUMBERS: Final[dict[str, tuple[str, str] | None]] = {
-    "steering_wheel_demand_rad": None,  # recorded where it arrives, among the inputs of the engine
-    "drive_torque_demand_Nm": ("Nm", "drive torque demanded, all wheels together"),
-    "brake_pedal": ("", "brake pedal position, 0 to 1"),
-    "parking_brake": ("", "parking brake, 0 to 1"),
-    "driver_saturated": ("", "1 where the steering is at its lock or the engine at its limit"),
-    "gear": None,
-    "front_steer_demand_rad": ("rad", "the driver's demand at the road wheel"),
-    "rear_steer_demand_rad": ("rad", "rear angle that the controller demands"),
-    "superposition_demand_rad": ("rad", "angle that the controller adds at the front wheels"),
-    "yaw_rate_desired_radps": ("rad/s", "yaw rate that the controller steers for"),
-    "prediction_rad": ("rad", "feed-forward part of the controller's angle"),
-    "correction_rad": ("rad", "feedback part of the controller's angle"),
-    "controller_saturated": ("", "1 where a limit of the controller is active"),
-    "fl_brake_torque_demand_Nm": ("Nm", "brake torque that the controller adds, front left"),
-    "fr_brake_torque_demand_Nm": ("Nm", "brake torque that the controller adds, front right"),
-    "rl_brake_torque_demand_Nm": ("Nm", "brake torque that the controller adds, rear left"),
-    "rr_brake_torque_demand_Nm": ("Nm", "brake torque that the controller adds, rear right"),
-    "drive_torque_change_Nm": ("Nm", "change of the drive torque that the controller asks for"),
-    "side_difference_Pa": ("Pa", "brake pressure by which the sides may differ, as the controller steers against it"),
-}
-"""What a row holds, in the order in which `write_commands` fills it, and what the channel means if there is one."""
 
+def command_numbers(messages: Mapping[str, type[Any]]) -> dict[str, Number]:
+    """Numbers of a row, in the order in which `write_commands` stores them.
+
+    Args:
+        messages: Sender -> message class. Its name precedes the names of fields that several messages have
+            (`driver_saturated`).
+
+    Returns:
+        Name of each number -> its description.
+    """
+    count = Counter(field for message in messages.values() for field in message._fields)
+    return {
+        f"{sender}_{number.name}" if count[number.field] > 1 else number.name: number
+        for sender, message in messages.items()
+        for number in numbers_of(message)
+    }
+
+
+def command_channels(numbers: Mapping[str, Number]) -> dict[Channel, int]:
+    """Channels of the numbers that are recorded -> their places in a row."""
+    return {
+        Channel(name, number.recorded.unit, number.recorded.meaning, "control"): place
+        for place, (name, number) in enumerate(numbers.items())
+        if number.recorded is not None
+    }
+
+
+_NUMBERS: Final = command_numbers({"driver": DriverCommand, "controller": ActuatorCommand})
 COMMANDS: Final = tuple(_NUMBERS)
 """Names of the numbers of a row."""
 COMMAND_ROW: Final = np.dtype([(name, np.float64) for name in COMMANDS])
 """A row as compiled code reads it."""
-BRAKES: Final = COMMANDS.index("fl_brake_torque_demand_Nm")
-"""Where in a row the brake torques of the wheels begin."""
-COMMAND_CHANNELS: Final = {
-    Channel(name, *about, "control"): place for place, (name, about) in enumerate(_NUMBERS.items()) if about
-}
+COMMAND_CHANNELS: Final = command_channels(_NUMBERS)
 """Channel -> its place in a row."""
-CARRIED_OUT: Final = (
-    "steering_wheel_demand_rad", "drive_torque_demand_Nm", "brake_pedal", "parking_brake", "rear_steer_demand_rad",
-    "superposition_demand_rad", *COMMANDS[BRAKES : BRAKES + 4], "drive_torque_change_Nm",
-    "side_difference_Pa",
-)  # fmt: skip
-"""What reaches the engine; the rest is for the recording."""
-
-_NOT_LOOKED_AT: Final = types.none
-"""A member of a message that is no number; it may be anything."""
-_NUMBER: Final = types.float64
-DRIVER_COMMAND: Final = types.Tuple([_NUMBER] * 4 + [_NOT_LOOKED_AT] + [_NUMBER] * 3)
-"""A `DriverCommand` as compiled code takes it from Python."""
-ACTUATOR_COMMAND: Final = types.Tuple([*[_NUMBER] * 6, types.UniTuple(_NUMBER, 4), _NUMBER, _NOT_LOOKED_AT, _NUMBER])
-"""An `ActuatorCommand`, likewise."""
+CARRIED_OUT: Final = tuple(name for name, number in _NUMBERS.items() if number.recorded is None or number.recorded.acts)
+"""Names of the numbers that the car acts on; the others are for the recording only."""
+BRAKES: Final = COMMANDS.index("fl_brake_torque_demand_Nm")
+"""Place of the brake torque of the first wheel in a row."""
+DRIVER_COMMAND, ACTUATOR_COMMAND = native_type(DriverCommand), native_type(ActuatorCommand)
+"""The commands as compiled code takes them from Python."""
+_SIZE_DRIVER: Final = 8 * len(numbers_of(DriverCommand))
+"""Bytes of a row that hold the driver's command."""
 
 
 @inlined
-def write_commands(address, command, asked):
-    """Writes a row.
+def write_commands(address, driver_command, actuator_command):
+    """Write a row.
 
     Args:
-        address: Where to: of `len(COMMANDS)` float64.
-        command: What the driver does.
-        asked: What the controller asks for.
+        address: Address of `len(COMMANDS)` float64.
+        driver_command: A `DriverCommand`.
+        actuator_command: An `ActuatorCommand`.
     """
-    steering_wheel, drive, pedal, at_limit, _, gear, front, parking = command
-    rear, added, desired, prediction, correction, limited, (fl, fr, rl, rr), change, _, sides = asked
-    numbers = (
-        steering_wheel, drive, pedal, parking, at_limit, gear, front, rear, added, desired, prediction,
-        correction, limited, fl, fr, rl, rr, change, sides,
-    )  # fmt: skip
-    row = f64_pointer(address)
-    for place in range(len(numbers)):
-        row[place] = numbers[place]
+    store_numbers(address, driver_command)
+    store_numbers(address + _SIZE_DRIVER, actuator_command)
 
 
 @compiled_call(types.void, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND)
-def write_commands_at(address, command, asked):
-    """The same, called from Python."""
-    write_commands(address, command, asked)
+def write_commands_at(address, driver_command, actuator_command):
+    """Write a row, called from Python; see `write_commands`."""
+    write_commands(address, driver_command, actuator_command)

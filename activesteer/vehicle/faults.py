@@ -22,7 +22,7 @@ from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Mot
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.named_parts import find
 
-Step = Callable[[DriverCommand, ActuatorCommand, int], tuple[Measurement, Motion]]
+Step = Callable[[DriverCommand, ActuatorCommand], tuple[Measurement, Motion]]
 _STOPS: Final = {"left": "high", "right": "low"}
 
 
@@ -119,10 +119,10 @@ class Faults:
         delays = [acting for acting in watching if isinstance(acting, _ActuatorFault)]
         sensors = [(acting, acting.begins <= begin) for acting in watching if isinstance(acting, _SensorFault)]
 
-        def step(command: DriverCommand, steer: ActuatorCommand, tape_address: int = 0) -> tuple[Measurement, Motion]:
+        def step(driver_command: DriverCommand, actuator_command: ActuatorCommand) -> tuple[Measurement, Motion]:
             for delay in delays:
                 delay.before_step()
-            measurement, motion = vehicle.step(command, steer, tape_address)
+            measurement, motion = vehicle.step(driver_command, actuator_command)
             for delay in delays:
                 delay.after_step()
             for sensor, active in sensors:

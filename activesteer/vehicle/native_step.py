@@ -1,7 +1,7 @@
-"""One step of the engine in one native call: commands in, a row for the recorder and what the sensors say out.
+"""One step of the engine in one native call: commands in; a row for the recorder, and the measurement, out.
 
-The call holds no lock of Python's. All that it needs stands in a `STEP_PLAN`, addresses and indices that a vehicle
-looks up once; so the compiled code is the same for every car.
+The call releases Python's lock. It finds everything through `STEP_BINDINGS`, addresses and indices that a vehicle looks
+up once, so the compiled code is the same for every car.
 """
 
 from __future__ import annotations
@@ -15,8 +15,10 @@ from activesteer.brakes.control_unit import step_brakes
 from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE
 from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS
+from activesteer.native_messages import native_type
 from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.sensors.signal_chain import CHAIN
+from activesteer.signals import Measurement, Motion
 from activesteer.vehicle.channels.raw_rows import ENGINE_ARRAYS
 from activesteer.vehicle.chassis_heading import YAW_DOF
 from activesteer.vehicle.command_row import (
@@ -29,19 +31,19 @@ from activesteer.vehicle.command_row import (
 from activesteer.vehicle.native_implicit import advance, implicit_plan_pointer
 from activesteer.vehicle.native_memory import f64_pointer, pointer_to
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
-from activesteer.vehicle.step_plan import N_SOURCES, N_WARNINGS, STEP_PLAN, TAPE
+from activesteer.vehicle.step_bindings import N_SOURCES, N_WARNINGS, STEP_BINDINGS, TAPE
 
 FASTEST_MPS: Final = 200.0
-"""No car of ours goes faster; a speed beyond it, or none at all, is a run that has diverged [m/s]."""
+"""No car of this package drives faster; a run with a higher speed, or a speed that is NaN, has diverged [m/s]."""
 
 _N_WHEELS: Final = len(CORNERS)
 _ENGINE_ARRAYS: Final = len(ENGINE_ARRAYS)
-"""They are the first of the arrays that a row is copied from."""
+"""Number of the engine's arrays, which come first in a row."""
 _EXPONENT: Final = 0x7FF0000000000000
-"""Bits of a float64 that are all set where it is not finite, and only there."""
+"""Bits of a float64 that are all set if, and only if, it is not finite."""
 
 _tape_pointer: Final = pointer_to(from_dtype(TAPE))
-_plan_pointer: Final = pointer_to(from_dtype(STEP_PLAN))
+_bindings_pointer: Final = pointer_to(from_dtype(STEP_BINDINGS))
 _command_pointer: Final = pointer_to(from_dtype(COMMAND_ROW))
 _chain_pointer: Final = pointer_to(from_dtype(CHAIN))
 _setup_pointer: Final = pointer_to(from_dtype(BRAKE_SETUP))
@@ -60,37 +62,54 @@ def _all_finite(address, size):
 
 
 @inlined
-def _sense(plan):
-    """Whether all is well, and the members of `Measurement` and of `Motion`."""
-    s = carray(f64_pointer(plan.sensordata), (plan.sizes[0],))
-    yaw_rate = carray(f64_pointer(plan.qvel), (plan.n_dofs,))[YAW_DOF]
-    speed = s[plan.velocimeter]
-    sane = -FASTEST_MPS < speed < FASTEST_MPS and _all_finite(plan.qvel, plan.n_dofs)
+def _sense(bindings):
+    """Whether the state is sane, and the fields of `Measurement` and of `Motion`."""
+    s = carray(f64_pointer(bindings.sensordata), (bindings.sizes[0],))
+    yaw_rate = carray(f64_pointer(bindings.qvel), (bindings.n_dofs,))[YAW_DOF]
+    speed = s[bindings.velocimeter]
+    sane = -FASTEST_MPS < speed < FASTEST_MPS and _all_finite(bindings.qvel, bindings.n_dofs)
     for index in range(_ENGINE_ARRAYS):
-        sane &= _all_finite(plan.sources[index], plan.sizes[index])
-    warnings = carray(_counter_pointer(plan.warnings), (2 * N_WARNINGS,))
+        sane &= _all_finite(bindings.sources[index], bindings.sizes[index])
+    warnings = carray(_counter_pointer(bindings.warnings), (2 * N_WARNINGS,))
     for index in range(N_WARNINGS):
         sane &= warnings[2 * index] == 0
-    w, x, y, z = s[plan.orientation], s[plan.orientation + 1], s[plan.orientation + 2], s[plan.orientation + 3]
+    w, x, y, z = (
+        s[bindings.orientation],
+        s[bindings.orientation + 1],
+        s[bindings.orientation + 2],
+        s[bindings.orientation + 3],
+    )
     yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     cos, sin = math.cos(yaw), math.sin(yaw)
-    east, north = s[plan.velocity], s[plan.velocity + 1]
-    pressure_Pa = carray(_state_pointer(plan.brake_state), (1,))[0].pressure_Pa
+    east, north = s[bindings.velocity], s[bindings.velocity + 1]
+    pressure_Pa = carray(_state_pointer(bindings.brake_state), (1,))[0].pressure_Pa
     return (
         sane,
         (
-            carray(f64_pointer(plan.time), (1,))[0],
+            carray(f64_pointer(bindings.time), (1,))[0],
             speed,
             yaw_rate,
-            s[plan.accelerometer + 1],
-            s[plan.accelerometer],
-            s[plan.steering_wheel_angle],
-            0.5 * (s[plan.rear_left_angle] + s[plan.rear_right_angle]),
-            s[plan.superposition_angle] / plan.ratio,
-            (s[plan.wheel_speed], s[plan.wheel_speed + 1], s[plan.wheel_speed + 2], s[plan.wheel_speed + 3]),
+            s[bindings.accelerometer + 1],
+            s[bindings.accelerometer],
+            s[bindings.steering_wheel_angle],
+            0.5 * (s[bindings.rear_left_angle] + s[bindings.rear_right_angle]),
+            s[bindings.superposition_angle] / bindings.ratio,
+            (
+                s[bindings.wheel_speed],
+                s[bindings.wheel_speed + 1],
+                s[bindings.wheel_speed + 2],
+                s[bindings.wheel_speed + 3],
+            ),
             (pressure_Pa[0], pressure_Pa[1], pressure_Pa[2], pressure_Pa[3]),
         ),
-        (s[plan.position], s[plan.position + 1], yaw, cos * east + sin * north, cos * north - sin * east, yaw_rate),
+        (
+            s[bindings.position],
+            s[bindings.position + 1],
+            yaw,
+            cos * east + sin * north,
+            cos * north - sin * east,
+            yaw_rate,
+        ),
     )
 
 
@@ -102,108 +121,109 @@ def _copy(source_address, target_address, size):
 
 
 @inlined
-def _record(plan, tape):
-    """Copies the recorded arrays onto a tape, one behind the other, and the poses of the bodies where they are due."""
+def _record(bindings, tape):
+    """Copy the recorded arrays onto a tape, one after the other, and the poses of the bodies when they are due."""
     if tape.room == 0:
         return
     place = tape.row
     for index in range(N_SOURCES):
-        _copy(plan.sources[index], place, plan.sizes[index])
-        place += 8 * plan.sizes[index]
+        _copy(bindings.sources[index], place, bindings.sizes[index])
+        place += 8 * bindings.sizes[index]
     if tape.rows % tape.pose_every == 0:
-        _copy(plan.positions, tape.position, 3 * plan.n_bodies)
-        _copy(plan.quaternions, tape.quaternion, 4 * plan.n_bodies)
-        tape.position += 24 * plan.n_bodies
-        tape.quaternion += 32 * plan.n_bodies
+        _copy(bindings.positions, tape.position, 3 * bindings.n_bodies)
+        _copy(bindings.quaternions, tape.quaternion, 4 * bindings.n_bodies)
+        tape.position += 24 * bindings.n_bodies
+        tape.quaternion += 32 * bindings.n_bodies
     tape.row += tape.row_bytes
     tape.rows += 1
     tape.room -= 1
 
 
-_MEASUREMENT: Final = types.Tuple([types.float64] * 8 + [types.UniTuple(types.float64, 4)] * 2)
-_SENSED: Final = types.Tuple([types.boolean, _MEASUREMENT, types.UniTuple(types.float64, 6)])
+_SENSED: Final = types.Tuple([types.boolean, native_type(Measurement), native_type(Motion)])
 
 
 @compiled_call(_SENSED, types.intp)
-def sense(plan_address):
-    """What ideal sensors say now.
+def sense(bindings_address):
+    """Read the ideal sensors.
 
     Args:
-        plan_address: Address of a `STEP_PLAN`.
+        bindings_address: Address of a `STEP_BINDINGS`.
 
     Returns:
-        Whether all is well, and the members of `Measurement` and of `Motion`.
+        Whether the state is sane, and the fields of `Measurement` and of `Motion`.
     """
-    return _sense(carray(_plan_pointer(plan_address), (1,))[0])
+    return _sense(carray(_bindings_pointer(bindings_address), (1,))[0])
 
 
-@compiled_call(_SENSED, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND, types.intp, types.boolean)
-def step(plan_address, command, asked, tape_address, torques_stand):
-    """Carries out the commands, makes one step of the engine and reads everything.
+@compiled_call(_SENSED, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND, types.boolean)
+def step(bindings_address, driver_command, actuator_command, torques_set):
+    """Carry out the commands, advance the engine by one step, record it and read the sensors.
+
+    The commands stay in the first recorded array after the engine's. The step is recorded on the tape of the bindings,
+    unless the state is not sane.
 
     Args:
-        plan_address: Address of a `STEP_PLAN`; the commands are kept where the source behind the engine's arrays is.
-        command: A `DriverCommand`.
-        asked: An `ActuatorCommand`.
-        tape_address: Address of a `TAPE` that the step is recorded on, unless something is wrong with it; 0 for none.
-        torques_stand: Whether drive and brakes have their inputs already; what driver and controller want of the drive,
-            and the pedal, then do not count.
+        bindings_address: Address of a `STEP_BINDINGS`.
+        driver_command: A `DriverCommand`.
+        actuator_command: An `ActuatorCommand`.
+        torques_set: Whether drive and brakes have their inputs already; drive torque demands and the pedal then have
+            no effect.
 
     Returns:
-        Whether all is well, and the members of `Measurement` and of `Motion`.
+        Whether the state is sane, and the fields of `Measurement` and of `Motion`.
     """
-    plan = carray(_plan_pointer(plan_address), (1,))[0]
-    commands_address = plan.sources[_ENGINE_ARRAYS]
-    write_commands(commands_address, command, asked)
+    bindings = carray(_bindings_pointer(bindings_address), (1,))[0]
+    commands_address = bindings.sources[_ENGINE_ARRAYS]
+    write_commands(commands_address, driver_command, actuator_command)
     commands = carray(_command_pointer(commands_address), (1,))[0]
     brake_torques_Nm = carray(f64_pointer(commands_address), (BRAKES + _N_WHEELS,))[BRAKES:]
-    ctrl = f64_pointer(plan.ctrl)
-    ctrl[plan.steering_wheel] = commands.steering_wheel_demand_rad
-    ctrl[plan.superposition] = commands.superposition_demand_rad * plan.ratio
-    ctrl[plan.rear_left] = commands.rear_steer_demand_rad
-    ctrl[plan.rear_right] = commands.rear_steer_demand_rad
+    ctrl = f64_pointer(bindings.ctrl)
+    ctrl[bindings.steering_wheel] = commands.steering_wheel_demand_rad
+    ctrl[bindings.superposition] = commands.superposition_demand_rad * bindings.ratio
+    ctrl[bindings.rear_left] = commands.rear_steer_demand_rad
+    ctrl[bindings.rear_right] = commands.rear_steer_demand_rad
     drive_torque_Nm = 0.0
     if commands.gear != CLUTCH_OPEN:
         drive_torque_Nm = commands.drive_torque_demand_Nm + commands.drive_torque_change_Nm
-    setup = carray(_setup_pointer(plan.brake_setup), (1,))[0]
-    state = carray(_state_pointer(plan.brake_state), (1,))[0]
-    sensors = carray(f64_pointer(plan.sensordata), (plan.sizes[0],))
-    wheel_speeds, ax = sensors[plan.wheel_speed : plan.wheel_speed + _N_WHEELS], sensors[plan.accelerometer]
-    if plan.n_sensors != 0:
-        said = carray(f64_pointer(plan.sensor_memory), (plan.sensor_memory_size,))
-        wheel_speeds, ax = said[WHEEL_SPEEDS : WHEEL_SPEEDS + _N_WHEELS], said[AX]
-    pedal = 0.0 if torques_stand else commands.brake_pedal
+    setup = carray(_setup_pointer(bindings.brake_setup), (1,))[0]
+    state = carray(_state_pointer(bindings.brake_state), (1,))[0]
+    sensors = carray(f64_pointer(bindings.sensordata), (bindings.sizes[0],))
+    wheel_speeds, ax = sensors[bindings.wheel_speed : bindings.wheel_speed + _N_WHEELS], sensors[bindings.accelerometer]
+    if bindings.n_sensors != 0:
+        outputs = carray(f64_pointer(bindings.sensor_memory), (bindings.sensor_memory_size,))
+        wheel_speeds, ax = outputs[WHEEL_SPEEDS : WHEEL_SPEEDS + _N_WHEELS], outputs[AX]
+    pedal = 0.0 if torques_set else commands.brake_pedal
     drive_torque_Nm = step_brakes(
         setup, state, wheel_speeds, ax, pedal, drive_torque_Nm, brake_torques_Nm, commands.side_difference_Pa
     )
     for wheel in range(_N_WHEELS):
-        if not torques_stand:
-            # + 0.0: a wheel that is not driven would get -0.0 while the engine brakes.
-            ctrl[plan.drives[wheel]] = plan.drive_fractions[wheel] * drive_torque_Nm + 0.0
-            ctrl[plan.brakes[wheel]] = commands.parking_brake * setup.parking_torque_Nm[wheel]
-        ctrl[plan.brakes[wheel]] += setup.torque_per_pressure_NmpPa[wheel] * state.pressure_Pa[wheel]
-    advance(carray(implicit_plan_pointer(plan.implicit), (1,))[0])
-    sane, truth, motion = _sense(plan)
-    if tape_address != 0 and sane:
-        _record(plan, carray(_tape_pointer(tape_address), (1,))[0])
-    if plan.n_sensors == 0:
+        if not torques_set:
+            # Without + 0.0, a wheel that is not driven would get -0.0 during engine braking.
+            ctrl[bindings.drives[wheel]] = bindings.drive_fractions[wheel] * drive_torque_Nm + 0.0
+            ctrl[bindings.brakes[wheel]] = commands.parking_brake * setup.parking_torque_Nm[wheel]
+        ctrl[bindings.brakes[wheel]] += setup.torque_per_pressure_NmpPa[wheel] * state.pressure_Pa[wheel]
+    advance(carray(implicit_plan_pointer(bindings.implicit), (1,))[0])
+    sane, truth, motion = _sense(bindings)
+    if bindings.tape != 0 and sane:
+        _record(bindings, carray(_tape_pointer(bindings.tape), (1,))[0])
+    if bindings.n_sensors == 0:
         return sane, truth, motion
-    chains = carray(_chain_pointer(plan.sensors), (plan.n_sensors,))
-    memory = carray(f64_pointer(plan.sensor_memory), (plan.sensor_memory_size,))
-    return sane, measured(chains, memory, plan.wheel_radii_m, plan.timestep_s, truth), motion
+    chains = carray(_chain_pointer(bindings.sensors), (bindings.n_sensors,))
+    memory = carray(f64_pointer(bindings.sensor_memory), (bindings.sensor_memory_size,))
+    return sane, measured(chains, memory, bindings.wheel_radii_m, bindings.timestep_s, truth), motion
 
 
 @compiled_call(types.void, types.intp, types.Array(types.float64, 2, "C"))
-def replay(plan_address, inputs):
-    """Makes a step of the engine for each row of inputs, and nothing else.
+def replay(bindings_address, inputs):
+    """Advance the engine by one step for each row of inputs, and do nothing else.
 
     Args:
-        plan_address: Address of a `STEP_PLAN`.
+        bindings_address: Address of a `STEP_BINDINGS`.
         inputs: Inputs of all actuators, shape (steps, number of actuators).
     """
-    plan = carray(_plan_pointer(plan_address), (1,))[0]
-    implicit = carray(implicit_plan_pointer(plan.implicit), (1,))[0]
-    ctrl = f64_pointer(plan.ctrl)
+    bindings = carray(_bindings_pointer(bindings_address), (1,))[0]
+    implicit = carray(implicit_plan_pointer(bindings.implicit), (1,))[0]
+    ctrl = f64_pointer(bindings.ctrl)
     for step in range(len(inputs)):
         for actuator in range(inputs.shape[1]):
             ctrl[actuator] = inputs[step, actuator]

@@ -12,25 +12,25 @@ from activesteer.vehicle.command_row import COMMANDS, write_commands_at
 
 
 def engine_arrays(data: mujoco.MjData) -> dict[str, Array]:
-    """Those of the engine, by the names that they have there and in `RawRows`."""
+    """The engine's arrays, by the names that the engine and `RawRows` share."""
     return {name: getattr(data, name) for name in ENGINE_ARRAYS}
 
 
 class RecordedArrays:
-    """The engine's arrays, the last commands, what the sensors say, the brakes, and what is estimated.
+    """The engine's arrays, the last commands, the measurement, the state of the brakes, and the estimate.
 
     Attributes:
-        commands: What driver and controller last asked for, as `write_commands` leaves it.
-        estimate: The members of an `Estimate`; empty where none is recorded.
+        commands: Last commands of driver and controller, as `write_commands` leaves them.
+        estimate: Fields of an `Estimate`; empty if none is recorded.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, measured: Array, brakes: Array) -> None:
-        """Takes the arrays of a car.
+        """Collect the arrays of a car.
 
         Args:
             model: The car.
             data: Its state.
-            measured: What the sensors say; empty with ideal sensors.
+            measured: Outputs of the sensors; empty with ideal sensors.
             brakes: A `BRAKE_STATE` as numbers.
         """
         self._model, self._data = model, data
@@ -39,27 +39,27 @@ class RecordedArrays:
         self.estimate: Array = np.empty(0)
 
     def live(self) -> RawRows:
-        """The arrays themselves, in the order in which a row holds them."""
+        """Return the arrays themselves, in the order of a row."""
         return self._of(self._data, self.commands)
 
     def empty(self, count: int) -> RawRows:
-        """Empty rows for `count` steps: `live`, one behind the other in one block, as `Vehicle.step` fills them."""
+        """Allocate rows for `count` steps in one block, as `Vehicle.step` fills them."""
         live = self.live()
         ends = np.cumsum([array.size for array in live])
         block = np.empty((count, ends[-1]))
         return RawRows(*(block[:, end - array.size : end] for array, end in zip(live, ends, strict=True)))
 
-    def present(self, command: DriverCommand, asked: ActuatorCommand) -> RawRows:
-        """One row as a step fills it, of the present instant with the inputs that are in force; nothing is changed.
+    def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> RawRows:
+        """Return one row as a step fills it, for the present instant and the present inputs; change nothing.
 
         Args:
-            command: What the driver last did.
-            asked: What the controller last asked for.
+            driver_command: Last command of the driver.
+            actuator_command: Last command of the controller.
         """
         now, commands = mujoco.MjData(self._model), np.empty_like(self.commands)
         mujoco.mj_copyData(now, self._model, self._data)
         mujoco.mj_forward(self._model, now)
-        write_commands_at(commands.ctypes.data, command, asked)
+        write_commands_at(commands.ctypes.data, driver_command, actuator_command)
         return RawRows(*(array[np.newaxis] for array in self._of(now, commands)))
 
     def _of(self, data: mujoco.MjData, commands: Array) -> RawRows:

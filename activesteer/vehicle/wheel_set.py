@@ -15,7 +15,7 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.named_parts import find
 from activesteer.vehicle.parameters import Powertrain
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
-from activesteer.vehicle.step_plan import Wheels
+from activesteer.vehicle.step_bindings import Wheels
 
 _CALIBRATED_AT_MPS: Final = 20.0
 """Speed at which the rolling radii are taken that turn wheel speeds into the speed of the car [m/s]."""
@@ -62,6 +62,8 @@ class WheelSet:
 
     def apply(self, torques: WheelTorques) -> None:
         """Torques of the wheels, one by one: past the engine, so at once and whatever that can give."""
+        if len(torques.drive_Nm) != len(CORNERS) or len(torques.brake_Nm) != len(CORNERS):
+            raise ValueError(f"{torques!r}: four torques each are needed")
         self._ctrl[self.torques.drives] = torques.drive_Nm
         self._ctrl[self.torques.brakes] = torques.brake_Nm
 

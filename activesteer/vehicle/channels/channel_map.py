@@ -1,7 +1,8 @@
-"""The table of all channels of a car, and their values from raw rows."""
+"""The table of all channels of a car, and the computation of their values from raw rows."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Final
 
 import mujoco
@@ -9,31 +10,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import Array
+from activesteer.errors import ParameterError
 from activesteer.sensors.block import MEASURED
 from activesteer.vehicle.channels.actuators import actuator_signals, motor_signals
 from activesteer.vehicle.channels.car_motion import MOTION_CHANNELS, CarMotion, motion_copied, motion_inputs
 from activesteer.vehicle.channels.corners import brake_signals, corner_signals
 from activesteer.vehicle.channels.links import link_signals
 from activesteer.vehicle.channels.native_channels import record_of, take_rows, within
-from activesteer.vehicle.channels.raw_rows import Actuator, AxialForce, Column, Computed, RawRows, Signal, signal
+from activesteer.vehicle.channels.raw_rows import (
+    Actuator,
+    AxialForce,
+    Column,
+    Computed,
+    RawRows,
+    Signal,
+    Values,
+    signal,
+)
 from activesteer.vehicle.channels.steering import steering_signals
 from activesteer.vehicle.command_row import COMMAND_CHANNELS
 from activesteer.vehicle.estimate_row import ESTIMATE_CHANNELS
 from activesteer.vehicle.parameters import VehicleParameters
 
 MAX_VALUE: Final = float(np.finfo(np.float32).max)
-"""Most that a recorded value may be: files keep most channels to 32 bit."""
+"""Largest recorded value: files store most channels with 32 bits."""
 
 
 class ChannelMap:
     """All channels of a vehicle, evaluated block by block.
 
     Attributes:
-        channels: Their table, in the order of the columns.
+        channels: The table of channels, in the order of the columns.
     """
 
     def __init__(self, model: mujoco.MjModel, parameters: VehicleParameters) -> None:
-        """Looks up everything by name, once.
+        """Look up everything by name, once.
 
         Args:
             model: The car.
@@ -51,25 +62,27 @@ class ChannelMap:
             *(Signal(channel, Column("commands", place)) for channel, place in COMMAND_CHANNELS.items()),
             *(
                 signal(
-                    "measured", f"measured_{name}", unit, f"{meaning} as the sensors say it", Column("measured", place)
+                    "measured", f"measured_{number.name}", number.recorded.unit, f"{number.recorded.meaning}, measured",
+                    Column("measured", place),
                 )
-                for place, (name, unit, meaning) in enumerate(measured)
+                for place, number in enumerate(measured)
+                if number.recorded is not None
             ),
             *brake_signals(),
             signal(
-                "vehicle", "active_faults", "", "how many faults of actuators and sensors act",
+                "vehicle", "active_faults", "", "number of active faults of actuators and sensors",
                 Column("userdata", model.nuserdata - 1),
             ),
         ]  # fmt: skip
         self._arrange()
 
     def add_estimate(self) -> None:
-        """Adds the channels of what a controller estimates."""
+        """Add the channels of a controller's estimate."""
         self._signals += [Signal(channel, Column("estimate", place)) for place, channel in enumerate(ESTIMATE_CHANNELS)]
         self._arrange()
 
     def _arrange(self) -> None:
-        """The motion comes first, behind it the signals in their order."""
+        """Arrange the columns: the motion first, then the signals in their order."""
         self.channels = (*MOTION_CHANNELS, *(signal.channel for signal in self._signals))
         values = [*(self._motion_copied.get(channel.name) for channel in MOTION_CHANNELS)]
         self._motion = [(place, MOTION_CHANNELS[place].name) for place, value in enumerate(values) if value is None]
@@ -84,39 +97,51 @@ class ChannelMap:
         self._computed = [
             (place, value.law, [self._inputs[column] for column in value.columns]) for place, value in computed
         ]
+        self._widths = _widths(wanted, self._inputs)
         self._late = np.array([place for place, *_ in (*self._motion, *self._computed)], np.intp)
 
     def inputs(self, count: int) -> Array:
-        """Room for what `take` leaves for `compute`, of `count` rows."""
+        """Allocate `count` rows for the intermediate values between `take` and `compute`."""
         return np.empty((count, len(self._inputs)), order="F")
 
     def take(self, rows: RawRows, out: Array, inputs: Array) -> bool:
-        """Everything that compiled code does; cheap for few rows at a time, while they are in the processor's caches.
+        """Compute the channels of compiled code, best for few rows that are still in the processor's caches.
 
         Args:
             rows: Raw rows of n steps, n > 0.
-            out: Where the values of channels go, shape (n, len(channels)), by column.
-            inputs: Where what `compute` needs goes, n rows of `inputs`.
+            out: Values of the channels, shape (n, len(channels)), by column; written.
+            inputs: Intermediate values for `compute`, n rows of `inputs`; written.
 
         Returns:
-            Whether no value is larger than `MAX_VALUE`, and all are finite.
+            Whether all values are finite and at most `MAX_VALUE`.
+
+        Raises:
+            ParameterError: an array has another type, shape or memory layout.
         """
+        count = self._checked(inputs, out)
+        for name, array, width in zip(RawRows._fields, rows, self._widths, strict=True):
+            if not _is_matrix(array, count, width) or (width > 1 and array.strides[1] != array.itemsize):
+                raise ParameterError(f"has {_form(array)}; {count} rows of {width} float64 are needed", key=name)
         return take_rows(
             tuple(rows), self._copies, self._input_copies, self._forces, self._limits, out, inputs, MAX_VALUE
         )
 
     def compute(self, inputs: Array, out: Array, last_yaw_rad: float = 0.0) -> bool:
-        """Everything that numpy does; best for many rows at a time.
+        """Compute the channels of numpy, best for many rows at a time.
 
         Args:
-            inputs: What `take` left, n rows.
-            out: Where the values of channels go, shape (n, len(channels)).
-            last_yaw_rad: Yaw angle of the row before the first one, which the angle is unwrapped from [rad].
+            inputs: Intermediate values of `take`, n rows.
+            out: Values of the channels, shape (n, len(channels)); written.
+            last_yaw_rad: Yaw angle of the row before the first one, from which the angle is unwrapped [rad].
 
         Returns:
-            As `take`.
+            Whether all values are finite and at most `MAX_VALUE`.
+
+        Raises:
+            ParameterError: an array has another type, shape or memory layout.
         """
-        # The last rows of a run that diverged are not finite; they are to be recorded, not complained about.
+        self._checked(inputs, out)
+        # The last rows of a diverged run are not finite; record them without a warning.
         with np.errstate(invalid="ignore", over="ignore"):
             motion = CarMotion(inputs[:, : len(self._motion_inputs)], self._gravity_mps2, last_yaw_rad)
             for place, name in self._motion:
@@ -126,22 +151,58 @@ class ChannelMap:
         return within(out, self._late, MAX_VALUE)
 
     def evaluate(self, rows: RawRows) -> Array:
-        """Values of all channels of n raw rows, shape (n, len(channels)); the first yaw angle is within half a turn."""
+        """Return all channels of n raw rows, shape (n, len(channels)); the first yaw angle is within half a turn."""
         count = len(rows.sensordata)
         out, inputs = np.empty((count, len(self.channels)), order="F"), self.inputs(count)
         self.take(rows, out, inputs)
         self.compute(inputs, out)
         return out
 
+    def _checked(self, inputs: Array, out: Array) -> int:
+        """The number of rows of the arrays that `take` and `compute` write."""
+        count = len(out) if isinstance(out, np.ndarray) and out.ndim else 0
+        for name, array, width in (("out", out, len(self.channels)), ("inputs", inputs, len(self._inputs))):
+            if not _is_matrix(array, count, width) or array.shape[1] != width or array.strides[0] != array.itemsize:
+                raise ParameterError(f"has {_form(array)}; ({count}, {width}) float64 by column are needed", key=name)
+        return count
+
+
+def _is_matrix(array: object, rows: int, columns: int) -> bool:
+    """Whether an array holds this many rows, and at least this many columns, of writable float64."""
+    return (
+        isinstance(array, np.ndarray)
+        and array.dtype == np.float64
+        and array.ndim == 2
+        and len(array) == rows
+        and array.shape[1] >= columns
+        and array.flags.behaved
+    )
+
+
+def _form(array: object) -> str:
+    return f"shape {array.shape} of {array.dtype}" if isinstance(array, np.ndarray) else f"type {type(array).__name__}"
+
+
+def _widths(wanted: list[tuple[int, Values]], inputs: Iterable[Column]) -> list[int]:
+    """How many columns of each array of `RawRows` compiled code reads."""
+    columns = [*inputs, *(value for _, value in wanted if isinstance(value, Column))]
+    for _, value in wanted:
+        if isinstance(value, AxialForce):
+            columns += [Column(name, value.tendon) for name in ("ten_length", "ten_velocity")]
+        elif isinstance(value, Actuator):
+            columns += [Column(name, value.control) for name in ("ctrl", "actuator_force")]
+            columns.append(Column("act", value.activation))
+    return [max((c.column + 1 for c in columns if c.array == name), default=0) for name in RawRows._fields]
+
 
 def _copies(wanted: list[tuple[Column, int]]) -> tuple[NDArray[np.intp], ...]:
-    """What compiled code takes of what is copied: where each array's part ends, columns, places; see `take_rows`."""
+    """Tables of the copied columns for `take_rows`: end of each array's part, columns, places."""
     order = sorted((RawRows._fields.index(array), column, place) for (array, column), place in wanted)
     arrays, columns, places = np.array(order, np.intp).reshape(-1, 3).T.copy()
     return np.searchsorted(arrays, np.arange(len(RawRows._fields)), side="right"), columns, places
 
 
 def _of_kind(kind: type[AxialForce | Actuator], wanted: list[tuple[int, Any]]) -> tuple[NDArray[Any], NDArray[np.intp]]:
-    """What compiled code takes of a kind of channel: the laws, and the places of the channels."""
-    here = [(values, place) for place, values in wanted if isinstance(values, kind)]
-    return np.array([law for law, _ in here], record_of(kind)), np.array([place for _, place in here], np.intp)
+    """Tables of a kind of channel for `take_rows`: the laws, and the places of the channels."""
+    laws = [(values, place) for place, values in wanted if isinstance(values, kind)]
+    return np.array([law for law, _ in laws], record_of(kind)), np.array([place for _, place in laws], np.intp)

@@ -65,7 +65,8 @@ def test_channels_that_the_interface_promises_are_there():
 def test_commands_are_recorded_as_they_were_given():
     simulated = simulation()
     recorder = Recorder(simulated.vehicle, 3)
-    simulated.vehicle.step(COMMAND, ASKED, recorder.tape_address)
+    simulated.vehicle.record_on(recorder.tape)
+    simulated.vehicle.step(COMMAND, ASKED)
     given = {
         "front_steer_demand_rad": 0.02, "drive_torque_demand_Nm": 150.0, "brake_pedal": 0.25, "parking_brake": 0.0,
         "driver_saturated": 1.0, "rear_steer_demand_rad": -0.01, "superposition_demand_rad": 0.003,

@@ -11,7 +11,7 @@ import pytest
 from activesteer.conventions import CORNERS
 from activesteer.errors import ParameterError
 from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
-from activesteer.vehicle import TAPE, Vehicle
+from activesteer.vehicle import Tape, Vehicle
 from activesteer.vehicle.powertrain import Drive
 from tests.raising import raises
 from tests.unit.vehicle.cars import activation, actuator, dof, floating, standing, step
@@ -117,13 +117,15 @@ def test_the_commands_reach_their_actuators() -> None:
 def test_what_a_controller_asks_of_brakes_and_drive_comes_on_top_of_the_driver() -> None:
     vehicle = standing()
     rows = vehicle.rows.empty(1)
-    tape, poses = np.zeros(1, TAPE), np.empty((2, vehicle.model.nbody, 4))
+    recorded, poses = Tape(), np.empty((2, vehicle.model.nbody, 4))
     asked = ActuatorCommand(brake_torque_demand_Nm=(300.0, 0.0, -50.0, 20.0), drive_torque_change_Nm=-200.0)
     for _ in range(100):
         vehicle.step(DriverCommand(0.0, 800.0, 0.25), asked)
+    tape = recorded.record
     tape["row"], tape["row_bytes"], tape["room"] = rows.sensordata.ctypes.data, rows.sensordata.strides[0], 1
     tape["pose_every"], tape["position"], tape["quaternion"] = 2, poses[0].ctypes.data, poses[1].ctypes.data
-    vehicle.step(DriverCommand(0.0, 800.0, 0.25), asked, tape.ctypes.data)
+    vehicle.record_on(recorded)
+    vehicle.step(DriverCommand(0.0, 800.0, 0.25), asked)
     front_Nm, rear_Nm = (0.25 * torque for torque in (vehicle.parameters.brakes.front_torque_Nm, 700.0))
     brakes = [vehicle.data.ctrl[actuator(vehicle, f"{corner}_brake")] for corner in CORNERS]
     assert brakes == pytest.approx([front_Nm + 300.0, front_Nm, rear_Nm - 50.0, rear_Nm + 20.0], rel=1e-3)

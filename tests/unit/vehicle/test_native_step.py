@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from activesteer.conventions import CORNERS
-from activesteer.errors import SimulationDiverged
+from activesteer.errors import ParameterError, SimulationDiverged
 from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
-from activesteer.vehicle import TAPE, Vehicle
+from activesteer.vehicle import Tape, Vehicle
 from activesteer.vehicle.channels import RawRows
 from tests.raising import raises
 from tests.unit.vehicle.cars import standing
@@ -38,7 +38,7 @@ def _rolling() -> Vehicle:
 )
 def test_what_is_no_message_is_an_error_and_ends_no_process(command, asked) -> None:
     vehicle = _rolling()
-    with pytest.raises(TypeError):
+    with pytest.raises(ParameterError):
         vehicle.step(command, asked)
     assert vehicle.step(COMMAND, STEER)[0].speed_mps == pytest.approx(20.0, abs=0.1)
 
@@ -47,18 +47,19 @@ def test_a_row_is_a_copy_of_the_engine_s_arrays() -> None:
     vehicle = _rolling()
     rows, bodies = vehicle.rows.empty(3), vehicle.model.nbody - 1
     positions_m, quaternions = np.zeros((2, bodies, 3)), np.zeros((2, bodies, 4))
-    tape = np.zeros(1, TAPE)
+    tape = (recorded := Tape()).record
     tape["row"], tape["row_bytes"], tape["room"] = rows.sensordata.ctypes.data, rows.sensordata.strides[0], 3
     tape["pose_every"], tape["position"], tape["quaternion"] = 2, positions_m.ctypes.data, quaternions.ctypes.data
+    vehicle.record_on(recorded)
     for row in range(3):
-        vehicle.step(COMMAND, STEER, tape.ctypes.data)
+        vehicle.step(COMMAND, STEER)
         assert (tape["rows"][0], tape["room"][0]) == (row + 1, 2 - row)
         if row % 2 == 0:
             np.testing.assert_array_equal(positions_m[row // 2], vehicle.data.xpos[1:])
             np.testing.assert_array_equal(quaternions[row // 2], vehicle.data.xquat[1:])
         for name, live in zip(RawRows._fields, vehicle.rows.live(), strict=True):
             np.testing.assert_array_equal(getattr(rows, name)[row], live, err_msg=name)
-    vehicle.step(COMMAND, STEER, tape.ctypes.data)
+    vehicle.step(COMMAND, STEER)
     assert tape["rows"][0] == 3, "where there is no room, nothing is written"
 
 

@@ -1,4 +1,4 @@
-"""All that the native step needs to know of a car: addresses and indices in one record, `STEP_PLAN`."""
+"""Addresses and indices of a car that the native step needs, in one record: `STEP_BINDINGS`."""
 
 from __future__ import annotations
 
@@ -16,39 +16,42 @@ from activesteer.vehicle.engine_layout import engine_layout
 from activesteer.vehicle.named_parts import find, sensor_columns
 
 N_SOURCES: Final = len(RawRows._fields)
-"""Arrays that a row is copied from."""
+"""Number of arrays that a row is copied from."""
 N_WARNINGS: Final = len(mujoco.mjtWarning.__members__) - 1
 _N_WHEELS: Final = len(CORNERS)
 
 
 class Wheels(NamedTuple):
-    """How torques come to the four wheels, order of `CORNERS`."""
+    """Actuators of the four wheels, order of `CORNERS`.
+
+    Attributes:
+        drives: Places of the drive torques in `ctrl`.
+        brakes: Places of the brake torques in `ctrl`.
+        drive_fractions: Fraction of the drive torque that each wheel gets.
+    """
 
     drives: Sequence[int]
-    """Controls of the drive."""
     brakes: Sequence[int]
-    """Controls of the brakes."""
     drive_fractions: Sequence[float]
-    """What each gets of the drive torque."""
 
 
 _INPUTS: Final = {
     "steering_wheel": "steering_wheel", "superposition": "superposition", "rear_left": "rl_steer",
     "rear_right": "rr_steer",
 }  # fmt: skip
-"""Actuator, as the step calls it -> as the model does."""
+"""Name of an actuator in the step -> its name in the model."""
 _SENSORS: Final = {
     "velocimeter": "cg_velocimeter", "accelerometer": "cg_accelerometer",
     "steering_wheel_angle": "steering_wheel_angle", "superposition_angle": "superposition_angle",
     "rear_left_angle": "rl_steer_angle", "rear_right_angle": "rr_steer_angle", "wheel_speed": "fl_wheel_speed",
     "position": "cg_position", "velocity": "cg_velocity", "orientation": "chassis_orientation",
 }  # fmt: skip
-"""The same of sensors; their first place in `sensordata` counts."""
+"""Name of a sensor in the step -> its name in the model; bound by its first place in `sensordata`."""
 _ADDRESSES: Final = (
     "implicit", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata", "positions", "quaternions",
-    "n_bodies", "brake_setup", "brake_state",
+    "n_bodies", "brake_setup", "brake_state", "tape",
 )  # fmt: skip
-STEP_PLAN: Final = np.dtype(
+STEP_BINDINGS: Final = np.dtype(
     (
         np.record,
         [
@@ -70,11 +73,25 @@ TAPE: Final = np.dtype(
         [(name, np.intp) for name in ("room", "row", "row_bytes", "rows", "pose_every", "position", "quaternion")],
     )
 )
-"""Where steps are recorded: for how many rows there is room, the address of the next row and how far it is to the one
-behind it, how many rows were taken, after how many the bodies' poses are taken too, and where the next ones go."""
 
 
-def step_plan(
+class Tape:
+    """Memory that steps are recorded in.
+
+    Attributes:
+        record: A `TAPE`, shape (1,). `room`: rows that still fit. `row`, `row_bytes`: address and size of the next row.
+            `rows`, `pose_every`: rows recorded so far, and rows between two poses. `position`, `quaternion`: addresses
+            of the next poses.
+        address: Address of the record.
+    """
+
+    def __init__(self) -> None:
+        """Create a tape without room."""
+        self.record = np.zeros(1, TAPE)
+        self.address = self.record.ctypes.data
+
+
+def bind_step(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     implicit: NDArray[Any],
@@ -84,25 +101,25 @@ def step_plan(
     sensors: SensorBlock | None,
     brakes: tuple[NDArray[Any], NDArray[Any]],
 ) -> NDArray[Any]:
-    """Looks up all addresses.
+    """Look up all addresses and indices.
 
     Args:
         model: The car.
-        data: Its state; both must outlive the plan.
-        implicit: `IMPLICIT_PLAN` of the car, shape (1,); must outlive the plan.
+        data: Its state. The bindings keep no reference: model and data must outlive them, as must all arrays below.
+        implicit: `IMPLICIT_PLAN` of the car, shape (1,).
         recorded: The arrays that a row is copied from.
-        wheels: How torques come to the wheels.
+        wheels: Actuators of the wheels.
         ratio: Overall steering ratio.
-        sensors: What is between the truth and the measurement; must outlive the plan. None where nothing is.
-        brakes: `BRAKE_SETUP` and `BRAKE_STATE`; must outlive the plan too.
+        sensors: Sensors between the truth and the measurement; None for ideal sensors.
+        brakes: `BRAKE_SETUP` and `BRAKE_STATE`.
 
     Returns:
-        The plan, shape (1,), at an address that stays.
+        The bindings, shape (1,), at a fixed address, without a tape.
 
     Raises:
         ModelError: the model lacks an actuator or a sensor.
     """
-    plan = np.zeros(1, STEP_PLAN)
+    bindings = np.zeros(1, STEP_BINDINGS)
     values: Mapping[str, int] = {
         "implicit": implicit.ctypes.data,
         "time": data._address + engine_layout().d_time,
@@ -111,7 +128,7 @@ def step_plan(
         "n_dofs": model.nv,
         "ctrl": data.ctrl.ctypes.data,
         "sensordata": data.sensordata.ctypes.data,
-        # Without the world, which is the engine's body 0.
+        # Body 0 of the engine is the world, which is not recorded.
         "positions": data.xpos[1:].ctypes.data,
         "quaternions": data.xquat[1:].ctypes.data,
         "n_bodies": model.nbody - 1,
@@ -121,35 +138,35 @@ def step_plan(
         **{name: sensor_columns(model, sensor).start for name, sensor in _SENSORS.items()},
     }
     for name, value in wheels._asdict().items():
-        plan[name] = value
+        bindings[name] = value
     for name, value in values.items():
-        plan[name] = value
-    plan["ratio"] = ratio
-    plan["timestep_s"] = model.opt.timestep
-    read_through(plan, sensors)
-    record_from(plan, recorded)
-    return plan
+        bindings[name] = value
+    bindings["ratio"] = ratio
+    bindings["timestep_s"] = model.opt.timestep
+    read_through(bindings, sensors)
+    record_from(bindings, recorded)
+    return bindings
 
 
-def record_from(plan: NDArray[Any], recorded: RawRows) -> None:
-    """Has rows copied from these arrays.
-
-    Args:
-        plan: A `STEP_PLAN`; changed.
-        recorded: As for `step_plan`; they must outlive the plan.
-    """
-    plan["sources"] = [array.ctypes.data for array in recorded]
-    plan["sizes"] = [array.size for array in recorded]
-
-
-def read_through(plan: NDArray[Any], sensors: SensorBlock | None) -> None:
-    """Puts other sensors between the truth and the measurement.
+def record_from(bindings: NDArray[Any], recorded: RawRows) -> None:
+    """Bind the arrays that rows are copied from.
 
     Args:
-        plan: A `STEP_PLAN`, shape (1,).
-        sensors: The sensors; must outlive the plan. None for none.
+        bindings: A `STEP_BINDINGS`; changed.
+        recorded: The arrays; they must outlive the bindings.
     """
-    plan["n_sensors"] = 0
+    bindings["sources"] = [array.ctypes.data for array in recorded]
+    bindings["sizes"] = [array.size for array in recorded]
+
+
+def read_through(bindings: NDArray[Any], sensors: SensorBlock | None) -> None:
+    """Bind the sensors between the truth and the measurement.
+
+    Args:
+        bindings: A `STEP_BINDINGS`; changed.
+        sensors: The sensors, which must outlive the bindings; None for ideal sensors.
+    """
+    bindings["n_sensors"] = 0
     if sensors is not None:
-        plan["n_sensors"], plan["sensors"] = len(sensors.chains), sensors.chains.ctypes.data
-        plan["sensor_memory"], plan["sensor_memory_size"] = sensors.memory.ctypes.data, sensors.memory.size
+        bindings["n_sensors"], bindings["sensors"] = len(sensors.chains), sensors.chains.ctypes.data
+        bindings["sensor_memory"], bindings["sensor_memory_size"] = sensors.memory.ctypes.data, sensors.memory.size

@@ -1,0 +1,82 @@
+"""Messages in native code: the types of their fields, and their numbers in consecutive memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from activesteer.signals import widths_of
+
+_IGNORED: Final = types.none
+"""Type of a field that holds no number: native code ignores its value."""
+_TYPES: Final = {0: _IGNORED, 1: types.float64}
+
+
+def native_type(message: type[Any]) -> types.Tuple:
+    """The type by which compiled code takes a message from Python.
+
+    Python then converts every number to float64, but checks neither the class of the message nor the length of a tuple.
+    Call `is_complete` first.
+    """
+    widths = widths_of(message)
+    return types.Tuple([_TYPES.get(width) or types.UniTuple(types.float64, width) for width in widths])
+
+
+def is_complete(message: tuple[Any, ...], kind: type[Any]) -> bool:
+    """Whether a message has all fields, and a tuple of the right length where it holds a number per wheel.
+
+    Args:
+        message: What was given.
+        kind: Message class that is needed.
+    """
+    if type(message) is not kind or len(message) != len(kind._fields):
+        return False
+    widths = zip(message, widths_of(kind), strict=True)
+    return all(width < 2 or (type(value) is tuple and len(value) == width) for value, width in widths)
+
+
+def _places(kind: types.BaseTuple) -> list[tuple[int, ...]]:
+    """Indices of the numbers of a tuple and of the tuples within it, one after the other."""
+    places: list[tuple[int, ...]] = []
+    for index, part in enumerate(kind):
+        if isinstance(part, types.BaseTuple):
+            places += [(index, *inner) for inner in _places(part)]
+        elif part != _IGNORED:
+            places.append((index,))
+    return places
+
+
+def _numbers_at(builder: ir.IRBuilder, address: Any) -> Callable[[int], Any]:
+    """Pointer to a float64 by its place behind an address."""
+    start = builder.inttoptr(address, ir.DoubleType().as_pointer())
+    return lambda place: builder.gep(start, [ir.Constant(ir.IntType(64), place)])
+
+
+@intrinsic
+def store_numbers(_typing_context, address, message):
+    """Compiled code: write the numbers of a tuple, in their order, as consecutive float64 at an address."""
+
+    def generate(context, builder, _signature, arguments):
+        pointer = _numbers_at(builder, arguments[0])
+        for place, path in enumerate(_places(message)):
+            builder.store(builder.extract_value(arguments[1], path), pointer(place))
+        return context.get_dummy_value()
+
+    return types.void(address, message), generate
+
+
+@intrinsic
+def load_numbers(_typing_context, address, like):
+    """Compiled code: read a tuple of the type of another one from consecutive float64 at an address."""
+
+    def generate(_context, builder, _signature, arguments):
+        pointer, message = _numbers_at(builder, arguments[0]), arguments[1]
+        for place, path in enumerate(_places(like)):
+            message = builder.insert_value(message, builder.load(pointer(place)), path)
+        return message
+
+    return like(address, like), generate
