@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from activesteer.vehicle import native_step
 from activesteer.vehicle.implicit_plan import ImplicitPlan, drop_metric
-from activesteer.vehicle.step_plan import STEP_PLAN
+from activesteer.vehicle.step_bindings import STEP_BINDINGS
 
 STATE = ("qpos", "qvel", "act", "qacc", "sensordata", "actuator_force")
 FRAME = """<mujoco><option timestep="{step}" integrator="discrete" tolerance="1e-14" iterations="1000" {options}>
@@ -167,7 +167,7 @@ class Stepper:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         self.data, self.implicit = data, ImplicitPlan(model, data)
-        self._plan = np.zeros(1, STEP_PLAN)
+        self._plan = np.zeros(1, STEP_BINDINGS)
         self._plan["implicit"], self._plan["ctrl"] = self.implicit.plan.ctypes.data, data.ctrl.ctypes.data
         drop_metric(model, data)
 
