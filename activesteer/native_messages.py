@@ -19,27 +19,14 @@ _TYPES: Final = {0: _IGNORED, 1: types.float64}
 def native_type(message: type[Any]) -> types.Tuple:
     """The type by which compiled code takes a message from Python.
 
-    Python then converts every number to float64, but checks neither the class of the message nor the length of a tuple.
-    Call `is_complete` first.
+    Every number is converted to float64. Check class and length of a message first: one that is too short ends the
+    process.
     """
     widths = widths_of(message)
     return types.Tuple([_TYPES.get(width) or types.UniTuple(types.float64, width) for width in widths])
 
 
-def is_complete(message: tuple[Any, ...], kind: type[Any]) -> bool:
-    """Whether a message has all fields, and a tuple of the right length where it holds a number per wheel.
-
-    Args:
-        message: What was given.
-        kind: Message class that is needed.
-    """
-    if type(message) is not kind or len(message) != len(kind._fields):
-        return False
-    widths = zip(message, widths_of(kind), strict=True)
-    return all(width < 2 or (type(value) is tuple and len(value) == width) for value, width in widths)
-
-
-def _places(kind: types.BaseTuple) -> list[tuple[int, ...]]:
+def _places(kind: Any) -> list[tuple[int, ...]]:
     """Indices of the numbers of a tuple and of the tuples within it, one after the other."""
     places: list[tuple[int, ...]] = []
     for index, part in enumerate(kind):
@@ -56,10 +43,7 @@ def _numbers_at(builder: ir.IRBuilder, address: Any) -> Callable[[int], Any]:
     return lambda place: builder.gep(start, [ir.Constant(ir.IntType(64), place)])
 
 
-@intrinsic
-def store_numbers(_typing_context, address, message):
-    """Compiled code: write the numbers of a tuple, in their order, as consecutive float64 at an address."""
-
+def _store(_typing_context, address, message):
     def generate(context, builder, _signature, arguments):
         pointer = _numbers_at(builder, arguments[0])
         for place, path in enumerate(_places(message)):
@@ -69,10 +53,7 @@ def store_numbers(_typing_context, address, message):
     return types.void(address, message), generate
 
 
-@intrinsic
-def load_numbers(_typing_context, address, like):
-    """Compiled code: read a tuple of the type of another one from consecutive float64 at an address."""
-
+def _load(_typing_context, address, like):
     def generate(_context, builder, _signature, arguments):
         pointer, message = _numbers_at(builder, arguments[0]), arguments[1]
         for place, path in enumerate(_places(like)):
@@ -80,3 +61,9 @@ def load_numbers(_typing_context, address, like):
         return message
 
     return like(address, like), generate
+
+
+store_numbers: Final[Any] = intrinsic(_store)
+"""`store_numbers(address, message)` in compiled code: write the numbers of a tuple as consecutive float64."""
+load_numbers: Final[Any] = intrinsic(_load)
+"""`load_numbers(address, like)` in compiled code: read a tuple of the type of another one from consecutive float64."""

@@ -81,7 +81,7 @@ class SensorBlock:
         """
         values = iter(self.outputs.tolist())
         parts = (next(values) if width == 1 else tuple(islice(values, width)) for width in widths_of(Measurement)[1:])
-        return Measurement(time_s, *parts)
+        return Measurement._make((time_s, *parts))
 
 
 def speed_radii(front_fraction: float, rolling_radii_m: Sequence[float]) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ import pickle
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -110,8 +110,9 @@ def test_a_controller_of_the_user_s_own_is_copied_with_its_state(name: str, tmp_
     original.advance(400)
     Simulation("step_steer", given, overrides=KEYS)  # which loads the file once more
     other = COPIED[name](original)
-    assert other.loop.controller.inner.calls == original.loop.controller.inner.calls
-    assert other.loop.controller.inner is not original.loop.controller.inner
+    own, copied = (cast(Any, simulation.loop.controller).inner for simulation in (original, other))
+    assert copied.calls == own.calls
+    assert copied is not own
     assert_same_end(original, other)
 
 

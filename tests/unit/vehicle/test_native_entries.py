@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ActiveSteerError, ParameterError
-from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, WheelTorques, new_message
+from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, WheelTorques, new_message
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.channels import RawRows
 from tests.unit.vehicle.cars import standing
@@ -40,7 +40,7 @@ def rolling() -> Vehicle:
 
 def of_any_length(rng: random.Random, kind: type[Any]) -> Any:
     """A tuple that claims to be a message, mostly of a wrong length or with wrong fields."""
-    members = list(kind(*[0.0] * len(kind._fields)) if kind is Estimate else kind())
+    members: list[Any] = list(kind(*[0.0] * len(kind._fields)) if kind is Estimate else kind())
     for _ in range(rng.randint(0, 3)):
         members[rng.randrange(len(members))] = rng.choice((*WRONG, *NUMBERS))
     length = rng.choice((len(members), len(members), rng.randrange(16)))
@@ -65,9 +65,7 @@ def test_malformed_commands_are_refused_or_carried_out() -> None:
     for _ in range(COUNT):
         driver, actuator = command(rng, DriverCommand), command(rng, ActuatorCommand)
         if type(driver) is DriverCommand and len(driver) == 8 and rng.random() < 0.3:
-            torques = rng.choice(
-                (WheelTorques((1.0,) * 4, (1.0,) * 4), of_any_length(rng, Estimate), rng.choice(WRONG))
-            )
+            torques = rng.choice((WheelTorques(NO_BRAKES, NO_BRAKES), of_any_length(rng, Estimate), rng.choice(WRONG)))
             driver = driver._replace(wheel_torques=torques)
         if type(actuator) is ActuatorCommand and len(actuator) == 10 and rng.random() < 0.3:
             actuator = actuator._replace(estimate=of_any_length(rng, Estimate))
@@ -97,7 +95,9 @@ def test_a_gear_that_does_not_exist_is_refused(gear: Any) -> None:
         rolling().step(DriverCommand(gear=gear), ActuatorCommand())
 
 
-@pytest.mark.parametrize("estimate", [None, (0.0,) * 9, new_message(Estimate, (0.0,) * 9), Estimate(*["a"] * 10)])
+@pytest.mark.parametrize(
+    "estimate", [None, (0.0,) * 9, new_message(Estimate, (0.0,) * 9), new_message(Estimate, "0123456789"[:9] + "a")]
+)
 def test_an_estimate_of_another_form_is_not_recorded(estimate: Any) -> None:
     with pytest.raises(ParameterError):
         standing().record_estimate(estimate)
@@ -132,6 +132,7 @@ def test_rows_of_another_form_are_not_taken() -> None:
         for wrong in [*arrays_but(own), own[1:]]:
             with pytest.raises(ParameterError):
                 channels.take(rows._replace(**{name: wrong}), out, inputs)
+    wrong: Any
     for wrong in (out[1:], out[:, 1:], np.ascontiguousarray(out), out.astype(np.float32), None):
         with pytest.raises(ParameterError):
             channels.take(rows, wrong, inputs)
