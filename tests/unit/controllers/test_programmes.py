@@ -1,0 +1,161 @@
+"""The quadratic programmes of `mpc` and `integrated`, against the sums and forces that they stand for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from activesteer.controllers import load_controller
+from activesteer.controllers.axle_slopes import AxleSlopes
+from activesteer.controllers.esc import wheel_torques
+from activesteer.controllers.integrated import Integrated
+from activesteer.controllers.lqr import BOTH, SPEEDS_MPS, Lqr, schedule, steady_turn
+from activesteer.controllers.mpc import GIVEN, STATES, envelope_problem, model
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.scenario import resolve
+from activesteer.signals import Estimate
+from tests.unit.controllers.cars import CAR, held, measured, steering
+
+pytest.importorskip("daqp")
+INTERVAL_S, SPEED_MPS, LAG_S = 0.01, 25.0, 0.05
+BLOCKS, LOOKED_AT = (1, 2, 3, 6, 12), (2, 4, 7, 10, 13, 19, 25)
+
+
+@pytest.fixture(scope="module")
+def known():
+    return resolve("straight_line").controller_setup(INTERVAL_S)
+
+
+def driven(p, z, angles):
+    """Cost of driving on with angles in blocks, and yaw rate and rear slip angle at the calls looked at."""
+    a, b = model(CAR, p, LAG_S, INTERVAL_S, SPEED_MPS, 0.8, 0.6)
+    given = dict(zip((*STATES, *GIVEN), z, strict=True))
+    before = np.array([given["superposition_before"], given["rear_before"]])
+    steady = np.array([given["superposition_steady"], given["rear_steady"]])
+    scales = np.array([p.superposition_scale_rad, p.rear_scale_rad])
+    cost, bounded = 0.0, []
+    z = a @ z + b @ before
+    each_call = [block for block, calls in zip(angles, BLOCKS, strict=True) for _ in range(calls)]
+    for call, demanded in enumerate(each_call, start=2):
+        z = a @ z + b @ demanded
+        yaw_rate, sideslip, rear = z[0], z[1], z[3]
+        cost += ((yaw_rate - given["desired"]) / p.yaw_rate_scale_radps) ** 2 + (sideslip / p.sideslip_scale_rad) ** 2
+        cost += (((demanded - steady) / scales) ** 2).sum()
+        if call in LOOKED_AT:
+            bounded.append((yaw_rate, rear - sideslip + CAR.cg_to_rear_m * yaw_rate / SPEED_MPS))
+    for one, other in zip([before, *angles[:-1]], angles, strict=True):
+        cost += (((other - one) / p.change_scale_rad) ** 2).sum()
+    return cost, np.array(bounded).T.ravel()
+
+
+def test_programme_costs_what_driving_on_with_its_angles_costs(known, rng):
+    p = known.gains.mpc
+    problem = envelope_problem(CAR, p, LAG_S, INTERVAL_S, SPEED_MPS, 0.8, 0.6)
+    z, angles = rng.normal(0.0, 0.05, len(STATES) + len(GIVEN)), rng.normal(0.0, 0.05, (len(BLOCKS), 2))
+    x = np.append(angles.ravel(), (0.0, 0.0))
+    cost, bounded = driven(p, z, angles)
+    without, _ = driven(p, z, np.zeros_like(angles))
+    assert x @ problem.hessian @ x + 2.0 * (problem.gradient @ z) @ x == pytest.approx(cost - without)
+    assert problem.rows @ x + problem.offsets @ z == pytest.approx(np.tile(bounded, 2))
+
+
+def test_leaving_the_envelope_is_dear_and_softens_each_bound_by_its_own_slack(known):
+    problem = envelope_problem(CAR, known.gains.mpc, LAG_S, INTERVAL_S, SPEED_MPS)
+    slacks = np.zeros(len(problem.hessian))
+    slacks[-2:] = 0.3, 0.02
+    looks = len(LOOKED_AT)
+    softened = np.repeat([0.3, 0.02], looks)
+    assert problem.rows @ slacks == pytest.approx(np.concatenate([-softened, softened]))
+    # A rad/s beyond costs a hundred times what an error of a rad/s over the whole horizon costs.
+    error = (sum(BLOCKS) + 1) / known.gains.mpc.yaw_rate_scale_radps**2
+    assert problem.hessian[-1, -1] == problem.hessian[-2, -2] > 30.0 * error
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_rear_wheels_turn_out_of_the_turn_by_what_a_heavily_loaded_axle_needs_more(known, side):
+    slopes = AxleSlopes(known)
+    controller, driver = load_controller("mpc", known), steering(0.09 * side)
+    answer = held(controller, driver, measured(0.25 * side, SPEED_MPS), 300)
+    straight = steady_turn(known.single_track, SPEED_MPS)[1, 0] * answer.yaw_rate_desired_radps
+    more = answer.prediction_rad - straight
+    # Load transfer: in a turn at most of the friction an axle needs a larger slip angle than its stiffness says.
+    friction, ay_mps2 = answer.estimate.friction, SPEED_MPS * answer.yaw_rate_desired_radps
+    assert side * ay_mps2 > 0.7 * friction * GRAVITY_MPS2
+    assert more * side > math.radians(0.05)
+    assert more == pytest.approx(slopes.excess_rad(ay_mps2, friction)[1], rel=0.1)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_sliding_car_gets_side_force_against_its_sideslip_the_more_the_sooner_it_is_to_end(known, side):
+    sideslip_rad = 0.04 * side
+
+    class Sliding:
+        def step(self, _measurement):
+            return Estimate(SPEED_MPS, SPEED_MPS * sideslip_rad, sideslip_rad, 0.0, 0.9, *[0.0] * 5)
+
+    forces_N = []
+    for time_s in (0.1, 10.0):
+        gains = replace(known.gains, integrated=replace(known.gains.integrated, sideslip_time_s=time_s))
+        controller = Integrated(replace(known, gains=gains))
+        controller._lqr._estimator = Sliding()
+        answer, car = controller.step(steering(0.0), measured(0.0, SPEED_MPS)), known.single_track
+        forces_N.append(
+            car.front_stiffness_Nprad * answer.superposition_demand_rad
+            + car.rear_stiffness_Nprad * answer.rear_steer_demand_rad
+        )
+    # The steering stays near what the state feedback wants, so that the force changes little, but it does.
+    assert (forces_N[0] - forces_N[1]) * side < -10.0
+
+
+@pytest.mark.parametrize(
+    ("moment_Nm", "yaw_rate_radps", "torques_Nm"),
+    [
+        (-1000.0, 0.3, (0.0, 400.0, 0.0, 0.0)), (1000.0, 0.3, (0.0, 0.0, 300.0, 0.0)),
+        (1000.0, -0.3, (400.0, 0.0, 0.0, 0.0)), (-1000.0, -0.3, (0.0, 0.0, 0.0, 300.0)),
+    ],
+)  # fmt: skip
+def test_one_wheel_makes_the_moment_and_the_others_roll(moment_Nm, yaw_rate_radps, torques_Nm):
+    assert wheel_torques(moment_Nm, yaw_rate_radps, (0.4, 0.3), 2000.0) == torques_Nm
+
+
+@pytest.mark.parametrize(("works", "stuck"), [((False, True), 0), ((True, False), 1)])
+def test_turn_with_a_stuck_axle_is_asked_with_the_angle_at_which_it_is_stuck(known, works, stuck):
+    seen = measured(0.1, SPEED_MPS)._replace(superposition_rad=0.01, rear_steer_rad=0.02)
+    assert Lqr(known).turn(steering(0.03), seen, works).steady_rad[stuck] == pytest.approx((0.01, 0.02)[stuck])
+
+
+def test_brakes_of_a_car_that_spins_to_the_left_are_those_of_one_that_spins_to_the_right_mirrored(known):
+    answers = []
+    for side in (1.0, -1.0):
+        seen = measured(0.6 * side, SPEED_MPS)._replace(
+            rear_steer_rad=side * math.radians(3.0), superposition_rad=-side * math.radians(3.0)
+        )
+        answers.append(load_controller("integrated", known).step(steering(0.0), seen).brake_torque_demand_Nm)
+    fl, fr, rl, rr = answers[0]
+    assert answers[1] == pytest.approx((fr, fl, rr, rl), abs=0.1)
+
+
+def test_gains_of_the_regulator_are_those_of_the_schedule_and_between_its_speeds_their_mean(known):
+    regulator, p = Lqr(known), known.gains
+    rows = schedule(known.single_track, p.lqr, p.servos.lag_s, INTERVAL_S)
+    assert regulator._gains(BOTH, SPEEDS_MPS[3]) == pytest.approx(rows[3])
+    mean = 0.5 * (np.array(rows[3]) + rows[4])
+    assert regulator._gains(BOTH, 0.5 * (SPEEDS_MPS[3] + SPEEDS_MPS[4])) == pytest.approx(mean)
+    assert regulator._gains(BOTH, 2.0 * SPEEDS_MPS[-1]) == pytest.approx(rows[-1], rel=1e-5)
+
+
+def test_axle_that_carries_all_of_the_load_transfer_feels_twice_the_height(known):
+    def excesses(height_m, front_fraction):
+        two_track = replace(
+            known.estimation.two_track, load_height_m=height_m, front_load_transfer_fraction=front_fraction
+        )
+        slopes = AxleSlopes(replace(known, estimation=replace(known.estimation, two_track=two_track)))
+        return slopes.excess_rad(6.0, 0.9)
+
+    front, rear = excesses(0.6, 1.0)
+    assert front == pytest.approx(excesses(1.2, 0.5)[0])
+    assert rear == pytest.approx(excesses(0.0, 0.5)[1])
+    assert excesses(0.6, 0.0)[1] > rear
