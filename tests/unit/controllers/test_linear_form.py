@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
@@ -52,7 +54,7 @@ class FirstOrder:
 class Limited:
     """Answers each measurement in proportion, up to a limit."""
 
-    limits = {"yaw_rate_radps": 2e-4, "ay_mps2": 2e-3, "rear_steer_rad": 2e-5, "superposition_rad": 2e-5}
+    limits: ClassVar = {"yaw_rate_radps": 2e-4, "ay_mps2": 2e-3, "rear_steer_rad": 2e-5, "superposition_rad": 2e-5}
 
     def step(self, _, measurement):
         return ActuatorCommand(sum(min(getattr(measurement, name), most) for name, most in self.limits.items()))

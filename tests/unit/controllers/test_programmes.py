@@ -159,3 +159,10 @@ def test_axle_that_carries_all_of_the_load_transfer_feels_twice_the_height(known
     assert front == pytest.approx(excesses(1.2, 0.5)[0])
     assert rear == pytest.approx(excesses(0.0, 0.5)[1])
     assert excesses(0.6, 0.0)[1] > rear
+
+
+def test_sides_may_not_differ_once_an_actuator_is_known_to_be_stuck(known):
+    controller = load_controller("integrated", known)
+    stuck = measured(0.0, SPEED_MPS)._replace(rear_steer_rad=math.radians(0.6))
+    assert controller.step(steering(0.0), stuck).side_difference_Pa > 0.0
+    assert held(controller, steering(0.0), stuck, 60).side_difference_Pa == 0.0
