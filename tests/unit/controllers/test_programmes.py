@@ -82,6 +82,7 @@ def test_rear_wheels_turn_out_of_the_turn_by_what_a_heavily_loaded_axle_needs_mo
     straight = steady_turn(known.single_track, SPEED_MPS)[1, 0] * answer.yaw_rate_desired_radps
     more = answer.prediction_rad - straight
     # Load transfer: in a turn at most of the friction an axle needs a larger slip angle than its stiffness says.
+    assert answer.estimate is not None
     friction, ay_mps2 = answer.estimate.friction, SPEED_MPS * answer.yaw_rate_desired_radps
     assert side * ay_mps2 > 0.7 * friction * GRAVITY_MPS2
     assert more * side > math.radians(0.05)
@@ -100,7 +101,7 @@ def test_sliding_car_gets_side_force_against_its_sideslip_the_more_the_sooner_it
     for time_s in (0.1, 10.0):
         gains = replace(known.gains, integrated=replace(known.gains.integrated, sideslip_time_s=time_s))
         controller = Integrated(replace(known, gains=gains))
-        controller._lqr._estimator = Sliding()
+        controller._lqr._estimator = Sliding()  # pyright: ignore[reportAttributeAccessIssue]
         answer, car = controller.step(steering(0.0), measured(0.0, SPEED_MPS)), known.single_track
         forces_N.append(
             car.front_stiffness_Nprad * answer.superposition_demand_rad
