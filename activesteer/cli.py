@@ -1,4 +1,4 @@
-"""The command line: `activesteer run`, `reproduce` and the others; each has a module in `commands`."""
+"""Command line of the program; every command has a module in `commands`."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of the console script.
 
     Args:
-        arguments: Words after the program's name. Where not given, those of the process, which then is the program's
-            own: Ctrl-C and SIGTERM end it as `commands.stopping` says.
+        arguments: Words after the name of the program; those of the process by default. Only then does the process
+            belong to the program: Ctrl-C and SIGTERM end it, see `commands.stopping`.
 
     Returns:
-        Exit status: 0, 1 for an error that was explained, 130 after Ctrl-C, 143 after SIGTERM.
+        Exit status: 0, 1 after an explained error, 130 after Ctrl-C, 143 after SIGTERM.
     """
     # Before anything else is imported: a signal may come at any moment.
     from activesteer.commands.stopping import StopSignals
@@ -33,11 +33,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = _called(arguments, stop)
         if arguments is None:
             sys.stdout.flush()
-    except BrokenPipeError:  # whoever reads the output, such as `head`, has seen enough
+    except BrokenPipeError:  # the reader of the output, such as `head`, has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
     except BaseException as error:
-        # Whatever an interrupted import or an ended worker made of the signal, the signal is the reason.
+        # An interrupted import or an ended worker may turn the signal into any other exception.
         if stop.number is None and not isinstance(error, KeyboardInterrupt):
             raise
         return stop.end()
@@ -60,14 +60,14 @@ def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
     except (ActiveSteerError, OSError) as error:
         if stop.number is not None:
             raise
-        # An OSError that gets here is of the output, or of a folder for what is temporary.
+        # An OSError that arrives here concerns the output or a temporary folder.
         lines = [f"activesteer: {error}", *getattr(error, "__notes__", [])]
         print("\n".join(lines), file=sys.stderr)
         return 1
 
 
 def all_commands() -> Commands:
-    """The commands of the program, in the groups under which `--help` lists them."""
+    """Return all commands in the groups in which `--help` lists them."""
     from activesteer.commands import (
         bench,
         compare,
@@ -103,10 +103,10 @@ def all_commands() -> Commands:
     commands = Commands(f"activesteer {__version__}")
     for title, modules in {
         "drive": (listing, run, watch),
-        "look": (info, report, compare, replay, video, import_, recover),
+        "recordings": (info, report, compare, replay, video, import_, recover),
         "car": (vehicle, tyre, kc),
         "study": (study, tune, fit, envelope, fault_map, identify, linearise, driver, margins),
-        "prove": (reproduce, test, figures, validate, bench),
+        "verify": (reproduce, test, figures, validate, bench),
     }.items():
         commands.begin_group(title)
         for module in modules:

@@ -48,7 +48,7 @@ def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Abst
 
 @contextmanager
 def replacing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[Path]:
-    """Gives a new file beside `path` to write to, which takes the place of `path` in the end.
+    """Give a new file beside `path` to write to, which takes the place of `path` in the end.
 
     So no one reads half a file: where the body fails, the new file is deleted and what was there before stays. A device
     is written to as it is.
@@ -94,14 +94,14 @@ def passing(part: Path) -> Iterator[None]:
 
 
 def delete_passing() -> None:
-    """Deletes the files of `passing` that are being written, for an end of the process that does not unwind it."""
+    """Delete the files of `passing` that are being written, for an end of the process that does not unwind it."""
     for part in tuple(_passing):
         with suppress(OSError):
             part.unlink(missing_ok=True)
 
 
 def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerError]) -> Path:
-    """Writes a text file, in UTF-8; one that exists is replaced as a whole.
+    """Write a text file, in UTF-8; one that exists is replaced as a whole.
 
     Args:
         path: The file.
@@ -183,7 +183,7 @@ def why_no_file(path: str | os.PathLike[str]) -> str:
 
 
 def read_bytes(path: str | os.PathLike[str], error: type[ActiveSteerError], max_bytes: int = MAX_TEXT_BYTES) -> bytes:
-    """Reads a regular file of limited size.
+    """Read a regular file of limited size.
 
     Args:
         path: The file.
@@ -216,7 +216,7 @@ def read_text(
     error: type[ActiveSteerError],
     max_bytes: int = MAX_TEXT_BYTES,
 ) -> str:
-    """Reads a text file in UTF-8; see `read_bytes`. Line ends become those of Python, a byte order mark is left out."""
+    """Read a text file in UTF-8; see `read_bytes`. Line ends become those of Python, a byte order mark is left out."""
     try:
         text = read_bytes(path, error, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError as reason:
@@ -241,7 +241,7 @@ class CsvRow(NamedTuple):
 def read_csv(
     path: str | os.PathLike[str], error: type[ActiveSteerError], *, empty_cells_count: bool = False
 ) -> list[CsvRow]:
-    """Reads the rows of a CSV, whose cells are apart by commas, semicolons or tabs; the first line with any decides.
+    """Read the rows of a CSV, whose cells are apart by commas, semicolons or tabs; the first line with any decides.
 
     What is behind a `#` is a comment. Where cells are apart by semicolons or tabs, 1,5 is the number 1.5.
 
@@ -300,7 +300,7 @@ def csv_number(cell: str, error: type[ActiveSteerError], file: str, line: int, c
 
 
 def make_folder(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:
-    """Makes a folder and those above it, where they do not exist.
+    """Make a folder and those above it, where they do not exist.
 
     Args:
         path: The folder.

@@ -1,4 +1,4 @@
-"""Finds the models, manoeuvres and studies, in a checkout, in an editable install and in an installed wheel.
+"""Find the models, manoeuvres and studies, in a checkout, in an editable install and in an installed wheel.
 
 In a wheel they travel inside the package, in `_data/`; in a checkout they lie beside the package, at the top.
 """
@@ -179,7 +179,7 @@ def _vehicle_in(folder: Path) -> Path:
 
 
 def check_own(file: Path) -> None:
-    """Refuses to change a file that belongs to an installed package.
+    """Refuse to change a file that belongs to an installed package.
 
     Args:
         file: The file.

@@ -1,1 +1,1 @@
-"""The commands of the command line, a module each; every one has `add_to(commands)`."""
+"""Commands of the command line. Each module has `add_to(commands)`."""

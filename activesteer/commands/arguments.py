@@ -1,4 +1,4 @@
-"""Options that several commands share, each declared once: the same name, meaning and help everywhere."""
+"""Options that several commands share, each declared once."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _NAME_WIDTH: Final = 12
 
 
 class Commands:
-    """The commands of the program as they are added, and the list of them that `--help` shows, in groups."""
+    """All commands of the program, listed by `--help` in groups."""
 
     def __init__(self, version: str) -> None:
-        """Begins with no command.
+        """Create a command line without commands.
 
         Args:
-            version: What `--version` prints.
+            version: Text that `--version` prints.
         """
         self._parser = argparse.ArgumentParser(
             prog="activesteer",
@@ -41,16 +41,16 @@ class Commands:
         self._groups: dict[str, dict[str, str]] = {}
 
     def begin_group(self, title: str) -> None:
-        """Commands that are added from now on stand under this title."""
+        """Start a group; commands that are added later belong to it."""
         self._groups[title] = {}
 
     def add_parser(self, name: str, help: str, description: str = "") -> argparse.ArgumentParser:
-        """Adds a command, as argparse does it.
+        """Add a command to the current group.
 
         Args:
-            name: Its name.
-            help: What it does, in some words.
-            description: What its own help begins with; the words of `help` where not given.
+            name: Name of the command.
+            help: One line for the list of commands.
+            description: First lines of the command's own help; `help` by default.
         """
         group = self._groups[next(reversed(self._groups))]
         group[name] = help
@@ -63,18 +63,18 @@ class Commands:
         return [name for group in self._groups.values() for name in group]
 
     def parser(self) -> argparse.ArgumentParser:
-        """The whole command line."""
+        """Return the parser of the whole command line."""
         lines = []
         for title, group in self._groups.items():
             lines += [f"{title}:", *(f"  {name:{_NAME_WIDTH}}{words}" for name, words in group.items()), ""]
-        self._parser.epilog = "\n".join([*lines, "`activesteer COMMAND --help` tells more of a command."])
+        self._parser.epilog = "\n".join([*lines, "`activesteer COMMAND --help` describes a command."])
         return self._parser
 
     def parse(self, arguments: Sequence[str] | None = None) -> argparse.Namespace:
-        """What a command line asks for; one that is wrong ends the program with what would be right.
+        """Parse a command line; end the program with a correction if the command line is wrong.
 
         Args:
-            arguments: Words after the program's name; those of the process where not given.
+            arguments: Words after the name of the program; those of the process by default.
         """
         words = list(sys.argv[1:] if arguments is None else arguments)
         command = next((word for word in words if not word.startswith("-")), None)
@@ -87,22 +87,22 @@ class Commands:
         return options
 
     def _hint(self, parser: argparse.ArgumentParser, words: Sequence[str], unknown: str) -> str:
-        """Where an argument belongs, or which one may have been meant."""
+        """Correction of an unknown argument."""
         known = list(parser._option_string_actions)
         option = unknown.partition("=")[0]
         if option in known:
-            return f"{option} stands behind the command: activesteer {next(w for w in words if w[0] != '-')} {option}"
+            return f"put {option} after the command: activesteer {next(w for w in words if w[0] != '-')} {option}"
         if close := difflib.get_close_matches(option, known, 1, 0.7):
             return f"did you mean {close[0]}?"
         if "=" in unknown and "--set" in known:
-            return f"a parameter is replaced by --set {unknown}"
+            return f"--set {unknown} replaces a parameter"
         if "--set" in words and not unknown.startswith("-"):
-            return "--set KEY=VALUE has no blanks around its sign"
-        return f"`{parser.prog} --help` lists what there is"
+            return "write --set KEY=VALUE without blanks around '='"
+        return f"`{parser.prog} --help` lists the arguments"
 
 
 def add_vehicle(parser: argparse.ArgumentParser) -> None:
-    """Adds `--vehicle`."""
+    """Add `--vehicle`."""
     parser.add_argument(
         "--vehicle", default="compact", metavar="NAME_OR_PATH",
         help="a name from `activesteer list`, a vehicle file or its folder (default: compact)",
@@ -110,35 +110,41 @@ def add_vehicle(parser: argparse.ArgumentParser) -> None:
 
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
-    """Adds what `scenario_of` reads: the manoeuvre, `--vehicle`, `--driver`, `--set`, `--overrides` and `--fault`."""
+    """Add the arguments of `scenario_of`: the manoeuvre, `--vehicle`, `--driver`, `--set`, `--overrides`, `--fault`."""
     parser.add_argument(
         "maneuver", metavar="MANEUVER",
-        help="a name from `activesteer list`, a TOML file, or a recording, whose steering, speed and brake are driven",
+        help="a name from `activesteer list`, a TOML file, or a recording, whose inputs are driven again",
     )  # fmt: skip
     add_car(parser)
     add_driver(parser)
     parser.add_argument(
         "--fault", action="append", default=[], dest="faults", metavar="PART:KIND[=SIZE]@START[-END]",
-        help="let an actuator or a sensor fail, as rear:stuck@2.0 or yaw_rate_sensor:offset=2degps@1-3; "
-        "in place of the manoeuvre's own faults",
+        help="let an actuator or a sensor fail, such as rear:stuck@2.0 or yaw_rate_sensor:offset=2degps@1-3; "
+        "replaces the faults of the manoeuvre",
     )  # fmt: skip
 
 
 def add_car(parser: argparse.ArgumentParser) -> None:
-    """Adds `--vehicle`, and `--set` and `--overrides`, which `overrides_of` reads."""
+    """Add `--vehicle`, `--set` and `--overrides`; `overrides_of` reads the last two."""
     add_vehicle(parser)
     parser.add_argument(
         "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
-        help="replace a parameter, as road.mu=0.4 or controllers.ars.limit_deg=2",
+        help="replace a parameter, such as road.mu=0.4 or controllers.ars.limit_deg=2",
     )  # fmt: skip
     parser.add_argument(
         "--overrides", action="append", default=[], dest="override_files", type=Path, metavar="FILE.toml",
-        help="replace the parameters of a file, as `activesteer fit` writes it: \"road.mu\" = 0.4 in every line",
+        help="replace the parameters listed in a file, a line such as \"road.mu\" = 0.4 each",
     )  # fmt: skip
 
 
 def add_controller(parser: argparse.ArgumentParser, *, several: bool, default: str = "none") -> None:
-    """Adds `-c`; where there may be several, `options.controller` is a list, or None: then `default`, in words."""
+    """Add `-c`.
+
+    Args:
+        parser: Parser of the command.
+        several: Whether the option may be repeated. `options.controller` then is a list, or None for the default.
+        default: Default in words, for the help.
+    """
     words = "none, ars, afs or another of `activesteer list`, a variant's file, or my_file.py:MyController?gain=2"
     parser.add_argument(
         "-c", "--controller", metavar="CONTROLLER",
@@ -148,9 +154,12 @@ def add_controller(parser: argparse.ArgumentParser, *, several: bool, default: s
 
 
 def add_driver(parser: argparse.ArgumentParser, default: str = "", *, several: bool = False) -> None:
-    """Adds `--driver`; where the default depends on something, it is None, and `default` says it in words.
+    """Add `--driver`.
 
-    Where there may be several, `options.driver` is a list, or None.
+    Args:
+        parser: Parser of the command.
+        default: Default in words; `options.driver` is None by default then.
+        several: Whether the option may be repeated. `options.driver` then is a list, or None.
     """
     words = f"novice, typical, expert, a driver file, or my_file.py:MyDriver{'; may be repeated' if several else ''}"
     parser.add_argument(
@@ -160,8 +169,8 @@ def add_driver(parser: argparse.ArgumentParser, default: str = "", *, several: b
 
 
 def add_recording(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
-    """Adds the recordings to look at: `options.file`, or `options.files` where there may be several."""
-    words = "a recording that `activesteer run` or `reproduce` made"
+    """Add the recordings of a command: `options.file`, or `options.files` for several."""
+    words = "a recording of `activesteer run` or `reproduce`"
     if several:
         parser.add_argument("files", nargs="+", type=Path, metavar="FILE.mcap", help=f"{words}; several are compared")
     else:
@@ -169,18 +178,18 @@ def add_recording(parser: argparse.ArgumentParser, *, several: bool = False) -> 
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
-    """Adds `--json`."""
+    """Add `--json`."""
     parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
 
 
 def add_output(parser: argparse.ArgumentParser, metavar: str, words: str, default: str | None = None) -> None:
-    """Adds `-o`.
+    """Add `-o`.
 
     Args:
-        parser: Of the command.
-        metavar: What is to be given: DIR, FILE.html.
-        words: What goes there, and what is done without the option where it has no default.
-        default: Where it goes if nothing is given.
+        parser: Parser of the command.
+        metavar: Form of the value: DIR, FILE.html.
+        words: Help: what is written there, and what happens without the option if it has no default.
+        default: Default path.
     """
     parser.add_argument(
         "-o", "--output", type=Path, metavar=metavar, default=None if default is None else Path(default),
@@ -189,17 +198,17 @@ def add_output(parser: argparse.ArgumentParser, metavar: str, words: str, defaul
 
 
 def add_figures_folder(parser: argparse.ArgumentParser) -> None:
-    """Adds `-o` of a command that draws only where it is told to."""
-    add_output(parser, "DIR", "folder for the figures; none are drawn without it")
+    """Add `-o` of a command that draws figures only with this option."""
+    add_output(parser, "DIR", "folder for figures (default: no figures)")
 
 
 def add_jobs(parser: argparse.ArgumentParser) -> None:
-    """Adds `--jobs`."""
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one per processor)")
+    """Add `--jobs`."""
+    parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per processor)")
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Adds `--jobs` and `--scheduler`."""
+    """Add `--jobs` and `--scheduler`."""
     add_jobs(parser)
     parser.add_argument(
         "--scheduler", metavar="ADDRESS",
@@ -208,29 +217,38 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def add_pace(parser: argparse.ArgumentParser) -> None:
-    """Adds `--speed`, the pace of what is shown."""
+    """Add `--speed`, the pace of a film or a view."""
     parser.add_argument(
-        "--speed", type=float, default=1.0, metavar="FACTOR", help="0.25 is slow motion, 4 is fast (default: 1)"
+        "--speed", type=float, default=1.0, metavar="FACTOR", help="pace: 0.25 is slow motion, 4 is fast (default: 1)"
     )
 
 
 def add_speeds(parser: argparse.ArgumentParser, default: str) -> None:
-    """Adds `--speed-kmh` of a command that computes something at several speeds; `default` says in words at which."""
+    """Add `--speeds-kmh`; `default` describes the default. `--speed-kmh` is the same and may be repeated."""
     parser.add_argument(
-        "--speed-kmh", type=float, action="append", metavar="V", help=f"may be repeated (default: {default})"
-    )
+        "--speeds-kmh", "--speed-kmh", type=numbers, action="extend", metavar="V,V",
+        help=f"speeds, separated by commas (default: {default})",
+    )  # fmt: skip
+
+
+def numbers(text: str) -> list[float]:
+    """Return the numbers of an option, which are separated by commas."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no list of numbers such as 60,100") from None
 
 
 def add_cutaway(parser: argparse.ArgumentParser) -> None:
-    """Adds `--cutaway`, which shows what the body hides."""
-    parser.add_argument("--cutaway", action="store_true", help="see the suspension through the body")
+    """Add `--cutaway`."""
+    parser.add_argument("--cutaway", action="store_true", help="show the suspension through the body")
 
 
 def scenario_of(options: argparse.Namespace) -> Scenario:
-    """The scenario that the arguments name.
+    """Return the scenario that the arguments describe.
 
     Raises:
-        ActiveSteerError: there is no such manoeuvre, vehicle or parameter, or a value is wrong.
+        ActiveSteerError: a manoeuvre, vehicle or parameter does not exist, or a value is wrong.
     """
     from activesteer.faults import fault_table
     from activesteer.scenario import resolve
@@ -241,20 +259,20 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
 
 def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """What `--overrides` and `--set` give.
+    """Return the parameters that `--overrides` and `--set` replace.
 
     Args:
-        options: What the command was called with.
-        given: Keys that have values already.
+        options: Options of the command.
+        given: Keys that already have values.
 
     Raises:
-        ParameterError: a file cannot be read, something is not written so, or a key is given twice.
+        ParameterError: a file cannot be read, an option is malformed, or a key is given twice.
     """
     values = dict(given or {})
     for path in options.override_files:
         table, source = read_toml(path)
         if not table:
-            raise source.fail((), 'replaces nothing; a line as "road.mu" = 0.4 is needed')
+            raise source.fail((), 'replaces nothing; write lines such as "road.mu" = 0.4')
         for key in table:
             if key in values:
                 raise source.fail((key,), "is given twice; leave one out")
@@ -263,16 +281,16 @@ def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = 
 
 
 def pairs(texts: Sequence[str], option: str, example: str, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Keys and values that an option gives, each value as in TOML; what is no TOML value is a text.
+    """Return the keys and values of a repeated option. A value is written as in TOML; any other value is a text.
 
     Args:
-        texts: As `key=value`.
-        option: The option, for error messages.
-        example: What may stand behind it.
-        given: Keys that have values already.
+        texts: Values of the option, `key=value` each.
+        option: Name of the option, for error messages.
+        example: Example of a value.
+        given: Keys that already have values.
 
     Raises:
-        ParameterError: one is not written so, or a key is given twice.
+        ParameterError: a text is no `key=value`, or a key is given twice.
     """
     values = dict(given or {})
     for text in texts:

@@ -11,7 +11,7 @@ from activesteer.errors import ParameterError
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "bench",
         help="where the time of a step goes",

@@ -1,4 +1,4 @@
-"""`activesteer compare MEASURED.mcap... SIMULATED.mcap`: measured runs beside a simulated one, with a verdict."""
+"""`activesteer compare MEASURED.mcap... SIMULATED.mcap`: compare measured runs with a simulated one."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from activesteer.errors import ParameterError
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "compare",
-        help="measured runs beside a simulated one: shift, residuals, verdict",
-        description="Finds the time shift, and says which share of the measurement lies in the tolerance corridor "
-        "around the simulation. The status is 1 where a quantity does not.",
+        help="compare measured runs with a simulated one",
+        description="Finds the time shift, and prints the share of the measurement inside the tolerance corridor of "
+        "the simulation. The exit status is 1 if a quantity is outside.",
     )
     parser.add_argument(
         "files", nargs="+", type=Path, metavar="FILE.mcap",
-        help="recordings: measured ones, of several their mean counts, and the simulated one at the end",
+        help="recordings: measured ones, whose mean is compared, and the simulated one last",
     )  # fmt: skip
     parser.add_argument(
         "--standard", choices=("iso19364", "iso19365"), default="iso19365",
         help="iso19364: cross plots over the lateral acceleration, for steady-state driving; iso19365: over time "
         "(default)",
     )  # fmt: skip
-    add_output(parser, "FILE.html", "the page; none is written without it")
+    add_output(parser, "FILE.html", "the page (default: no page)")
     add_json(parser)
     parser.set_defaults(action=_compare)
 
@@ -39,7 +39,7 @@ def _compare(options: argparse.Namespace) -> int:
     from activesteer.recording import Recording
 
     if len(options.files) < 2:
-        raise ParameterError("two recordings at least are needed: measured ones, and the simulated one at the end")
+        raise ParameterError("at least two recordings are needed: measured ones, and the simulated one last")
     *measured, simulated = (Recording.open(file, recover=True) for file in options.files)
     found = compare(measured, simulated, options.standard)
     if options.output is not None:

@@ -1,4 +1,4 @@
-"""`activesteer driver [NAME]`: how stable driver, controller and car are as one loop, over speed."""
+"""`activesteer driver [NAME]`: stability of the loop of driver, controller and car, over speed."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ _COLUMNS = {
     "phase_margin_deg": "margin deg",
     "crossover_rad_s": "crossover rad/s",
 }
-"""Key of a loop's figures -> head of its column."""
+"""Key of a result -> head of its column."""
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "driver",
         help="damping and phase margin of driver and car",
-        description="Crossover frequency, phase margin and damping of the loop of driver, controller and linearised "
-        "car, the corrector fully active; beside it the damping after a small step of the path, of the same loop and "
-        "in a run, and how far the two are apart at most.",
+        description="Prints crossover frequency, phase margin and damping of the loop of driver, controller and "
+        "linearised car, with a fully active corrector. Also prints the damping after a small step of the path, for "
+        "the same loop and for a run, and the largest distance between the two.",
     )
     parser.add_argument(
         "name", nargs="?", default=DEFAULT_DRIVER, metavar="NAME",
@@ -61,7 +61,7 @@ def _driver(options: argparse.Namespace) -> int:
         options.name,
         options.vehicle,
         options.controller or ("none", "ars", "afs"),
-        options.speed_kmh or SPEEDS_KMH,
+        options.speeds_kmh or SPEEDS_KMH,
         overrides_of(options),
     )
     rows = [loop.to_json() for loop in loops]

@@ -1,4 +1,4 @@
-"""`activesteer envelope`: how fast each car gets through a lane change or a slalom, and where who is lost."""
+"""`activesteer envelope`: highest entry speeds of a lane change or a slalom, and where each car loses control."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from activesteer.commands.arguments import (
     add_driver,
     add_figures_folder,
     add_json,
+    add_speeds,
     add_workers,
+    numbers,
     overrides_of,
 )
 from activesteer.commands.output import print_json
@@ -27,16 +29,16 @@ if TYPE_CHECKING:
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("envelope", help="how fast cars get through lanes or cones, and where who is lost")
+    """Add the command to the command line."""
+    parser = commands.add_parser("envelope", help="highest entry speeds, and where each car loses control")
     parser.add_argument(
         "maneuvers", nargs="+", metavar="MANEUVER", help="lane changes and slaloms: names, or TOML files"
     )
     add_controller(parser, several=True, default="none, ars and afs")
     add_driver(parser, several=True)
     add_car(parser)
-    parser.add_argument("--speeds-kmh", metavar="V,V", help="speeds of the map (default: the manoeuvre's +-30)")
-    parser.add_argument("--lines-m", metavar="D,D", help="lane.margin_m or cones.offset_m of the map")
+    add_speeds(parser, "30 below to 30 above that of the manoeuvre")
+    parser.add_argument("--lines-m", type=numbers, metavar="D,D", help="lane.margin_m or cones.offset_m of the map")
     add_figures_folder(parser)
     add_workers(parser)
     add_json(parser)
@@ -47,7 +49,7 @@ def _envelope(options: argparse.Namespace) -> int:
     from activesteer.studies.paper.envelope import envelope
 
     overrides, drivers = overrides_of(options), options.driver or (DEFAULT_DRIVER,)
-    speeds_kmh, lines_m = _numbers(options.speeds_kmh, "--speeds-kmh"), _numbers(options.lines_m, "--lines-m")
+    lines_m = options.lines_m or []
     _check(options, overrides, drivers[0], given_lines=bool(lines_m))
     found = []
     for maneuver in options.maneuvers:
@@ -58,7 +60,7 @@ def _envelope(options: argparse.Namespace) -> int:
                 options.vehicle,
                 overrides,
                 drivers=drivers,
-                speeds_kmh=speeds_kmh,
+                speeds_kmh=options.speeds_kmh or [],
                 lines_m=lines_m,
                 jobs=options.jobs,
                 scheduler=options.scheduler,
@@ -74,7 +76,7 @@ def _envelope(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace, overrides: Mapping[str, Any], driver: Any, *, given_lines: bool) -> None:
-    """What is wrong with the last manoeuvre is said before the first is driven, which takes minutes."""
+    """Check all manoeuvres before the first one is driven, which takes minutes."""
     from activesteer.scenario import resolve
     from activesteer.studies.paper.envelope import line_of
 
@@ -82,19 +84,19 @@ def _check(options: argparse.Namespace, overrides: Mapping[str, Any], driver: An
     keys = list(dict.fromkeys(line_of(scenario).key for scenario in scenarios))
     if given_lines and len(keys) > 1:
         raise ParameterError(
-            f"would be {' and '.join(keys)} at once; one command for each of them is needed",
+            f"would set {' and '.join(keys)} at once; use one command for each",
             key="--lines-m", value=options.lines_m,
         )  # fmt: skip
     names = [scenario.maneuver.name for scenario in scenarios]
     if len(set(names)) < len(names):
         raise ParameterError(
-            f"{', '.join(options.maneuvers)}: two of them have the same name, which tells figures apart",
+            f"{', '.join(options.maneuvers)}: names must be unique, because the figures are named after them",
             key="MANEUVER", value=tuple(options.maneuvers),
         )  # fmt: skip
 
 
 def _drawn(made: Envelope, folder: Path | None) -> list[str]:
-    """The files of the figure; none without a folder."""
+    """Draw the figure, and return its files; none without a folder."""
     if folder is None:
         return []
     from activesteer.errors import StudyError
@@ -109,7 +111,7 @@ def _print(made: Envelope, figures: Sequence[str]) -> None:
     tried = f"between {RANGE_KMH[0]:g} and {RANGE_KMH[1]:g} km/h"
     print(f"{made.maneuver}: highest entry speed at {made.line.key} = {made.nominal[1]:g}, {tried}")
     for entry in made.entry_speeds:
-        found = "gets through at none" if entry["entry_speed_kmh"] is None else f"{entry['entry_speed_kmh']:.0f} km/h"
+        found = "fails at every speed" if entry["entry_speed_kmh"] is None else f"{entry['entry_speed_kmh']:.0f} km/h"
         print(f"  {entry['driver']:<12}{entry['controller']:<8}{found}")
     for driver in made.drivers:
         states = list(made.cells(driver).values())
@@ -117,17 +119,8 @@ def _print(made: Envelope, figures: Sequence[str]) -> None:
         print(f"map of {driver}, {len(states)} cells: {counts}")
     for case in made.exceptions:
         print(
-            f"not as bisection assumes: {case['driver']} {case['controller']} at {made.line.key} = {case['line_m']:g} "
-            f"is lost at {case['lost_kmh']:g} km/h and not at {case['kept_kmh']:g}"
+            f"bisection is wrong here: {case['driver']} {case['controller']} at {made.line.key} = {case['line_m']:g} "
+            f"loses control at {case['lost_kmh']:g} km/h and not at {case['kept_kmh']:g}"
         )
     for figure in figures:
         print(f"figure: {figure}")
-
-
-def _numbers(text: str | None, option: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")] if text else []
-    except ValueError as reason:
-        raise ParameterError(
-            f"is {text!r}; numbers with commas between are needed, as 60,100", key=option, value=text
-        ) from reason

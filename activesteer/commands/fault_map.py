@@ -1,4 +1,4 @@
-"""`activesteer fault-map`: what each fault does to the car, and how long it may last."""
+"""`activesteer fault-map`: effect of each fault on the car, and the longest time it may last."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from activesteer.commands.arguments import (
     add_driver,
     add_figures_folder,
     add_json,
+    add_speeds,
     add_workers,
     overrides_of,
     pairs,
@@ -30,24 +31,24 @@ _HEADS: Final = (
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("fault-map", help="what faults do to the car, and how long they may last")
+    """Add the command to the command line."""
+    parser = commands.add_parser("fault-map", help="effect of faults on the car, and how long they may last")
     add_controller(parser, several=False)
     add_driver(parser)
     add_car(parser)
     parser.add_argument(
         "--fault", action="append", default=[], dest="faults", metavar="PART:KIND[=SIZE]",
-        help="a fault, as rear:stuck or rear:offset=1deg (default: those of the controller's actuators)",
+        help="a fault, such as rear:stuck or rear:offset=1deg (default: all of the controller's actuators)",
     )  # fmt: skip
     parser.add_argument("--preset", default="usual", metavar="NAME", help="usual, or un_r79: circles of 100 m, 80 km/h")
-    parser.add_argument("--speeds-kmh", metavar="V,V", help="speeds, in place of the preset's (usual: 60,100,140)")
+    add_speeds(parser, "those of the preset, usual: 60,100,140")
     parser.add_argument(
         "--situations", metavar="NAME,NAME",
-        help="in place of the preset's: straight, turn, lane_change, circle_100m, circle_100m_right",
+        help="replaces those of the preset: straight, turn, lane_change, circle_100m, circle_100m_right",
     )  # fmt: skip
     parser.add_argument(
         "--limit", action="append", default=[], dest="limits", metavar="KEY=VALUE",
-        help="what a fault may do: yaw_rate_degps (3), ay_mps2 (1), lateral_offset_m (the lane's), window_s (2)",
+        help="allowed effect of a fault: yaw_rate_degps (3), ay_mps2 (1), lateral_offset_m (the lane's), window_s (2)",
     )  # fmt: skip
     add_figures_folder(parser)
     add_workers(parser)
@@ -74,7 +75,7 @@ def _fault_map(options: argparse.Namespace) -> int:
             options.vehicle,
             overrides_of(options),
             faults=options.faults,
-            speeds_kmh=_speeds(options.speeds_kmh) if options.speeds_kmh else preset.speeds_kmh,
+            speeds_kmh=options.speeds_kmh or preset.speeds_kmh,
             situations=options.situations.split(",") if options.situations else preset.situations,
             limits=build(Limits, limits, Source("--limit")),
             driver=options.driver,
@@ -107,12 +108,3 @@ def _line(row: Mapping[str, Any]) -> str:
     correction_deg = math.degrees(row["steering_correction_rad"])
     numbers = [*(f"{value:.2f}" for value in (*figures, *offsets)), f"{correction_deg:.1f}"]
     return _ROW.format(row["fault"], row["situation"], f"{row['speed_kmh']:g}", *numbers, words)
-
-
-def _speeds(text: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError as reason:
-        raise ParameterError(
-            f"is {text!r}; numbers with commas between are needed, as 60,100", key="--speeds-kmh", value=text
-        ) from reason

@@ -1,4 +1,4 @@
-"""`activesteer figures DIR`: the paper's figures from our own runs."""
+"""`activesteer figures`: figures of the paper, from runs of this program."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from activesteer.commands.arguments import add_jobs, add_vehicle
+from activesteer.commands.arguments import add_jobs, add_output, add_vehicle
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ParameterError
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("figures", help="the paper's figures from our own runs, as PNG, SVG and PDF")
-    parser.add_argument("output", type=Path, metavar="DIR", help="folder for the figures")
+    """Add the command to the command line."""
+    parser = commands.add_parser("figures", help="draw the figures of the paper from own runs: PNG, SVG, PDF")
+    add_output(parser, "DIR", "folder for the figures", "figures")
     parser.add_argument(
         "--recordings", type=Path, metavar="DIR",
-        help="recordings that `activesteer reproduce -o DIR` has made; where not given they are made now, in DIR/runs",
+        help="recordings of `activesteer reproduce -o DIR` (default: driven now, into the folder runs of -o)",
     )  # fmt: skip
     add_vehicle(parser)
     add_jobs(parser)
@@ -56,15 +56,15 @@ def _figures(options: argparse.Namespace) -> int:
 
 
 def draw_all(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle: str) -> list[Path]:
-    """All figures that can be drawn from these runs, and the suspension's, which needs none.
+    """Draw all figures that these runs allow, and the figure of the suspension.
 
     Args:
         recordings: Scenario -> system -> recording.
-        folder: Where they go.
-        vehicle: Name or path of the vehicle, for what the rig measures and for the linear models.
+        folder: Folder for the figures.
+        vehicle: Name or path of the vehicle, for the rig and the linear models.
 
     Returns:
-        The files written, PNG, SVG and PDF of each.
+        Files of the figures: PNG, SVG and PDF.
 
     Raises:
         ActiveSteerError: matplotlib is not installed, a file cannot be written, or the rig fails.
@@ -86,10 +86,10 @@ def draw_all(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle:
 
 
 def models_beside(run: Recording) -> dict[str, dict[str, NDArray[np.float64]]]:
-    """What the single-track model and, on a level road, the linearised car make of the steering of a run.
+    """Return responses of linear models to the steering of a run: single track and, on a level road, the full car.
 
     Args:
-        run: A run without control; what it was made from is taken from its metadata.
+        run: A run without control; its metadata describe car and manoeuvre.
 
     Returns:
         Name of the model -> channel -> values over the time of the run.

@@ -1,4 +1,4 @@
-"""`activesteer fit STUDY.toml`: parameters of a car from recordings."""
+"""`activesteer fit STUDY.toml`: fit parameters of a car to recordings."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "fit",
-        help="parameters of a car from recordings, with their intervals",
-        description="Drives the inputs of recordings again and finds values of a study's factors, by least squares, "
-        "with which the car comes nearest to what was measured.",
+        help="fit parameters of a car to recordings, with intervals",
+        description="Drives the inputs of recordings again, and finds by least squares the values of the factors of a "
+        "study for which the car matches the recordings best.",
     )
     parser.add_argument(
-        "study", metavar="STUDY", help="a study file with recordings for manoeuvres and a table [fit], or its name"
+        "study", metavar="STUDY", help="a study file (or its name) with recordings as manoeuvres and a table [fit]"
     )
-    add_output(parser, "DIR", "folder for fit.json, fit.html and overrides.toml; none are written without it")
+    add_output(parser, "DIR", "folder for fit.json, fit.html and overrides.toml (default: no files)")
     add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_fit)
@@ -59,8 +59,8 @@ def _fit(options: argparse.Namespace) -> int:
         print(f"correlation {value:+.2f}  {one}, {other}")
     for recording, label, noise, before, after, samples, independent in (each.words() for each in found.compared):
         print(f"  {recording}: {label:24} noise {noise:>12}   rms {before:>12} -> {after:>12}   "
-              f"{independent} of {samples} samples count")  # fmt: skip
-    print(f"{found.rounds} rounds, {found.runs} runs; what is left is {found.misfit:.3g} times the noise")
+              f"{independent} of {samples} samples independent")  # fmt: skip
+    print(f"{found.rounds} rounds, {found.runs} runs; the remaining difference is {found.misfit:.3g} times the noise")
     for line in rests_on(found)[:1]:
         print_entry("", line, hanging=0)
     for path in files:

@@ -1,4 +1,4 @@
-"""`activesteer identify`: steady-state handling by ISO 4138, and the single-track model that the controllers use."""
+"""`activesteer identify`: steady-state handling by ISO 4138, and the single-track model of the controllers."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from activesteer.errors import ParameterError
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser("identify", help="understeer, limits and single-track model of a vehicle (ISO 4138)")
     add_car(parser)
     parser.add_argument(
-        "--write", action="store_true", help="also write the result to the table [single_track] of the vehicle file"
+        "--write", action="store_true", help="also write the result into [single_track] of the vehicle file"
     )
     add_json(parser)
     parser.set_defaults(action=_identify)
@@ -33,7 +33,7 @@ def _identify(options: argparse.Namespace) -> int:
     file, overrides = find_vehicle(options.vehicle), overrides_of(options)
     if options.write:
         if overrides:
-            raise ParameterError("belongs to the car of the file alone, without --set and --overrides", key="--write")
+            raise ParameterError("writes into the vehicle file, so leave out --set and --overrides", key="--write")
         check_own(file)
         options.output = file
     result = identify(options.vehicle, overrides, progress)

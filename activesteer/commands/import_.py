@@ -1,4 +1,4 @@
-"""`activesteer import FILE -o OUT.mcap`: measured data as a recording."""
+"""`activesteer import FILE -o OUT.mcap`: convert measured data to a recording."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from activesteer.errors import ParameterError
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "import",
-        help="measured data as a recording",
-        description="Reads a CSV, MAT, Parquet or MDF file: columns become channels in SI units and signs of ISO 8855 "
-        "on a uniform time. Without a map by the names that exporters write.",
+        help="convert measured data to a recording",
+        description="Reads a CSV, MAT, Parquet or MDF file. Columns become channels in SI units with the signs of ISO "
+        "8855 on a uniform time. Without a map, columns are recognised by the names that exporters write.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="a .csv, .txt, .mat, .parquet or .mf4 file")
-    parser.add_argument("--map", type=Path, metavar="MAP.toml", help="which column is which channel, and in which unit")
+    parser.add_argument("--map", type=Path, metavar="MAP.toml", help="column and unit of each channel")
     add_vehicle(parser)
-    add_output(parser, "OUT.mcap", "the recording; FILE with the ending .mcap where not given")
+    add_output(parser, "OUT.mcap", "the recording (default: FILE.mcap)")
     add_json(parser)
     parser.set_defaults(action=_import)
 

@@ -1,4 +1,4 @@
-"""`activesteer info FILE.mcap`: what a recording holds."""
+"""`activesteer info FILE.mcap`: print the contents of a recording."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from activesteer.files import shown_path
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("info", help="what a recording holds")
+    """Add the command to the command line."""
+    parser = commands.add_parser("info", help="print the contents of a recording")
     add_recording(parser)
     add_json(parser)
     parser.set_defaults(action=_info)
@@ -64,7 +64,7 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _driver(recorded: Any) -> str:
-    """Who drove, and with which numbers; recordings of earlier versions have the name alone."""
+    """Name and parameters of the driver; recordings of earlier versions hold the name only."""
     if not isinstance(recorded, dict):
         return str(recorded)
     numbers = recorded.get("parameters", recorded)

@@ -1,4 +1,4 @@
-"""`activesteer kc`: kinematics and compliance of both axles, measured as on a rig."""
+"""`activesteer kc`: measure kinematics and compliance of both axles, as on a rig."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from activesteer.commands.arguments import add_car, add_figures_folder, add_json
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("kc", help="kinematics and compliance of the suspensions, as on a rig")
+    """Add the command to the command line."""
+    parser = commands.add_parser("kc", help="measure kinematics and compliance of the suspensions")
     add_car(parser)
     add_figures_folder(parser)
     parser.add_argument(
         "--tables",
         type=Path,
         metavar="DIR",
-        help="write all curves as CSV, and the car's own table: what vehicle new --kc reads",
+        help="write all curves as CSV and the table of the car, as input of vehicle new --kc",
     )
     add_json(parser)
     parser.set_defaults(action=_kc)

@@ -1,4 +1,4 @@
-"""`activesteer linearise`: modes of the full car with its tyres at a speed, Bode plots and root locus."""
+"""`activesteer linearise`: modes of the full car at a speed, Bode plots and root locus."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _LOCUS_KMH: Final = (40.0, 60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser("linearise", help="modes of the full car at a speed, Bode plots and root locus")
     add_car(parser)
-    parser.add_argument("--speed-kmh", type=float, default=80.0, metavar="V", help="default: 80")
+    parser.add_argument("--speed-kmh", type=float, default=80.0, metavar="V", help="speed (default: 80)")
     add_json(parser)
     add_figures_folder(parser)
     parser.set_defaults(action=_linearise)

@@ -1,4 +1,4 @@
-"""`activesteer list`: the manoeuvres, controllers, drivers, vehicles, studies and standards that there are."""
+"""`activesteer list`: print all manoeuvres, controllers, drivers, vehicles, studies and standards."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from activesteer.commands.arguments import add_json
 from activesteer.commands.output import print_entry, print_json
 
 _WIDTH: Final = 25
-"""Of the column of names."""
+"""Width of the column of names."""
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("list", help="manoeuvres, controllers, drivers, vehicles, studies, standards")
+    """Add the command to the command line."""
+    parser = commands.add_parser("list", help="print manoeuvres, controllers, drivers, vehicles, studies, standards")
     add_json(parser)
     parser.set_defaults(action=_list)
 

@@ -1,4 +1,4 @@
-"""`activesteer margins`: how far the loops of a controller are from instability, over speed."""
+"""`activesteer margins`: stability margins of the loops of a controller, over speed."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ _COLUMNS: Final = {
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "margins",
         help="gain, phase, delay and disk margins of a controller",
-        description="Margins of the loop of controller, control unit, actuators, linearised car and sensors, opened at "
-        "the rear actuator and at the superposition. Sensors are ideal unless --set sensors.preset=production.",
+        description="Prints margins of the loop of controller, control unit, actuators, linearised car and sensors, "
+        "opened at the rear actuator and at the superposition. Use --set sensors.preset=production for real sensors.",
     )
     add_car(parser)
     add_controller(parser, several=True, default="ars and afs")
     add_speeds(parser, "60, 80 ... 160")
     parser.add_argument(
-        "--study", metavar="STUDY", help="the smallest over the samples of a study, by its file or name: its factors "
-        "on the car, its design and overrides; controllers know the car without its factors",
+        "--study", metavar="STUDY", help="print the smallest margins over the samples of a study (file or name); "
+        "controllers are designed for the car without the factors of the study",
     )  # fmt: skip
     add_workers(parser)
     add_json(parser)
@@ -56,7 +56,7 @@ def _margins(options: argparse.Namespace) -> int:
     found = _found(options)
     rows = [margins.to_json() for margins in found]
     if not rows:
-        raise ParameterError("none of these controllers answers to a measurement: there is no loop", key="-c")
+        raise ParameterError("none of these controllers uses a measurement, so there is no loop", key="-c")
     if options.json:
         print_json(rows)
         return 0
@@ -72,7 +72,7 @@ def _margins(options: argparse.Namespace) -> int:
 def _found(options: argparse.Namespace) -> list[LoopMargins]:
     from activesteer.studies.linear.margins import SPEEDS_KMH, loop_margins
 
-    speeds_kmh, overrides = options.speed_kmh or SPEEDS_KMH, overrides_of(options)
+    speeds_kmh, overrides = options.speeds_kmh or SPEEDS_KMH, overrides_of(options)
     controllers = options.controller or ("ars", "afs")
     if options.study is None:
         for name in ("jobs", "scheduler"):

@@ -1,4 +1,4 @@
-"""What commands print: JSON that any reader takes, colours, and what the package has to say."""
+"""Output of commands: JSON, tables, colours, wrapped text and log messages."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from activesteer.files import json_text
 GOOD: Final = 32
 BAD: Final = 31
 KNOWN: Final = 33
-"""What makes a terminal write green, red and yellow."""
+"""Colour codes of a terminal: green, red, yellow."""
 _COLOURS: Final = {"passed": GOOD, "FAILED": BAD, "not reproduced": KNOWN}
-"""By verdict."""
+"""Verdict -> colour."""
 _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
 _COLUMNS: Final = 80
@@ -27,11 +27,11 @@ _WHOLE: Final[dict[str, Any]] = {"break_on_hyphens": False, "break_long_words": 
 
 
 def print_table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
-    """Prints rows below their heads, numbers with three digits.
+    """Print a table; numbers have three digits.
 
     Args:
-        rows: Key -> text or number.
-        columns: Key -> head.
+        rows: Rows, key -> text or number.
+        columns: Key -> head of its column.
     """
     texts = {key: [row[key] for row in rows if isinstance(row[key], str)] for key in columns}
     widths = {key: max(10, len(head), *map(len, texts[key])) for key, head in columns.items()}
@@ -50,12 +50,12 @@ def print_wrapped(text: str) -> None:
 
 
 def print_json(value: Any) -> None:
-    """Prints a value as JSON and nothing else; see `json_text`."""
+    """Print a value as JSON; see `json_text`."""
     print(json_text(value))
 
 
 def in_colour() -> bool:
-    """Whether standard output may be coloured: a terminal that NO_COLOR does not forbid, or FORCE_COLOR asks for it.
+    """Return whether standard output is coloured: on a terminal, or with FORCE_COLOR, and never with NO_COLOR.
 
     Source: no-color.org, force-color.org.
     """
@@ -66,12 +66,12 @@ def in_colour() -> bool:
 
 
 def painted(text: str, colour: int) -> str:
-    """The text in a colour, where there may be one."""
+    """Return the text in a colour if output is coloured."""
     return f"\x1b[{colour}m{text}\x1b[0m" if in_colour() and text.strip() else text
 
 
 def coloured(text: str) -> str:
-    """The text with its verdicts in colour, where there may be one."""
+    """Return the text with coloured verdicts if output is coloured."""
     return _VERDICT.sub(lambda found: f"{found[1]}{painted(found[2], _COLOURS[found[2]])}", text)
 
 
@@ -97,7 +97,7 @@ def print_entry(head: str, text: str, hanging: int = 2, file: TextIO | None = No
 
 @contextmanager
 def log_to_terminal() -> Iterator[None]:
-    """What the package logs, such as that it compiles, goes to standard error."""
+    """Print the log messages of the package to standard error."""
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter("activesteer: %(message)s"))
     logger = logging.getLogger("activesteer")

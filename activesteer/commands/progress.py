@@ -1,4 +1,4 @@
-"""Bars on the terminal, gone when the work ends."""
+"""Progress bars on the terminal, which disappear at the end of the work."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ if TYPE_CHECKING:
 
 _CELLS: Final = 30
 _LINE_EVERY_S: Final = 10.0
-"""How often a log gets a line [s]."""
+"""Time between two lines of a log [s]."""
 
 
 class ProgressBar:
-    """Shows how much is done."""
+    """Bar that shows which fraction of the work is done."""
 
     def __init__(self, label: str, *, quiet: bool) -> None:
-        """Shows nothing yet.
+        """Create the bar without showing it.
 
         Args:
-            label: The words.
-            quiet: Whether to show nothing.
+            label: Text before the bar.
+            quiet: Whether to show nothing at all.
         """
         self._label = label
         self._shown = not quiet and sys.stderr.isatty()
         self._width = 0
 
     def __enter__(self) -> ProgressBar:
-        """Returns itself; the first value draws it."""
+        """Return the bar; the first value draws it."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Wipes the line."""
+        """Clear the line."""
         if self._shown:
             print("\r" + " " * self._width + "\r", end="", file=sys.stderr, flush=True)
 
     def __call__(self, fraction: float, note: str = "") -> None:
-        """Shows a fraction, 0 to 1, and a word on what was just done."""
+        """Show a fraction, 0 to 1, and a note."""
         if self._shown:
             filled = round(_CELLS * fraction)
             line = f"{self._label} [{'#' * filled}{' ' * (_CELLS - filled)}] {fraction:4.0%} {note}"
@@ -47,33 +47,33 @@ class ProgressBar:
 
 
 class RunCounter:
-    """Shows how many of many runs are done, how fast, and how long the rest takes.
+    """Progress of many runs: number, rate and remaining time.
 
-    A bar in a terminal; elsewhere, as in the log of a batch job, a line now and then.
+    A terminal gets a bar; a log, as of a batch job, gets a line every ten seconds.
     """
 
     def __init__(self, label: str, *, quiet: bool) -> None:
-        """Shows nothing yet.
+        """Create the bar without showing it.
 
         Args:
-            label: The words.
-            quiet: Whether to show nothing.
+            label: Text before the bar.
+            quiet: Whether to show nothing at all.
         """
         self._bar = ProgressBar(label, quiet=quiet)
         self._as_lines = not quiet and not sys.stderr.isatty()
         self._begun_s = self._said_s = time.monotonic()
 
     def __enter__(self) -> RunCounter:
-        """Begins to count the time."""
+        """Start the clock."""
         self._begun_s = self._said_s = time.monotonic()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Wipes the bar."""
+        """Clear the bar."""
         self._bar.__exit__()
 
     def __call__(self, counted: StudyProgress) -> None:
-        """Shows the state."""
+        """Show the progress."""
         now_s = time.monotonic()
         words = _words(counted, now_s - self._begun_s)
         self._bar(counted.done / counted.total, words)

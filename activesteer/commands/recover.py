@@ -1,4 +1,4 @@
-"""`activesteer recover FILE.mcap -o OUT.mcap`: a sound file of what can be read of a broken one."""
+"""`activesteer recover FILE.mcap -o OUT.mcap`: write the readable part of a broken recording to a new file."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from activesteer.errors import ParameterError
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "recover",
-        help="a sound file of what a killed run left",
-        description="Writes what can be read of a recording that was cut short or damaged to a new file, which ends "
-        "properly, so that tools that seek open it too. It stays marked as incomplete.",
+        help="repair the recording of a killed run",
+        description="Writes the readable part of a damaged or cut recording to a new file that ends properly, so that "
+        "all tools can open it. The new file stays marked as incomplete.",
     )
     add_recording(parser)
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.mcap", help="file to write")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.mcap", help="the new file")
     parser.set_defaults(action=_recover)
 
 
@@ -28,7 +28,7 @@ def _recover(options: argparse.Namespace) -> int:
 
     recording = Recording.open(options.file, recover=True)
     if options.output.exists() and options.output.samefile(options.file):
-        raise ParameterError(f"-o {options.output} is the file that is to be recovered; give another name")
+        raise ParameterError(f"-o {options.output} is the input file; choose another name")
     recording.save(options.output)
     span = f"{len(recording)} steps up to {recording.time_s[-1]:.3f} s" if len(recording) else "no steps"
     print(f"{options.output}: {span}")

@@ -1,4 +1,4 @@
-"""`activesteer replay FILE.mcap...`: recordings in the rerun viewer."""
+"""`activesteer replay FILE.mcap...`: show recordings in the rerun viewer."""
 
 from __future__ import annotations
 
@@ -13,26 +13,32 @@ from activesteer.errors import ParameterError, PlaybackError
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "replay",
-        help="look at recordings: the car in 3D, its signals, its metrics",
-        description="Opens recordings in the rerun viewer; several are shown together.",
+        help="show recordings in 3D, with signals and metrics",
+        description="Opens recordings in the rerun viewer, several in one window.",
     )
     add_recording(parser, several=True)
     parser.add_argument(
-        "--save", type=Path, dest="output", metavar="OUT.rrd", help="write a file for the viewer, open no window"
+        "-o",
+        "--output",
+        "--save",
+        type=Path,
+        dest="output",
+        metavar="OUT.rrd",
+        help="write a file for the viewer instead of opening a window",
     )
-    parser.add_argument("--web", action="store_true", help="serve it to a browser, until Ctrl-C")
+    parser.add_argument("--web", action="store_true", help="serve a page for a browser until Ctrl-C")
     parser.add_argument(
-        "--compare", action="store_true", help="of several files, only the page that shows them side by side"
+        "--compare", action="store_true", help="show only the page that compares several files side by side"
     )
     add_cutaway(parser)
     parser.set_defaults(action=_replay)
 
 
 def _replay(options: argparse.Namespace) -> int:
-    # rerun's own threads write to the terminal, in colours, what we say ourselves.
+    # Threads of rerun would repeat our messages on the terminal.
     os.environ.setdefault("RUST_LOG", "warn,re_log_encoding=off,re_sdk=off")
     try:
         from activesteer.playback import Showing, runs_of, save, serve, show

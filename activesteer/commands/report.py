@@ -1,4 +1,4 @@
-"""`activesteer report FILE.mcap...`: runs compared on one HTML page."""
+"""`activesteer report FILE.mcap...`: compare runs on one HTML page."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from activesteer.commands.arguments import add_output, add_recording
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "report",
         help="compare recordings on one HTML page",
-        description="One page that needs no network: scorecard, plots, track, metrics, parameters, versions.",
+        description="Writes a page that needs no network: scorecard, plots, track, metrics, parameters, versions.",
     )
     add_recording(parser, several=True)
-    add_output(parser, "FILE.html", "the page; one that exists is replaced", "report.html")
+    add_output(parser, "FILE.html", "the page; replaces an existing one", "report.html")
     parser.set_defaults(action=_report)
 
 
@@ -25,7 +25,7 @@ def _report(options: argparse.Namespace) -> int:
     from activesteer.errors import ParameterError
 
     if options.output.suffix.lower() not in {".html", ".htm"}:
-        raise ParameterError(f"-o {options.output}: a report is a page, whose name ends in .html; a browser prints it")
+        raise ParameterError(f"-o {options.output}: the name of a report ends in .html")
 
     print(f"report: {write_report(open_all(options.files), options.output)}")
     return 0

@@ -1,4 +1,4 @@
-"""`activesteer reproduce`: the paper's five scenarios with its three systems, and the scorecard of its claims."""
+"""`activesteer reproduce`: drive the paper's five scenarios with its three systems, and check its claims."""
 
 from __future__ import annotations
 
@@ -19,33 +19,31 @@ if TYPE_CHECKING:
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("reproduce", help="drive the paper's scenarios and check what it claims")
-    words = (
-        "folder for recordings, report and figures (default: runs), or for a population's study (default: population)"
-    )
+    """Add the command to the command line."""
+    parser = commands.add_parser("reproduce", help="drive the scenarios of the paper and check its claims")
+    words = "folder for recordings, report and figures (default: runs, comparison or population)"
     add_output(parser, "DIR", words)
     add_vehicle(parser)
     add_workers(parser)
     parser.add_argument("--all", action="store_true", help="also print every claim with its numbers")
-    parser.add_argument("--figures", action="store_true", help="also draw the paper's figures, or the comparison's")
+    parser.add_argument("--figures", action="store_true", help="also draw the figures")
     parser.add_argument(
         "--population", type=int, metavar="N",
-        help="instead: in which share of N cars, roads and drivers each claim holds, and what each system does there, "
-        "15 N runs; with --controllers, what each of these does there",
+        help="instead, check each claim for N cars, roads and drivers (15 N runs); with --controllers, compare these "
+        "controllers for N cars",
     )  # fmt: skip
     parser.add_argument(
-        "-c", "--controllers", action="append", metavar="C,C...",
-        help="instead: these controllers side by side, with the sensors of production cars, in the five scenarios, a "
-        "step at 120 km/h, the severe lane change, braking on split friction and in a turn, a turn across snow",
+        "-c", "--controllers", "--controller", action="append", dest="controllers", metavar="C,C...",
+        help="instead, compare these controllers with the sensors of production cars: in the five scenarios, a step at "
+        "120 km/h, the severe lane change, braking on split friction and in a turn, a turn across snow",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, metavar="S", help="of the population's sample (default: the stored one's)")
+    parser.add_argument("--seed", type=int, metavar="S", help="seed of the population (default: the stored one)")
     add_json(parser)
     parser.set_defaults(action=_reproduce)
 
 
 def _reproduce(options: argparse.Namespace) -> int:
-    # Here, where an interruption finds out what is saved.
+    # The handler of signals looks there for saved files.
     given = {"comparison": options.controllers, "population": options.population}
     default = "_".join(name for name, value in given.items() if value is not None) or "runs"
     options.output = options.output or Path(default)
@@ -137,7 +135,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _report(result: Reproduction, folder: Path) -> Path | None:
-    """The page with all runs, also those that ended early, as far as they got; None where none got anywhere."""
+    """Write a page with all runs, including those that ended early; return None if no run made a step."""
     from activesteer.analysis.report import write_report
     from activesteer.errors import RecordingError
     from activesteer.recording import Recording
@@ -147,7 +145,7 @@ def _report(result: Reproduction, folder: Path) -> Path | None:
         for system, path in systems.items():
             with suppress(RecordingError):
                 recording = Recording.open(path, recover=True)
-                # What an earlier call left of a run that now could not begin is complete, and not this one's.
+                # A complete file of a run that failed now is left from an earlier call.
                 if len(recording) and recording.metadata["complete"] is ((scenario, system) not in result.failures):
                     recordings[str(path)] = recording
     return write_report(recordings, folder / "report.html") if recordings else None
@@ -159,7 +157,7 @@ def _population(options: argparse.Namespace) -> int:
     from activesteer.studies.paper.population import population
 
     if options.figures and options.controllers is None:
-        raise ParameterError("--figures draws the nominal runs; leave --population out")
+        raise ParameterError("--figures draws the nominal runs; leave out --population")
     drive = population if options.controllers is None else functools.partial(compare_population, _controllers(options))
     with RunCounter("population", quiet=options.json) as counter:
         found = drive(

@@ -1,4 +1,4 @@
-"""`activesteer run MANEUVER`: drives a manoeuvre with one controller after the other and records it."""
+"""`activesteer run MANEUVER`: drive and record a manoeuvre, with one controller after the other."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from activesteer.plugins import Plugin
 
 _OTHER_FILES: Final = frozenset((".mp4", ".gif", ".rrd", ".csv", ".mat", ".parquet", ".json", ".html", ".png", ".pdf"))
-"""Endings of what other commands write: a folder that is called so is a mistake."""
+"""Endings of files of other commands; such a name for a folder is a mistake."""
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     run = commands.add_parser("run", help="drive a manoeuvre and record it")
     add_scenario(run)
     add_controller(run, several=True)
-    add_output(run, "FILE_OR_DIR", "a file ending in .mcap, or a folder for MANEUVER-CONTROLLER.mcap", "runs")
-    run.add_argument("--replace", action="store_true", help="replace recordings that were made with other settings")
+    add_output(run, "FILE_OR_DIR", "a file *.mcap, or a folder for MANEUVER-CONTROLLER.mcap", "runs")
+    run.add_argument("--replace", action="store_true", help="replace recordings of other settings")
     run.add_argument("--all", action="store_true", help="print all metrics, not only the key metrics of the manoeuvre")
     run.add_argument("--plot", action="store_true", help="also draw the runs: PNG and PDF")
     add_json(run)
@@ -45,7 +45,7 @@ def _run(options: argparse.Namespace) -> int:
 
     controllers = [find_controller(name) for name in options.controller or ["none"]]
     scenario = scenario_of(options)
-    # What is wrong with the last controller or the plot is said before the first run, not after it.
+    # Check all controllers before the first run.
     for controller in controllers:
         controller.make(scenario.controller_setup(DEFAULT_TIMESTEP_S))
     check_gains(scenario.overrides, controllers)
@@ -90,7 +90,7 @@ def _chosen(metrics: Mapping[str, float], names: Sequence[str]) -> dict[str, flo
 
 
 def _paint(name: str, value: float, first: float, text: str) -> str:
-    """What is better than in the first run in green, what is worse in red."""
+    """Return a value in green if it is better than in the first run, in red if it is worse."""
     from activesteer.analysis.report.significance import Change, significance
 
     colour = {Change.BETTER: GOOD, Change.WORSE: BAD}.get(significance(name, value, first))
@@ -98,7 +98,7 @@ def _paint(name: str, value: float, first: float, text: str) -> str:
 
 
 def _print_outcomes(metrics: Mapping[str, Mapping[str, float]]) -> None:
-    """What each run lost or kept, below its numbers."""
+    """Print in words for each run a loss of control, or that the car kept its lane."""
     from activesteer.analysis.loss_of_control import kept, losses
 
     for label, found in metrics.items():
@@ -112,44 +112,41 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) ->
 
     labels, names = zip(*((controller.label, controller.name) for controller in controllers), strict=True)
     if len(set(labels)) != len(labels):
-        raise ParameterError(
-            f"-c {' -c '.join(names)}: two of them have the same name, which tells runs and files apart"
-        )
+        raise ParameterError(f"-c {' -c '.join(names)}: controller names must be unique; two have the same name")
     if output.suffix == ".mcap":
         if len(controllers) > 1:
-            raise ParameterError(f"-o {output}: {len(controllers)} controllers make as many files; give a folder")
+            raise ParameterError(f"-o {output}: one file for {len(controllers)} controllers; give a folder")
         folder, paths = output.parent, [output]
     elif output.suffix in _OTHER_FILES and not output.is_dir():
-        raise ParameterError(f"-o {output}: a recording ends in .mcap; anything else is a folder", value=output)
+        raise ParameterError(f"-o {output}: a recording ends in .mcap; any other name is a folder", value=output)
     else:
         folder, paths = output, [output / f"{maneuver}-{label}.mcap" for label in labels]
     make_folder(folder, ParameterError)
-    # Before the first run, not before the last.
     for path in paths:
         check_target(path)
     return paths
 
 
 def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:
-    """Refuses to replace a recording that was made with other settings, which could be missed."""
+    """Refuse to replace a recording of other settings."""
     from activesteer.errors import RecordingError
     from activesteer.recording import Recording
 
     try:
         before = _flat(Recording.open(path, recover=True).metadata)
-    except RecordingError:  # there is no recording that could be missed
+    except RecordingError:  # there is no recording
         return
     now = _flat({key: value for key, value in settings.items() if key != "overrides"})
     other = sorted(key for key, value in now.items() if before.get(key, value) != value)
     if other:
         some = ", ".join(f"{key} {shown(before[key])}" for key in other[:3]) + (" ..." if len(other) > 3 else "")
         raise ParameterError(
-            f"{path} was made with other settings ({some}); --replace replaces it, -o names another place"
+            f"{path} was made with other settings ({some}); --replace replaces it, or choose another -o"
         )
 
 
 def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, Any]:
-    """Nested tables as dotted keys, with what JSON makes of the values."""
+    """Return nested tables as dotted keys, with values as JSON has them."""
     flat: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
@@ -160,7 +157,7 @@ def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, Any]:
 
 
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:
-    """All runs over each other; of a step steer also the control-free car beside its linear models."""
+    """Draw all runs in one figure, and for a step steer the car without control beside its linear models."""
     from activesteer.analysis.figures import figure_2, figure_for
     from activesteer.commands.figures import models_beside
 

@@ -1,9 +1,9 @@
-"""Ctrl-C and SIGTERM: a command ends within a second, says what is saved, and leaves no traceback.
+"""End of a command after Ctrl-C or SIGTERM: within a second, with one line about saved files, without a traceback.
 
-The signal first raises KeyboardInterrupt in the command, so that files are closed and processes ended in order. Where
-that takes too long, because native code runs or somebody swallowed the exception, a thread ends the process.
+The signal raises KeyboardInterrupt in the command, which closes files and ends worker processes. A thread ends the
+process if that takes too long: native code may run, or user code may have caught the exception.
 
-This module is imported before all others, and imports next to nothing, so that signals are watched for from the start.
+This module is imported first and imports little, so that signals are handled from the start.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ if TYPE_CHECKING:
     from typing import Final
 
 _IN_ORDER_S: Final = 0.7
-"""How long a command may take to end in order [s]."""
+"""Time for a command to end in order [s]."""
 _CLOCK_STEP_NS: Final = 20_000_000
-"""How far the time of a file may lag behind the clock [ns]: a tick of the kernel is 10 ms at most."""
+"""Largest lag of a file's time behind the clock [ns]: a tick of the kernel is at most 10 ms."""
 _MAX_NAMED: Final = 3
 _MCAP_END: Final = b"\x89MCAP0\r\n"
 
 
 class StopSignals:
-    """What was asked of this process by a signal, and how it ends then.
+    """Handler of the signals that stop the program.
 
     Attributes:
-        number: The signal that has come; None where none has.
-        options: What the command was called with; its `output` is the file or folder that it writes, and
-            `how_to_resume`, where it has one, is said behind what is saved.
-        finished: Whether the command is done, and only the interpreter still has to end.
+        number: Number of the signal that arrived; None before.
+        options: Options of the command. `output` is the file or folder that it writes; `how_to_resume`, if set,
+            follows the list of saved files.
+        finished: Whether the command is done and only the interpreter has to end.
     """
 
     def __init__(self) -> None:
-        """Before any signal has arrived."""
+        """Start without a signal."""
         self.number: int | None = None
         self.options: argparse.Namespace | None = None
         self.finished = False
@@ -51,19 +51,19 @@ class StopSignals:
         self._ending = threading.Lock()
 
     def watch(self) -> None:
-        """Watches for signals from now on, until the process ends."""
+        """Handle signals until the process ends."""
         self._watching = True
-        # Where processes are cut off, one of multiprocessing's own clears up behind them; that is no news to a user.
+        # After killed workers, a process of multiprocessing cleans up and warns; the warning means nothing to a user.
         sys.warnoptions.append("ignore:resource_tracker:UserWarning")
         read, write = os.pipe()
         os.set_blocking(write, False)
-        # Python runs its handlers between its own instructions only; this byte is written at once, whatever runs.
+        # Python calls its handlers between its own instructions only; this byte is written at once.
         signal.set_wakeup_fd(write, warn_on_full_buffer=False)
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
                 signal.signal(number, self._interrupt)
         threading.Thread(target=self._end_in_time, args=(read,), daemon=True).start()
-        # First in, last out: when all else has ended the status stands, and Python would take its handlers away.
+        # Registered first, so called last: the exit status is fixed then, and Python would remove its handlers.
         atexit.register(self._ignore)
 
     def _ignore(self) -> None:
@@ -79,7 +79,7 @@ class StopSignals:
         raise KeyboardInterrupt
 
     def _hush(self) -> None:
-        """From now on nobody prints a traceback: native code that is being imported or called back, a thread."""
+        """Suppress tracebacks of threads, of imports and of callbacks from native code."""
         sys.unraisablehook = threading.excepthook = lambda _: None
         sys.excepthook = lambda *_: None
 
@@ -95,16 +95,16 @@ class StopSignals:
         self.end(in_order=False)
 
     def end(self, *, in_order: bool = True) -> int:
-        """Says what is saved, and ends the process where it is the program's own.
+        """Print which files are saved; end the process if it belongs to the program.
 
         Args:
-            in_order: Whether the command has come to its end; else it is cut off.
+            in_order: Whether the command unwound; otherwise it is cut off.
 
         Returns:
-            The exit status, 128 and the signal's number.
+            Exit status: 128 plus the number of the signal.
         """
         number = self.number or signal.SIGINT
-        with self._ending:  # kept for good by the first: who comes second waits for the end
+        with self._ending:  # never released by the first caller; a second one waits for the end
             if in_order and self._watching:
                 try:
                     sys.stdout.flush()
@@ -113,7 +113,7 @@ class StopSignals:
             try:
                 saved = self._saved(in_order=in_order)
             except Exception:
-                saved = "what was saved cannot be told"
+                saved = "the saved files are unknown"
             name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
             line = f"activesteer: stopped by {name}; {saved}{getattr(self.options, 'how_to_resume', '')}"
             if "activesteer.files" in sys.modules:
@@ -122,14 +122,14 @@ class StopSignals:
                 print(line, file=sys.stderr)
                 return 128 + number
             try:
-                start = "" if in_order or not os.isatty(2) else "\n"  # a bar of progress may stand in the line
+                start = "" if in_order or not os.isatty(2) else "\n"  # after a progress bar in the same line
                 os.write(2, f"{start}{line}\n".encode(errors="backslashreplace"))
             except OSError:
                 pass
             os._exit(128 + number)
 
     def _saved(self, *, in_order: bool) -> str:
-        """What the command has written, as it is on the disk now."""
+        """Return the files that the command has written, in words."""
         output: Path | None = getattr(self.options, "output", None)
         files = [path for path in _files(output) if path.stat().st_mtime_ns >= self._begun_ns]
         if not files:
@@ -143,7 +143,7 @@ class StopSignals:
 
 
 def _files(output: Path | None) -> Iterator[Path]:
-    """The file, or those of a folder and of the folders in it, without what is hidden."""
+    """Yield the file, or the visible files of a folder and of its subfolders."""
     if output is None or not output.exists():
         return
     if not output.is_dir():
@@ -155,13 +155,13 @@ def _files(output: Path | None) -> Iterator[Path]:
 
 
 def _part(path: Path, *, in_order: bool) -> str:
-    """How much of a run a recording holds; empty for all of it, and for other files."""
+    """Return in words how much of a run a recording holds; an empty text for a complete one and for other files."""
     if path.suffix != ".mcap":
         return ""
     with path.open("rb") as file:
         size = path.stat().st_size
         file.seek(max(0, size - len(_MCAP_END)))
-        if file.read() != _MCAP_END or size == len(_MCAP_END):  # a file begins with the same bytes
+        if file.read() != _MCAP_END or size == len(_MCAP_END):  # a file starts with the same bytes
             return "cut off"
         if not in_order:
             return ""
@@ -173,6 +173,6 @@ def _part(path: Path, *, in_order: bool) -> str:
             return ""
         summary = reader.get_summary()
         statistics = summary.statistics if summary is not None else None
-        if statistics is None or statistics.message_count <= 1:  # what the car looks like is a message too
+        if statistics is None or statistics.message_count <= 1:  # the scene is one message
             return "without a step"
         return f"up to {1e-9 * statistics.message_end_time:.3f} s"

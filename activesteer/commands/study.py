@@ -1,4 +1,4 @@
-"""`activesteer study`: many runs from one file, on this machine or a cluster, interrupted and resumed at will."""
+"""`activesteer study`: many runs from one file, on this machine or a cluster, which can be resumed."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from activesteer.errors import StudyError
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("study", help="drive many runs over varied parameters; say how far they are")
+    """Add the command to the command line."""
+    parser = commands.add_parser("study", help="drive many runs over varied parameters")
     parser.add_argument("study", metavar="STUDY_OR_DIR", help="a study file or its name, or the folder of a study")
     add_output(parser, "DIR", "folder for the results, needed for a new study; a study found there is resumed")
     add_workers(parser)
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--limit", type=int, metavar="N", help="make at most N runs now and leave the rest")
-    what.add_argument("--status", action="store_true", help="only say how far the study in DIR is")
-    what.add_argument("--report", action="store_true", help="only write DIR/report.html, of the runs that are done")
+    what.add_argument("--limit", type=int, metavar="N", help="drive at most N runs now")
+    what.add_argument("--status", action="store_true", help="only print the progress of the study in DIR")
+    what.add_argument("--report", action="store_true", help="only write DIR/report.html for the finished runs")
     add_json(parser)
     parser.set_defaults(action=_study)
 
@@ -35,7 +35,7 @@ def _study(options: argparse.Namespace) -> int:
     folder = options.output or (given if given.is_dir() else None)
     if folder is None:
         read_study(options.study)
-        raise StudyError(f"-o DIR is needed: where the results of {options.study} go")
+        raise StudyError(f"-o DIR is needed: the folder for the results of {options.study}")
     if options.status:
         return _status(folder, as_json=options.json)
     if options.report:
@@ -44,7 +44,7 @@ def _study(options: argparse.Namespace) -> int:
     from activesteer.studies.engine.study import study
 
     if given.is_dir():
-        read_environment(given)  # says what is wrong with a folder without a study
+        read_environment(given)  # refuses a folder without a study
     options.output = folder
     options.how_to_resume = f"; resume with `activesteer study {folder}`"
     with RunCounter("study", quiet=options.json) as counter:

@@ -1,4 +1,4 @@
-"""`activesteer test`: a car by a standard, with verdict and page."""
+"""`activesteer test`: test a car by a standard, with verdict and page."""
 
 from __future__ import annotations
 
@@ -19,14 +19,18 @@ from activesteer.commands.progress import ProgressBar
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("test", help="test a car by a standard: series, verdict, page")
+    """Add the command to the command line."""
+    parser = commands.add_parser("test", help="test a car by a standard")
     parser.add_argument(
-        "standard", metavar="STANDARD", nargs="?", default="", help="its name; without one, those there are"
+        "standard",
+        metavar="STANDARD",
+        nargs="?",
+        default="",
+        help="name of the standard (default: print all names)",
     )
     add_controller(parser, several=True)
     add_car(parser)
-    add_driver(parser, default="whom the standard asks for")
+    add_driver(parser, default="the driver of the standard")
     add_output(parser, "DIR", "folder for page, JSON and runs; an interrupted test is resumed there (default: none)")
     add_workers(parser)
     add_json(parser)

@@ -1,4 +1,4 @@
-"""`activesteer tune`: values of a study's factors that make objectives small."""
+"""`activesteer tune`: find values of the factors of a study that minimise its objectives."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("tune", help="find values of a study's factors that make objectives small")
+    """Add the command to the command line."""
+    parser = commands.add_parser("tune", help="find values of factors that minimise objectives")
     parser.add_argument("study", metavar="STUDY", help="a study file with a table [tune], or its name")
     add_output(parser, "DIR", "folder of the search; a search found there is resumed", "tuning")
-    parser.add_argument("--trials", type=int, metavar="N", help="sets to have tried in the end (default: the file's)")
+    parser.add_argument("--trials", type=int, metavar="N", help="total number of sets (default: that of the file)")
     add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_tune)
@@ -43,7 +43,7 @@ def _tune(options: argparse.Namespace) -> int:
         front = [vars(trial) for trial in result.front]
         print_json({"done": result.done, "failed": result.failed, "front": front, "figures": list(map(str, figures))})
         return 0
-    print(f"{result.done} sets were tried, of {result.failed} a run failed; the best:")
+    print(f"{result.done} sets tried, {result.failed} with a failed run; the best:")
     for trial in result.front:
         print("  ".join(f"{name} {value:.4g}" for name, value in trial.objectives.items()))
         for key, value in trial.values.items():
@@ -54,7 +54,7 @@ def _tune(options: argparse.Namespace) -> int:
 
 
 def _draw(result: Tuning, folder: Path) -> list[Path]:
-    """The objectives of all sets, two against each other, or one over the sets; nothing without matplotlib."""
+    """Draw two objectives against each other, or one over the sets; nothing without matplotlib."""
     if not result.trials:
         return []
     from activesteer.errors import ParameterError, StudyError

@@ -1,4 +1,4 @@
-"""`activesteer tyre FILE.tir`: what a tyre is, what is unusual in it, and its pictures."""
+"""`activesteer tyre FILE.tir`: describe a tyre file, list unusual values, and draw its curves."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from activesteer.errors import TyreFileError, nearest_names
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("tyre", help="what a .tir file holds, what is unusual in it, and its pictures")
+    """Add the command to the command line."""
+    parser = commands.add_parser("tyre", help="describe a tyre file, list unusual values, draw curves")
     parser.add_argument("file", metavar="FILE.tir", help="a path, or a name in models/tyres")
     add_figures_folder(parser)
     add_json(parser)

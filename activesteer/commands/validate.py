@@ -1,4 +1,4 @@
-"""`activesteer validate`: a car against the same car in another multibody code."""
+"""`activesteer validate`: compare a car with another multibody code or with a measurement."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("validate", help="a car beside another multibody code or a measured one")
+    """Add the command to the command line."""
+    parser = commands.add_parser("validate", help="compare a car with another multibody code or a measurement")
     parser.add_argument(
         "name",
         nargs="?",
@@ -28,20 +28,20 @@ def add_to(commands: Any) -> None:
         metavar="NAME",
         help="folder in models/reference: sedan, tesla_model_s (default: sedan)",
     )
-    add_output(parser, "DIR", "folder for page, JSON and runs; none are written without it")
+    add_output(parser, "DIR", "folder for page, JSON and runs (default: no files)")
     parser.add_argument(
-        "--reference", type=Path, metavar="DIR", help="folder with further reference runs, NAME.csv in the same columns"
+        "--reference", type=Path, metavar="DIR", help="folder with further reference runs NAME.csv in the same columns"
     )
     parser.add_argument(
         "--study", action="store_true",
-        help="also: what the other code's simplifications of the tyre cost, and what the step size costs",
+        help="also compute the effect of the other code's tyre simplifications and of the step size",
     )  # fmt: skip
     parser.add_argument(
         "--samples", type=int, metavar="N",
-        help="of a car that was measured on the road: how often mass, tyre, radius, lateral acceleration are drawn "
+        help="number of samples of mass, tyre, radius and lateral acceleration for a car measured on the road "
         "(default: 200)",
     )  # fmt: skip
-    parser.add_argument("--timestep", type=float, metavar="S", help="our step [s] (default: 0.001)")
+    parser.add_argument("--timestep", type=float, metavar="S", help="step of the simulation [s] (default: 0.001)")
     add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_validate)
@@ -54,7 +54,7 @@ def _validate(options: argparse.Namespace) -> int:
     for name in ("reference", "study", "timestep") if measured else ("samples",):
         if getattr(options, name):
             other = "another code" if measured else "a measurement on the road"
-            raise ParameterError(f"is of a comparison with {other}; {options.name} is none", key=f"--{name}")
+            raise ParameterError(f"belongs to a comparison with {other}; {options.name} is none", key=f"--{name}")
     if measured:
         return _circle(options)
     from activesteer.validation import to_json, validate
@@ -90,7 +90,7 @@ def _validate(options: argparse.Namespace) -> int:
         line = f"{mark} {run:13} {quantity:42} {ours:>15} {theirs:>15} {error:>14} {tolerance:>9}"
         print(painted(line, BAD) if comparison.inside is False else line)
     kept = result.judged - len(result.outside)
-    print(f"{kept} of {result.judged} comparisons keep their tolerance (! does not, ~ has none)")
+    print(f"{kept} of {result.judged} comparisons within tolerance (! outside, ~ no tolerance)")
     if options.output is not None:
         print(f"page: {files[0]}\nruns: {len(result.runs)} CSV files in {options.output / 'runs'}")
     if tables:
@@ -130,6 +130,6 @@ def _study(data: ReferenceData, options: argparse.Namespace) -> dict[str, list[R
 
 
 def _titled(tables: Mapping[str, list[Response]]) -> dict[str, list[Response]]:
-    """The tables under the titles that they are shown with."""
-    titles = {"conventions": "What the other code's conventions cost", "step_sizes": "What the step size costs"}
+    """Return the tables by their titles."""
+    titles = {"conventions": "Effect of the other code's conventions", "step_sizes": "Effect of the step size"}
     return {titles[key]: rows for key, rows in tables.items()}

@@ -1,4 +1,4 @@
-"""`activesteer vehicle`: a car of one's own, from a table of hardpoints; and what is wrong with a car."""
+"""`activesteer vehicle`: make a car from a table of hardpoints, and check a car."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from activesteer.commands.arguments import add_json, add_output
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
-    parser = commands.add_parser("vehicle", help="make a car from a table of hardpoints, check a car")
+    """Add the command to the command line."""
+    parser = commands.add_parser("vehicle", help="make a car from a table of hardpoints, or check a car")
     actions = parser.add_subparsers(required=True, metavar="ACTION")
 
     new = actions.add_parser("new", help="make a car from a table of hardpoints, masses, springs and bushings")
@@ -22,26 +22,26 @@ def add_to(commands: Any) -> None:
         metavar="FILE",
         help=".toml or .csv; see docs/own_car.md (default with --kc: its car.toml)",
     )
-    new.add_argument("--kc", type=Path, metavar="DIR", help="measurements of a K&C rig, for axles of the kind curves")
-    add_output(new, "DIR", "folder for its files (default: vehicles/NAME)")
-    new.add_argument("--front", metavar="KIND", help="mcpherson, double_wishbone, curves; default: what the table says")
+    new.add_argument("--kc", type=Path, metavar="DIR", help="measurements of a K&C rig, for axles of kind curves")
+    add_output(new, "DIR", "folder for the files (default: vehicles/NAME)")
+    new.add_argument("--front", metavar="KIND", help="mcpherson, double_wishbone, curves (default: that of the table)")
     new.add_argument(
-        "--rear", metavar="KIND", help="five_link, multilink, double_wishbone, curves; default: the table's"
+        "--rear", metavar="KIND", help="five_link, multilink, double_wishbone, curves (default: that of the table)"
     )
-    new.add_argument("--overwrite", action="store_true", help="replace the files of an earlier car in that folder")
+    new.add_argument("--overwrite", action="store_true", help="replace an earlier car in that folder")
     add_json(new)
     new.set_defaults(action=_new)
 
-    table = actions.add_parser("table", help="print a table that comes with the package, to start from")
-    table.add_argument("table", nargs="?", metavar="NAME", help="without it, which there are")
+    table = actions.add_parser("table", help="print a table of the package, as a start")
+    table.add_argument("table", nargs="?", metavar="NAME", help="name of a table (default: print all names)")
     table.set_defaults(action=_table)
 
-    check = actions.add_parser("check", help="what is missing or implausible in a car; exit status 1 on errors")
+    check = actions.add_parser("check", help="list missing and implausible values of a car; exit status 1 on errors")
     check.add_argument("vehicle", metavar="NAME_OR_PATH", help="name, vehicle file, or its folder")
     add_json(check)
     check.set_defaults(action=_check)
 
-    keyframe = actions.add_parser("keyframe", help="write the position in which a car stands, after it was edited")
+    keyframe = actions.add_parser("keyframe", help="write the standing position of an edited car")
     keyframe.add_argument("vehicle", metavar="PATH", help="vehicle file or its folder")
     keyframe.set_defaults(action=_keyframe)
     for action in (new, table, check, keyframe):
@@ -77,7 +77,7 @@ def _new(options: argparse.Namespace) -> int:
         part = found.axle(axle)
         print(f"  {axle} springs {1e-3 * part.spring_rate_Npm:.1f} N/mm, {part.spring_force_N:.0f} N as it stands")
     print(f"  steering ratio {found.ratio:.2f}, chassis {found.chassis.mass_kg:.0f} kg")
-    print(f"  {len(made.assumptions)} values were not given and assumed by a rule: {made.folder / 'README.md'}")
+    print(f"  {len(made.assumptions)} missing values were assumed by rules: {made.folder / 'README.md'}")
     for line in made.questions:
         print(f"  unusual: {line}")
     print(f"next: activesteer vehicle check {made.vehicle_file}")

@@ -1,4 +1,4 @@
-"""`activesteer video FILE.mcap`: a recording as a film."""
+"""`activesteer video FILE.mcap`: make a film of a recording."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from activesteer.errors import ParameterError
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "video",
         help="make a film of a recording",
-        description="Draws a recording picture by picture, without a window, and writes an MP4 or a GIF.",
+        description="Draws a recording without a window, and writes an MP4 or a GIF.",
     )
     add_recording(parser)
     add_output(parser, "OUT.mp4|gif", "the film (default: FILE.mp4 beside the recording)")
     parser.add_argument(
-        "--camera", default="chase", choices=("chase", "top", "wheel"), help="where it is taken from (default: chase)"
+        "--camera", default="chase", choices=("chase", "top", "wheel"), help="camera position (default: chase)"
     )
-    parser.add_argument("--corner", choices=CORNERS, help="the wheel that the camera `wheel` looks at (default: fl)")
+    parser.add_argument("--corner", choices=CORNERS, help="wheel for the camera `wheel` (default: fl)")
     parser.add_argument(
         "--compare", type=Path, action="append", default=[], metavar="OTHER.mcap",
         help="also show the car of another recording; may be repeated",
     )  # fmt: skip
     parser.add_argument(
         "--layout", default="overlay", choices=("overlay", "side-by-side"),
-        help="other cars transparent in the same picture, or each car in a picture of its own (default: overlay)",
+        help="transparent cars in one picture, or one picture for each car (default: overlay)",
     )  # fmt: skip
     parser.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="pixels (default: 1280x720)")
-    parser.add_argument("--fps", type=float, help="pictures a second (default: 30, of a GIF 20)")
+    parser.add_argument("--fps", type=float, help="pictures per second (default: 30, GIF: 20)")
     add_pace(parser)
     add_cutaway(parser)
     parser.set_defaults(action=_video)
@@ -47,7 +47,7 @@ def _size(text: str) -> tuple[int, int]:
     """`1280x720`."""
     found = re.fullmatch(r"(\d{1,6})[x*](\d{1,6})", text.strip().lower())
     if found is None:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size; one such as 1280x720 is needed")
+        raise argparse.ArgumentTypeError(f"{text!r} is no size such as 1280x720")
     return int(found[1]), int(found[2])
 
 
@@ -60,11 +60,11 @@ def _video(options: argparse.Namespace) -> int:
     files = [options.file, *options.compare]
     for number, other in enumerate(files):
         if other.resolve() in [file.resolve() for file in files[:number]]:
-            raise ParameterError(f"--compare {other}: it is the same file, so there is nothing to compare")
+            raise ParameterError(f"--compare {other}: this file is already shown")
     if options.corner and options.camera != "wheel":
         raise ParameterError("belongs to --camera wheel", key="--corner", value=options.corner)
     if options.layout == "side-by-side" and not options.compare:
-        raise ParameterError("--layout side-by-side needs --compare OTHER.mcap: there is one car")
+        raise ParameterError("--layout side-by-side needs --compare OTHER.mcap")
     recordings = [Recording.open(file, recover=True) for file in files]
     output = options.output if options.output is not None else options.file.with_suffix(".mp4")
     rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0

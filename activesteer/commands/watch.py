@@ -1,4 +1,4 @@
-"""`activesteer watch MANEUVER`: a manoeuvre in a window, while it is driven."""
+"""`activesteer watch MANEUVER`: show a manoeuvre in a window while it is driven."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _LONGEST_CLOSING_S: Final = 5.0
 
 
 def add_to(commands: Any) -> None:
-    """Adds the command to the parser's."""
+    """Add the command to the command line."""
     parser = commands.add_parser(
         "watch",
-        help="see a manoeuvre while it is driven",
-        description="Opens MuJoCo's viewer and drives the manoeuvre at the pace of a clock; nothing is recorded.",
+        help="show a manoeuvre while it is driven",
+        description="Opens the viewer of MuJoCo and drives the manoeuvre in real time; nothing is recorded.",
     )
     add_scenario(parser)
     add_controller(parser, several=False)
@@ -39,7 +39,7 @@ def _watch(options: argparse.Namespace) -> int:
 
     if not 0.01 <= options.speed <= 100.0:
         raise ParameterError(f"--speed: is {options.speed:g}, must be 0.01 to 100")
-    # What is wrong with the manoeuvre is said wherever one is; only then is a window needed.
+    # Check the manoeuvre first, with or without a display.
     scenario = scenario_of(options)
     check_gains(scenario.overrides, [options.controller])
     check_display()
@@ -73,7 +73,7 @@ def _show(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
 
 @contextmanager
 def _threads_joined() -> Iterator[None]:
-    """Waits for the viewer's thread in the end: Python, when it shuts down under it, ends with a segmentation fault."""
+    """Wait for the thread of the viewer at the end; without it, the shutdown of Python crashes."""
     before = set(threading.enumerate())
     try:
         yield
@@ -83,7 +83,7 @@ def _threads_joined() -> Iterator[None]:
 
 
 def check_display() -> None:
-    """Looks for a display with OpenGL: without one, MuJoCo's viewer would wait for its window for ever.
+    """Check that there is a display with OpenGL; without one, the viewer would wait forever.
 
     Raises:
         PlaybackError: there is none.

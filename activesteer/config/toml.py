@@ -19,7 +19,7 @@ _DEEP_KEY: Final = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){{{_MAX_DE
 
 
 def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tuple[dict[str, Any], Source]:
-    """Reads a TOML file.
+    """Read a TOML file.
 
     Args:
         path: The file.

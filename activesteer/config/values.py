@@ -20,7 +20,7 @@ _MAX_TEXT: Final = 1000
 
 
 def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence[str] = (), base: Any = None) -> T:
-    """Makes a dataclass from a table.
+    """Make a dataclass from a table.
 
     Args:
         cls: Dataclass to make.

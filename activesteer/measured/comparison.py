@@ -149,7 +149,7 @@ class Comparison(NamedTuple):
 
 
 def compare(measured: Sequence[Recording], simulated: Recording, standard: str = "iso19365") -> Comparison:
-    """Compares measured runs of one manoeuvre with its simulation.
+    """Compare measured runs of one manoeuvre with its simulation.
 
     Args:
         measured: At least one.

@@ -29,7 +29,7 @@ class FitTable:
 
 
 def read_fit(given: FileOrTable) -> tuple[StudyFile, FitTable]:
-    """Reads a study file with a table [fit].
+    """Read a study file with a table [fit].
 
     Args:
         given: Name or path of the file, or its table.

@@ -59,7 +59,7 @@ def fit(
     scheduler: str | None = None,
     progress: Callable[[FitProgress], None] | None = None,
 ) -> Fit:
-    """Finds values of a study's factors with which the car, driven by recorded inputs, comes nearest to recordings.
+    """Find values of a study's factors with which the car, driven by recorded inputs, comes nearest to recordings.
 
     Args:
         study_file: Name or path of a study file with a table [fit], or its table.

@@ -69,7 +69,7 @@ class _Source(NamedTuple):
 
 
 def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compact") -> Import:
-    """Reads a file of measured data.
+    """Read a file of measured data.
 
     Args:
         path: CSV, MAT, Parquet or MDF.

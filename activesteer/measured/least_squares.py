@@ -51,7 +51,7 @@ class Found(NamedTuple):
 def search(
     answers: Callable[[list[Array]], Sequence[Answer]], start: Array, check: Callable[[list[Array]], None]
 ) -> Found:
-    """Makes the sum of squares of all differences as small as it becomes (trust region reflective, SciPy).
+    """Make the sum of squares of all differences as small as it becomes (trust region reflective, SciPy).
 
     Args:
         answers: Drives several sets of parameters at once.

@@ -53,7 +53,7 @@ class MeasurementMap:
 
 
 def read_map(path: Path | None) -> MeasurementMap:
-    """Reads a map; the empty one where there is no file.
+    """Read a map; the empty one where there is no file.
 
     Raises:
         RecordingError: it cannot be read, or a key or value is wrong.

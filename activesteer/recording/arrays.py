@@ -1,4 +1,4 @@
-"""Checks of the arrays that enter a recording."""
+"""Check of the arrays that enter a recording."""
 
 from __future__ import annotations
 

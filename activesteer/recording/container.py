@@ -64,7 +64,7 @@ class ChunkData(NamedTuple):
 
 
 class McapFile:
-    """Writes the records of one MCAP file to a stream, and its summary at the end."""
+    """Write the records of one MCAP file to a stream, and its summary at the end."""
 
     def __init__(self, stream: BinaryIO, library: str) -> None:
         """Write magic and header.

@@ -52,7 +52,7 @@ _SHOWN: Final = 100
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,254}")
 
 Check = Callable[[Any, str], object]
-"""Takes a value and its key; raises `RecordingError`."""
+"""Take a value and its key; raises `RecordingError`."""
 
 
 def _name(value: Any, key: str) -> None:
@@ -126,7 +126,7 @@ may be missing, and others may hold any JSON within the limits above."""
 
 
 def check_metadata(metadata: Mapping[str, Any]) -> None:
-    """Checks metadata as JSON gives them: their size, and the values of all known keys.
+    """Check metadata as JSON gives them: their size, and the values of all known keys.
 
     Raises:
         RecordingError: a value is not what its key stands for, or too large.
@@ -147,7 +147,7 @@ _MISSING: Final = object()
 
 
 class _Sizes:
-    """Counts what there is of a tree of values."""
+    """Count what there is of a tree of values."""
 
     def __init__(self) -> None:
         self._entries = self._elements = 0
@@ -186,7 +186,7 @@ def _letters(value: str, key: str, maximum: int) -> None:
 
 
 def check_metrics(metrics: Mapping[str, Any]) -> None:
-    """Checks metrics: names that can be field names everywhere, and numbers.
+    """Check metrics: names that can be field names everywhere, and numbers.
 
     Raises:
         RecordingError: a name or a value is none, or there are too many.
@@ -206,7 +206,7 @@ def check_metrics(metrics: Mapping[str, Any]) -> None:
 
 
 def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
-    """Checks names of bodies, parts, attachments.
+    """Check names of bodies, parts, attachments.
 
     Raises:
         RecordingError: one is no text or empty, or there are too many.
@@ -219,7 +219,7 @@ def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
 
 
 def check_numbers(values: Sequence[Any], what: str, low: float, high: float) -> None:
-    """Checks sizes, places and colours.
+    """Check sizes, places and colours.
 
     Raises:
         RecordingError: one is no number within the limits; they are part of them.

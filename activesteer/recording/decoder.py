@@ -63,7 +63,7 @@ class Block(NamedTuple):
 
 
 class BlockDecoder:
-    """Decodes the chunks of one file."""
+    """Decode the chunks of one file."""
 
     def __init__(
         self, groups: Mapping[int, Group], body_names: Sequence[str], transforms_id: int | None, others: Iterable[int]

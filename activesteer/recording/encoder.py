@@ -59,7 +59,7 @@ class _Rows:
 
 
 class BlockEncoder:
-    """Encodes blocks of rows for one file: in each row one message for every group, poses between the rows."""
+    """Encode blocks of rows for one file: in each row one message for every group, poses between the rows."""
 
     def __init__(
         self,

@@ -78,7 +78,7 @@ def to_dataframe(recording: Exportable) -> pd.DataFrame:
 
 
 def to_csv(recording: Exportable, path: str | os.PathLike[str]) -> Path:
-    """Writes a line of names and a line for each row: `time_s`, then the channels; a file that exists is replaced.
+    """Write a line of names and a line for each row: `time_s`, then the channels; a file that exists is replaced.
 
     Numbers have as many digits as are needed to read the same ones back; channels with `single` have 32 bit.
 
@@ -97,7 +97,7 @@ def to_csv(recording: Exportable, path: str | os.PathLike[str]) -> Path:
 
 
 def to_parquet(recording: Exportable, path: str | os.PathLike[str]) -> Path:
-    """Writes `time_s` and the channels as columns; a file that exists is replaced.
+    """Write `time_s` and the channels as columns; a file that exists is replaced.
 
     Channels with `single` have 32 bit. Each field carries `unit` and `meaning`, the schema `metadata` and `metrics` as
     JSON texts.
@@ -111,7 +111,7 @@ def to_parquet(recording: Exportable, path: str | os.PathLike[str]) -> Path:
 
 
 def to_mat(recording: Exportable, path: str | os.PathLike[str]) -> Path:
-    """Writes a MATLAB file (version 5, as `load` of every MATLAB and Octave reads it); one that exists is replaced.
+    """Write a MATLAB file (version 5, as `load` of every MATLAB and Octave reads it); one that exists is replaced.
 
     `time_s` and every channel is a column of doubles: single ones would turn all that is computed with them single.
     Structs `units`, `meanings` and `metrics` have a field for each name; `metadata` is JSON text, for `jsondecode`.

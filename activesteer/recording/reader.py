@@ -1,4 +1,4 @@
-"""Reads a recording from an MCAP file, whole, cut short or damaged; all sizes that it declares are limited."""
+"""Read a recording from an MCAP file, whole, cut short or damaged; all sizes that it declares are limited."""
 
 from __future__ import annotations
 

@@ -201,7 +201,7 @@ def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
 
 
 def check_scene(parts: Sequence[ScenePart]) -> None:
-    """Checks that a scene can be drawn.
+    """Check that a scene can be drawn.
 
     Raises:
         RecordingError: a kind is unknown, a name is none, or a number is out of range.

@@ -16,7 +16,7 @@ _START_BYTES: Final = 64
 
 
 def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Says now what would be wrong with writing a recording there; touches nothing.
+    """Say now what would be wrong with writing a recording there; touches nothing.
 
     Args:
         path: The file.

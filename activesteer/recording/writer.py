@@ -1,4 +1,4 @@
-"""Writes a recording to an MCAP file while the run goes on."""
+"""Write a recording to an MCAP file while the run goes on."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ _BLOCKS_IN_FLIGHT = 1  # More would be lost when the process is killed, and held
 
 
 class McapWriter:
-    """Streams channel values and poses into an MCAP file, readable up to the last block at any moment.
+    """Stream channel values and poses into an MCAP file, readable up to the last block at any moment.
 
     `write` encodes on the calling thread; compressing and writing run in one thread of their own, because zstd and
     file output release the interpreter lock and the simulation need not wait. An error of that thread is raised by the

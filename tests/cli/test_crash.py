@@ -119,7 +119,7 @@ def test_recovered_file_of_a_killed_run_opens_in_readers_that_seek(call, left, t
         assert summary.statistics.message_end_time >= (len(before) - 1) * 1_000_000
     refused = call("recover", left, "-o", left)
     assert refused.status == 1
-    assert "is the file that is to be recovered" in refused.err
+    assert "is the input file; choose another name" in refused.err
 
 
 def test_disk_that_fills_up_leaves_no_half_file_for_the_viewer(call, tmp_path):

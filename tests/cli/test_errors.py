@@ -45,7 +45,10 @@ def refused(told, *texts: str) -> None:
         (["step_steer", "--set", "mjcf=x.xml"], ["override mjcf: there is no file 'x.xml'"]),
         (["step_steer", "--set", "steer.start_s=9"], ["steer.start_s: is 9 s, but the run ends at 5 s"]),
         (["step_steer", "-c", "ars", "-c", "ars"], ["-c ars -c ars", "same name"]),
-        (["step_steer", "-c", "ars", "-c", "afs", "-o", "a.mcap"], ["-o a.mcap: 2 controllers", "give a folder"]),
+        (
+            ["step_steer", "-c", "ars", "-c", "afs", "-o", "a.mcap"],
+            ["-o a.mcap: one file for 2 controllers", "give a folder"],
+        ),
         (["step_steer", "-o", "film.mp4"], ["-o film.mp4", "ends in .mcap"]),
     ],
 )
@@ -86,7 +89,7 @@ def test_a_misplaced_or_misspelt_word_is_answered_with_the_right_one(capsys, wor
         (["validate", "tesla_model_s", "--timestep", "0.0005"], ["--timestep", "tesla_model_s"]),
         (["validate", "golf"], ["sedan", "tesla_model_s"]),
         (["report", "."], ["DIR/*.mcap"]),
-        (["figures", "out", "--recordings", "runs", "--jobs", "2"], ["--jobs", "--recordings"]),
+        (["figures", "-o", "out", "--recordings", "runs", "--jobs", "2"], ["--jobs", "--recordings"]),
         (["bench", "--maneuvers", "--rounds", "2"], ["--rounds", "--maneuvers"]),
         (["test", "iso4138", "--jobs", "2", "--scheduler", "tcp://nowhere:1"], ["--jobs 2", "--scheduler"]),
         (["video", "run.mcap", "--corner", "rl"], ["--corner", "--camera wheel"]),

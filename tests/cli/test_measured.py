@@ -74,7 +74,7 @@ def test_a_run_written_in_degrees_50_ms_late_comes_back_and_is_driven_again(call
 
 def test_what_cannot_be_compared_or_imported_is_answered(call, truth, tmp_path):
     truth.save(tmp_path / "a.mcap")
-    assert call("compare", "a.mcap").err.startswith("activesteer: two recordings at least")
+    assert call("compare", "a.mcap").err.startswith("activesteer: at least two recordings")
     assert "file does not exist" in call("import", "no.csv").err or call("import", "no.csv").status == 1
     (tmp_path / "a.csv").write_text("t,yawrate\n0,0\n1,1\n")
     assert "ends in .mcap" in call("import", "a.csv", "-o", "a.txt").err

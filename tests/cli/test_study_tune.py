@@ -67,7 +67,7 @@ def test_a_search_goes_on_where_it_was(file, tmp_path, call):
     assert call("tune", str(file), "-o", folder, "--jobs", "1", "--trials", "2", "--json").json["done"] == 2
     told = call("tune", str(file), "-o", folder, "--jobs", "1")
     assert told.status == 0
-    assert told.out.startswith("3 sets were tried, of 0 a run failed; the best:")
+    assert told.out.startswith("3 sets tried, 0 with a failed run; the best:")
     assert "road.mu = " in told.out
 
 

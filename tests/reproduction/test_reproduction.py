@@ -64,7 +64,7 @@ def test_the_steering_wheel_angle_is_not_wrapped(runs: Runs) -> None:
 
 
 def test_the_figures_are_drawn_from_the_files(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["figures", str(tmp_path / "figures"), "--recordings", str(folder)]) == 0
+    assert main(["figures", "-o", str(tmp_path / "figures"), "--recordings", str(folder)]) == 0
     names = {Path(line).name for line in capsys.readouterr().out.splitlines()}
     for number in (1, 2, 7, 9, *range(11, 25)):
         assert {".png", ".svg", ".pdf"} == {
@@ -74,7 +74,7 @@ def test_the_figures_are_drawn_from_the_files(folder: Path, tmp_path: Path, caps
 
 
 def test_a_folder_without_runs_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["figures", str(tmp_path / "figures"), "--recordings", str(tmp_path)]) == 1
+    assert main(["figures", "-o", str(tmp_path / "figures"), "--recordings", str(tmp_path)]) == 1
     assert "activesteer reproduce -o" in capsys.readouterr().err
 
 
