@@ -16,7 +16,7 @@ _WIDTH: Final = 25
 
 def add_to(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("list", help="print manoeuvres, controllers, drivers, vehicles, studies, standards")
+    parser = commands.add_parser("list", help="list manoeuvres, controllers, drivers, cars, studies, standards")
     add_json(parser)
     parser.set_defaults(action=_list)
 

@@ -47,7 +47,7 @@ def refused(told, *texts: str) -> None:
         (["step_steer", "-c", "ars", "-c", "ars"], ["-c ars -c ars", "same name"]),
         (
             ["step_steer", "-c", "ars", "-c", "afs", "-o", "a.mcap"],
-            ["-o a.mcap: one file for 2 controllers", "give a folder"],
+            ["-o a.mcap: one file", "give a folder"],
         ),
         (["step_steer", "-o", "film.mp4"], ["-o film.mp4", "ends in .mcap"]),
     ],
