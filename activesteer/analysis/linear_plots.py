@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.frequency_response import OUTPUTS, frequency_response
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import RUN_COLOURS, run_looks
+from activesteer.conventions import RUN_COLOURS, Array, run_looks
 from activesteer.errors import ParameterError
-from activesteer.plotting import new_figure, plain_axis, save
+from activesteer.plotting import Curve, Panel, Picture, draw, new_figure, save
 from activesteer.quantities import quantity_of
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 BODE_RANGE_Hz: Final = (0.1, 10.0)
 """Frequencies of a Bode diagram [Hz]."""
 LOCUS_LIMIT_Hz: Final = 4.5
-"""Natural frequency up to which poles are shown: body modes and tyre lag, without wheel hop [Hz]."""
+"""Greatest natural frequency of the poles that are shown: body modes and tyre lag, without wheel hop [Hz]."""
 DAMPING_RAYS: Final = (0.2, 0.4, 0.6, 0.8)
 """Damping ratios drawn as rays into a root locus."""
 
@@ -45,9 +45,9 @@ def draw_bode(
 
     Args:
         systems: Linear cars by label, with the outputs of a linearised car, or fewer of them.
-        path: File to write; its ending says the format (.png, .pdf, .svg).
+        path: File to write; its ending gives the format (.png, .pdf, .svg).
         input_name: Input that the responses belong to.
-        recording: A sine sweep of the full car, drawn as dots where it reaches.
+        recording: A sine sweep of the full car, drawn as dots within its frequencies.
 
     Returns:
         The path written.
@@ -58,44 +58,46 @@ def draw_bode(
     """
     if not systems:
         raise ParameterError("there is no linear car to draw, at least one is needed")
-    figure = new_figure(width_in=7.5, height_in=9.0)
-    axes = figure.subplots(len(OUTPUTS), 2, sharex=True)
+    responses = {label: _responses(label, system, input_name) for label, system in systems.items()}
     frequency_Hz = np.geomspace(*BODE_RANGE_Hz, 300)
-    for (label, system), colour in zip(systems.items(), RUN_COLOURS[1:] * len(systems), strict=False):
-        if input_name not in system.input_labels:
-            raise ParameterError(
-                f"{label}: there is no input {input_name!r}; its inputs are {system.input_labels}",
-                value=input_name,
-                allowed=system.input_labels,
-            )
-        response = system(2j * math.pi * frequency_Hz, squeeze=False)
-        for row, output in enumerate(OUTPUTS):
-            if output not in system.output_labels:
-                continue
-            values = response[system.output_labels.index(output), system.input_labels.index(input_name)]
-            axes[row, 0].loglog(frequency_Hz, np.abs(values), color=colour, label=label)
-            axes[row, 1].semilogx(frequency_Hz, np.degrees(np.unwrap(np.angle(values))), color=colour)
-    if recording is not None:
-        points = np.geomspace(0.2, 4.0, 25)
-        for row, output in enumerate(OUTPUTS):
+    points = np.geomspace(0.2, 4.0, 25)
+    panels = []
+    for output in OUTPUTS:
+        gain, phase = [], []
+        for label, colour in zip(systems, RUN_COLOURS[1:] * len(systems), strict=False):
+            if output in responses[label]:
+                values = responses[label][output]
+                gain.append(Curve(frequency_Hz, np.abs(values), label, colour, "-", 1.5))
+                phase.append(Curve(frequency_Hz, _phase_deg(values), label, colour, "-", 1.5))
+        if recording is not None:
             found = frequency_response(recording, output, points)
-            axes[row, 0].loglog(
-                found.frequency_Hz, np.abs(found.response), "o", ms=3.5, c=RUN_COLOURS[0], label="sweep"
-            )
-            phase = np.degrees(np.unwrap(np.angle(found.response)))
-            axes[row, 1].semilogx(found.frequency_Hz, phase, "o", ms=3.5, c=RUN_COLOURS[0])
-    for row, output in enumerate(OUTPUTS):
-        axes[row, 0].set_ylabel(f"{quantity_of(output).short}\n[{_GAIN_UNITS[output]}]")
-        axes[row, 1].set_ylabel("phase [deg]")
-    for axis in axes.flat:
-        plain_axis(axis)
-    for axis in axes[-1]:
-        axis.set_xlabel("frequency [Hz]")
-        axis.set_xlim(*BODE_RANGE_Hz)
-    figure.align_ylabels(axes)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 4), frameon=False)
-    return save(figure, Path(path))
+            for curves, values in ((gain, np.abs(found.response)), (phase, _phase_deg(found.response))):
+                curves.append(Curve(found.frequency_Hz, values, "sweep", RUN_COLOURS[0], "", marker="o", size=3.5))
+        below = "frequency [Hz]" if output == OUTPUTS[-1] else ""
+        y_label = f"{quantity_of(output).short}\n[{_GAIN_UNITS[output]}]"
+        panels.append(Panel(below, y_label, gain, log="xy", x_range=BODE_RANGE_Hz))
+        panels.append(Panel(below, "phase [deg]", phase, log="x", x_range=BODE_RANGE_Hz))
+    picture = Picture("", panels, columns=2, width_in=7.5, height_in=9.0, shared_legend=True)
+    return save(draw(picture), Path(path))
+
+
+def _responses(label: str, system: control.StateSpace, input_name: str) -> dict[str, NDArray[np.complexfloating]]:
+    """Return the frequency responses of a linear car by output, over `BODE_RANGE_Hz`."""
+    if input_name not in system.input_labels:
+        raise ParameterError(
+            f"{label}: there is no input {input_name!r}; its inputs are {system.input_labels}",
+            value=input_name,
+            allowed=system.input_labels,
+        )
+    found = system(2j * math.pi * np.geomspace(*BODE_RANGE_Hz, 300), squeeze=False)
+    place = system.input_labels.index(input_name)
+    return {
+        output: found[system.output_labels.index(output), place] for output in OUTPUTS if output in system.output_labels
+    }
+
+
+def _phase_deg(response: NDArray[np.complexfloating]) -> Array:
+    return np.degrees(np.unwrap(np.angle(response)))
 
 
 def driver_loops_figure(
@@ -103,26 +105,24 @@ def driver_loops_figure(
     frequency_radps: NDArray[np.float64],
     responses: Sequence[NDArray[np.complexfloating]],
 ) -> Figure:
-    """Bode diagrams of the opened loop of driver and car, and its damping over speed.
-
-    The diagrams are those of the speed in the middle.
+    """Return Bode diagrams of the open loop of driver and car at the middle speed, and its damping over speed.
 
     Args:
-        rows: Figures of each loop: `speed_kmh`, `controller`, `damping`, `damping_in_run`, `phase_margin_deg`,
+        rows: Properties of each loop: `speed_kmh`, `controller`, `damping`, `damping_in_run`, `phase_margin_deg`,
             `crossover_rad_s`.
         frequency_radps: Frequencies [rad/s].
-        responses: What comes back of a decision, one row for each loop.
+        responses: Return ratios, one row for each loop.
 
     Raises:
         ParameterError: matplotlib is not installed.
     """
-    figure = new_figure(width_in=7.5, height_in=8.0)
-    gain, phase, damping = axes = figure.subplots(3, 1, height_ratios=(1.2, 1.0, 1.0))
     speeds = sorted({row["speed_kmh"] for row in rows})
     middle = speeds[len(speeds) // 2]
     controllers = list(dict.fromkeys(row["controller"] for row in rows))
+    gain = [Curve([frequency_radps[0], 20.0], [1.0, 1.0], "", RUN_COLOURS[0], "-", 0.6)]
+    phase = [Curve([frequency_radps[0], 20.0], [-180.0, -180.0], "", RUN_COLOURS[0], "-", 0.6)]
+    damping = []
     for place, (controller, look) in enumerate(run_looks(controllers).items()):
-        colour = look.colour
         own = [row for row in rows if row["controller"] == controller]
         shown, response = next(
             (row, response)
@@ -131,45 +131,36 @@ def driver_loops_figure(
         )
         crossover_radps, margin_deg = shown["crossover_rad_s"], shown["phase_margin_deg"]
         label = f"{controller}: {crossover_radps:.1f} rad/s, margin {margin_deg:.0f} deg"
-        gain.loglog(frequency_radps, np.abs(response), color=colour, label=label)
-        angle = np.degrees(np.unwrap(np.angle(response)))
-        phase.semilogx(frequency_radps, angle - 360.0 * round((angle[0] + 180.0) / 360.0), color=colour)
-        for axis in (gain, phase):
-            axis.axvline(crossover_radps, color=colour, lw=0.8, ls=":")
+        angle = _phase_deg(response)
+        angle -= 360.0 * round((angle[0] + 180.0) / 360.0)
+        for curves, values, text, low, high in (
+            (gain, np.abs(response), label, 0.05, 50.0), (phase, angle, "", -360.0, -90.0),
+        ):  # fmt: skip
+            curves.append(Curve(frequency_radps, values, text, look.colour, "-", 1.5))
+            curves.append(Curve([crossover_radps, crossover_radps], [low, high], "", look.colour, ":", 0.8))
         speed_kmh = [row["speed_kmh"] for row in own]
-        damping.plot(speed_kmh, [row["damping"] for row in own], color=colour)
-        damping.plot(
-            speed_kmh, [row["damping_in_run"] for row in own], "o", color=colour, ms=max(3.0, 9.0 - 3.0 * place)
-        )
-    gain.axhline(1.0, color=RUN_COLOURS[0], lw=0.6)
-    gain.set_ylim(0.05, 50.0)
-    gain.set_ylabel(f"gain at {middle:.0f} km/h [-]")
-    gain.legend(frameon=False)
-    phase.axhline(-180.0, color=RUN_COLOURS[0], lw=0.6)
-    phase.set_ylim(-360.0, -90.0)
-    phase.set_yticks(range(-360, -89, 90))
-    phase.set_ylabel("phase [deg]")
-    phase.set_xlabel("frequency [rad/s]")
-    for axis in (gain, phase):
-        axis.set_xlim(frequency_radps[0], 20.0)
-    damping.set_ylim(min(0.0, *(row["damping_in_run"] for row in rows)), 1.1)
-    damping.set_ylabel("damping [-]\nlines linear, dots runs")
-    damping.set_xlabel("speed [km/h]")
-    for axis in axes:
-        plain_axis(axis)
-    figure.align_ylabels(axes)
-    return figure
+        in_runs, size = [row["damping_in_run"] for row in own], max(3.0, 9.0 - 3.0 * place)
+        damping.append(Curve(speed_kmh, [row["damping"] for row in own], "", look.colour, "-", 1.5))
+        damping.append(Curve(speed_kmh, in_runs, "", look.colour, "", marker="o", size=size))
+    lowest = min(0.0, *(row["damping_in_run"] for row in rows))
+    x_range = (frequency_radps[0], 20.0)
+    panels = [
+        Panel("", f"gain at {middle:.0f} km/h [-]", gain, log="xy", x_range=x_range, y_range=(0.05, 50.0)),
+        Panel("frequency [rad/s]", "phase [deg]", phase, log="x", x_range=x_range, y_range=(-360.0, -90.0)),
+        Panel("speed [km/h]", "damping [-]\nlines linear, dots runs", damping, y_range=(lowest, 1.1)),
+    ]
+    return draw(Picture("", panels, columns=1, width_in=7.5, height_in=8.0))
 
 
 def draw_root_locus(
     systems: Sequence[control.StateSpace], speeds_mps: Sequence[float], path: str | os.PathLike[str]
 ) -> Path:
-    """Draw how the poles of a car move with its speed, with rays of equal damping, and save it.
+    """Draw the poles of a car over its speed, with rays of equal damping, and save the picture.
 
     Args:
         systems: The car linearised at every speed.
         speeds_mps: The speeds [m/s].
-        path: File to write; its ending says the format (.png, .pdf, .svg).
+        path: File to write; its ending gives the format (.png, .pdf, .svg).
 
     Returns:
         The path written.

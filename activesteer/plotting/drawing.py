@@ -26,6 +26,8 @@ _BESIDE: Final = 3
 _ROW_IN: Final = 2.7
 _NAME_IN: Final = 0.17
 """Height of a row of panels, and of a name of an ordinate [in]."""
+_LONG_NAME: Final = 6
+"""Longest name of a column that stands upright."""
 _LIMIT: Final = "#b3261e"
 _ZERO: Final = "#999999"
 _SCALE: Final = "viridis"
@@ -119,7 +121,7 @@ def _draw_curves(axis: Axes, panel: Panel) -> None:
             own += 1
         axis.plot(
             np.asarray(curve.x), np.asarray(curve.y), color=colour, ls="-" if dashes is None else dashes,
-            lw=curve.width, marker=curve.marker or None, ms=curve.size, label=curve.label or None,
+            lw=curve.width, marker=curve.marker or None, ms=curve.size, mew=curve.width, label=curve.label or None,
         )  # fmt: skip
 
 
@@ -151,6 +153,7 @@ def _set_axes(axis: Axes, panel: Panel) -> None:
     if panel.above is not None:
         _add_abscissa(axis, *panel.above)
     plain_axis(axis)
+    axis.set_axisbelow(True)
     axis.set_title(panel.title, fontsize="small")
     axis.set_xlabel(panel.x_label, fontsize="small")
     axis.set_ylabel(panel.y_label, fontsize="small")
@@ -184,7 +187,11 @@ def _fill_heat(axis: Axes, heat: Heat) -> None:
     for row, texts in enumerate(heat.texts):
         for column, text in enumerate(texts):
             axis.text(column, row, text, ha="center", va="center", fontsize="x-small")
+    long = any(len(name) > _LONG_NAME for name in heat.columns)
     axis.set_xticks(range(len(heat.columns)), heat.columns, fontsize="x-small")
+    axis.tick_params(axis="x", labelrotation=45.0 if long else 0.0)
+    if not heat.title:
+        axis.xaxis.tick_top()
     axis.set_yticks(range(len(heat.rows)), heat.rows, fontsize="x-small")
     axis.set_title(heat.title, fontsize="small")
     axis.set_xlabel(heat.x_label, fontsize="small")

@@ -37,7 +37,8 @@ def page(result: Examination) -> str:
     for key, value in result.overrides.items():
         car += Markup(", {} {} (<code>{}</code>)").format(parameter_title(key), value, key)
     lead: list[Text] = [car + f". {result.date.isoformat()}."]
-    lead.append(", ".join(f"{name} {version}" for name, version in result.versions.items()))
+    versions = ", ".join(f"{name} {version}" for name, version in result.versions.items())
+    lead.append(Markup('<span class="quiet">{}</span>').format(versions))
     rows = [(name, _verdict(found), found.error or found.summary) for name, found in result.findings.items()]
     sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])]
     for name, found in result.findings.items():

@@ -33,7 +33,7 @@ DIGITS: Final = 4
 """Digits after the first of a signal's range; more cannot be seen."""
 
 
-class Panel(NamedTuple):
+class TimePlot(NamedTuple):
     """A plot over time.
 
     Attributes:
@@ -50,9 +50,9 @@ class Panel(NamedTuple):
     note: str = ""
 
 
-def _of(channel: str, *others: Callable[[Recording], Array | None], note: str = "") -> Panel:
+def _of(channel: str, *others: Callable[[Recording], Array | None], note: str = "") -> TimePlot:
     shown = quantity_of(channel)
-    return Panel(shown.label.capitalize(), shown, (lambda recording: recording[channel], *others), note)
+    return TimePlot(shown.label.capitalize(), shown, (lambda recording: recording[channel], *others), note)
 
 
 def _desired(recording: Recording) -> Array | None:
@@ -68,7 +68,7 @@ def _added(name: str) -> Callable[[Recording], Array | None]:
     return values
 
 
-def _beside_truth(word: str, channel: str) -> Panel:
+def _beside_truth(word: str, channel: str) -> TimePlot:
     """What a sensor says or a controller estimates, and the truth where that was recorded beside it."""
 
     def truth(recording: Recording) -> Array | None:
@@ -94,17 +94,19 @@ PANELS: Final = (
     _of("yaw_rate_radps", _desired, note="dotted: desired by the controller"),
     _of("sideslip_rad"),
     _of("ay_mps2"),
-    Panel("Added angle at the wheels", quantity_of("rear_steer_rad"), (_added("rear_steer"), _added("superposition")),
-          "rear wheels, dotted: front superposition"),
-    Panel(_DISTANCE.label.capitalize(), _DISTANCE, (_from_path,)),
+    TimePlot(
+        "Added angle at the wheels", quantity_of("rear_steer_rad"), (_added("rear_steer"), _added("superposition")),
+        "rear wheels, dotted: front superposition",
+    ),
+    TimePlot(_DISTANCE.label.capitalize(), _DISTANCE, (_from_path,)),
     _of("roll_rad"),
     _of("speed_mps"),
     _beside_truth(ESTIMATED, "sideslip_rad"),
     _beside_truth(ESTIMATED, "speed_mps"),
     _beside_truth(MEASURED, "yaw_rate_radps"),
     _beside_truth(MEASURED, "ay_mps2"),
-    Panel("Friction utilisation, highest of four wheels", quantity_of(_USE), (_over_corners(_USE, np.maximum),)),
-    Panel("Wheel load, lowest of four wheels", _LOAD, (_over_corners("tyre_fz_N", np.minimum),)),
+    TimePlot("Friction utilisation, highest of four wheels", quantity_of(_USE), (_over_corners(_USE, np.maximum),)),
+    TimePlot("Wheel load, lowest of four wheels", _LOAD, (_over_corners("tyre_fz_N", np.minimum),)),
 )  # fmt: skip
 """In pairs, as they stand beside each other."""
 
@@ -147,7 +149,7 @@ def time_grid(times_s: Sequence[Array]) -> Array:
     return np.rint((start + np.arange(count) * (every * step)) * 1e9) / 1e9
 
 
-def _panel(panel: Panel, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
+def _panel(panel: TimePlot, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
     series = []
     for number, run in enumerate(runs):
         alone = True

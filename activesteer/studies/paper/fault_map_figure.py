@@ -1,4 +1,4 @@
-"""The fault map as pictures: a panel for each situation, faults downwards, speeds across."""
+"""The fault map as pictures: a panel for each situation, with a row for each fault and a column for each speed."""
 
 from __future__ import annotations
 
@@ -6,26 +6,23 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from activesteer.errors import StudyError
 from activesteer.files import make_folder
-from activesteer.plotting import new_figure, save
+from activesteer.plotting import Heat, Picture, draw, save
 from activesteer.studies.paper.fault_map import FaultMap
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class _Shown(NamedTuple):
-    """A figure of a row.
+    """A value of a row.
 
     Attributes:
-        title: What it is.
-        value: Row -> what is written into its field; None where nothing came out.
-        fraction: Value, limits -> 0 good to 1 bad, which is the colour.
+        title: Name and unit of the value.
+        value: Function from a row to the text of its field; None without a result.
+        fraction: Function from the value and the limits to the colour, from 0 (good) to 1 (bad).
     """
 
     title: str
@@ -39,7 +36,7 @@ def _tolerated(row: Mapping[str, Any]) -> float | None:
 
 _PICTURES: Final = {
     "fault_tolerant_time": _Shown(
-        "fault-tolerant time [s]; blank: the limits hold",
+        "fault-tolerant time [s]; blank: the car stays within the limits",
         _tolerated,
         lambda value, made: 1.0 - min(value / made.limits.window_s, 1.0) ** 0.5,
     ),
@@ -54,49 +51,43 @@ _PICTURES: Final = {
         lambda value, made: min(0.5 * value / (made.limits.lateral_offset_m or 0.85), 1.0),
     ),
 }
-"""File name -> what is shown; half of the way to red is the limit."""
+"""File name -> value; a value at its limit has the colour half-way to red."""
 
 
 def draw_fault_map(made: FaultMap, folder: str | os.PathLike[str]) -> list[Path]:
-    """Draws the heat maps.
+    """Draw the heat maps and return their files.
 
     Args:
         made: The map.
-        folder: Where they go; created where it does not exist.
-
-    Returns:
-        The files.
+        folder: Folder for the files; it is created if it does not exist.
 
     Raises:
         ActiveSteerError: a file cannot be written, or matplotlib is not installed.
     """
     directory = make_folder(folder, StudyError)
-    return [save(_drawn(made, shown), directory / f"{name}.png", StudyError) for name, shown in _PICTURES.items()]
+    return [
+        save(draw(_picture(made, shown)), directory / f"{name}.png", StudyError) for name, shown in _PICTURES.items()
+    ]
 
 
-def _drawn(made: FaultMap, shown: _Shown) -> Figure:
+def _picture(made: FaultMap, shown: _Shown) -> Picture:
     faults, situations, speeds = (
         list(dict.fromkeys(row[key] for row in made.rows)) for key in ("fault", "situation", "speed_kmh")
     )
     cells = {(row["fault"], row["situation"], row["speed_kmh"]): row for row in made.rows}
-    figure = new_figure(
-        2.6 + len(situations) * (0.7 + 0.55 * len(speeds)), 1.2 + 0.26 * len(faults), f"Faults: {shown.title}"
-    )
-    panels = figure.subplots(1, len(situations), sharey=True, squeeze=False)[0]
-    for axes, situation in zip(panels, situations, strict=True):
+    panels = []
+    for situation in situations:
         fractions = np.full((len(faults), len(speeds)), math.nan)
-        for place in np.ndindex(fractions.shape):
-            row = cells[faults[place[0]], situation, speeds[place[1]]]
-            value = shown.value(row)
-            if value is None or math.isnan(value):
-                text = "failed"
-            else:
-                fractions[place] = shown.fraction(value, made)
-                text = "" if math.isinf(value) else f"{value:.2g}"
-            axes.text(place[1], place[0], text, ha="center", va="center", fontsize=7)
-        axes.imshow(fractions, cmap="RdYlGn_r", vmin=0.0, vmax=1.0, aspect="auto")
-        axes.set_title(situation.replace("_", " "), fontsize="small")
-        axes.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds], fontsize=7)
-        axes.set_xlabel("speed [km/h]", fontsize=8)
-    panels[0].set_yticks(range(len(faults)), faults, fontsize=7)
-    return figure
+        texts = [["failed"] * len(speeds) for _ in faults]
+        for row, column in np.ndindex(fractions.shape):
+            value = shown.value(cells[faults[row], situation, speeds[column]])
+            if value is not None and not math.isnan(value):
+                fractions[row, column] = shown.fraction(value, made)
+                texts[row][column] = "" if math.isinf(value) else f"{value:.2g}"
+        names = faults if situation == situations[0] else [""] * len(faults)
+        columns = [f"{speed:g}" for speed in speeds]
+        title = situation.replace("_", " ")
+        panels.append(Heat(fractions, texts, columns, names, (0.0, 1.0), "RdYlGn_r", title, "speed [km/h]"))
+    width_in = 2.6 + len(situations) * (0.7 + 0.55 * len(speeds))
+    title = f"Faults: {shown.title}"
+    return Picture(title, panels, columns=len(panels), width_in=width_in, height_in=1.2 + 0.26 * len(faults))
