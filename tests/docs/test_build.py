@@ -49,21 +49,6 @@ def test_pages_for_the_disk_promise_no_search(site: Path) -> None:
     assert 'data-md-component="search"' not in (site / "index.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("page", "name"),
-    [
-        ("runs", "activesteer.simulation.runner.simulate"),
-        ("runs", "activesteer.signals.Measurement"),
-        ("recordings", "activesteer.recording.recording.Recording.open"),
-        ("controllers", "activesteer.controllers.parameters.ControllerSetup"),
-        ("tyres", "activesteer.tyre.evaluation.MagicFormula.evaluate"),
-        ("errors", "activesteer.errors.ActiveSteerError"),
-    ],
-)
-def test_reference_has_what_users_call(site: Path, page: str, name: str) -> None:
-    assert f'id="{name}"' in (site / "reference" / f"{page}.html").read_text(encoding="utf-8")
-
-
 @pytest.mark.render
 @pytest.mark.parametrize("page", ["chassis_control", "claims", "gallery", "manoeuvre_keys", "reference/vehicle"])
 def test_pages_are_no_wider_than_a_telephone(site: Path, browser: Browser, page: str) -> None:
