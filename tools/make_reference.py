@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -77,9 +78,9 @@ class Page:
 PAGES: Final[dict[str, Page]] = {
     "runs": Page(
         "Runs and signals",
-        "Run a manoeuvre with `simulate`, or drive it step by step with `Simulation`. The second part lists every field of the\n"
-        "messages that controllers and drivers receive and return. Guides: [the first run](../index.md),\n"
-        "[a loop of your own](../stepping.md).",
+        "Run a manoeuvre with `simulate`, or drive it step by step with `Simulation`. The second part "
+        "lists every field of the messages that controllers and drivers receive and return. Guides: "
+        "[the first run](../index.md), [a loop of your own](../stepping.md).",
         (
             Section("Run a manoeuvre", "activesteer.simulation.runner", ("simulate", "run_scenario")),
             Section("", "activesteer.simulation.preparation", ("prepared",)),
@@ -102,10 +103,12 @@ PAGES: Final[dict[str, Page]] = {
     ),
     "manoeuvres": Page(
         "Manoeuvres and road",
-        "The classes that read manoeuvre files. Their fields are the keys of the TOML files; [keys of a manoeuvre\n"
-        "file](../manoeuvre_keys.md) lists every key with its default and its range. A key with an SI unit may carry an edge unit\n"
-        "instead: `speed_kmh` fills `speed_mps`, `steering_wheel_deg` fills `steering_wheel_rad`, `rate_degps` fills\n"
-        "`rate_radps`, and `lateral_acceleration_g` fills `lateral_acceleration_mps2`. Guide: [manoeuvres](../manoeuvres.md).",
+        "The classes that read manoeuvre files. Their fields are the keys of the TOML files; [keys of "
+        "a manoeuvre file](../manoeuvre_keys.md) lists every key with its default and its range. A "
+        "key with an SI unit may carry an edge unit instead: `speed_kmh` fills `speed_mps`, "
+        "`steering_wheel_deg` fills `steering_wheel_rad`, `rate_degps` fills `rate_radps`, and "
+        "`lateral_acceleration_g` fills `lateral_acceleration_mps2`. Guide: "
+        "[manoeuvres](../manoeuvres.md).",
         (
             Section("All manoeuvres", "activesteer.maneuver.base", ("Maneuver",)),
             Section("Road", "activesteer.road.road", ("Road", "RoadPatch")),
@@ -119,9 +122,9 @@ PAGES: Final[dict[str, Page]] = {
     ),
     "controllers": Page(
         "Controllers and drivers",
-        "The interfaces of a controller and a driver, the parameters that they receive, and parts that you can reuse. Their\n"
-        "messages are on the page [runs and signals](runs.md#signals). Guides: [a controller](../controller.md),\n"
-        "[the driver](../driver.md).",
+        "The interfaces of a controller and a driver, the parameters that they receive, and parts "
+        "that you can reuse. Their messages are on the page [runs and signals](runs.md#signals). "
+        "Guides: [a controller](../controller.md), [the driver](../driver.md).",
         (
             Section(
                 "Controller interface",
@@ -131,7 +134,8 @@ PAGES: Final[dict[str, Page]] = {
             Section(
                 "Controller parameters",
                 "activesteer.controllers.parameters",
-                text="The keys of the table `[controllers]` of a vehicle file, and the `setup` that a controller of your own receives.",
+                text="The keys of the table `[controllers]` of a vehicle file, and the `setup` that a controller of "
+                "your own receives.",
             ),
             Section("Reusable parts", "activesteer.theory.single_track"),
             Section("", "activesteer.controllers.desired_yaw_rate", ("DesiredYawRate",)),
@@ -150,8 +154,8 @@ PAGES: Final[dict[str, Page]] = {
     ),
     "tyres": Page(
         "Tyres",
-        "Read and write Magic Formula tyre files, evaluate the formula, and measure a tyre on the rig. Guide:\n"
-        "[a tyre](../tyre.md).",
+        "Read and write Magic Formula tyre files, evaluate the formula, and measure a tyre on the "
+        "rig. Guide: [a tyre](../tyre.md).",
         (
             Section("Tyre files", "activesteer.tyre.file.tir", ("load_tir",)),
             Section("", "activesteer.tyre.file.writer", ("write_tir",)),
@@ -163,27 +167,28 @@ PAGES: Final[dict[str, Page]] = {
     ),
     "vehicle": Page(
         "Vehicle and rigs",
-        "The keys of a vehicle file, the car in the engine, the kinematics and compliance rig, identification and linearisation.\n"
-        "Guides: [the car](../car.md), [the suspension](../suspension.md).",
+        "The keys of a vehicle file, the car in the engine, the kinematics and compliance rig, "
+        "identification and linearisation. Guides: [the car](../car.md), [the "
+        "suspension](../suspension.md).",
         (
             Section("Keys of a vehicle file", "activesteer.vehicle.parameters"),
             Section("The car in the engine", "activesteer.vehicle.car", ("Vehicle",)),
             Section("Kinematics and compliance", "activesteer.rigs.kc.rig", ("kinematics_compliance",)),
             Section("", "activesteer.rigs.kc.result", ("KcResult",)),
-            Section("Identification", "activesteer.studies.identification"),
-            Section("Linearisation", "activesteer.studies.linearisation"),
+            Section("Identification", "activesteer.studies.linear.identification"),
+            Section("Linearisation", "activesteer.studies.linear.linearisation"),
         ),
     ),
     "analysis": Page(
         "Analysis",
-        "Metrics by kind of manoeuvre, the paper's claims, figures and the report. All of them read recordings only. Guides:\n"
-        "[recordings](../recordings.md), [claims](../claims.md).",
+        "Metrics by kind of manoeuvre, the paper's claims, figures and the report. All of them read "
+        "recordings only. Guides: [recordings](../recordings.md), [claims](../claims.md).",
         (
             Section("Metrics", "activesteer.analysis.metrics", ("metrics",)),
             *(Section(kind, f"activesteer.analysis.{kind}") for kind in METRICS),
             Section("Claims", "activesteer.analysis.claims.claim", ("Claim",)),
             Section("Figures", "activesteer.analysis.figures", ("draw_all", "figure_for")),
-            Section("Report", "activesteer.analysis.report.page", ("write_report",)),
+            Section("Report", "activesteer.analysis.report.run_page", ("write_report",)),
         ),
     ),
     "playback": Page(
@@ -208,7 +213,7 @@ PAGES: Final[dict[str, Page]] = {
 
 def text_of(page: Page) -> str:
     """Return the Markdown of a page."""
-    parts = [f"# {page.title}\n", NOTE, f"{page.introduction}\n"]
+    parts = [f"# {page.title}\n", NOTE, textwrap.fill(page.introduction, 120, break_on_hyphens=False) + "\n"]
     for section in page.sections:
         parts += _section(section)
     return "\n".join(parts)
@@ -250,7 +255,7 @@ def _class(module: str, cls: Any) -> Iterator[str]:
     rows = []
     for field in fields:
         meaning = described.pop(field.name, "") or (field.docstring.value if field.docstring else "")
-        rows.append((_code(field.name), _type(field.annotation), _code(field.value), meaning))
+        rows.append((_code(field.name), _type(field.annotation, cls.module), _code(field.value), meaning))
     if any(row[2] for row in rows):
         yield from _table(("field", "type", "default", "meaning"), rows)
     elif rows:
@@ -385,8 +390,11 @@ def _code(value: Any) -> str:
     return f"`{text}`" if text else ""
 
 
-def _type(annotation: Any) -> str:
-    """Return the type of a field, with its range in words where it has one."""
+def _type(annotation: Any, module: Any) -> str:
+    """Return the type of a field, with its range in words where it has one; private aliases are resolved."""
+    alias = module.members.get(str(annotation)) if str(annotation).startswith("_") else None
+    if alias is not None and alias.is_attribute:
+        annotation = alias.value
     found = _RANGED.fullmatch(str(annotation))
     return f"{_code(found[1])}, {found[2]} to {found[3]}" if found else _code(annotation)
 
