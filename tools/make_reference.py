@@ -47,6 +47,7 @@ METRICS: Final = (
 )
 
 _RANGED: Final = re.compile(r"Annotated\[(.*), Range\(([-\w.()]+), ([-\w.()]+)\)\]")
+_ANNOTATED: Final = re.compile(r"Annotated\[(.*?), \w+\(.*\)\]")
 
 
 @dataclass(frozen=True)
@@ -307,7 +308,7 @@ def _signature(function: Any, name: str, *, bound: bool) -> str:
     return f"```py\n{line}\n```\n"
 
 
-def _docstring(item: Any, level: int, *, without_attributes: bool = False) -> Iterator[str]:
+def _docstring(item: Any, level: int, *, without_attributes: bool = False) -> Iterator[str]:  # noqa: PLR0912 - one case a kind
     if item.docstring is None:
         return
     for section in griffe.parse(item.docstring, "google", warnings=False):
@@ -395,8 +396,11 @@ def _type(annotation: Any, module: Any) -> str:
     alias = module.members.get(str(annotation)) if str(annotation).startswith("_") else None
     if alias is not None and alias.is_attribute:
         annotation = alias.value
-    found = _RANGED.fullmatch(str(annotation))
-    return f"{_code(found[1])}, {found[2]} to {found[3]}" if found else _code(annotation)
+    ranged = _RANGED.fullmatch(str(annotation))
+    if ranged:
+        return f"{_code(ranged[1])}, {ranged[2]} to {ranged[3]}"
+    annotated = _ANNOTATED.fullmatch(str(annotation))
+    return _code(annotated[1] if annotated else annotation)
 
 
 def _line(text: str) -> str:
