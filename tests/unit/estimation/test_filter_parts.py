@@ -1,0 +1,176 @@
+"""Parts of the estimator by themselves: knowledge of car and sensors, wheels, brush model, and what is said of errors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.estimation import advance
+from activesteer.estimation.kalman_filter import begin, predict
+from activesteer.estimation.records import FRICTION, LATERAL_SPEED, MEMORY, N_STATES, SAID, YAW_RATE, known_of
+from activesteer.estimation.speed_filter import brush_slip
+from activesteer.estimation.wheels import read_wheels
+from activesteer.scenario import resolve
+from tests.unit.estimation.drives import estimates, rolling
+
+MOTION = np.ix_([LATERAL_SPEED, YAW_RATE], [LATERAL_SPEED, YAW_RATE])
+
+
+@pytest.fixture(scope="module")
+def setup():
+    return resolve("straight_line", overrides={"sensors.preset": "production"}).controller_setup(0.001)
+
+
+@pytest.fixture(scope="module")
+def known(setup):
+    return known_of(setup.estimation, setup.gains.estimator, setup.timestep_s)[0]
+
+
+@pytest.fixture
+def memory(known):
+    found = np.zeros(1, MEMORY)[0]
+    begin(known, found)
+    return found
+
+
+def test_lateral_load_transfer_of_both_axles_balances_the_roll_moment(setup, known):
+    car, more = setup.single_track, setup.estimation.two_track
+    moment_kgm = known.front_load_kg * more.front_track_m + known.rear_load_kg * more.rear_track_m
+    assert moment_kgm == pytest.approx(car.mass_kg * more.load_height_m)
+    front = known.front_load_kg * more.front_track_m / moment_kgm
+    assert front == pytest.approx(more.front_load_transfer_fraction)
+    pitch_kgm = 2.0 * known.along_load_kg * (car.cg_to_front_m + car.cg_to_rear_m)
+    assert pitch_kgm == pytest.approx(car.mass_kg * more.load_height_m)
+
+
+def test_wheels_stand_at_their_corners(setup, known):
+    car, more = setup.single_track, setup.estimation.two_track
+    half_m = 0.5 * np.repeat([more.front_track_m, more.rear_track_m], 2)
+    assert known.left_m == pytest.approx(half_m * (1, -1, 1, -1))
+    assert known.half_track_m == pytest.approx(half_m)
+    assert known.to_axle_m == pytest.approx([car.cg_to_front_m] * 2 + [-car.cg_to_rear_m] * 2)
+
+
+def test_samples_are_as_old_as_delay_and_low_pass_of_their_sensors(setup):
+    sensors = setup.estimation.sensors
+    changed = replace(
+        sensors,
+        yaw_rate=replace(sensors.yaw_rate, delay_s=0.02, bandwidth_Hz=10.0),
+        ay=replace(sensors.ay, delay_s=0.004, bandwidth_Hz=None),
+        steering_wheel=replace(sensors.steering_wheel, delay_s=0.005, bandwidth_Hz=None),
+        rear_steer=replace(sensors.rear_steer, delay_s=None, bandwidth_Hz=None),
+        wheel_speed=replace(sensors.wheel_speed, delay_s=0.002, sample_time_s=0.012, bandwidth_Hz=None),
+    )
+    estimation = replace(setup.estimation, sensors=changed)
+    age_s = 0.02 + 1.0 / (2.0 * math.pi * 10.0)
+    for timestep_s in (0.001, 0.004):
+        known = known_of(estimation, setup.gains.estimator, timestep_s)[0]
+        # A slower controller sees a sample half an interval later in the mean.
+        seen_s = age_s + 0.5 * (timestep_s - 0.001)
+        assert known.age_s == pytest.approx(seen_s)
+        assert known.steering_age == round((seen_s - 0.005) / timestep_s)
+        assert known.actuator_age == round(seen_s / timestep_s)
+        assert known.wheel_age == round((seen_s - 0.002 - 0.5 * (0.012 - timestep_s)) / timestep_s)
+
+
+def test_noise_and_its_floors_add_as_variances(setup):
+    sensors = setup.estimation.sensors
+    changed = replace(
+        sensors,
+        yaw_rate=replace(sensors.yaw_rate, noise_radps=0.003, bias_radps=0.004, drift_radps=0.06),
+        ay=replace(sensors.ay, noise_mps2=0.04, bias_mps2=0.5),
+        ax=replace(sensors.ax, bias_mps2=0.4),
+        wheel_speed=replace(sensors.wheel_speed, noise_radps=0.1),
+    )
+    p = setup.gains.estimator
+    known = known_of(replace(setup.estimation, sensors=changed), p, 0.001)[0]
+    assert known.rate_variance_rad2ps2 == pytest.approx(0.003**2 + math.radians(0.02) ** 2)
+    assert known.ay_variance_m2ps4 == pytest.approx(0.04**2 + 0.03**2)
+    assert known.rate_offset_std_radps == pytest.approx(0.004)
+    assert known.rate_walk_rad2ps3 * 60.0 == pytest.approx(0.06**2)
+    assert known.ay_offset_std_mps2 == pytest.approx(math.hypot(0.5, p.bank_std_mps2))
+    assert known.ax_offset_std_mps2 == pytest.approx(math.hypot(0.4, p.slope_std_mps2))
+    radius_m = setup.estimation.tyres[0].rolling_radius_m
+    assert known.wheel_variance_m2ps2 == pytest.approx((0.1 * radius_m) ** 2 + p.wheel_std_mps**2)
+
+
+def test_wheels_carry_the_car_and_shift_load_to_the_front_in_braking_and_out_of_the_turn(setup, known, memory):
+    memory["ax_mps2"], memory["loading_mps2"], memory["speed_mps"] = -4.0, 3.0, 20.0
+    said = np.zeros(len(SAID))
+    said[SAID.index("fl_spin_radps") :][:4] = 20.0 / known.rolling_radius_m
+    memory["last_spin_radps"] = said[SAID.index("fl_spin_radps") :][:4]
+    pressure_Pa = 20e5
+    said[SAID.index("fl_pressure_Pa") :][:4] = pressure_Pa
+    read_wheels(known, memory, said, 0.01)
+    car, more = setup.single_track, setup.estimation.two_track
+    fl_N, fr_N, rl_N, rr_N = memory.load_N
+    assert memory.load_N.sum() == pytest.approx(car.mass_kg * GRAVITY_MPS2)
+    # Moments of the loads about the centre of gravity hold those of the accelerations.
+    pitch_Nm = car.cg_to_front_m * (fl_N + fr_N) - car.cg_to_rear_m * (rl_N + rr_N)
+    assert pitch_Nm == pytest.approx(4.0 * car.mass_kg * more.load_height_m)
+    roll_Nm = 0.5 * more.front_track_m * (fr_N - fl_N) + 0.5 * more.rear_track_m * (rr_N - rl_N)
+    assert roll_Nm == pytest.approx(3.0 * car.mass_kg * more.load_height_m)
+    brakes_N = known.torque_per_pressure_NmpPa * pressure_Pa / known.rolling_radius_m
+    assert -memory.along_N == pytest.approx(brakes_N)
+    assert memory.front_along_N == pytest.approx(-brakes_N[:2].sum())
+    assert memory.moment_Nm == pytest.approx(0.0, abs=1e-9)
+    assert memory.by_wheel_mps == pytest.approx([20.0] * 4)
+
+
+def test_brush_model_gives_slip_and_slope_that_belong_together():
+    friction, load_N, stiffness = 0.8, 4000.0, 20.0
+
+    def slip(used):
+        return brush_slip.py_func(used * friction * load_N, load_N, friction, stiffness)
+
+    for used in (0.1, 0.5, 0.9):
+        value, slope, found = slip(used)
+        assert found == pytest.approx(used)
+        assert value == pytest.approx(3.0 * friction / stiffness * (1.0 - (1.0 - used) ** (1.0 / 3.0)))
+        assert slope == pytest.approx((slip(used + 1e-6)[0] - slip(used - 1e-6)[0]) / 2e-6, rel=1e-6)
+        assert slip(-used) == pytest.approx((-value, slope, used))
+    # Small forces: the slip stiffness. Beyond the friction the slip stays finite.
+    assert slip(1e-6)[0] == pytest.approx(1e-6 * friction * load_N / (stiffness * load_N))
+    assert slip(2.0) == pytest.approx((slip(0.98)[0], slip(0.98)[1], 1.0))
+
+
+def test_motion_of_a_standing_car_is_uncertain_by_its_creeping_alone(known, memory, setup):
+    tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
+    memory["covariance"] = 0.0
+    predict(known, tyres, memory, 0.01)
+    assert memory.covariance[MOTION] == pytest.approx(np.diag([0.05**2, 0.05 * 0.01]))
+
+
+def test_said_errors_are_those_of_the_filters_and_of_the_way_to_the_present(known):
+    memory = np.zeros(1, MEMORY)[0]
+    memory["speed_mps"], memory["ax_mps2"], memory["loading_mps2"] = 20.0, -3.0, 5.0
+    memory["now"][[LATERAL_SPEED, YAW_RATE, FRICTION]] = 0.6, 0.25, 0.8
+    memory["speed_variance"], memory["waited_s"] = 0.04, 0.003
+    memory["covariance"] = np.diag(0.001 * np.arange(1.0, N_STATES + 1.0))
+    advance._write_estimate(known, memory)
+    lateral, rate, friction = (0.001 * (place + 1) for place in (LATERAL_SPEED, YAW_RATE, FRICTION))
+    ahead_s = known.age_s + 0.003
+    speed_mps = 20.0 + ahead_s * (-3.0 + 0.25 * 0.6)
+    wrong_N = known.force_std_N + known.force_fraction * known.mass_kg * 5.0
+    lateral_std = math.hypot(math.sqrt(lateral), wrong_N / known.mass_kg * ahead_s)
+    half_wheelbase_m = 0.5 * (known.cg_to_front_m + known.cg_to_rear_m)
+    turned = half_wheelbase_m * wrong_N / known.yaw_inertia_kgm2 * ahead_s
+    assert memory.estimate == pytest.approx([
+        speed_mps, 0.6, math.atan2(0.6, speed_mps), 0.25, 0.8, math.hypot(0.2, known.radius_std * speed_mps),
+        lateral_std, math.atan2(lateral_std, speed_mps), math.hypot(math.sqrt(rate), turned), math.sqrt(friction),
+    ])  # fmt: skip
+
+
+def test_braking_shows_how_much_friction_there_is_at_least(make):
+    slippery = make(**{"controllers.estimator.friction": 0.3, "controllers.estimator.friction_std": 0.001})
+    braking = [rolling(30.0 - 0.006 * step, ax_mps2=-6.0, brake_pressure_Pa=(30e5,) * 4) for step in range(1500)]
+    friction = estimates(slippery, [rolling(30.0)] * 500 + braking)["friction"]
+    assert friction[499] == pytest.approx(0.3, abs=0.01)
+    # 85 % of what is used, which is smoothed over 0.2 s; the body pitches, so that a little less than 6 m/s2 is felt.
+    assert friction[-1] == pytest.approx(0.85 * 6.0 / GRAVITY_MPS2, rel=0.07)
+    risen = friction[500 + 400] / friction[-1]
+    assert risen == pytest.approx(1.0 - math.exp(-2.0), abs=0.05)
