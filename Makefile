@@ -8,7 +8,7 @@ READY := $(VENV)/.ready-demo
 READY_DEV := $(VENV)/.ready-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all pytest pictures lint format docs site wheel clean clean-kernels clean-amplitudes
+.PHONY: help demo test test-all pytest pictures lint mutants format docs site wheel clean clean-kernels clean-amplitudes
 
 help:  ## what there is
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 24
@@ -38,6 +38,9 @@ lint: $(READY_DEV)  ## ruff, pyright, import-linter
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports --no-logo
+
+mutants: $(READY_DEV)  ## change 300 lines, one at a time, and see which the quick tests notice; hours, resumes where it was
+	nice $(BIN)/python tools/mutants.py
 
 format: $(READY_DEV)  ## format the code and mend what ruff can mend
 	$(BIN)/ruff check --fix .

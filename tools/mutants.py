@@ -1,0 +1,322 @@
+"""Mutation testing: change one line of the program and see whether a quick test fails.
+
+`make mutants` draws changes among all that cosmic-ray can make in the rooms below, runs the tests of the room on each,
+and prints the score. The draw depends on the seed and on the lines themselves, so that it stays the same while other
+lines change. Results are kept in `build/mutants`: an interrupted run resumes there. `tools/mutants.md` lists the
+survivors with a reason each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import hashlib
+import itertools
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.ast.ast_query import ASTQuery
+from cosmic_ray.mutating import use_mutation
+from cosmic_ray.plugins import get_operator
+from cosmic_ray.testing import run_tests
+from cosmic_ray.work_item import TestOutcome
+
+ROOT: Final = Path(__file__).resolve().parents[1]
+PLACE: Final = ROOT / "build" / "mutants"
+TREE: Final = PLACE / "tree"
+REASONS: Final = ROOT / "tools" / "mutants.md"
+LEAST_PER_ROOM: Final = 15
+CACHES: Final = PLACE / "caches"
+TIME_LIMIT_S: Final = 400
+"""A mutant whose tests take longer is caught: it loops."""
+
+
+class Room(NamedTuple):
+    """A room, and the tests that must notice a change in it: files, folders and patterns in `tests`.
+
+    Attributes:
+        files: Patterns of its files in the package.
+        near: Quick tests of the room; those that are called like the changed file come first.
+        wide: What is run if these notice nothing.
+        plain: What is run before all others without the compiler, which takes half a minute for a change of a kernel.
+    """
+
+    files: str
+    near: str
+    wide: str = ""
+    plain: str = ""
+
+
+_STUDIES: Final = "design factor_values factors plan run_identity dependence report workers study_file"
+ROOMS: Final = {
+    "controllers": Room(
+        "controllers/*.py",
+        "unit/controllers",
+        "physics/test_chassis_controllers.py physics/test_step_steer.py unit/scenario "
+        "unit/studies/linear/test_margins.py",
+    ),
+    "estimation": Room("estimation/*.py", "unit/estimation", "physics/test_sensors.py"),
+    "brakes": Room(
+        "brakes/*.py",
+        "unit/brakes physics/test_chassis_hardware.py",
+        "physics/test_braking.py physics/test_standstill.py",
+        plain="unit/brakes",
+    ),
+    "driver": Room(
+        "driver/*.py", "unit/driver physics/test_step_steer.py", "unit/scenario physics/test_driver_loop.py"
+    ),
+    "sensors": Room("sensors/*.py", "unit/sensors physics/test_sensors.py"),
+    "faults": Room("faults/*.py", "unit/faults physics/test_faults.py"),
+    "tyre/kernels": Room(
+        "tyre/kernels/*.py",
+        "unit/tyre/kernels reference/test_tyre_against_mfeval.py",
+        "physics/test_step_steer.py unit/tyre/test_*.py",
+        plain="unit/tyre/kernels/test_vertical.py reference/test_tyre_against_mfeval.py",
+    ),
+    "vehicle/native": Room(
+        "vehicle/native_*.py",
+        "unit/vehicle physics/test_step_steer.py",
+        "physics/test_signs.py physics/test_toe_link_screw.py physics/test_braking.py",
+    ),
+    "analysis/claims": Room(
+        "analysis/claims/*.py",
+        "unit/analysis/test_claims*.py unit/analysis/test_scorecard.py",
+        "reproduction/test_fakes.py",
+    ),
+    "studies/engine": Room(
+        "studies/engine/*.py",
+        " ".join(f"unit/studies/engine/test_{name}.py" for name in _STUDIES.split()),
+        "unit/studies/engine/test_study.py unit/studies/engine/test_tuning.py",
+    ),
+}
+
+_ARITHMETIC: Final = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Mod_Mul", "FloorDiv_Mul", "Sub_Mul")
+_COMPARISONS: Final = (
+    "Eq_NotEq", "NotEq_Eq", "Lt_LtE", "Lt_GtE", "LtE_Lt", "LtE_Gt", "Gt_GtE", "Gt_LtE", "GtE_Gt", "GtE_Lt",
+    "Is_IsNot", "IsNot_Is",
+)  # fmt: skip
+OPERATORS: Final = (
+    *(f"ReplaceBinaryOperator_{name}" for name in _ARITHMETIC),
+    *(f"ReplaceComparisonOperator_{name}" for name in _COMPARISONS),
+    *("ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Not"),
+    *("AddNot", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd"),
+    *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ZeroIterationForLoop"),
+    *("ExceptionReplacer", "NumberReplacer"),
+)
+"""Of cosmic-ray's operators those that leave a plausible program: no `<<` for `*`, which any test would catch."""
+_NO_CODE: Final = {"decorator", "raise_stmt", "fstring", "import_from", "import_name"}
+
+
+class Mutant(NamedTuple):
+    """One change of one line.
+
+    Attributes:
+        identity: Text that stays the same while other lines change.
+        room: Room of the file.
+        file: Path in the project.
+        operator: Name of cosmic-ray's operator.
+        occurrence: Which of the places in the file that the operator can change.
+    """
+
+    identity: str
+    room: str
+    file: str
+    operator: str
+    occurrence: int
+
+
+def _is_code(node: Any) -> bool:
+    """Whether a node belongs to code, not to a type, a decorator, an import or an error message."""
+    child = node
+    while (parent := child.parent) is not None:
+        typed = parent.type in {"annassign", "tfpdef"} and child is parent.children[1]
+        returned = parent.type == "funcdef" and child is getattr(parent, "annotation", None)
+        checking = parent.type == "if_stmt" and "TYPE_CHECKING" in parent.children[1].get_code()
+        hinted = parent.type == "atom_expr" and parent.children[0].get_code().strip() == "Annotated"
+        if typed or returned or checking or hinted or child.type in _NO_CODE:
+            return False
+        child = parent
+    return True
+
+
+def _is_weak(node: Any, operator: str) -> bool:
+    """Whether a number would change by less than 1 %, which no test should pin."""
+    return operator == "NumberReplacer" and abs(ast.literal_eval(node.value)) >= 100
+
+
+def mutants_of(room: str, path: Path) -> Iterator[Mutant]:
+    """All changes that could be made in a file."""
+    source = path.read_text()
+    lines, tree = source.splitlines(), get_ast(source)
+    same = Counter[str]()
+    for name in OPERATORS:
+        operator = get_operator(f"core/{name}")()
+        places = ((node, *place) for node in ast_nodes(tree) for place in operator.mutation_positions(node))
+        for occurrence, (node, start, _) in enumerate(places):
+            if not _is_code(node) or _is_weak(node, name):
+                continue
+            definition = ASTQuery(node).get_definition_name() or "module"
+            text = f"{path.stem}.{definition}: `{lines[start[0] - 1].strip()}` {name}"
+            same[text] += 1
+            yield Mutant(f"{text} {same[text]}", room, str(path.relative_to(ROOT)), f"core/{name}", occurrence)
+
+
+def draw(count: int, seed: int) -> dict[str, list[Mutant]]:
+    """Draw mutants in proportion to the number possible in each room, but at least `LEAST_PER_ROOM`."""
+    possible: dict[str, list[Mutant]] = {}
+    for room, about in ROOMS.items():
+        files = sorted(file for one in about.files.split() for file in (ROOT / "activesteer").glob(one))
+        possible[room] = [mutant for file in files for mutant in mutants_of(room, file)]
+        possible[room].sort(key=lambda mutant: hashlib.sha256(f"{seed} {mutant.identity}".encode()).digest())
+    share = count / sum(map(len, possible.values()))
+    sizes = {room: max(LEAST_PER_ROOM, round(share * len(of_room))) for room, of_room in possible.items()}
+    while sum(sizes.values()) > count:
+        sizes[max(sizes, key=lambda room: sizes[room])] -= 1
+    return {room: possible[room][: sizes[room]] for room in ROOMS}
+
+
+def copy_tree(tree: Path) -> None:
+    """Bring a private copy of the project up to date: the files that git knows or would add."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=ROOT, check=True, stdout=-1
+    ).stdout.decode()
+    files = {name for name in listed.split("\0") if name and (ROOT / name).is_file()}
+    for old in [path for path in tree.rglob("*") if path.is_file() and str(path.relative_to(tree)) not in files]:
+        if "__pycache__" not in old.parts:
+            old.unlink()
+    for name in files:
+        copy = tree / name
+        if not copy.exists() or copy.read_bytes() != (ROOT / name).read_bytes():
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, copy)
+    # The hash decides, not the time: a mutant may be written in the second in which its file was.
+    compiling = [
+        sys.executable,
+        "-m",
+        "compileall",
+        "-q",
+        "--invalidation-mode",
+        "checked-hash",
+        "activesteer",
+        "tests",
+    ]
+    subprocess.run(compiling, cwd=tree, check=False)
+
+
+def commands(mutant: Mutant, *, wide: bool) -> list[str]:
+    """The pytest commands for a mutant."""
+    stem, room = Path(mutant.file).stem.removeprefix("native_"), ROOMS[mutant.room]
+    pytest = f"{sys.executable} -m pytest -x -q -p no:cacheprovider -m 'not slow'"
+    plain = f"env NUMBA_DISABLE_JIT=1 {pytest} -W ignore::RuntimeWarning"
+    own = f"**/test_{stem}.py **/test_{stem}_*.py {room.near}"
+    wanted = [(plain, room.plain), (pytest, own), (pytest, room.wide if wide else "")]
+    return [f"{start} {' '.join(found)}" for start, patterns in wanted if (found := tests_of(patterns))]
+
+
+def tests_of(patterns: str) -> list[str]:
+    """The test files and folders of some patterns, in their order, as they are in the copy."""
+    found = (path for pattern in patterns.split() for path in sorted((TREE / "tests").glob(pattern)))
+    return [str(path.relative_to(TREE)) for path in dict.fromkeys(found)]
+
+
+def run_on(mutant: Mutant, warm: Path, *, wide: bool) -> tuple[TestOutcome, str]:
+    """Run the tests with a copy of compiled kernels and found amplitudes, so that a mutant leaves nothing behind."""
+    shutil.rmtree(CACHES, ignore_errors=True)
+    shutil.copytree(warm, CACHES)
+    outcome, output = TestOutcome.SURVIVED, ""
+    for tests in commands(mutant, wide=wide):
+        if outcome is TestOutcome.SURVIVED:
+            outcome, output = run_tests(tests, TIME_LIMIT_S)
+    return outcome, output
+
+
+def catcher(outcome: TestOutcome, output: str) -> str:
+    """The test that caught a mutant, or nothing."""
+    if outcome is TestOutcome.SURVIVED:
+        return ""
+    assert "no tests ran" not in output, output
+    found = re.search(r"^(?:FAILED|ERROR) (\S+)", output, re.MULTILINE)
+    return found[1] if found else output.strip().rpartition("\n")[2] or "error"
+
+
+def report(drawn: dict[str, list[Mutant]], results: dict[str, dict[str, Any]]) -> None:
+    """Print the score of each room, and the survivors that `tools/mutants.md` does not explain."""
+    reasons = REASONS.read_text() if REASONS.exists() else ""
+    print("\n| room | drawn | caught | survived | not yet run |\n|---|---:|---:|---:|---:|")
+    total = Counter[str]()
+    for room, mutants in drawn.items():
+        found = [results.get(mutant.identity) for mutant in mutants]
+        row = Counter("left" if result is None else "caught" if result["by"] else "survived" for result in found)
+        total += row
+        print(f"| {room} | {len(found)} | {row['caught']} | {row['survived']} | {row['left']} |")
+    print(f"| all | {total.total()} | {total['caught']} | {total['survived']} | {total['left']} |")
+    for mutant in itertools.chain.from_iterable(drawn.values()):
+        result = results.get(mutant.identity)
+        if result is not None and not result["by"] and mutant.identity not in reasons:
+            print(f"\nsurvivor without a reason: {mutant.file}\n{mutant.identity}\n{result['diff']}")
+
+
+def main() -> None:
+    """Run the mutants that have no result yet, and report."""
+    parser = argparse.ArgumentParser(description="Change lines at random, and see which changes quick tests notice.")
+    parser.add_argument("--count", type=int, default=300, help="mutants to draw")
+    parser.add_argument("--seed", type=int, default=26, help="seed of the draw")
+    parser.add_argument("--room", choices=ROOMS, action="append", help="only this room (may be repeated)")
+    parser.add_argument("--near", action="store_true", help="leave out the tests that look wide")
+    parser.add_argument("--again", action="store_true", help="run the survivors of earlier runs again")
+    parser.add_argument("--list", action="store_true", help="run nothing, only report")
+    options = parser.parse_args()
+    drawn = {
+        room: found for room, found in draw(options.count, options.seed).items() if room in (options.room or ROOMS)
+    }
+    kept = PLACE / "results.json"
+    results = json.loads(kept.read_text()) if kept.exists() else {}
+    if options.again:
+        results = {identity: result for identity, result in results.items() if result["by"]}
+    if not options.list:
+        run(drawn, results, kept, wide=not options.near)
+    report(drawn, results)
+
+
+def run(drawn: dict[str, list[Mutant]], results: dict[str, dict[str, Any]], kept: Path, *, wide: bool) -> None:
+    """Run the tests on each mutant that has no result yet, and keep each result at once."""
+    warm = PLACE / "warm"
+    copy_tree(TREE)
+    os.chdir(TREE)
+    os.environ |= {"PYTHONPATH": str(TREE), "NUMBA_CACHE_DIR": str(CACHES / "kernels"), "XDG_CACHE_HOME": str(CACHES)}
+    for room, mutants in drawn.items():
+        left = [mutant for mutant in mutants if mutant.identity not in results]
+        if not left:
+            continue
+        warm.mkdir(exist_ok=True)
+        outcome, output = run_on(Mutant("", room, "-", "", 0), warm, wide=wide)
+        if outcome is not TestOutcome.SURVIVED:
+            print(f"{room}: skipped, its tests fail without a mutant\n{output[-2000:]}", flush=True)
+            continue
+        shutil.rmtree(warm)
+        CACHES.rename(warm)
+        for mutant in left:
+            started = time.monotonic()
+            operator = get_operator(mutant.operator)()
+            with use_mutation(TREE / mutant.file, operator, mutant.occurrence) as (before, after):
+                outcome, output = run_on(mutant, warm, wide=wide)
+            lines = zip(before.split("\n"), str(after).split("\n"), strict=False)
+            diff = "\n".join(f"- {old}\n+ {new}" for old, new in lines if old != new)
+            took_s, by = round(time.monotonic() - started, 1), catcher(outcome, output)
+            results[mutant.identity] = {"by": by, "took_s": took_s, "diff": diff}
+            kept.write_text(json.dumps(results, indent=1))
+            print(f"{room} {took_s} s {mutant.identity} -> {by or 'SURVIVED'}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
