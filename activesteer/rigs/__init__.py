@@ -1,4 +1,4 @@
-"""Test rigs: one part of the car on its own, moved as on a bench."""
+"""Test rigs: one part of the car alone, moved as on a test bench."""
 
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.rigs.tyre_rig import TyreRig

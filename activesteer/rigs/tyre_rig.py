@@ -1,9 +1,8 @@
-"""A tyre test rig: one wheel in the engine, moved as wanted, its forces measured at its body.
+"""A tyre test rig: one wheel in the engine with an imposed motion, whose forces are measured at its body.
 
-The wheel hangs on joints whose positions and velocities are imposed: three slides, heading, inclination, spin. The
-tyre is the compiled callback of the car. What it does to the wheel is read back from the generalised passive forces
-through the engine's own Jacobian, so that frames, signs and the way the forces reach the joints are all part of the
-measurement.
+The wheel hangs on joints with imposed positions and velocities: three slides, heading, inclination, spin. The tyre is
+the compiled callback of the car. The rig computes its force on the wheel from the generalised passive forces by the
+Jacobian of the engine, so that the measurement includes frames, signs and the transfer of the forces to the joints.
 """
 
 from __future__ import annotations
@@ -26,12 +25,12 @@ from activesteer.vehicle.native_forces import install_native_forces
 from activesteer.vehicle.parameters import TyreFitment
 
 _PLACE_M: Final = (12.0, -7.0)
-"""Where the wheel touches the road: not at the origin, so that an arm taken about the wrong point shows."""
+"""Contact point on the road: away from the origin, so that a lever arm about the wrong point shows."""
 _SPIN_ANGLE_RAD: Final = 0.7
-"""Where the wheel stands about its axis: not at zero, so that a force applied in the spinning frame shows."""
+"""Angle of the wheel about its axis: not zero, so that a force in the spinning frame shows."""
 _LOAD_TOLERANCE: Final = 1e-10
 _RATE_TOLERANCE_MPS: Final = 1e-9
-"""How far from steady the relaxation may be: at 3 m/s and 0.5 m of relaxation length 2e-10 of slip."""
+"""Tolerated rate of the relaxation states: at 3 m/s and 0.5 m of relaxation length a slip of 2e-10."""
 _MAX_STEPS: Final = 30
 _LOWERING_M: Final = 0.005
 
@@ -40,7 +39,7 @@ class TyreRig:
     """One wheel on a plane road.
 
     Attributes:
-        formula: The tyre as `MagicFormula` evaluates it, mounted on the rig's side.
+        formula: `MagicFormula` of the tyre, mounted on the rig's side.
         mu: Friction of the road relative to that of the tyre file.
         pressure_Pa: Inflation pressure [Pa].
         timestep_s: Step of the engine [s].
@@ -70,20 +69,20 @@ class TyreRig:
         low_speed_damping_Nspm: float = TyreFitment.low_speed_damping_Nspm,
         timestep_s: float = 0.001,
     ) -> None:
-        """Compiles the rig and installs the native forces.
+        """Compile the rig and install the native forces.
 
         Args:
             tyre: Tyre file.
-            side: Side of the vehicle that the tyre is mounted on.
+            side: Side of the vehicle on which the tyre is mounted.
             mu: Friction of the road relative to that of the tyre file, > 0.
-            pressure_Pa: Inflation pressure [Pa]; None is that of the file.
-            low_speed_mps: Speed below which the standstill behaviour fades in [m/s], > 0.
+            pressure_Pa: Inflation pressure [Pa]; None for the pressure of the file.
+            low_speed_mps: Speed below which the standstill model fades in [m/s], > 0.
             low_speed_damping_Nspm: Viscous coefficient of the contact patch at rest [N s/m], >= 0.
             timestep_s: Step of the engine [s], > 0.
 
         Raises:
             ParameterError: an argument is outside its range.
-            ModelError: another part of the program has taken MuJoCo's callbacks.
+            ModelError: another part of the program uses MuJoCo's callbacks.
         """
         pressure = tyre["INFLPRES"] if pressure_Pa is None else pressure_Pa
         positive = {"mu": mu, "pressure_Pa": pressure, "low_speed_mps": low_speed_mps, "timestep_s": timestep_s}
@@ -107,21 +106,21 @@ class TyreRig:
         self.reset()
 
     def reset(self) -> None:
-        """Unstressed tyre, wheel at the rig's place."""
+        """Reset to an unstressed tyre, with the wheel at the contact point."""
         mujoco.mj_resetData(self._model, self._data)
         self._data.qpos[:2] = _PLACE_M
         self._data.qpos[5] = _SPIN_ANGLE_RAD
 
     def advance(self, motion: Motion) -> RigForces:
-        """Forces at the present deflection of the tyre and a motion; then the deflection goes on by one step.
+        """Return the forces for the present deflection of the tyre, then advance the deflection by one step.
 
         Args:
-            motion: What is imposed on the wheel at this instant.
+            motion: Imposed motion of the wheel at this instant.
         """
         self._impose(motion)
         deflections = self._data.act.copy()
-        # The step moves the wheel as well, but what matters of that is imposed anew: the road is plane. Places, motion
-        # axes and passive forces stay those of the step's beginning, so that they can be read afterwards.
+        # The step moves the wheel too, but the next call imposes the relevant motion again: the road is plane.
+        # Positions, motion axes and passive forces stay those at the beginning of the step, and can be read afterwards.
         mujoco.mj_step(self._model, self._data)
         return self._read(motion, deflections)
 
@@ -134,16 +133,16 @@ class TyreRig:
         speed_mps: float,
         heading_rad: float = 0.0,
     ) -> RigForces:
-        """Forces of a tyre that rolls steadily at an operating point.
+        """Return the forces of a tyre that rolls steadily at an operating point.
 
-        Height and relaxation states are searched for in the engine, until it carries the load and the states rest.
-        The spin is the one at which the formula's rolling radius gives the slip.
+        A search in the engine finds height and relaxation states at which the tyre carries the load and the states are
+        at rest. The spin follows from the slip and the rolling radius of the formula.
 
         Args:
-            slip_angle_rad: Slip angle against the speed's absolute value [rad], ISO-W: positive moves the contact
-                point to the left of the heading, the force is to the right.
-            slip_ratio: Longitudinal slip, positive drives, also in reverse: against the sliding of the contact patch.
-            inclination_rad: Camber [rad], positive leans the top to the right.
+            slip_angle_rad: Slip angle for the absolute value of the speed [rad], ISO-W: for a positive angle the
+                contact point moves to the left of the heading, and the force is to the right.
+            slip_ratio: Longitudinal slip; positive slip drives, also in reverse, against the sliding of the patch.
+            inclination_rad: Camber [rad], positive with the top to the right.
             load_N: Vertical load [N], > 0.
             speed_mps: Speed along the heading [m/s], negative in reverse, not 0.
             heading_rad: Heading in the world [rad].
@@ -155,7 +154,7 @@ class TyreRig:
             raise ParameterError(f"is {load_N:g}, must be greater than 0", key="load_N", value=load_N)
         if speed_mps == 0.0:
             raise ParameterError(
-                "is 0, steady rolling needs a speed; use advance() at rest", key="speed_mps", value=speed_mps
+                "is 0, but steady rolling needs a speed; use advance() at rest", key="speed_mps", value=speed_mps
             )
         expected = self.formula.evaluate(
             load_N, slip_ratio, slip_angle_rad, inclination_rad, self.pressure_Pa, speed_mps, road_friction=self.mu
@@ -174,7 +173,7 @@ class TyreRig:
             )
 
         height = float(expected.loaded_radius_m) * math.cos(inclination_rad)
-        # Only where the search begins; it ends where the engine's own rates vanish.
+        # Start of the search; it ends where the rates of the engine vanish.
         unknown: Vector = np.array(
             [
                 height,
@@ -188,7 +187,7 @@ class TyreRig:
             if (np.abs(residual) <= scale).all():
                 return self._read(motion(unknown[0]), unknown[1:])
             if residual[0] <= -load_N:
-                # Lifted: nothing of the tyre depends on the height here.
+                # Lifted: here the tyre does not depend on the height.
                 unknown[0] -= _LOWERING_M
                 residual = self._residual(motion(unknown[0]), unknown, load_N)
                 continue
@@ -209,7 +208,7 @@ class TyreRig:
         raise ParameterError(
             f"tyre rig: no steady state at load {load_N:g} N, slip ratio {slip_ratio:g}, slip angle "
             f"{slip_angle_rad:g} rad, inclination {inclination_rad:g} rad, speed {speed_mps:g} m/s; "
-            f"at a height of {unknown[0]:.3g} m load is off by {residual[0]:.3g} N, deflections change by "
+            f"at a height of {unknown[0]:.3g} m the load differs by {residual[0]:.3g} N, and deflections change by "
             f"{residual[1]:.3g} and {residual[2]:.3g} m/s"
         )
 
@@ -222,7 +221,7 @@ class TyreRig:
         speed_mps: ArrayLike,
         heading_rad: ArrayLike = 0.0,
     ) -> RigForces:
-        """`steady` at every point of arrays, which broadcast to shape (n,).
+        """Return `steady` at every point of arrays, which broadcast to shape (n,).
 
         Raises:
             ParameterError: the shapes do not broadcast to one dimension, or a point has no steady state.
@@ -234,7 +233,7 @@ class TyreRig:
             raise ParameterError(f"tyre rig: {error}") from error
         if points[0].ndim != 1:
             raise ParameterError(
-                f"tyre rig: the points have {points[0].ndim} dimensions, one is needed", value=points[0].ndim
+                f"tyre rig: the points have {points[0].ndim} dimensions; one is needed", value=points[0].ndim
             )
         return stacked([self.steady(*point) for point in zip(*(array.tolist() for array in points), strict=True)])
 
@@ -247,20 +246,17 @@ class TyreRig:
         heading_rad: ArrayLike = 0.0,
         inclination_rad: ArrayLike = 0.0,
     ) -> RigForces:
-        """The tyre's forces over time under an imposed motion, from its present deflection.
+        """Return the forces over time for an imposed motion, from the present deflection.
 
         Args:
             time_s: Instants [s], shape (n,), at the rig's time step.
             velocity_mps: Velocity of the wheel centre in the plane of the road, along and across the wheel's heading
                 (x forward, y left) [m/s], shape (2,) or (n, 2).
-            spin_radps: Spin [rad/s], a number or shape (n,), as the following ones.
-            centre_height_m: Height of the wheel centre [m]; it, heading and inclination move with the rates of their
+            spin_radps: Spin [rad/s], a number or shape (n,), like the following arguments.
+            centre_height_m: Height of the wheel centre [m]. The rates of height, heading and inclination are their
                 differences.
             heading_rad: Heading [rad].
             inclination_rad: Inclination [rad].
-
-        Returns:
-            The forces at every instant.
 
         Raises:
             ParameterError: the instants are not at the rig's time step, or a shape does not fit.
@@ -282,7 +278,7 @@ class TyreRig:
         return stacked([self.advance(Motion(*row)) for row in zip(*columns, strict=True)])
 
     def _spin(self, load_N: float, slip_ratio: float, speed_mps: float) -> float:
-        """Spin [rad/s] at a slip ratio; the rolling radius grows with it."""
+        """Return the spin at a slip ratio; the rolling radius grows with the spin [rad/s]."""
         tyre = self.formula.parameters.record
         spin = 0.0
         for _ in range(_MAX_STEPS):
@@ -301,29 +297,29 @@ class TyreRig:
         data.qvel[5] = motion.spin_radps
 
     def _residual(self, motion: Motion, unknown: Vector, load_N: float) -> Vector:
-        """Missing load [N] and rates of the deflections along and across [m/s]; a steady wheel is not twisted."""
+        """Return missing load [N] and deflection rates along and across [m/s]; a steady wheel is not twisted."""
         self._impose(motion)
         self._data.act[:] = (unknown[1], unknown[2], 0.0)
         mujoco.mj_forward(self._model, self._data)
         return np.array([self._wrench(self._contact_point())[2] - load_N, *self._data.act_dot[:2]])
 
     def _contact_point(self) -> Vector:
-        """From the wheel centre down in the wheel plane, onto the road; world frame [m]."""
+        """Return the point below the wheel centre in the wheel plane, on the road, world frame [m]."""
         x, y, z = self._data.xmat[self._wheel, 1::3]
-        # The part of the vertical that is in the wheel plane.
+        # Component of the vertical in the wheel plane.
         up = np.array([-z * x, -z * y, 1.0 - z * z])
         centre = self._data.xpos[self._wheel]
         return centre - up * (centre[2] / up[2])
 
     def _wrench(self, point: Vector) -> Vector:
-        """Force [N] and moment about a point [Nm] that the passive forces stand for, world frame."""
+        """Return the force [N] and the moment about a point [Nm] of the passive forces, world frame."""
         model, data, jacobian = self._model, self._data, self._jacobian
         mujoco.mj_jac(model, data, jacobian[:3], jacobian[3:], point, self._wheel)
         try:
             return np.linalg.solve(jacobian.T, data.qfrc_passive)
         except np.linalg.LinAlgError as reason:
             raise ParameterError(
-                "a wheel that lies flat has no contact point: the axes of the rig fall together"
+                "a wheel that lies flat has no contact point: two axes of the rig coincide"
             ) from reason
 
     def _read(self, motion: Motion, deflections_m: Vector) -> RigForces:

@@ -1,4 +1,4 @@
-"""The tyre rig's model: a wheel on joints for every motion, with its tyre in the block of the native forces."""
+"""The model of the tyre rig: a wheel on joints for every motion, with its tyre in the block of the native forces."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def compile_rig(
     low_speed_damping_Nspm: float,
     timestep_s: float,
 ) -> mujoco.MjModel:
-    """The rig's model with its block for the native callbacks."""
+    """Compile the model of the rig, with its block for the native callbacks."""
     spec = mujoco.MjSpec.from_string(_MJCF)
     spec.option.timestep = timestep_s
     spec.nuserdata = fb.USERDATA_PER_WHEEL

@@ -1,4 +1,4 @@
-"""What is imposed on a wheel, and what is measured at it."""
+"""Imposed motion of a wheel, and its measured forces."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Motion:
-    """What is imposed on the wheel: its centre, its orientation, and how they change."""
+    """Imposed position and orientation of the wheel, and their rates."""
 
     centre_height_m: float
     """Height of the wheel centre above the road."""
@@ -32,10 +32,10 @@ class Motion:
 
 @dataclass(frozen=True)
 class RigForces:
-    """What the road does to the wheel, read from the engine, and where.
+    """Force of the road on the wheel, read from the engine, and its contact point.
 
     `force_N` and `moment_Nm` are in the world frame, the moment about the contact point; shape (3,), or (n, 3) for n
-    operating points, and the other members (n,).
+    operating points. The other members have the shape (n,).
     """
 
     force_N: Vector
@@ -49,17 +49,17 @@ class RigForces:
     deflection_y_m: Vector
     """Relaxation state across the heading."""
     limited: Vector
-    """1 where the tyre was outside its file's range of validity."""
+    """1 if the tyre was outside the range of validity of its file."""
 
 
 def turned(vectors: Vector, angle_rad: Vector) -> Vector:
-    """Vectors, shape (..., 3), turned about z."""
+    """Return vectors, shape (..., 3), turned about z."""
     cos, sin = np.cos(angle_rad), np.sin(angle_rad)
     x, y, z = np.moveaxis(vectors, -1, 0)
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
 
 
 def stacked(forces: list[RigForces]) -> RigForces:
-    """Many operating points as one record of arrays."""
+    """Return several operating points as one record of arrays."""
     names = RigForces.__dataclass_fields__
     return RigForces(**{name: np.stack([getattr(one, name) for one in forces]) for name in names})

@@ -1,4 +1,4 @@
-"""Kinematics and compliance: a car with its chassis held, its wheels on pads, measured as on a bench."""
+"""Kinematics and compliance of a car with a held chassis and its wheels on pads, measured as on a test bench."""
 
 from activesteer.rigs.kc.figures import draw, rear_camber_figure
 from activesteer.rigs.kc.result import KcMetric, KcResult

@@ -1,4 +1,4 @@
-"""What a metric is: a function with a name, a unit and the axles it is for; its docstring is its definition."""
+"""Definition of a metric: a function with a name, a unit and axles, whose docstring is the definition."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _SMALL: Final = {
     "parallel": SMALL_TRAVEL_M, "opposite": SMALL_TRAVEL_M, "lateral": 1000.0, "longitudinal": 1000.0,
     "aligning": 100.0,
 }  # fmt: skip
-"""First word of a sweep's name -> slopes are those of the straight line through the points within this of static ride:
-travel [m], force [N] or moment [N m]."""
+"""First word of a sweep's name -> range about static ride in which a straight line gives the slopes: travel [m], force
+[N] or moment [N m]."""
 
 
 class Axle(NamedTuple):
-    """One axle of the measured car; arrays of its two wheels are left, right."""
+    """One axle of the measured car; arrays of its wheels are in the order left, right."""
 
     name: AxleName
     measured: Measured
@@ -59,19 +59,16 @@ class Axle(NamedTuple):
         return (f"{self.name[0]}l_knuckle", f"{self.name[0]}r_knuckle")
 
     def sweep(self, name: str) -> Sweep:
-        """One of the rig's sweeps."""
+        """Return a sweep of the rig."""
         return self.measured.sweeps[name]
 
     def slope(self, sweep: str, values: Array, over: Array | None = None) -> Array:
-        """Slope of each wheel around static ride, within 15 mm, 1 kN or 100 N m.
+        """Return the slopes of the axle's wheels about static ride, within 15 mm, 1 kN or 100 N m, shape (2,).
 
         Args:
             sweep: Name of the sweep.
             values: Its values, shape (n, 4).
-            over: What to take the slope over, shape (n, 4); what was swept, where not given.
-
-        Returns:
-            Slopes of the axle's wheels, shape (2,).
+            over: Variable of the slope, shape (n, 4). Default: the variable of the sweep.
         """
         x = self.sweep(sweep).x
         near = np.abs(x) <= _SMALL[sweep.split("_", maxsplit=1)[0]] * (1.0 + 1e-9)
@@ -81,12 +78,12 @@ class Axle(NamedTuple):
         return np.sum(base * (rows - rows.mean(axis=0)), axis=0) / np.sum(base * base, axis=0)
 
     def mean_slope(self, sweep: str, quantity: str, axis: int | None = None) -> float:
-        """Mean of both wheels' slopes over what is swept.
+        """Return the mean slope of both wheels over the variable of the sweep.
 
         Args:
             sweep: Name of the sweep.
             quantity: One of the arrays of a `Sweep`.
-            axis: Which coordinate of a point.
+            axis: Coordinate of a point.
         """
         values = getattr(self.sweep(sweep), quantity)
         return float(self.slope(sweep, values if axis is None else values[..., axis]).mean())
@@ -100,11 +97,11 @@ class Definition:
     """A metric's definition.
 
     Attributes:
-        name: Its name.
-        unit: Its unit.
-        axles: The axles it is given for.
-        text: What it is: definition, sign, source.
-        evaluate: Its value for one axle.
+        name: Name.
+        unit: Unit.
+        axles: Axles that have the metric.
+        text: Definition, sign, source.
+        evaluate: Function from an axle to its value.
     """
 
     name: str
@@ -119,11 +116,11 @@ DEFINITIONS: Final[list[Definition]] = []
 
 
 def metric(unit: str, *axles: AxleName) -> Callable[[Evaluate], Evaluate]:
-    """Makes a function of an axle a metric, by its name and docstring.
+    """Make a function of an axle a metric, by its name and docstring.
 
     Args:
         unit: Unit of its value.
-        axles: Axles it is given for; both where none is named.
+        axles: Axles that have the metric. Default: both.
     """
 
     def enter(function: Evaluate) -> Evaluate:

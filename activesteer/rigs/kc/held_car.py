@@ -1,12 +1,12 @@
 """The car with its chassis held and its wheels on pads: equilibrium by Newton's method on the forces at rest.
 
-It is the model of the simulations with the six coordinates of the chassis, and the rotation of the wheels, left out of
-the search. The chassis is held 1 m above where it stands, so that the tyre forces of that model vanish and the pads
-take their place: each pad holds the height of its wheel, pushes straight up at the contact point, and carries whatever
-horizontal force or moment it is told to. A wheel is fastened to its pad, which can pull as well.
+The model is that of the simulations. The search leaves out the six coordinates of the chassis and the rotation of the
+wheels. The chassis is held 1 m above its standing position, so that the tyre forces vanish and pads replace them. Each
+pad holds the height of its wheel, pushes straight up at the contact point, and applies a given horizontal force or
+moment. A wheel is fastened to its pad, which can also pull.
 
-The wheel is rigid and has the loaded radius that it has in the standing car: what the rig measures is the suspension.
-Joint limits are constraints of the engine and take no part; the rig takes dry friction out of the car (see `rig`).
+The wheel is rigid, with its loaded radius in the standing car: the rig measures the suspension. Joint limits are
+constraints of the engine and play no part. The rig removes dry friction from the car (see `rig`).
 """
 
 from __future__ import annotations
@@ -27,30 +27,30 @@ Springs = Literal["in", "out", "locked"]
 Hold = Literal["centre", "contact", "nothing"]
 
 _LIFT_M: Final = 1.0
-"""How far the chassis is lifted off the road [m]."""
+"""Height by which the chassis is lifted [m]."""
 _DIFFERENCE: Final = 1e-7
 """Step of the finite differences [m, rad]: a link of 1e7 N/m changes its force by 1 N."""
 _LARGEST_STEP: Final = 0.02
-"""Most that a coordinate may move in one iteration [m, rad], so that stops are met from outside."""
+"""Largest step of a coordinate in one iteration [m, rad], so that the search approaches stops from outside."""
 _ITERATIONS: Final = 60
 _SMALLEST_STEP: Final = 1e-11
-"""A step of Newton's method below this ends the search [m, rad] where rounding keeps the forces from vanishing."""
+"""Newton step below which the search ends if rounding keeps the forces from vanishing [m, rad]."""
 _TOLERANCE: Final = 1e-6
 """Residual at which the search ends [N, N m], heights in units of 0.1 mm."""
 _ROUNDING: Final = 1e-2
-"""Largest residual that rounding may leave behind; links of 1e9 N/m leave 1e-4."""
+"""Largest residual that rounding may leave; links of 1e9 N/m leave 1e-4."""
 _HEIGHT_SCALE_NPM: Final = 1e4
-"""Heights are multiplied by this, so that their residual is of the size of the forces'."""
+"""Factor of the heights, which gives their residual the size of the forces."""
 _STALE: Final = 0.3
-"""A step that leaves more than this fraction of the residual shows that the stiffness in use is out of date."""
+"""Fraction of the residual left by a step above which the stiffness is computed again."""
 _LOCK_NPM: Final = 1e9
 _NO_MOMENT: Final = np.zeros(3)
 _SPRING_ENDINGS: Final = ("_spring", "_damper", "_anti_roll_bar")
-"""Tendons whose names end so carry the car."""
+"""Endings of the names of the tendons that carry the car."""
 
 
 class WheelPose(NamedTuple):
-    """Where one wheel is: world axes, its rotation about its own axle locked to the knuckle."""
+    """Pose of a wheel in world axes, with its rotation about its own axle locked to the knuckle."""
 
     centre_m: Array
     rotation: Array
@@ -59,14 +59,14 @@ class WheelPose(NamedTuple):
 
 @dataclass
 class Case:
-    """What the rig does to the car at one point of a sweep; arrays by corner."""
+    """Loads and positions that the rig imposes at one point of a sweep; arrays by corner."""
 
     hold: Hold = "centre"
-    """What the pads hold: the heights of the wheel centres, of the contact points, or nothing at all."""
+    """What the pads hold: heights of the wheel centres, heights of the contact points, or nothing."""
     height_m: Array = field(default_factory=lambda: np.zeros(4))
-    """Height above the one in the standing car [m], shape (4,)."""
+    """Height above the height in the standing car [m], shape (4,)."""
     patch_N: Array = field(default_factory=lambda: np.zeros((4, 3)))
-    """Force at the contact points beside the pads' vertical one [N], shape (4, 3)."""
+    """Force at the contact points in addition to the vertical force of the pads [N], shape (4, 3)."""
     centre_N: Array = field(default_factory=lambda: np.zeros((4, 3)))
     """Force at the wheel centres [N], shape (4, 3)."""
     moment_Nm: Array = field(default_factory=lambda: np.zeros((4, 3)))
@@ -87,16 +87,17 @@ class HeldCar:
     """
 
     def __init__(self, vehicle: Vehicle, springs: Springs = "in") -> None:
-        """Puts the car on the rig, in the attitude in which it stands.
+        """Put the car on the rig, in its standing attitude.
 
         Args:
             vehicle: The car, in static ride on a level road.
-            springs: `in`; `out`: without springs, stops, anti-roll bars and weight, the links carry nothing and have
-                their design lengths; `locked`: the same with the lengths of the dampers fixed, as for turning the
-                wheels about their steering axes.
+            springs: `in`; `out`: without springs, stops, anti-roll bars and weight, so that the links are unloaded and
+                have their design lengths; `locked`: like `out`, with fixed damper lengths, to turn the wheels about
+                their steering axes.
         """
         self.model = model = copy.copy(vehicle.model)
-        # What the rig asks for is within its torque, but a step of the search may not be, and has no stiffness there.
+        # The rig stays within the torque of the servo, but a step of the search may leave it, where there is no
+        # stiffness.
         model.actuator_forcelimited[model.actuator("superposition").id] = False
         self.data = data = mujoco.MjData(model)
         self._wheels = [model.body(f"{corner}_wheel").id for corner in CORNERS]
@@ -142,7 +143,7 @@ class HeldCar:
                 model.tendon_lengthspring[tendon] = data.ten_length[tendon]
 
     def reset(self) -> None:
-        """Back to the first equilibrium, in every digit."""
+        """Return to the first equilibrium, to the last digit."""
         qpos, load, inverse, self._held = self._start
         self.data.qpos[:] = qpos
         self.load_N, self._inverse = load.copy(), inverse.copy()
@@ -151,26 +152,26 @@ class HeldCar:
         mujoco.mj_fwdPosition(self.model, self.data)
 
     def wheel(self, corner: int) -> WheelPose:
-        """Where a wheel is; the contact point is the lowest point of the rigid wheel's circle."""
+        """Return the pose of a wheel; its contact point is the lowest point of the rigid circle."""
         body = self._wheels[corner]
         centre = self.data.xpos[body].copy()
         return WheelPose(centre, self.data.xmat[body].reshape(3, 3).copy(), centre + self._down(corner))
 
     def _down(self, corner: int) -> Array:
-        """From a wheel's centre to its contact point [m], world axes, shape (3,)."""
+        """Return the vector from a wheel centre to its contact point, world axes, shape (3,) [m]."""
         _, x, _, _, y, _, _, z, _ = self.data.xmat[self._wheels[corner]].tolist()
         across = math.sqrt(1.0 - z * z)
         scale = self._radii[corner] / across
         return np.array([scale * x * z, scale * y * z, -self._radii[corner] * across])
 
     def equilibrium(self, case: Case) -> None:
-        """Moves the car into equilibrium, from where it is.
+        """Move the car from its present position into equilibrium.
 
         Args:
-            case: What the rig does.
+            case: Loads and positions that the rig imposes.
 
         Raises:
-            ModelError: no equilibrium was found.
+            ModelError: there is no equilibrium.
         """
         self._command(case)
         residual = self._residual(case)
@@ -192,11 +193,11 @@ class HeldCar:
         dofs = [*(self.model.joint(int(self.model.dof_jntid[dof])).name for dof in self._free), *CORNERS]
         raise ModelError(
             f"kinematics and compliance rig: no equilibrium found in {_ITERATIONS} iterations; {size:.3g} N (or N m) "
-            f"remain at {dofs[int(np.abs(residual).argmax())]!r}; do the links leave each wheel one way to travel?"
+            f"remain at {dofs[int(np.abs(residual).argmax())]!r}; do the links leave each wheel one degree of freedom?"
         )
 
     def _command(self, case: Case) -> None:
-        """Commands the servos. The search begins where they will arrive: further away one is at its torque's limit."""
+        """Command the servos, and start at their targets: further away they reach their torque limit."""
         model, data = self.model, self.data
         commands = [(self._steering_wheel, case.steering_wheel_rad)]
         commands += [(actuator, case.rear_steer_rad) for actuator in self._rear]
@@ -205,14 +206,14 @@ class HeldCar:
                 continue
             data.ctrl[actuator] = angle
             if actuator in self._rear:
-                # Servos that have arrived.
+                # Servos at their targets.
                 for state, value in self._rear_states_at(angle).items():
                     data.act[state] = value
             if model.actuator_trntype[actuator] == int(mujoco.mjtTrn.mjTRN_JOINT):
                 data.qpos[int(model.jnt_qposadr[model.actuator_trnid[actuator, 0]])] = angle
 
     def _residual(self, case: Case) -> Array:
-        """Forces that are not balanced [N, N m], and heights that are not met (scaled), shape (free + 4,)."""
+        """Return unbalanced forces [N, N m] and scaled height errors, shape (free + 4,)."""
         model, data = self.model, self.data
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
@@ -241,7 +242,7 @@ class HeldCar:
         self.load_N += step[-4:]
 
     def _renew(self, case: Case, residual: Array) -> None:
-        """Measures the stiffness of the car where it is, pads included, and inverts it."""
+        """Compute and invert the stiffness of the car with its pads, at the present position."""
         data, count = self.data, self._free.size
         matrix = np.empty((count + 4, count + 4))
         start, load = data.qpos.copy(), self.load_N.copy()
@@ -261,6 +262,6 @@ class HeldCar:
             self._inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
         except np.linalg.LinAlgError as reason:
             raise ModelError(
-                "kinematics and compliance rig: a part of the car moves without any force; is a link missing?"
+                "kinematics and compliance rig: a part of the car moves without a force; is a link missing?"
             ) from reason
         self._held = case.hold

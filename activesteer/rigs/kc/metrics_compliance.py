@@ -1,4 +1,4 @@
-"""Metrics of compliance: what forces and moments do at fixed wheel heights. The docstring of each is its definition."""
+"""Metrics of compliance: effects of forces and moments at fixed wheel heights. Each docstring is the definition."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TRAIL_M: Final = 0.03
 
 
 def _deg_per_side_force(axle: Axle, angle: str) -> float:
-    """Slope of an angle over a side force in phase that points inwards at the wheel that is read, within 1 kN."""
+    """Slope of an angle over a side force in phase that points inwards at the evaluated wheel, within 1 kN."""
     slopes = axle.slope("lateral_in_phase", getattr(axle.sweep("lateral_in_phase"), angle))
     return 1e3 * math.degrees(float(np.mean(INWARDS[axle.wheels] * slopes)))
 
@@ -28,7 +28,7 @@ def lateral_compliance_centre(axle: Axle) -> float:
 
 @metric("mm/kN")
 def lateral_compliance_patch(axle: Axle) -> float:
-    """Motion of the contact point with a side force there, in phase, within 1 kN."""
+    """Motion of the contact point with a side force at the contact points, in phase, within 1 kN."""
     return 1e6 * axle.mean_slope("lateral_in_phase", "contact_m", 1)
 
 
@@ -36,16 +36,17 @@ def lateral_compliance_patch(axle: Axle) -> float:
 def side_force_toe(axle: Axle) -> float:
     """Change of the outer wheel's toe angle per side force, in phase, within 1 kN; positive goes to toe-in.
 
-    The force acts at the contact point, towards the middle of the car, on the other wheel the same way.
+    The force acts at the contact points, on both wheels in the same direction, at the outer wheel towards the middle of
+    the car.
     """
     return _deg_per_side_force(axle, "toe_rad")
 
 
 @metric("deg/kN")
 def side_force_toe_with_trail(axle: Axle) -> float:
-    """The same with the force 30 mm behind the contact point, about the pneumatic trail of a tyre."""
+    """`side_force_toe` with the force 30 mm behind the contact point, about the pneumatic trail of a tyre."""
     moment = axle.mean_slope("aligning_in_phase", "steer_rad")
-    # A force to the right on the left wheel, behind it, turns it to the left: toe-out.
+    # A force to the right, behind the left wheel's contact point, turns the wheel to the left: toe-out.
     return side_force_toe(axle) - 1e3 * _TRAIL_M * math.degrees(moment)
 
 
@@ -117,7 +118,7 @@ def aligning_camber(axle: Axle) -> float:
 
 
 def _bushes_Npmm(axle: Axle) -> np.ndarray:
-    """Stiffness of one bush of each link [N/mm], both alike and in series, unloaded; nan of an axle without links."""
+    """Stiffness of one of two equal bushes in series in each link, unloaded; nan for an axle without links [N/mm]."""
     model = axle.measured.vehicle.model
     rates = []
     for index in range(model.ntendon):

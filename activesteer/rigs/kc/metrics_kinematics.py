@@ -1,4 +1,4 @@
-"""Metrics of static ride and of wheel travel. The docstring of each is its definition."""
+"""Metrics of static ride and of wheel travel. Each docstring is the definition."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ def ride_rate(axle: Axle) -> float:
 
 @metric("Hz")
 def ride_frequency(axle: Axle) -> float:
-    """Undamped natural frequency of the static load less the unsprung mass on the ride rate, each axle by itself.
+    """Undamped natural frequency of the sprung mass of one axle on the ride rate.
 
-    Unsprung are the knuckle and everything on it (Milliken 1995, ch. 16).
+    The sprung mass is the static load less the unsprung mass: the knuckle and all parts on it (Milliken 1995, ch. 16).
     """
     model = axle.measured.vehicle.model
     unsprung = np.mean([model.body_subtreemass[model.body(name).id] for name in axle.knuckles])
@@ -96,7 +96,7 @@ def damper_ratio(axle: Axle) -> float:
 
 
 def _damper_sense(axle: Axle) -> float:
-    """1 where a longer damper is rebound, as in every car; checked against the sweep, for the stops."""
+    """1 if a longer damper is rebound, as in every car; taken from the sweep, for the stops."""
     damper = axle.sweep("parallel_travel").damper_m[:, axle.wheels]
     return -1.0 if (damper[-1] > damper[0]).all() else 1.0
 
@@ -137,10 +137,10 @@ def roll_centre_height(axle: Axle) -> float:
 
 @metric("mm")
 def roll_centre_height_by_force(axle: Axle) -> float:
-    """Height over the road at which a side force would have to act in order not to change the pads' vertical forces.
+    """Height over the road at which a side force does not change the vertical forces of the pads.
 
-    Half the track times the change of vertical force per side force in phase, at fixed wheel heights, within 1 kN: how
-    much of a side force the links carry directly (force-based roll centre: Milliken 1995, ch. 17).
+    Half the track times the change of vertical force per side force in phase, at fixed wheel heights, within 1 kN: the
+    part of a side force that the links carry directly (force-based roll centre: Milliken 1995, ch. 17).
     """
     sweep = axle.sweep("lateral_in_phase")
     slopes = axle.slope("lateral_in_phase", sweep.load_N)
@@ -172,7 +172,7 @@ def roll_stiffness(axle: Axle) -> float:
 
 @metric("%", "car")
 def front_roll_stiffness_fraction(axle: Axle) -> float:
-    """Roll stiffness of the front axle over that of both, tyres rigid."""
+    """Roll stiffness of the front axle over the roll stiffness of both axles, tyres rigid."""
     front, rear = (roll_stiffness(Axle(name, axle.measured)) for name in ("front", "rear"))
     return 100.0 * front / (front + rear)
 
@@ -186,10 +186,10 @@ def roll_steer_outer(axle: Axle) -> float:
 
 @metric("deg/deg")
 def roll_understeer(axle: Axle) -> float:
-    """Change of the mean steer angle per roll angle, positive where it makes the car understeer.
+    """Change of the mean steer angle per roll angle, positive for understeer.
 
-    In a left turn the body rolls to the right: positive where the front wheels then steer right, the rear ones left
-    (Gillespie 1992, ch. 7).
+    In a left turn the body rolls to the right: positive if the front wheels then steer to the right, or the rear wheels
+    to the left (Gillespie 1992, ch. 7).
     """
     sweep = axle.sweep("opposite_travel")
     steer = _per_roll(axle, sweep.steer_rad[:, axle.wheels].mean(axis=1))
@@ -200,7 +200,7 @@ def roll_understeer(axle: Axle) -> float:
 def roll_camber(axle: Axle) -> float:
     """Change of the outer wheel's camber to the body per roll angle; negative leans it into the turn.
 
-    -1 would keep it upright on the road.
+    With -1 the wheel stays upright on the road.
     """
     sweep = axle.sweep("opposite_travel")
     return _per_roll(axle, sweep.camber_rad[:, axle.wheels][:, 1])

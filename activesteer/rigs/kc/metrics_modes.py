@@ -1,4 +1,4 @@
-"""Metrics of the standing car on its tyres: natural frequencies, damping, how it leans. Docstrings are definitions."""
+"""Metrics of the standing car on its tyres: natural frequencies, damping, lean. Each docstring is the definition."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def roll_gradient(axle: Axle) -> float:
 
 @metric("deg/g", "car")
 def braking_pitch_gradient(axle: Axle) -> float:
-    """Pitch angle per deceleration, positive nose down, linearised, brakes as distributed at full pedal."""
+    """Pitch angle per deceleration, positive nose down, linearised, with the brake distribution at full pedal."""
     return math.degrees(axle.measured.modes.pitch_gradient_radps2pm) * GRAVITY_MPS2
 
 
 @metric("-")
 def damper_asymmetry(axle: Axle) -> float:
-    """Force of the damper in rebound over the one in bump, at 0.3 m/s."""
+    """Force of the damper in rebound over the force in bump, at 0.3 m/s."""
     dampers = axle.measured.parameters.dampers
     curve = dampers.front if axle.name == "front" else dampers.rear
     bump, rebound = (abs(float(np.interp(speed, curve.velocity_mps, curve.force_N))) for speed in (0.3, -0.3))

@@ -1,4 +1,4 @@
-"""Metrics of steering axes and steering system. The docstring of each is its definition."""
+"""Metrics of steering axes and steering system. Each docstring is the definition."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ _ON_CENTRE_RAD = math.radians(20.0)
 def caster(axle: Axle) -> float:
     """Angle of the steering axis to the vertical in side view, positive with the top to the rear (ISO 8855).
 
-    In front the axis about which the wheel turns with its damper's length fixed; at the rear the steering hinge's.
+    Front axle: the axis about which the wheel turns at a fixed damper length. Rear axle: the axis of the steering
+    hinge.
     """
     return math.degrees(np.mean([axis.caster_rad for axis in axle.axes]))
 
@@ -71,7 +72,7 @@ def steering_ratio(axle: Axle) -> float:
 
 
 def _ratio_at(axle: Axle, steer_deg: float) -> float:
-    """Total steering wheel angle over total mean steer angle where the latter is given."""
+    """Total steering wheel angle over total mean steer angle, at a given mean steer angle."""
     mean = mean_steer_rad(axle)
     sides = [np.interp(sign * math.radians(steer_deg), mean, axle.sweep("steering_rolling").x) for sign in (1.0, -1.0)]
     return math.degrees(float(sides[0] - sides[1]) / 2.0) / steer_deg
@@ -79,13 +80,13 @@ def _ratio_at(axle: Axle, steer_deg: float) -> float:
 
 @metric("-", "front")
 def steering_ratio_10deg(axle: Axle) -> float:
-    """Steering wheel angle over mean steer angle at 10 deg of the latter."""
+    """Steering wheel angle over mean steer angle, at a mean steer angle of 10 deg."""
     return _ratio_at(axle, 10.0)
 
 
 @metric("-", "front")
 def steering_ratio_25deg(axle: Axle) -> float:
-    """Steering wheel angle over mean steer angle at 25 deg of the latter."""
+    """Steering wheel angle over mean steer angle, at a mean steer angle of 25 deg."""
     return _ratio_at(axle, 25.0)
 
 
@@ -115,7 +116,7 @@ def _at_lock(axle: Axle) -> tuple[float, float]:
 
 
 def _from_straight(axle: Axle) -> np.ndarray:
-    """Steer angles of both front wheels less those straight ahead [rad], shape (n, 2)."""
+    """Steer angles of both front wheels relative to straight ahead [rad], shape (n, 2)."""
     sweep = axle.sweep("steering_rolling")
     steer = sweep.steer_rad[:, :2]
     return steer - steer[sweep.zero]
@@ -123,10 +124,10 @@ def _from_straight(axle: Axle) -> np.ndarray:
 
 @metric("%", "front")
 def ackermann(axle: Axle) -> float:
-    """Difference of inner and outer steer angle over the one that makes both wheels roll, at 20 deg of the inner wheel.
+    """Difference of inner and outer steer angle over the ideal difference, at 20 deg of the inner wheel.
 
-    Ideal: cot(outer) - cot(inner) = distance of the steering axes on the ground / wheelbase. From straight
-    ahead; 0 is parallel steering, 100 pure rolling at walking pace (Milliken 1995, ch. 19).
+    Ideal difference: cot(outer) - cot(inner) = distance of the steering axes on the ground / wheelbase. Angles from
+    straight ahead; 0 is parallel steering, 100 pure rolling at walking pace (Milliken 1995, ch. 19).
     """
     steer = _from_straight(axle)
     inner = math.radians(20.0)
@@ -144,7 +145,8 @@ def ackermann(axle: Axle) -> float:
 def turning_circle(axle: Axle) -> float:
     """Diameter of the kerb circle at full lock and walking pace: path of the outer front tyre's outer edge.
 
-    The car turns about the point beside its rear axle that both front wheels' normals meet on average (mean cotangent).
+    The car turns about the point beside its rear axle at which the normals of both front wheels meet on average (mean
+    cotangent).
     """
     inner, outer = (math.radians(angle) for angle in _at_lock(axle))
     sweep = axle.sweep("steering_rolling")
@@ -157,7 +159,7 @@ def turning_circle(axle: Axle) -> float:
 
 @metric("deg", "front")
 def parking_lost_angle(axle: Axle) -> float:
-    """Steering wheel angle that is lost in the compliance when the wheels of the standing car are turned on a dry road.
+    """Steering wheel angle lost in the compliance when the standing car is steered on a dry road.
 
     Half the width of the loop at straight ahead, 0.9 of friction (moment of each tyre: Gough 1956).
     """

@@ -1,4 +1,4 @@
-"""Metrics of how links support the car that brakes and drives, with the whole car's figures that these rest on."""
+"""Metrics of the support by the links in braking and driving, with the values of the whole car that they need."""
 
 from __future__ import annotations
 
@@ -22,35 +22,35 @@ def _wheelbase_over_height(axle: Axle) -> float:
 def anti_dive(axle: Axle) -> float:
     """Fraction of the dive that the front links prevent: brake fraction x l/h x slope of the locked wheel's patch.
 
-    Positive where the contact point of the wheel, locked to its knuckle, moves forwards in bump. Links unloaded, brakes
-    as distributed at full pedal (Gillespie 1992, ch. 7; Milliken 1995, ch. 17).
+    Positive if the contact point of the wheel, locked to its knuckle, moves forwards in bump. Links unloaded, brake
+    distribution at full pedal (Gillespie 1992, ch. 7; Milliken 1995, ch. 17).
     """
     return 100.0 * _brake_fraction(axle) * _wheelbase_over_height(axle) * _support(axle, "patch_m")
 
 
 @metric("%", "rear")
 def anti_lift(axle: Axle) -> float:
-    """Fraction of the rear's lift in braking that its links prevent: as anti-dive, with the sign of a rear axle.
+    """Fraction of the rear lift in braking that the rear links prevent: anti-dive with the sign of a rear axle.
 
-    Positive where the contact point of the wheel, locked to its knuckle, moves rearwards in bump.
+    Positive if the contact point of the wheel, locked to its knuckle, moves rearwards in bump.
     """
     return -100.0 * _brake_fraction(axle) * _wheelbase_over_height(axle) * _support(axle, "patch_m")
 
 
 @metric("%", "front")
 def anti_lift_drive(axle: Axle) -> float:
-    """Fraction of the front's lift in acceleration that its links prevent, were it driven alone by half-shafts.
+    """Fraction of the front lift in acceleration that the front links prevent, if only half-shafts drive this axle.
 
-    l/h x slope of the wheel centre's path, positive where the wheel centre moves forwards in bump.
+    l/h x slope of the wheel centre's path, positive if the wheel centre moves forwards in bump.
     """
     return 100.0 * _wheelbase_over_height(axle) * _support(axle, "centre_m")
 
 
 @metric("%", "rear")
 def anti_squat(axle: Axle) -> float:
-    """Fraction of squat in acceleration that the rear links would prevent, were the rear driven alone by half-shafts.
+    """Fraction of the squat in acceleration that the rear links prevent, if only half-shafts drive this axle.
 
-    l/h x slope of the wheel centre's path, positive where it moves rearwards in bump (Gillespie 1992, ch. 7).
+    l/h x slope of the wheel centre's path, positive if it moves rearwards in bump (Gillespie 1992, ch. 7).
     """
     return -100.0 * _wheelbase_over_height(axle) * _support(axle, "centre_m")
 

@@ -1,8 +1,9 @@
 """Natural frequencies and damping of the standing car on its tyres, from the linearised model.
 
-The car is free, each tyre a spring at the contact point: vertical with the stiffness that it has under static load, and
-sideways with that of its carcass, since it does not slide (a four-post rig). Along the car the wheels roll. Dampers,
-links and servos act as in the simulations; the slope of a damper is the mean of its bump and rebound slopes at rest.
+The car is free. Each tyre is a spring at the contact point: vertically with its stiffness under static load, and
+sideways with the stiffness of its carcass, since it does not slide (a four-post rig). Along the car the wheels roll.
+Dampers, links and servos act as in the simulations; the slope of a damper is the mean of its bump and rebound slopes at
+rest.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _LIFT_M: Final = 1.0
 _DIFFERENCE: Final = 1e-6
 """Step of the central differences [m, rad, and per second]."""
 _FASTEST_HZ: Final = 40.0
-"""Modes above this are those of links and steering, not of body and wheels."""
+"""Highest frequency of the modes of body and wheels; links and steering have higher ones [Hz]."""
 NAMES: Final = (
     "body_bounce",
     "body_pitch",
@@ -40,13 +41,13 @@ class Mode:
     """One mode of the car."""
 
     frequency_Hz: float
-    """Of the undamped oscillation: magnitude of the eigenvalue."""
+    """Frequency of the undamped oscillation: magnitude of the eigenvalue [Hz]."""
     damping_ratio: float
 
 
 @dataclass(frozen=True)
 class Modes:
-    """The modes of body and wheels, and how the car leans."""
+    """The modes of body and wheels, and the lean of the car."""
 
     by_name: dict[str, Mode]
     """The modes of `NAMES`."""
@@ -55,7 +56,7 @@ class Modes:
     roll_gradient_radps2pm: float
     """Roll angle per lateral acceleration [rad s2/m], positive to the outside of the turn."""
     pitch_gradient_radps2pm: float
-    """Pitch angle per deceleration, brakes as distributed at full pedal [rad s2/m], positive nose down."""
+    """Pitch angle per deceleration with the brake distribution at full pedal [rad s2/m], positive nose down."""
 
 
 class _Linear:
@@ -92,7 +93,7 @@ class _Linear:
         return self.data.xpos[self.wheels] + self._radius[:, None] * down
 
     def at_contacts(self, forces_N: Array) -> Array:
-        """Generalised forces of forces at the contact points, shape (nv,)."""
+        """Return the generalised forces of forces at the contact points, shape (nv,)."""
         total = np.zeros(self.model.nv)
         for body, point, force in zip(self.wheels, self.contacts(), forces_N, strict=True):
             mujoco.mj_applyFT(self.model, self.data, force, np.zeros(3), point, body, total)
@@ -130,22 +131,19 @@ class _Linear:
         return stiffness, damping
 
     def velocity_map(self, body: int, point_m: Array) -> tuple[Array, Array]:
-        """Jacobians (3, free) of a point's velocity and of the body's rotation."""
+        """Return the Jacobians (3, free) of the velocity of a point and of the rotation of its body."""
         along, about = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
         mujoco.mj_jac(self.model, self.data, along, about, point_m, body)
         return along[:, self.free], about[:, self.free]
 
 
 def modes(vehicle: Vehicle, load_N: Array, tyres: tuple[TyreStiffness, TyreStiffness]) -> Modes:
-    """Linearises the standing car and names its modes.
+    """Linearise the standing car and name its modes.
 
     Args:
         vehicle: The car, in static ride.
-        load_N: Its wheel loads [N], shape (4,).
-        tyres: Its tyres, front and rear.
-
-    Returns:
-        Frequencies, damping ratios, and the gradients of roll and pitch.
+        load_N: Wheel loads [N], shape (4,).
+        tyres: Front and rear tyres.
 
     Raises:
         ModelError: a mode of the body does not oscillate.
@@ -162,7 +160,7 @@ def modes(vehicle: Vehicle, load_N: Array, tyres: tuple[TyreStiffness, TyreStiff
 
 
 def _named(linear: _Linear) -> dict[str, Mode]:
-    """Each mode goes to the motion that holds most of its kinetic energy."""
+    """Assign each mode to the motion with most of its kinetic energy."""
     size = linear.free.size
     lower = -np.linalg.solve(linear.mass, np.hstack([linear.stiffness, linear.damping]))
     upper = np.hstack([np.zeros((size, size)), np.eye(size)])
@@ -177,12 +175,12 @@ def _named(linear: _Linear) -> dict[str, Mode]:
         if not fraction.size or fraction.max() < 0.1:
             if name.startswith("body"):
                 where = f"of the standing car below {_FASTEST_HZ:g} Hz"
-                raise ModelError(f"kinematics and compliance rig: no mode {where} is its {name}")
-            # Hard dampers leave no oscillation of a wheel between spring and tyre.
+                raise ModelError(f"kinematics and compliance rig: no mode {where} is the {name}")
+            # With hard dampers a wheel does not oscillate between spring and tyre.
             named[name] = Mode(math.nan, math.nan)
             continue
         if name == "body_pitch":
-            # Bounce and pitch share two modes; what bounces more is the bounce.
+            # Bounce and pitch share two modes; the mode with more bounce is the bounce.
             taken = np.isclose(np.abs(roots), 2.0 * math.pi * named["body_bounce"].frequency_Hz)
             fraction[taken] = 0.0
         # Sideways on its tyres the body sways and rolls in two modes; the slower one is the roll.
@@ -197,7 +195,7 @@ def _named(linear: _Linear) -> dict[str, Mode]:
 
 
 def _motions(linear: _Linear) -> dict[str, tuple[float, Array]]:
-    """Inertia and Jacobian rows of each motion that gives a mode its name."""
+    """Return inertia and Jacobian rows of each motion that gives a mode its name."""
     model, data = linear.model, linear.data
     chassis = model.body("chassis").id
     along, about = linear.velocity_map(chassis, data.xipos[chassis])
@@ -217,7 +215,7 @@ def _motions(linear: _Linear) -> dict[str, tuple[float, Array]]:
 
 
 def _roll_gradient(linear: _Linear) -> float:
-    """From the inertial forces of a lateral acceleration, carried by the tyres' side forces."""
+    """Return the roll gradient, from the inertial forces of a lateral acceleration and the side forces of the tyres."""
     sideways = np.zeros(linear.free.size)
     sideways[linear.root + 1] = 1.0
     moved = np.linalg.lstsq(linear.stiffness, -linear.mass @ sideways, rcond=1e-13)[0]
@@ -225,7 +223,7 @@ def _roll_gradient(linear: _Linear) -> float:
 
 
 def _pitch_gradient(linear: _Linear, vehicle: Vehicle) -> float:
-    """From the inertial forces of a deceleration, carried by the brakes' forces at the contact points."""
+    """Return the pitch gradient, from the inertial forces of a deceleration and the brake forces."""
     brakes = vehicle.parameters.brakes
     fraction = np.repeat([brakes.front_torque_Nm, brakes.rear_torque_Nm], 2)
     total = fraction.sum()

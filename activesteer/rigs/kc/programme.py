@@ -28,44 +28,41 @@ _MOMENT_NM: Final = np.linspace(-150.0, 150.0, 13)
 _STEERING_POINTS: Final = 24
 """Points of the steering sweep to either side."""
 _AXIS_STEER_RAD: Final = math.radians(5.0)
-"""Steering wheel angle to either side between which the steering axis is found: a third of a degree at the wheel."""
+"""Steering wheel angle to either side for the search of the steering axis: a third of a degree at the wheel."""
 _STEERED_BUMP_M: Final = 0.04
-"""Bump and rebound in which the rear wheels are steered too, where screws in the toe links do it [m]."""
+"""Bump and rebound at which the rear wheels are steered too, for screws in the toe links [m]."""
 _AXIS_REAR_RAD: Final = math.radians(0.3)
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Everything that the rig found out about a car."""
+    """All results of the rig for a car."""
 
     vehicle: Vehicle
     sweeps: dict[str, Sweep]
     axes: tuple[SteeringAxis, ...]
-    """Steering axes by corner; at the rear those of the steering hinges."""
+    """Steering axes by corner; at the rear the axes of the steering hinges."""
     tyres: tuple[TyreStiffness, TyreStiffness]
-    """Front and rear."""
+    """Front and rear tyres."""
     static_load_N: Array
     """Wheel loads of the standing car, shape (4,)."""
     modes: Modes
 
     @property
     def parameters(self) -> VehicleParameters:
-        """Parameters of the vehicle that was measured."""
+        """Parameters of the measured vehicle."""
         return self.vehicle.parameters
 
 
 def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> Measured:
-    """Runs the whole programme.
+    """Run the whole programme.
 
     Args:
         vehicle: The car, in static ride on a level road.
         tyres: Tyres of the front and of the rear axle.
 
-    Returns:
-        What was measured.
-
     Raises:
-        ModelError: the car has no equilibrium somewhere.
+        ModelError: the car has no equilibrium at a point of a sweep.
     """
     load_N = fb.wheel_outputs(vehicle.data, 4)["fz_N"].copy()
     stiffness = (
@@ -110,7 +107,7 @@ def _sweeps(
     return {
         "parallel_travel": sweep("parallel wheel travel", travel, "m", _TRAVEL_M, lambda z: Case(height_m=z * both)),
         "opposite_travel": sweep(
-            "opposite wheel travel", "travel of the right wheels, positive in bump; the left ones go the other way",
+            "opposite wheel travel", "travel of the right wheels, positive in bump; the left wheels move the other way",
             "m", _TRAVEL_M, lambda z: Case(height_m=z * opposed),
         ),
         "parallel_kinematic": sweep(
@@ -169,13 +166,13 @@ def _sweeps(
 
 
 def rear_screw_travel_m(vehicle: Vehicle, angles_rad: Array) -> Array:
-    """By how much the screw of the left toe link makes it longer at angles of the actuators [m], shape (n,)."""
+    """Return the lengthening of the left toe link by its screw at angles of the actuators [m], shape (n,)."""
     address = int(vehicle.model.actuator_actadr[vehicle.model.actuator("rl_steer").id])
     return np.array([vehicle.actuators.rear_states_at(float(angle))[address] for angle in angles_rad])
 
 
 def _steering_angles(vehicle: Vehicle) -> Array:
-    """Denser around straight ahead; to the lock of the steering wheel or of the rack, whichever comes first."""
+    """Return steering wheel angles, denser about straight ahead, to the first lock of steering wheel or rack."""
     model = vehicle.model
     rack = float(model.jnt_range[model.joint("rack").id, 1])
     per_angle = vehicle.rack_per_steering_wheel_m
@@ -194,7 +191,7 @@ def _rear_range(vehicle: Vehicle) -> float:
 
 
 def _axes(vehicle: Vehicle, car: HeldCar) -> tuple[SteeringAxis, ...]:
-    """Steering axes of the unloaded links with the dampers at a fixed length."""
+    """Return the steering axes of the unloaded links, with dampers of fixed length."""
     locked = HeldCar(vehicle, springs="locked")
 
     def poses(sign: float) -> list[WheelPose]:

@@ -1,4 +1,4 @@
-"""What the kinematics and compliance rig says of a car: metrics in customary units, curves in SI, tables."""
+"""Result of the kinematics and compliance rig: metrics in customary units, curves in SI, tables."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from activesteer.rigs.kc.targets import Target, Targets
 
 @dataclass(frozen=True)
 class KcMetric:
-    """One number of the car.
+    """One metric of the car.
 
     Attributes:
-        name: What it is.
+        name: Name.
         axle: `front`, `rear` or `car`.
-        value: Its value; nan where the car has none.
-        unit: Its unit.
-        band: Where it should lie; None where nothing is asked.
-        inside: Whether it does; None where nothing is asked.
-        source: Where the band comes from; empty where there is none.
-        definition: What the name means: definition, sign, source.
-        remark: What the band's file says about a value outside it.
+        value: Value; nan if the car has none.
+        unit: Unit.
+        band: Target band; None without a target.
+        inside: Whether the value is inside the band; None without a target.
+        source: Source of the band; empty without a target.
+        definition: Definition, sign, source.
+        remark: Remark of the target file about a value outside the band.
     """
 
     name: str
@@ -47,9 +47,9 @@ class KcResult:
 
     Attributes:
         vehicle: Name of the car.
-        metrics: Its numbers, in the order of the table.
-        curves: The sweeps by name, in SI units, every wheel.
-        measured: All that was measured, steering axes and modes among it.
+        metrics: Metrics, in the order of the table.
+        curves: Sweeps of every wheel by name, in SI units.
+        measured: All results, with steering axes and modes.
     """
 
     vehicle: str
@@ -58,7 +58,7 @@ class KcResult:
     measured: Measured
 
     def __getitem__(self, key: tuple[str, str]) -> float:
-        """Value of a metric by axle and name.
+        """Return the value of a metric by axle and name.
 
         Raises:
             ParameterError: there is no such metric.
@@ -73,11 +73,11 @@ class KcResult:
 
     @property
     def outside(self) -> tuple[KcMetric, ...]:
-        """The metrics that miss their band."""
+        """The metrics outside their bands."""
         return tuple(entry for entry in self.metrics if entry.inside is False)
 
     def to_json(self) -> str:
-        """The metrics as JSON: name, axle, value, unit, band, inside, source; a value that does not exist is null."""
+        """Return the metrics as JSON: name, axle, value, unit, band, inside, source; a missing value is null."""
         rows = [
             {
                 "name": entry.name,
@@ -116,15 +116,12 @@ def _number(value: float) -> str:
 
 
 def evaluated(vehicle: str, measured: Measured, targets: Targets) -> KcResult:
-    """Works out all metrics and compares them with their bands.
+    """Compute all metrics and compare them with their bands.
 
     Args:
         vehicle: Name of the car.
-        measured: What the rig measured.
+        measured: Results of the rig.
         targets: Bands by axle and metric.
-
-    Returns:
-        The result.
     """
     metrics = []
     for definition in DEFINITIONS:

@@ -1,4 +1,4 @@
-"""The kinematics and compliance rig, as it is called."""
+"""Call of the kinematics and compliance rig."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from activesteer.errors import ModelError
 
-# The metrics enter themselves into the table of definitions, in this order.
+# The metrics register themselves in the table of definitions, in this order.
 from activesteer.rigs.kc import (  # isort: skip  # noqa: F401
     metrics_kinematics, metrics_support, metrics_steering, metrics_compliance, metrics_modes,
 )  # fmt: skip
@@ -27,12 +27,12 @@ def kinematics_compliance(
     overrides: Mapping[str, Any] | None = None,
     targets: str | os.PathLike[str] | None = None,
 ) -> KcResult:
-    """Measures kinematics and compliance of a car, chassis held, wheels on pads.
+    """Measure kinematics and compliance of a car with a held chassis and its wheels on pads.
 
     Args:
         vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key of the vehicle -> value, as `factors.mass`.
-        targets: File with target bands; the one of the vehicle's name in `models/targets` where not given.
+        overrides: Dotted key of the vehicle, such as `factors.mass`, to value.
+        targets: File with target bands. Default: the file with the vehicle's name in `models/targets`.
 
     Returns:
         Metrics with their bands, and all curves, of the car without the dry friction of its dampers and rack.
@@ -51,8 +51,8 @@ def kinematics_compliance(
     car = load_car(vehicle, overrides)
     check_gains(overrides or {}, ())
     bands = load_targets(car.name, targets)
-    # Dry friction pushes as far one way as the other: without it the rig finds the mean of both directions of a sweep.
-    # The same of the play of screws, whose two ends it would find by chance.
+    # Dry friction acts equally in both directions: without it the rig finds the mean of both directions of a sweep.
+    # The play of screws is removed for the same reason: the rig would find one of its ends by chance.
     rear = car.config.rear_actuator.smooth()
     smooth = dataclasses.replace(car, config=dataclasses.replace(car.config, friction=Friction(), rear_actuator=rear))
     try:
@@ -60,7 +60,7 @@ def kinematics_compliance(
     except np.linalg.LinAlgError as reason:
         raise ModelError(f"{car.mjcf}: the car has no equilibrium on the rig: {reason}") from reason
     except KeyError as reason:
-        # The engine's look-up by name: its message says which there are.
+        # The message of the engine's look-up by name lists the known names.
         raise ModelError(
             f"{car.mjcf}: the kinematics and compliance rig needs a part that the model lacks: {reason}"
         ) from reason

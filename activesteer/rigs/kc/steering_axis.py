@@ -1,4 +1,4 @@
-"""The axis about which a wheel steers, found from two positions of the wheel: no joint needs to lie on it."""
+"""The axis about which a wheel steers, from two positions of the wheel; no joint needs to lie on it."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from activesteer.rigs.kc.held_car import WheelPose
 
 @dataclass(frozen=True)
 class SteeringAxis:
-    """A steering axis and what lies around it, with the standing car's wheel."""
+    """A steering axis, and its distances from the wheel of the standing car."""
 
     point_m: Array
-    """Where it meets the height of the contact point, vehicle axes, shape (3,)."""
+    """Point of the axis at the height of the contact point, vehicle axes, shape (3,)."""
     direction: Array
     """Unit vector along it, upwards, shape (3,)."""
     caster_rad: float
@@ -24,28 +24,26 @@ class SteeringAxis:
     inclination_rad: float
     """Angle to the vertical in front view, positive with the top towards the middle of the car (ISO 8855)."""
     trail_m: float
-    """From the contact point forwards to the axis on the ground: positive where the axis meets the road ahead."""
+    """Distance from the contact point forwards to the axis on the ground: positive if the axis is ahead."""
     scrub_radius_m: float
-    """From the axis on the ground outwards to the contact point: positive where the axis meets the road inside."""
+    """Distance from the axis on the ground outwards to the contact point: positive if the axis is inside."""
     centre_trail_m: float
-    """From the wheel centre forwards to the axis, at the height of the wheel centre."""
+    """Distance from the wheel centre forwards to the axis, at the height of the wheel centre."""
     centre_offset_m: float
-    """From the axis outwards to the wheel centre, at the height of the wheel centre (disturbing force lever)."""
+    """Distance from the axis outwards to the wheel centre, at the height of the wheel centre (disturbing force
+    lever)."""
 
 
 def steering_axis(right: WheelPose, left: WheelPose, standing: WheelPose, inwards: float) -> SteeringAxis:
-    """Axis of the screw that takes a wheel from one position to another.
+    """Return the axis of the screw motion that takes a wheel from one position to another.
 
     Args:
-        right: The wheel steered a little to the right, vehicle axes.
-        left: The wheel steered as much to the left.
+        right: The wheel steered slightly to the right, vehicle axes.
+        left: The wheel steered by the same angle to the left.
         standing: The wheel straight ahead.
         inwards: Sign of y towards the middle of the car.
 
-    Returns:
-        The axis.
-
-    Source: Chasles' theorem; the point is the one of least norm of (I - R) p = t.
+    Source: Chasles' theorem; the point is the solution of least norm of (I - R) p = t.
     """
     turn = left.rotation @ right.rotation.T
     axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])

@@ -1,4 +1,4 @@
-"""What a sweep of the rig measures: where every wheel was, and what its pad carried, at each of its points."""
+"""Sweep of the rig: pose of every wheel and force of its pad, at each point."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ INWARDS: Final = np.array([-1.0, 1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Sweep:
-    """One sweep of the rig, n points in increasing order of what was swept.
+    """One sweep of the rig, n points in increasing order of its variable.
 
     Vehicle axes of the standing car: x forward, y left, z up, origin on the road below the middle of the front axle.
     Arrays have the shape (n, 4) or (n, 4, 3), by corner.
     """
 
     title: str
-    """What was done."""
+    """Title of the sweep."""
     variable: str
-    """What was swept, with its sign."""
+    """Variable of the sweep, with its sign."""
     unit: str
-    """SI unit of what was swept."""
+    """SI unit of the variable."""
     x: Array
-    """What was swept, shape (n,)."""
+    """Values of the variable, shape (n,)."""
     centre_m: Array
     """Wheel centres."""
     axle: Array
@@ -38,13 +38,13 @@ class Sweep:
     contact_m: Array
     """Contact points: the lowest points of the wheels."""
     patch_m: Array
-    """The points of the locked wheels that were the contact points at x = 0 (wheels are locked to their knuckles)."""
+    """Points of the wheels, locked to their knuckles, that are the contact points at x = 0."""
     load_N: Array
     """Vertical forces of the pads."""
     wind_up_rad: Array
-    """Rotation of the knuckles about y, positive as a wheel that rolls forward."""
+    """Rotation of the knuckles about y, positive in the sense of forward rolling."""
     damper_m: Array
-    """Lengths of the dampers; of a strut the extension from the design position."""
+    """Lengths of the dampers; for a strut its extension from the design position."""
     rack_m: Array
     """Travel of the rack, positive steers left, shape (n,)."""
     steering_wheel_rad: Array
@@ -74,11 +74,11 @@ class Sweep:
 
     @property
     def zero(self) -> int:
-        """Index of the point where nothing was swept away from the standing car."""
+        """Index of the point of the standing car, x = 0."""
         return int(np.abs(self.x).argmin())
 
     def as_table(self) -> dict[str, object]:
-        """All arrays as lists, for JSON; angles of the wheels among them."""
+        """Return all arrays as lists for JSON, with the angles of the wheels."""
         table: dict[str, object] = {"title": self.title, "variable": self.variable, "unit": self.unit}
         arrays = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in table}
         arrays |= {"toe_rad": self.toe_rad, "camber_rad": self.camber_rad, "steer_rad": self.steer_rad}
@@ -116,17 +116,14 @@ def _read(car: HeldCar) -> _Point:
 
 
 def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float, Case]) -> Sweep:
-    """Goes through the points of a sweep, from zero outwards to either side.
+    """Measure the points of a sweep, from zero outwards to either side.
 
     Args:
-        car: The car on the rig; left at its first equilibrium.
-        title: What is done.
-        variable: What is swept.
-        unit: Its SI unit.
-        cases: What the rig does, by value of the variable; 0 must be among them.
-
-    Returns:
-        What was measured.
+        car: The car on the rig; returned to its first equilibrium.
+        title: Title of the sweep.
+        variable: Variable of the sweep.
+        unit: SI unit of the variable.
+        cases: Loads and positions that the rig imposes, by value of the variable; 0 must be among them.
 
     Raises:
         ModelError: a point has no equilibrium.

@@ -1,8 +1,8 @@
-"""What a K&C rig measures as tables: one CSV for each test of an axle, with the same columns whoever has measured it.
+"""Results of a K&C rig as tables: one CSV for each test of an axle, with the same columns for every rig.
 
 A column is a channel and its unit: `left_toe [deg]`. Signs are those of ISO 8855 and of `Sweep`: toe positive toe-in,
-camber negative with the top inwards, caster positive with the top to the rear, everything that moves a wheel outwards
-or forwards positive; forces and moments as `TESTS` says.
+camber negative with the top inwards, caster positive with the top to the rear, motion of a wheel outwards or
+forwards positive; for forces and moments see `TESTS`.
 """
 
 from __future__ import annotations
@@ -29,11 +29,12 @@ class Test:
 
     Attributes:
         sweep: Name of our own sweep.
-        variable: Channel that is swept.
-        meaning: What it is, with its sign.
-        sign: From the variable to what the left wheel feels: its travel; forwards, to the left; a turn to the left.
-        mirror: Whether the right wheel, seen in a mirror, feels the same as the left one, or the opposite.
-        front_only: Whether the rear axle has no such test.
+        variable: Channel of the variable.
+        meaning: Meaning of the variable, with its sign.
+        sign: Sign from the variable to the load of the left wheel: its travel; forwards, to the left; a turn to the
+            left.
+        mirror: Whether the load of the right wheel is the mirror image of the left wheel's load, or its opposite.
+        front_only: Whether only the front axle has the test.
     """
 
     sweep: str
@@ -67,7 +68,7 @@ TESTS: Final = {
         "aligning_opposed", "moment", "moment about the vertical on each wheel, positive towards toe-in", -1.0
     ),
 }  # fmt: skip
-"""By name; AXLE_NAME.csv is its file."""
+"""Tests by name; AXLE_NAME.csv is the file of a test."""
 
 UNITS: Final = {
     "mm": ("m", 1e-3),
@@ -88,20 +89,17 @@ CHANNELS: Final = {
     "centre_forward": ("m", "mm"), "centre_outwards": ("m", "mm"), "contact_forward": ("m", "mm"),
     "contact_outwards": ("m", "mm"), "load": ("N", "N"), "damper": ("m", "mm"),
 }  # fmt: skip
-"""Channel -> its SI unit, and the one in which it is written; those of a wheel have left_ or right_ before them."""
+"""Channel -> its SI unit and its unit in a file; channels of a wheel begin with left_ or right_."""
 OF_THE_AXLE: Final = ("rack", "force", "moment", "steering_wheel")
-"""Channels that are not a wheel's."""
+"""Channels of the axle, not of a wheel."""
 
 
 def write_tables(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
-    """Writes all tests of both axles.
+    """Write all tests of both axles, and return the paths.
 
     Args:
-        result: What the rig measured.
-        folder: Where the files go; made where it does not exist.
-
-    Returns:
-        The paths written.
+        result: Result of the rig.
+        folder: Folder of the files; created if it does not exist.
 
     Raises:
         ParameterError: a file cannot be written.

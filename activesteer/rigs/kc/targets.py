@@ -1,4 +1,4 @@
-"""Target bands of a vehicle's metrics, from a file that says where each comes from."""
+"""Target bands of a vehicle's metrics, from a file with their sources."""
 
 from __future__ import annotations
 
@@ -14,29 +14,27 @@ from activesteer.rigs.kc.definitions import DEFINITIONS
 
 @dataclass(frozen=True)
 class Target:
-    """Where a metric should lie."""
+    """Target band of a metric."""
 
     band: tuple[float, ...]
     """Lowest and highest value, in the metric's unit."""
     source: str
-    """Where the band comes from."""
+    """Source of the band."""
     remark: str = ""
-    """What to say about a value outside it."""
+    """Remark about a value outside the band."""
 
 
 Targets = dict[tuple[str, str], Target]
-"""By axle and metric."""
+"""Targets by axle and metric."""
 
 
 def load_targets(vehicle: str, path: str | os.PathLike[str] | None = None) -> Targets:
-    """Reads the target bands of a vehicle.
+    """Read the target bands of a vehicle.
 
     Args:
-        vehicle: Its name; the bands are in `models/targets/NAME_kc.toml`, where there is such a file.
+        vehicle: Name of the vehicle, whose bands are in `models/targets/NAME_kc.toml`; without this file there are
+            none.
         path: Another file.
-
-    Returns:
-        The bands; none where there is no file for the vehicle.
 
     Raises:
         ParameterError: the file cannot be read, or names a metric that does not exist.

@@ -1,4 +1,4 @@
-"""What a standing tyre is to the rig: a spring upwards and sideways, and a moment against being turned."""
+"""Model of a standing tyre on the rig: a vertical and a lateral spring, and a moment against turning."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from activesteer.tyre.kernels.vertical import deflection_under_load, vertical_fo
 from activesteer.tyre.tyre_parameters import TyreParameters
 
 PARKING_FRICTION: Final = 0.9
-"""Coefficient of friction under the tyres that are turned at rest."""
+"""Coefficient of friction under tyres that are turned at rest."""
 
 
 @dataclass(frozen=True)
@@ -25,15 +25,12 @@ class TyreStiffness:
 
 
 def tyre_stiffness(tyre: TyreParameters, pressure_Pa: float | None, load_N: float) -> TyreStiffness:
-    """Stiffnesses of a tyre that stands upright.
+    """Return the stiffnesses of an upright standing tyre.
 
     Args:
-        tyre: Its parameters.
-        pressure_Pa: Inflation pressure [Pa]; that of the tyre file where None.
+        tyre: Parameters of the tyre.
+        pressure_Pa: Inflation pressure [Pa]; None for the pressure of the tyre file.
         load_N: Vertical load [N].
-
-    Returns:
-        What it is like under that load.
     """
     record = tyre.record
     pressure = tyre["INFLPRES"] if pressure_Pa is None else pressure_Pa
@@ -45,7 +42,7 @@ def tyre_stiffness(tyre: TyreParameters, pressure_Pa: float | None, load_N: floa
 
 
 def parking_moment_Nm(load_N: float, tyre: TyreStiffness) -> float:
-    """Moment with which a standing tyre resists being turned about the vertical on a dry road [N m].
+    """Return the moment of a standing tyre against turning about the vertical on a dry road [N m].
 
     Source: V. E. Gough, Practical Tire Research, SAE Transactions 64 (1956): mu / 3 sqrt(load^3 / pressure).
     """
