@@ -1,4 +1,4 @@
-"""A car of one's own: made from a table of hardpoints, and checked before anyone drives it."""
+"""A user's own car: made from a table of hardpoints, and checked before it is driven."""
 
 from activesteer.vehicle_builder.build import NewVehicle, new_vehicle
 from activesteer.vehicle_builder.check import CheckReport, Finding, check_vehicle

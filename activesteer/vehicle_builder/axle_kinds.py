@@ -1,4 +1,4 @@
-"""The axles that can be built: which hardpoints each needs, and which links run between them."""
+"""The kinds of axles: their hardpoints, and the links between them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from activesteer.errors import ParameterError, nearest_names
 
 @dataclass(frozen=True)
 class LinkKind:
-    """One link between chassis (or rack) and knuckle, and the elasticity it has where the table gives none."""
+    """One link between chassis (or rack) and knuckle, with its default elasticity."""
 
     name: str
     inner: str
@@ -22,9 +22,9 @@ class LinkKind:
     hardening_Npm3: float
     """Cubic part of the force [N/m3]."""
     damping_Nspm: float
-    """Of the rubber [N s/m]."""
+    """Damping of the rubber [N s/m]."""
     reason: str
-    """What the default stands for."""
+    """Meaning of the default."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,13 @@ class AxleKind:
     """One kind of suspension.
 
     Attributes:
-        name: What it is called in a table.
-        axles: Where it can be used, `front` or `rear`.
+        name: Name in a table.
+        axles: Axles that can have it, `front` or `rear`.
         links: Its links.
-        points: Points that are needed beside the ends of the links.
-        carriers: What can carry a spring or damper: `strut`, `knuckle`, the `travel` of the wheel itself, or an arm
-            (name -> its inner points) that is a link or the two links of an arm.
-        spring_on: Which of these does where the table does not say.
+        points: Points needed in addition to the ends of the links.
+        carriers: Possible carriers of a spring or damper: `strut`, `knuckle`, the `travel` of the wheel itself, or an
+            arm (name to its inner points) of one or two links.
+        spring_on: Default carrier of the spring.
     """
 
     name: str
@@ -50,23 +50,23 @@ class AxleKind:
 
     @property
     def strut(self) -> bool:
-        """Whether the knuckle slides on a strut."""
+        """The knuckle slides on a strut."""
         return self.spring_on == "strut"
 
     @property
     def guided(self) -> bool:
-        """Whether curves guide the wheel."""
+        """Curves guide the wheel."""
         return self.spring_on == "travel"
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """All points that a table has to give, in the order in which they are asked for."""
+        """All points that a table has to give, in the order of the messages."""
         ends = [point for link in self.links for point in (link.inner, link.outer)]
         return tuple(dict.fromkeys((*self.points, *ends)))
 
     @property
     def arms(self) -> dict[str, tuple[tuple[str, ...], str]]:
-        """What swings: name -> inner points (one or two) and outer point."""
+        """Swinging parts: name -> inner points (one or two) and outer point."""
         found = {}
         for name, inner in self.carriers.items():
             if inner:
@@ -150,26 +150,26 @@ MULTILINK: Final = AxleKind(
 )
 
 CURVES: Final = AxleKind("curves", ("front", "rear"), (), ("wheel_centre",), {"travel": ()}, "travel")
-"""Not links but what a K&C rig has measured guides the wheel; springs and dampers act along its travel."""
+"""Measurements of a K&C rig guide the wheel instead of links; springs and dampers act along its travel."""
 
 KINDS: Final = (MCPHERSON, DOUBLE_WISHBONE, DOUBLE_WISHBONE_REAR, FIVE_LINK, MULTILINK, CURVES)
 DEFAULTS: Final = {"front": "mcpherson", "rear": "five_link"}
 
 
 def kinds_for(axle: str) -> dict[str, AxleKind]:
-    """The kinds of suspension that a front or a rear axle can have, by name."""
+    """Return the kinds of suspension of a front or rear axle by name."""
     return {kind.name: kind for kind in KINDS if axle in kind.axles}
 
 
 def kind_of(axle: str, name: str) -> AxleKind:
-    """One kind of suspension.
+    """Return a kind of suspension.
 
     Args:
         axle: `front` or `rear`.
-        name: Its name.
+        name: Name of the kind.
 
     Raises:
-        ParameterError: there is none of this name for this axle.
+        ParameterError: this axle has no kind of this name.
     """
     kinds = kinds_for(axle)
     if name not in kinds:

@@ -1,4 +1,4 @@
-"""From a table to a folder with a car that stands: `activesteer vehicle new`."""
+"""From a table to a folder with a standing car: `activesteer vehicle new`."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ from activesteer.vehicle_builder.vehicle_text import vehicle_text
 
 @dataclass(frozen=True)
 class NewVehicle:
-    """A car that was made.
+    """A new car.
 
     Attributes:
-        folder: Where its files are.
-        vehicle_file: What `--vehicle` takes.
-        assumptions: The values that the table does not give.
-        trimmed: What was found by letting it stand.
-        questions: What is unusual in measurements that it was made of.
+        folder: Folder of its files.
+        vehicle_file: Vehicle file, as for `--vehicle`.
+        assumptions: Values that the table does not give.
+        trimmed: Values from the standing car.
+        questions: Unusual measurements.
     """
 
     folder: Path
@@ -60,19 +60,16 @@ def new_vehicle(
     kc: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
 ) -> NewVehicle:
-    """Makes a car from a table of hardpoints, masses, springs and bushings, or of what a K&C rig has measured.
+    """Make a car from a table of hardpoints, masses, springs and bushings, or from measurements of a K&C rig.
 
     Args:
         name: Name of the car: letters, digits, `_` and `-`.
-        table: The table, .toml or .csv; `car.toml` in the folder of measurements where not given.
-        folder: Where its files go; `vehicles/NAME` in the current folder where not given.
-        front: Kind of the front suspension; what the table says where not given.
-        rear: Kind of the rear suspension.
+        table: The table, .toml or .csv. Default: `car.toml` in the folder of measurements.
+        folder: Folder of the new files. Default: `vehicles/NAME` in the current folder.
+        front: Kind of the front suspension. Default: the kind in the table.
+        rear: Kind of the rear suspension. Default: the kind in the table.
         kc: Folder with the measurements of axles whose kind is `curves`.
-        overwrite: Replace files of an earlier car in that folder.
-
-    Returns:
-        What was made.
+        overwrite: Replace files of an earlier car in this folder.
 
     Raises:
         ParameterError: the table is wrong, or the folder has files already.
@@ -114,7 +111,7 @@ def new_vehicle(
         name, given, kinds, {axle: (file, parameters) for axle, (file, parameters, _) in tyres.items()}, log, tables
     )
     check_origin(car, raw)
-    # Everything is made in a folder of its own: a car that cannot stand leaves nothing behind.
+    # All files are written in a temporary folder: a car that cannot stand leaves no files.
     with tempfile.TemporaryDirectory() as scratch:
         made = Path(scratch)
         for _, _, own in tyres.values():
@@ -146,7 +143,7 @@ def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None)
 
 
 def _write(folder: Path, car: Car, trimmed: Trimmed, *, final: bool = False) -> Path:
-    """Writes MJCF and vehicle file; the final one holds the single-track model of the car itself."""
+    """Write MJCF and vehicle file; only the final file holds the single-track model of the car itself."""
     for name, text in mjcf_files(car, trimmed).items():
         (folder / name).write_text(text, encoding="utf-8")
     model = mujoco.MjModel.from_xml_path(str(folder / f"{car.name}.xml")) if final else None
@@ -156,7 +153,7 @@ def _write(folder: Path, car: Car, trimmed: Trimmed, *, final: bool = False) -> 
 
 
 def _tyre(axle: str, table: CarTable, beside: Path, log: Log) -> tuple[str, TyreParameters, Path | None]:
-    """Name of an axle's tyre file, its parameters, and the file that is to be copied into the car's folder."""
+    """Return name and parameters of an axle's tyre file, and the file to copy into the folder of the car."""
     name = table.axle(axle).tyre
     if name is None:
         log.note(f"{axle}.tyre", DEFAULT_TYRE, "the compact's")

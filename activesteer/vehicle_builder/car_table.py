@@ -1,6 +1,6 @@
-"""The table of a car that exists, to go with what the rig has measured of it: masses, tyres, dampers, steering, brakes.
+"""Table of an existing car for its rig measurements: masses, tyres, dampers, steering, brakes.
 
-With it, `activesteer vehicle new NAME --kc DIR` makes the same car again, its links replaced by curves.
+With it, `activesteer vehicle new NAME --kc DIR` makes the same car again, with curves instead of links.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ _REMARK = (
 
 
 _LEAST = 1e-4
-"""Mass and inertia of a part that the original does without [kg, kg m2]."""
+"""Mass and inertia of a part that the original car does not have [kg, kg m2]."""
 
 
 def car_table(car: Car, result: KcResult) -> str:
-    """Text of the table.
+    """Return the text of the table.
 
     Args:
         car: The car.
-        result: What the rig measured of it.
+        result: Result of the rig.
     """
     model, config = result.measured.vehicle.model, car.config
     data = mujoco.MjData(model)
@@ -41,7 +41,7 @@ def car_table(car: Car, result: KcResult) -> str:
     load, body = result.measured.static_load_N, mass_properties(model)
     standing = result.curves["parallel_travel"]
     centres = standing.centre_m[standing.zero].copy()
-    # The rig's origin is the chassis', which stands a little off the road's.
+    # The origin of the rig is that of the chassis, which stands slightly off the road.
     wheels = [model.body(f"{corner}_wheel").id for corner in CORNERS]
     centres[:, 2] = result.measured.vehicle.data.xpos[wheels, 2]
     steering = model.tendon("steering_column")
@@ -74,7 +74,7 @@ def car_table(car: Car, result: KcResult) -> str:
 
 
 def _rear_steering(result: KcResult, centre_m: Array) -> dict[str, Any]:
-    """A lower and an upper point of the hinge between rear knuckle and wheel."""
+    """Return a lower and an upper point of the hinge between rear knuckle and wheel."""
     model, axis = result.measured.vehicle.model, result.measured.axes[2]
     if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "rl_steer") < 0:
         return {}
@@ -102,7 +102,7 @@ def _axle(car: Car, model: mujoco.MjModel, data: mujoco.MjData, centres: Array, 
     curve = getattr(car.config.dampers, axle)
     friction = car.config.friction
     centre = centres[0 if front else 2]
-    # Design position and standing one differ by fractions of a millimetre, which move the masses along.
+    # Design position and standing position differ by fractions of a millimetre, which shift the masses too.
     moved = centre - data.xpos[model.body(f"{corner}_wheel").id]
     wheel = model.body(f"{corner}_wheel")
     parts = {"knuckle": f"{corner}_knuckle"} | ({} if front else {"carrier": f"{corner}_carrier"})
@@ -128,7 +128,7 @@ def _axle(car: Car, model: mujoco.MjModel, data: mujoco.MjData, centres: Array, 
         "damper_friction_N": friction.front_damper_N if front else friction.rear_damper_N,
         "wheel_mass_kg": round(float(wheel.mass[0]), 4),
         "wheel_spin_inertia_kgm2": round(float(wheel.inertia[spin]), 4),
-        # A disc has half; rounding is not to leave less.
+        # A disc has half; rounding must not give less.
         "wheel_inertia_kgm2": max(round(float(np.delete(wheel.inertia, spin).mean()), 4), across_least),
         **masses,
         "points": {"wheel_centre": _point(centre)},

@@ -1,4 +1,4 @@
-"""Makes a table complete: what it does not give is found by a rule, and every rule that was used is written down."""
+"""Complete a table: rules give the missing values, and every rule that was used is noted."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from activesteer.vehicle_builder.table import UNITS, AxleTable, CarTable, LinkTa
 
 DEFAULT_TYRE: Final = "compact_205_55R16.tir"
 BUSHINGS_NPM: Final = {"ball_joint": 1e8, "hard": 1e7, "medium": 1e6, "soft": 3e5}
-"""Radial stiffness of one bushing by class [N/m]; classes as in pysuspension's guide to joint types, `soft` raised from
-1e5, which lets a wheel move 10 mm under 1 kN."""
+"""Radial stiffness of one bushing by class [N/m]. Classes of pysuspension's guide to joint types, with `soft` raised
+from 1e5, which lets a wheel move by 10 mm under 1 kN."""
 _DAMPING: Final = ((3e6, 3000.0), (6e5, 2000.0), (0.0, 1500.0))
-"""Stiffness of a link from which on it has this damping [N/m, N s/m]: 10 to 35 % of critical, as in the compact."""
+"""Smallest stiffness of a link for this damping [N/m, N s/m]: 10 to 35 % of critical, as in the compact."""
 
 
 _SERVO_NMPRAD: Final = 1e5
-"""Rear steering of the compact."""
+"""Stiffness of the rear steering of the compact [N m/rad]."""
 _DRAWN: Final = {
     "spring_inner": (0.0, -0.16, 0.45), "spring_outer": (0.0, -0.12, 0.05), "damper_inner": (-0.06, -0.16, 0.5),
     "damper_outer": (-0.06, -0.12, 0.0), "tie_rod_inner": (-0.13, -0.4, -0.04),
 }  # fmt: skip
-"""Points of an axle of curves that are only drawn, from the wheel centre [m]: such an axle has none."""
+"""Points from the wheel centre for the drawing of an axle of curves, which has no points of its own [m]."""
 
 
 def complete(
@@ -44,21 +44,21 @@ def complete(
     log: Log,
     tables: KcTables | None = None,
 ) -> Car:
-    """Makes a car of a table in vehicle coordinates.
+    """Make a car from a table in vehicle coordinates.
 
     Args:
         name: Name of the car.
         table: The table, points in vehicle coordinates.
         kinds: Suspension of each axle.
         tyres: Tyre of each axle: name of its file, and its parameters.
-        log: Where assumptions go.
-        tables: What a K&C rig has measured, for axles of curves.
+        log: Log of the assumptions.
+        tables: Measurements of a K&C rig, for axles of curves.
 
     Returns:
-        The car, with everything but what `trim` finds.
+        The car, complete but for the values that `trim` finds.
 
     Raises:
-        ParameterError: something is geometrically impossible.
+        ParameterError: the geometry is impossible.
     """
     steering, brakes = table.steering, table.brakes
     column_Npm = log.take(
@@ -218,7 +218,7 @@ def _solid(
     where: str,
     log: Log,
 ) -> Solid:
-    """Mass properties of one part; inertia scales with the mass where it is not given."""
+    """Return the mass properties of one part; a missing inertia scales with the mass."""
     kg = log.take(f"{key}_mass_kg", mass, default_kg, "a part of this kind in the compact's class", "kg")
     if cg is None:
         log.note(f"{key}_cg", " ".join(f"{value:.3f}" for value in default_cg) + " m", where)
@@ -284,7 +284,7 @@ def _anti_roll_bar(
 
 
 def _kingpin(table: CarTable, centre: Array, log: Log) -> tuple[Array, Array]:
-    """Lower and upper point of the rear steering axis."""
+    """Return lower and upper point of the rear steering axis."""
     lower, upper = table.rear_steering.axis_lower, table.rear_steering.axis_upper
     if lower is not None and upper is not None:
         return np.array(lower), np.array(upper)
@@ -296,14 +296,14 @@ def _kingpin(table: CarTable, centre: Array, log: Log) -> tuple[Array, Array]:
 
 
 def check_origin(car: Car, given: CarTable) -> None:
-    """Vehicle coordinates begin on the road below the front axle.
+    """Check that the vehicle coordinates begin on the road below the front axle.
 
     Args:
         car: The car.
-        given: Its table as it was written.
+        given: Its table as the user wrote it.
 
     Raises:
-        ParameterError: the wheels do not stand there.
+        ParameterError: they do not.
     """
     centre, radius = car.front.wheel_centre_m, car.front.radius_m
     if abs(centre[0]) > 0.05 or not 0.75 * radius < centre[2] < 1.15 * radius:

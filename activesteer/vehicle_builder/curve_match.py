@@ -1,7 +1,8 @@
-"""Makes an axle of curves give on our own rig what was measured of it: what load bends is taken out of its curves.
+"""Match an axle of curves to its measurements on our own rig, by removing the deflection under load from its curves.
 
-A measured curve is that of the loaded axle; the guide's own is the one without load. They differ by a few hundredths of
-a degree, by what the wheel load does at its small levers. The rig measures, the difference goes into the curves.
+A measured curve belongs to the loaded axle, the curve of the guide to the unloaded axle. They differ by a few
+hundredths of a degree, the effect of the wheel load at its small lever arms. The curves are corrected by the difference
+that the rig measures.
 """
 
 from __future__ import annotations
@@ -20,20 +21,17 @@ from activesteer.vehicle_builder.design import Axle
 from activesteer.vehicle_builder.trimmed import TrimmedAxle
 
 NEAR_ENOUGH: Final = 5e-6
-"""Correction of a curve below which it stays [m, rad]; of caster 50 times as much, which moves no contact."""
+"""Smallest correction of a curve [m, rad]; 50 times as much for caster, which moves no contact point."""
 _CASTER: Final = 0.02
 
 
 def match_travel(axles: tuple[Axle, ...], found: dict[str, TrimmedAxle], held: HeldCar) -> float:
-    """Corrects the curves over travel of all guided axles.
+    """Correct the curves over travel of all guided axles, and return the largest correction [m, rad].
 
     Args:
         axles: The guided axles.
         found: Their curves; changed.
         held: The car on the rig.
-
-    Returns:
-        Greatest correction [m, rad].
     """
     heights = np.zeros((len(_asked(axles[0]).travel_m), 4))
     for axle in axles:
@@ -62,16 +60,13 @@ def match_travel(axles: tuple[Axle, ...], found: dict[str, TrimmedAxle], held: H
 
 
 def match_steering(axle: Axle, found: TrimmedAxle, held: HeldCar, pinion_m: float) -> float:
-    """Corrects the curves over the rack.
+    """Correct the curves over the rack, and return the largest correction [m, rad].
 
     Args:
         axle: The front axle, guided.
         found: Its curves; changed.
         held: The car on the rig.
         pinion_m: Rack travel per steering wheel angle [m/rad].
-
-    Returns:
-        Greatest correction [m, rad].
     """
     asked, curves = _asked(axle), found.curves
     assert curves is not None
@@ -79,9 +74,9 @@ def match_steering(axle: Axle, found: TrimmedAxle, held: HeldCar, pinion_m: floa
     cases = [Case("contact", steering_wheel_rad=float(at / pinion_m)) for at in rack]
     there = np.empty(len(rack))
     poses, _, standing, _ = _swept(held, cases, rack, there)
-    # The column gives way a little: the rack is not quite where the steering wheel asks for it.
+    # The column deflects slightly, so the rack is not exactly at the position of the steering wheel.
     there = 0.5 * (there - there[::-1])
-    # The left wheel at s and the right one at -s are mirror images.
+    # The left wheel at s and the right wheel at -s are mirror images.
     both = np.stack([_left(poses[:, 0], 0), _left(poses[::-1, 1], 1)])
     rest = np.stack([_left(standing[None, 0], 0), _left(standing[None, 1], 1)])
     now = (both - rest).mean(axis=0)
@@ -110,7 +105,7 @@ def _wheels(axle: Axle) -> list[int]:
 def _swept(
     held: HeldCar, cases: list[Case], order: Array, rack: Array | None = None
 ) -> tuple[Array, Array, Array, Array]:
-    """Poses (n, 4, 6) and loads (n, 4) of a sweep, from its middle outwards; and those of the standing car.
+    """Return poses (n, 4, 6) and loads (n, 4) of a sweep, from its middle outwards, and those of the standing car.
 
     `rack` is filled with the travel of the rack [m].
     """
@@ -130,7 +125,7 @@ def _swept(
 
 
 def _poses(held: HeldCar) -> Array:
-    """Forwards, left, camber, caster, toe, upwards of each wheel, signs as the rig's; shape (4, 6)."""
+    """Return forwards, left, camber, caster, toe, upwards of each wheel, with the signs of the rig; shape (4, 6)."""
     rows = []
     for corner in range(4):
         pose = held.wheel(corner)
@@ -148,7 +143,7 @@ def _rack(held: HeldCar) -> float:
 
 
 def _left(poses: Array, corner: int) -> Array:
-    """Poses of a wheel as those of the left one: outwards instead of left."""
+    """Return the poses of a wheel as for the left wheel: outwards instead of left."""
     return poses * np.array([1.0, -INWARDS[corner], 1.0, 1.0, 1.0, 1.0])
 
 

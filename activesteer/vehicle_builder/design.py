@@ -1,4 +1,4 @@
-"""A car made complete: what the table gives, and by a rule what it does not; every rule that was used is kept."""
+"""A complete car: values of the table, and values by rules, which are kept."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Link:
 
 @dataclass
 class Axle:
-    """An axle, complete but for what is trimmed."""
+    """An axle, complete but for the trim."""
 
     name: str
     kind: AxleKind
@@ -69,7 +69,7 @@ class Axle:
     damper: Mount
     anti_roll_bar_Npm: float
     measured: MeasuredAxle | None
-    """Of an axle of curves: what it is asked to do."""
+    """Measurements that an axle of curves has to match."""
     ride_frequency_Hz: float | None
     damping_ratio: float | None
 
@@ -91,7 +91,7 @@ class Axle:
 
 @dataclass
 class Car:
-    """A car, complete but for what is trimmed."""
+    """A car, complete but for the trim."""
 
     name: str
     table: CarTable
@@ -102,7 +102,7 @@ class Car:
     rack_limit_m: float
     rack_friction_N: float
     rack_sign: float
-    """-1 where the rack moves to the right to steer left (tie rods behind the steering axis), else 1."""
+    """-1 if the rack moves to the right to steer left (tie rods behind the steering axis), else 1."""
     column_stiffness_Npm: float
     kingpin_m: tuple[Array, Array]
     rear_limit_rad: float
@@ -114,12 +114,12 @@ class Car:
 
     @property
     def axles(self) -> tuple[Axle, Axle]:
-        """Front and rear."""
+        """Front and rear axle."""
         return self.front, self.rear
 
     @property
     def questions(self) -> tuple[str, ...]:
-        """What is unusual in measurements that it is made of."""
+        """Unusual measurements."""
         return tuple(line for axle in self.axles if axle.measured is not None for line in axle.measured.questions)
 
     @property
@@ -129,24 +129,24 @@ class Car:
 
 
 class Log:
-    """Where assumptions are written down as they are made."""
+    """Log of the assumptions."""
 
     def __init__(self) -> None:
         self.assumptions: list[Assumption] = []
 
     def take(self, key: str, given: float | None, default: float, rule: str, unit: str = "") -> float:
-        """The given value, or the default, which is then written down."""
+        """Return the given value, or the default, which is then noted."""
         if given is not None:
             return given
         self.note(key, f"{default:.4g} {unit}".strip(), rule)
         return default
 
     def angle(self, key: str, given_rad: float | None, default_deg: float, rule: str) -> float:
-        """The given angle, or the default in degrees, which is then written down [rad]."""
+        """Return the given angle, or the default in degrees, which is then noted [rad]."""
         if given_rad is None:
             self.note(key, f"{default_deg:g} deg", rule)
         return math.radians(default_deg) if given_rad is None else given_rad
 
     def note(self, key: str, value: str, rule: str) -> None:
-        """Writes an assumption down."""
+        """Note an assumption."""
         self.assumptions.append(Assumption(key, value, rule))

@@ -1,4 +1,4 @@
-"""What a table says of actuators and sensors: the tables of a vehicle file, which go over as they are written."""
+"""Actuators and sensors of a table: tables of a vehicle file, copied unchanged."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ _DIGITS: Final = 7
 
 
 class Hardware(Protocol):
-    """What has actuators and sensors: a table of a car, or a vehicle file."""
+    """Source of actuators and sensors: a table of a car, or a vehicle file."""
 
     @property
     def rear_actuator(self) -> RearActuator | None:
-        """What steers the rear wheels."""
+        """Actuator of the rear wheels."""
         ...
 
     @property
     def superposition_actuator(self) -> SuperpositionActuator | None:
-        """What adds to the steering wheel angle."""
+        """Actuator of the superposition."""
         ...
 
     @property
     def sensors(self) -> Sensors | None:
-        """What controllers see."""
+        """Sensors of the controllers."""
         ...
 
 
 def hardware_tables(part: Hardware) -> dict[str, Any]:
-    """The tables [rear_actuator], [superposition_actuator] and [sensors], each where it says something.
+    """Return the tables [rear_actuator], [superposition_actuator] and [sensors] that are not empty.
 
     Args:
         part: A table of a car, or a vehicle file.
 
     Returns:
-        Name -> table, with what its preset does not say, angles in degrees.
+        Name to table, without the values of its preset, angles in degrees.
     """
     tables = {
         "rear_actuator": to_table(part.rear_actuator or RearActuator(), defaults=False),
@@ -51,7 +51,7 @@ def hardware_tables(part: Hardware) -> dict[str, Any]:
 
 
 def in_degrees(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The same table with angles in degrees, and no more digits than anyone reads."""
+    """Return the table with angles in degrees, rounded for readers."""
     found = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
@@ -70,7 +70,7 @@ def _each(value: Any, change: Callable[[float], float]) -> Any:
 
 
 def _sensors(sensors: Sensors) -> dict[str, Any]:
-    """A preset fills in all that is not given: only what differs from it was."""
+    """Return the values that differ from the preset, which fills in all others."""
     table, filled = (to_table(one, defaults=False) for one in (sensors, Sensors(preset=sensors.preset)))
     given = {"preset": sensors.preset} if sensors.preset != Sensors.preset else {}
     for key, value in table.items():

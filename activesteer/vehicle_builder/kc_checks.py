@@ -1,7 +1,7 @@
-"""Whether measurements of a K&C rig can be true, and whether they are usual: signs and units of the file's columns.
+"""Checks of the measurements of a K&C rig: signs and units of the columns.
 
-What would win energy, or turn the wheels the other way than the rack, cannot be: an error. What is only unusual in a
-car is asked about.
+Measurements that would create energy, or turn the wheels against the rack, are errors. Unusual measurements give a
+question.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ _MUST_RISE: Final = (
     ("aligning_moment", "-toe", "the wheel turns against the moment: sign of moment or toe?"),
     ("aligning_moment_opposed", "-toe", "the wheel turns against the moment: sign of moment or toe?"),
 )
-"""Test, channel that has to rise with what is swept, and what is wrong where it falls."""
+"""Test, channel that has to rise with the variable, and message if it falls."""
 
 
 def check_signs(tests: dict[str, Samples]) -> None:
-    """Refuses what cannot be.
+    """Check the signs of the slopes.
 
     Args:
         tests: All tests of an axle.
 
     Raises:
-        ParameterError: something goes the wrong way.
+        ParameterError: a slope has the wrong sign.
     """
     for name, channel, words in _MUST_RISE:
         if name not in tests or (slope := _slope(name, tests[name], channel)) is None:
@@ -57,11 +57,11 @@ def check_signs(tests: dict[str, Samples]) -> None:
 
 
 def unusual(axle: str, tests: dict[str, Samples]) -> Iterator[str]:
-    """Questions about what cars seldom have.
+    """Return questions about unusual measurements.
 
     Args:
         axle: `front` or `rear`.
-        tests: All its tests.
+        tests: All tests of the axle.
     """
     per_m, per_kN = np.degrees(1.0), np.degrees(1e3)
     front = axle == "front"
@@ -97,6 +97,6 @@ def _slope(name: str, samples: Samples, channel: str) -> float | None:
 
 
 def _least(name: str, channel: str, samples: Samples) -> float:
-    """A slope below this is nothing: 0.02 mm or 0.002 deg, or 10 N, over the range that is looked at."""
+    """Smallest slope that counts: 0.02 mm or 0.002 deg, or 10 N, over the evaluated range."""
     step = 10.0 if channel == "load" else 3e-5 if channel.endswith("toe") else 2e-5
     return step / min(_NEAR[name], float(np.abs(samples.x).max()))

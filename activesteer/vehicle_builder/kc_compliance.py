@@ -1,7 +1,7 @@
 """The elastic part of an axle of curves: a 5 x 5 stiffness with hardening, from the tests of compliance.
 
-What no test has loaded stays as it is in the compact (a weak pull towards its compliance); everything is symmetric and
-holds the wheel, since it is searched for as a product of triangles.
+Directions without a load in the tests get the compliance of the compact (a weak pull towards it). The stiffness is
+symmetric and positive definite, because the search is for a product of triangles.
 """
 
 from __future__ import annotations
@@ -17,22 +17,23 @@ from activesteer.conventions import Array
 from activesteer.vehicle.axle_curves import COORDINATES, upper_triangle
 
 _SCALE: Final = np.array([1e-4, 1e-4, 2e-4, 2e-4, 2e-4])
-"""Residuals are counted in these: 0.1 mm and 0.01 deg."""
+"""Units of the residuals: 0.1 mm and 0.01 deg."""
 _PULL: Final = 0.3
 """Weight of the usual compliance against one sample."""
 _USUAL: Final = np.diag([2.2e-6, 1.0e-7, 1.8e-6, 6.0e-5, 8.0e-5])
 """Compliance of a wheel at its centre [m/N, rad/(N m)]: about the compact's, 2.2 mm/kN along and 0.1 mm/kN across the
 car, 0.03 deg of camber, 1 deg of wind-up and 0.5 deg of toe per 100 N m or 0.3 kN at the road."""
 _FLOOR: Final = np.diag([4e-9, 4e-9, 1e-7, 1e-7, 1e-7])
-"""Compliance that nothing falls below [m/N, rad/(N m)]: stiffer, and rounding would be felt."""
+"""Smallest compliance [m/N, rad/(N m)]; with a smaller value rounding would matter."""
 _WHEEL: Final = np.diag([35.0, 35.0, 0.9, 0.26, 0.4])
 """Inertia of a wheel with hub and knuckle [kg, kg m2]."""
 _FASTEST: Final = (2.0 * np.pi * 320.0) ** 2
-"""How fast it may swing on what holds it [1/s2]: faster tells nothing at a step of 1 ms, and takes iterations."""
+"""Square of the highest natural frequency of a wheel [1/s2]; higher ones show nothing at a step of 1 ms, and cost
+iterations."""
 _UNITS: Final = np.sqrt(np.outer(np.diag(_USUAL), np.diag(_USUAL)))
 _LOWER: Final = np.tril_indices(5)
 _LINEAR: Final = 15
-"""Numbers of a triangle; hardening springs have more."""
+"""Number of entries of a triangle, before those of the hardening springs."""
 _SPRING: Final = 250.0 * np.array([1.0, 1.0, 0.3, 0.3, 0.3])
 """Unit of the hardening springs: 4e9 N/m3 along the car."""
 _FIRST_SPRINGS: Final = np.array([1.0, 0.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, -0.5, 0.0, 0.0, 0.0])
@@ -45,10 +46,10 @@ class Load:
     Attributes:
         name: The test.
         direction: Load at the wheel centre per unit of x: forces along x and y, moments about x, y and z.
-        x: What was swept [N, N m].
-        moved: Coordinate -> its change [m, rad]; None where it was not measured.
-        beside: Compliance of what lies in series with the wheel's own, shape (5, 5): the rack that both wheels push the
-            same way, the servo of the rear steering.
+        x: Values of the variable [N, N m].
+        moved: Coordinate to its change [m, rad]; None if not measured.
+        beside: Compliance in series with the wheel's own, shape (5, 5): the rack that both wheels push in the same
+            direction, or the servo of the rear steering.
     """
 
     name: str
@@ -60,7 +61,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Elasticity:
-    """What was found: fields of `AxleCurves`, and what they rest on."""
+    """Fitted fields of `AxleCurves`, and a remark on their basis."""
 
     stiffness: tuple[float, ...]
     hardening: tuple[float, ...]
@@ -69,16 +70,10 @@ class Elasticity:
 
 
 def fitted(loads: list[Load]) -> Elasticity:
-    """The stiffness about the curves that gives the measured compliance.
+    """Fit stiffness and hardening about the curves to the measured compliance.
 
-    Directions that are rigid in the tests, as most are in an axle of few soft bushings, keep a little: a wheel
-    swings on them at 320 Hz, which is 0.007 mm/kN across the car, or 0.005 deg of wind-up per 100 N m.
-
-    Args:
-        loads: The tests.
-
-    Returns:
-        Stiffness and hardening.
+    Directions that are rigid in the tests, as most are in an axle with few soft bushings, keep a small compliance: a
+    wheel oscillates on them at 320 Hz, which is 0.007 mm/kN across the car, or 0.005 deg of wind-up per 100 N m.
     """
     forces = np.concatenate([np.outer(load.x, load.direction) for load in loads] or [np.zeros((0, 5))])
     wanted = np.concatenate([_wanted(load) for load in loads] or [np.zeros((0, 5))])
@@ -124,7 +119,7 @@ def fitted(loads: list[Load]) -> Elasticity:
 
 
 def _start(forces: Array, wanted: Array, weight: Array) -> Array:
-    """Triangle of the compliance that comes nearest by linear least squares, made to hold the wheel."""
+    """Return the triangle of the nearest compliance by linear least squares, made positive definite."""
     places, rows, right = list(zip(*_LOWER, strict=True)), [], []
     for index in range(5):
         known = np.isfinite(wanted[:, index])
@@ -150,19 +145,19 @@ def _start(forces: Array, wanted: Array, weight: Array) -> Array:
 
 
 def _wanted(load: Load) -> Array:
-    """What moved, less what moves beside the wheel's own compliance; nan where it was not measured; shape (n, 5)."""
+    """Return the motion less that of the compliance in series; nan if not measured; shape (n, 5)."""
     moved = [np.full(len(load.x), np.nan) if (row := load.moved[name]) is None else row for name in COORDINATES]
     return np.stack(moved, axis=1) - np.outer(load.x, load.direction) @ load.beside.T
 
 
 def deflections(forces: Array, compliance: Array, springs: Array, square: Array) -> Array:
-    """Deflections under loads, by Newton's method.
+    """Return deflections under loads, by Newton's method.
 
     Args:
         forces: Loads, shape (n, 5).
         compliance: Inverse of the stiffness, shape (5, 5).
-        springs: Directions of the springs that harden, shape (2, 5).
-        square: Their square parts, shape (2,).
+        springs: Directions of the hardening springs, shape (2, 5).
+        square: Quadratic parts of these springs, shape (2,).
     """
     moved, stiffness = forces @ compliance, np.linalg.inv(compliance)
     if not springs.any():

@@ -1,4 +1,4 @@
-"""From samples of a K&C rig to the curves and the compliance that an axle is asked to have."""
+"""From samples of a K&C rig to the curves and the compliance of an axle."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from activesteer.vehicle_builder.kc_compliance import Load, fitted
 from activesteer.vehicle_builder.kc_tables import KcTables, Samples, smoothed
 
 _POINTS: Final = 33
-"""Points of a curve in the vehicle file."""
+"""Number of points of a curve in the vehicle file."""
 _NEAR_M: Final = 0.015
-"""Travel within which a rate counts, as the rig's metrics have it."""
+"""Travel within which a rate is evaluated, as for the metrics of the rig."""
 _DIGITS: Final = 7
 
 
 @dataclass(frozen=True)
 class MeasuredAxle:
-    """What was measured of an axle, as one wheel sees it.
+    """Measurements of an axle, for one wheel.
 
     Attributes:
-        curves: Its curves as measured, and the stiffness.
-        wheel_load_N: Load over `curves.travel_m`, from the standing car's [N]; None where it was not measured.
-        anti_roll_bar_Npm: From opposite and parallel travel; None where that cannot be told.
-        damper_ratio: Shortening of the damper per wheel travel; None where it was not measured.
-        rack_lift: Rise of the left wheel centre per travel of the rack to the left, the spring's length fixed: the work
+        curves: Measured curves, and the stiffness.
+        wheel_load_N: Load over `curves.travel_m`, relative to the standing car [N]; None if not measured.
+        anti_roll_bar_Npm: Rate from opposite and parallel travel; None if they do not show it.
+        damper_ratio: Shortening of the damper per wheel travel; None if not measured.
+        rack_lift: Rise of the left wheel centre per travel of the rack to the left, at a fixed spring length: the work
             of the wheel load as caster raises one wheel and lowers the other.
-        roughness: Channel -> greatest distance of a sample from the curve through all of them, in SI units.
-        stiffness_remark: What the elastic part rests on.
-        questions: What is unusual in the measurements.
+        roughness: Channel to the largest distance of a sample from the curve through all samples, in SI units.
+        stiffness_remark: Basis of the elastic part.
+        questions: Unusual measurements.
     """
 
     curves: AxleCurves
@@ -63,21 +63,18 @@ def measured_axle(
     kingpin_m: tuple[Array, Array],
     in_series: tuple[float, float],
 ) -> MeasuredAxle:
-    """Curves and compliance of an axle.
+    """Return curves and compliance of an axle.
 
     Args:
         axle: `front` or `rear`.
         tables: All tests.
         wheel_centre_m: Left wheel centre in the standing car; its height is the arm of forces on the road [m].
         kingpin_m: Lower and upper point of the rear steering axis.
-        in_series: What lies in series with the compliance of the wheel: stiffness of the steering column at the rack
-            [N/m], and of the rear steering servo [N m/rad].
-
-    Returns:
-        What was measured.
+        in_series: Stiffnesses in series with the compliance of the wheel: steering column at the rack [N/m], and rear
+            steering servo [N m/rad].
 
     Raises:
-        ParameterError: a channel that is needed was not measured, or the compliance holds no wheel.
+        ParameterError: a necessary channel was not measured, or the stiffness is not positive definite.
     """
     tests, rolling_radius_m = tables.tests[axle], float(wheel_centre_m[2])
     check_signs(tests)
@@ -85,7 +82,7 @@ def measured_axle(
     travel, over_travel = _over_travel(tests["parallel_travel"], rolling_radius_m, rough)
     rack = _over_rack(tests["steering"], rolling_radius_m, over_travel, travel, rough) if "steering" in tests else {}
     if axle == "front" and not rack:
-        raise ParameterError("front_steering.csv (or .toml) is needed: how the rack steers the wheels")
+        raise ParameterError("front_steering.csv (or .toml) is needed, with the steering of the wheels by the rack")
     fields: dict[str, Any] = {**over_travel, **rack, "stiffness": upper_triangle(1e5 * np.eye(5))}
     placeholder = AxleCurves(**fields)
     column_Npm, servo_Nmprad = in_series
@@ -127,12 +124,12 @@ def _curve(samples: Samples, values: Array | None, at: Array, name: str, rough: 
 
 
 def _wheel_paths(samples: Samples, radius_m: float) -> tuple[Array | None, Array | None]:
-    """Way of the wheel centre outwards and forwards; from the contact point's where the centre was not measured."""
+    """Return the path of the wheel centre outwards and forwards; default: from the path of the contact point."""
     outwards, forward = samples.moved("centre_outwards"), samples.moved("centre_forward")
     contact = samples.moved("contact_outwards")
     if outwards is None and contact is not None:
         camber = samples.moved("camber")
-        # The contact point lies below the centre in the wheel plane: more camber (top outwards) takes it inwards.
+        # The contact point lies below the centre in the wheel plane: more camber (top outwards) moves it inwards.
         outwards = contact if camber is None else contact + radius_m * camber
     if forward is None:
         forward = samples.moved("contact_forward")
@@ -161,7 +158,7 @@ def _over_travel(
 def _over_rack(
     samples: Samples, radius_m: float, over_travel: dict[str, tuple[float, ...]], travel: Array, rough: dict[str, float]
 ) -> dict[str, tuple[float, ...]]:
-    """Curves over the rack, less what the wheel's own travel during the sweep has made of them."""
+    """Return the curves over the rack, less the effect of the wheel travel during the sweep."""
     rack = np.round(np.linspace(samples.x.min(), samples.x.max(), _POINTS), 6)
     lifted = samples.moved("travel")
 
@@ -190,9 +187,9 @@ def _over_rack(
 
 
 def _loads(axle: str, tests: dict[str, Samples], radius_m: float, in_series: Array) -> list[Load]:
-    """The tests of compliance: load at the wheel centre per unit of what was swept, and what moved."""
+    """Return the tests of compliance: load at the wheel centre per unit of the variable, and motion."""
     camber = tests["parallel_travel"]
-    # A wheel that leans stands beside its centre.
+    # The contact point of a cambered wheel is not below its centre.
     beside_m = -radius_m * float(np.sin(smoothed(camber.x, camber.channels["camber"], np.zeros(1))[0]))
     per_unit = {
         "side_force": (0.0, 1.0, radius_m, 0.0, 0.0),
@@ -207,7 +204,7 @@ def _loads(axle: str, tests: dict[str, Samples], radius_m: float, in_series: Arr
         if name not in tests:
             continue
         if f"{name}_opposed" in tests:
-            # Both say the same of a wheel; out of phase, the rack has no part in it.
+            # Both tests load a wheel in the same way; out of phase, the rack plays no part.
             continue
         samples = tests[name]
         outwards, forward = _wheel_paths(samples, radius_m)
@@ -222,7 +219,7 @@ def _loads(axle: str, tests: dict[str, Samples], radius_m: float, in_series: Arr
 
 
 def _rack_compliance(curves: AxleCurves, column_Npm: float) -> Array:
-    """What a wheel moves by as the column lets the rack give way under both wheels, loaded alike, shape (5, 5)."""
+    """Return the compliance of a wheel by the steering column, with both wheels loaded alike, shape (5, 5)."""
     rack, over = np.array(curves.rack_m), curves.over_rack()
     near = np.argsort(np.abs(rack))[:5]
     slopes = np.array([np.polyfit(rack[near], row[near], 1)[0] for row in over])
@@ -230,7 +227,7 @@ def _rack_compliance(curves: AxleCurves, column_Npm: float) -> Array:
 
 
 def _servo(wheel_centre_m: Array, kingpin_m: tuple[Array, Array]) -> Array:
-    """What a rear wheel moves by as its steering servo gives way, per compliance of that, shape (5, 5)."""
+    """Return the motion of a rear wheel per compliance of its steering servo, shape (5, 5)."""
     axis = kingpin_m[1] - kingpin_m[0]
     axis = axis / np.linalg.norm(axis)
     way = np.cross(axis, wheel_centre_m - kingpin_m[0])
@@ -239,7 +236,7 @@ def _servo(wheel_centre_m: Array, kingpin_m: tuple[Array, Array]) -> Array:
 
 
 def _anti_roll_bar(tests: dict[str, Samples], travel: Array, parallel: Array | None) -> float | None:
-    """Half of what opposite travel is stiffer than parallel travel: force at a wheel per difference of travel."""
+    """Return the anti-roll bar rate: half the stiffness difference of opposite and parallel travel."""
     if parallel is None or "opposite_travel" not in tests or (load := tests["opposite_travel"].moved("load")) is None:
         return None
     x = tests["opposite_travel"].x
@@ -249,7 +246,7 @@ def _anti_roll_bar(tests: dict[str, Samples], travel: Array, parallel: Array | N
 
 
 def _rack_lift(tests: dict[str, Samples]) -> float:
-    """From the change of wheel load as the wheels are steered; 0 where it was not measured."""
+    """Return the rack lift from the change of wheel load in steering; 0 if not measured."""
     steered, opposite = tests.get("steering"), tests.get("opposite_travel")
     if steered is None or opposite is None:
         return 0.0

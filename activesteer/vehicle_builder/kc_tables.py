@@ -1,8 +1,8 @@
-"""Reads a folder of K&C tables: files, units and names of a laboratory become samples of one wheel, the left one.
+"""Read a folder of K&C tables: files, units and names of a laboratory become samples of the left wheel.
 
 Each file is AXLE_TEST.csv, or AXLE_TEST.toml with the columns as lists (`rigs.kc.tables.TESTS` names the tests). The
-right wheel is mirrored and joins the left one; up and down of a loop stand beside each other and are averaged by the
-curve that is laid through them. `names.toml` says what a laboratory calls the channels and which of its signs differ:
+samples of the right wheel are mirrored and added to those of the left wheel. Both branches of a loop are kept, and the
+fitted curve averages them. `names.toml` gives the channel names of a laboratory and the signs that differ:
 
     [names]
     "Toe_FL_deg" = "left_toe [deg]"
@@ -30,26 +30,26 @@ from activesteer.rigs.kc.tables import CHANNELS, OF_THE_AXLE, TESTS, UNITS
 _HEAD: Final = re.compile(r"(?P<name>[\w ]+?)\s*\[\s*(?P<unit>[\w/]+)\s*\]")
 _SIDES: Final = ("left", "right")
 _MOST_INTERVALS: Final = 16
-"""Of the smoothing spline: over +-80 mm of travel one for each 10 mm."""
+"""Largest number of intervals of the smoothing spline: one for each 10 mm over +-80 mm of travel."""
 NAMES_FILE: Final = "names.toml"
 _LEAST_POINTS: Final = 5
 _GREATEST: Final = {
     "travel": 0.3, "rack": 0.3, "force": 5e4, "moment": 5e3, "steering_wheel": 40.0, "toe": 1.2, "camber": 0.8,
     "caster": 0.8, "load": 1e5,
 }  # fmt: skip
-"""What no car reaches on a rig, SI units: beyond it the unit of a column is another one."""
+"""Values that no car reaches on a rig, SI units: a larger value means another unit of the column."""
 _GREATEST_WAY_M: Final = 10.0
-"""The same of all other channels, which may count from any origin."""
+"""Such a value for all other channels, which may have any origin [m]."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """One test as the left wheel sees it, SI units.
+    """One test for the left wheel, SI units.
 
     Attributes:
-        x: What was swept: travel, rack to the left, force forwards or to the left, moment to the left; shape (n,).
-        channels: Channel -> samples, shape (n,).
-        file: Where they come from.
+        x: Variable: travel, rack to the left, force forwards or to the left, moment to the left; shape (n,).
+        channels: Channel to samples, shape (n,).
+        file: Name of the file.
     """
 
     x: Array
@@ -57,28 +57,28 @@ class Samples:
     file: str
 
     def moved(self, name: str) -> Array | None:
-        """A channel less its value at x = 0, which need not be among the samples; None where it was not measured."""
+        """Return a channel less its value at x = 0, which need not be a sample; None if not measured."""
         if name not in self.channels:
             return None
         return self.channels[name] - smoothed(self.x, self.channels[name], np.zeros(1))
 
 
 def smoothed(x: Array, y: Array, at: Array) -> Array:
-    """A least-squares cubic spline through samples, both branches of a loop alike.
+    """Evaluate a least-squares cubic spline through samples, with both branches of a loop.
 
-    Knots lie evenly, one for each two different places at most, so that noise and hysteresis are averaged.
+    Knots are evenly spaced, at most one for two different positions, so that noise and hysteresis are averaged.
 
     Args:
-        x: Places, in any order.
+        x: Positions, in any order.
         y: Samples.
-        at: Where it is wanted; beyond the samples it goes on straight.
+        at: Positions of the result; the spline is straight beyond the samples.
     """
     places = len(np.unique(np.round(x / np.ptp(x), 3)))
     intervals = int(np.clip(places // 2, 1, _MOST_INTERVALS))
     low, high = float(x.min()), float(x.max())
     knots = np.concatenate([[low] * 3, np.linspace(low, high, intervals + 1), [high] * 3])
     order = np.argsort(x, kind="stable")
-    # Samples at one place count as their mean: the fit asks for increasing places.
+    # Samples at one position count as their mean: the fit needs increasing positions.
     spots, where = np.unique(x[order], return_inverse=True)
     weight = np.bincount(where)
     mean = np.bincount(where, y[order]) / weight
@@ -89,7 +89,7 @@ def smoothed(x: Array, y: Array, at: Array) -> Array:
 
 @dataclass(frozen=True)
 class KcTables:
-    """All tests of a car: axle -> test -> samples; and the ratio of its steering where it was measured."""
+    """All tests of a car: axle -> test -> samples; and the ratio of its steering if measured."""
 
     tests: dict[str, dict[str, Samples]] = field(default_factory=dict)
     rack_per_steering_wheel_m: float | None = None
@@ -97,17 +97,14 @@ class KcTables:
 
 
 def read_kc(folder: Path, axles: list[str]) -> KcTables:
-    """Reads a folder.
+    """Read the tests of a folder.
 
     Args:
-        folder: With the files.
-        axles: Which are needed.
-
-    Returns:
-        The tests of both axles.
+        folder: Folder of the files.
+        axles: The axles that are needed.
 
     Raises:
-        ParameterError: there is no such folder, no table in it, or something in one that is not understood.
+        ParameterError: there is no such folder, no table in it, or a table is wrong.
     """
     if not is_folder(folder):
         raise ParameterError(f"there is no folder {folder}")
@@ -132,7 +129,7 @@ def read_kc(folder: Path, axles: list[str]) -> KcTables:
 
 
 def _check_files(folder: Path) -> None:
-    """A test whose name is misspelt would have no effect."""
+    """Check that each file is the table of a known test."""
     known = [f"{axle}_{name}" for axle in ("front", "rear") for name in TESTS]
     for path in sorted(folder.iterdir()):
         if path.suffix in (".csv", ".toml") and path.stem.startswith(("front_", "rear_")) and path.stem not in known:
@@ -161,7 +158,7 @@ def _translation(folder: Path) -> tuple[dict[str, str], dict[str, float]]:
 
 
 def _columns(file: Path, names: Mapping[str, str], signs: Mapping[str, float]) -> dict[str, Array]:
-    """Channel (with its side) -> values in SI units and our signs."""
+    """Return channels (with side) to values in SI units and our signs."""
     columns: dict[str, Array] = {}
     for head, values in _raw_columns(file).items():
         channel, factor = _channel(file, head, names.get(head, head))
@@ -172,7 +169,7 @@ def _columns(file: Path, names: Mapping[str, str], signs: Mapping[str, float]) -
         greatest, reached = _GREATEST.get(bare, _GREATEST_WAY_M), float(np.abs(columns[channel]).max(initial=0.0))
         if reached > greatest:
             raise ParameterError(
-                f"reaches {reached:.3g} {CHANNELS[bare][0]}, and {greatest:g} at most are possible: is its unit right?",
+                f"reaches {reached:.3g} {CHANNELS[bare][0]}; at most {greatest:g} are possible: is its unit right?",
                 file=file.name,
                 key=head,
             )
@@ -216,7 +213,7 @@ def _numbers(head: str, values: Any, source: Source) -> Array:
 
 
 def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
-    """Channel of a column, with its side, and the factor to SI units."""
+    """Return the channel of a column, with its side, and the factor to SI units."""
     match = _HEAD.fullmatch(name)
     if match is None:
         raise ParameterError(f"{name!r} is no channel with its unit, as 'left_toe [deg]'", file=file.name, key=head)
@@ -237,7 +234,7 @@ def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
 
 
 def _complete_rack(columns: dict[str, Array], file: Path) -> float | None:
-    """Rack travel per steering wheel angle; without a rack in the file one of 7.5 mm/rad, exact by definition."""
+    """Return the rack travel per steering wheel angle; without a rack in the file, 7.5 mm/rad by definition."""
     if "steering_wheel" not in columns:
         if "rack" not in columns:
             raise ParameterError("neither rack nor steering_wheel was measured", file=file.name)

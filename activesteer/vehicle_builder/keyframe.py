@@ -1,4 +1,4 @@
-"""The keyframe `static_ride`: where the car stands on its tyres, for viewers and for whoever loads the model."""
+"""The keyframe `static_ride`: the car standing on its tyres, for viewers and other users of the model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from activesteer.scenario import FileOrTable, load_car
 
 
 def keyframe_xml(vehicle: FileOrTable) -> tuple[str, Path]:
-    """The text of keyframes.xml, and the path of the file that it belongs into.
+    """Return the text of keyframes.xml, and the path of this file.
 
     Args:
         vehicle: Name, path, or table of a vehicle.

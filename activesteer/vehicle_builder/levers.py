@@ -1,10 +1,11 @@
-"""Springs and dampers that stand on an arm: links have no body, so the arm's lever goes into the tendon.
+"""Springs and dampers on an arm: links have no body, so the lever of the arm goes into the tendon.
 
-A massless arm that turns about its inner bushings carries a force f at P as a force r f at its outer joint O, where
-r = |PH| / |OH| and H is where the line through O and P meets the arm's axis; the rest of f goes into the chassis. The
-tendon therefore runs from a point that is 1/r times as far from O as the spring's upper end is from P, to O, and
-through a pulley of 1/r. By similar triangles its length is that of the spring, in every position of the arm. A foot P
-beside the arm's plane has the right length and motion ratio at the design position, but does not turn with the arm.
+A massless arm that turns about its inner bushings carries a force f at P as a force r f at its outer joint O, with r =
+|PH| / |OH|. H is the point where the line through O and P meets the axis of the arm; the chassis carries the rest of f.
+The tendon therefore ends at O, begins at a point 1/r times as far from O as the upper spring end from P, and runs
+through a pulley of 1/r. By similar triangles it has the length of the spring in every position of the arm. A foot P
+beside the plane of the arm has the right length and motion ratio at the design position, but does not turn with the
+arm.
 """
 
 from __future__ import annotations
@@ -18,19 +19,20 @@ from activesteer.errors import ParameterError
 from activesteer.vehicle_builder.axle_kinds import AxleKind
 
 _MIN_LEVER, _MAX_LEVER = 0.05, 1.5
-"""Levers beyond these are no springs of a car."""
+"""Smallest and largest lever of a spring of a car."""
 
 
 @dataclass(frozen=True)
 class Mount:
-    """How a spring or damper is attached.
+    """Attachment of a spring or damper.
 
     Attributes:
-        carrier: What carries its lower end.
-        lever: Force at the arm's outer joint, or along the wheel's travel, per force of the spring; 1 on the knuckle.
+        carrier: Carrier of its lower end.
+        lever: Force at the outer joint of the arm, or along the wheel travel, per force of the spring; 1 on the
+            knuckle.
         outer: Site at which the tendon ends, without the corner.
-        start_m: Where the tendon begins on the chassis; None where it lies along a strut or acts along the travel.
-        length_m: Its length in the design position; 0 along a strut.
+        start_m: Start of the tendon on the chassis; None if it lies along a strut or acts along the travel.
+        length_m: Length in the design position; 0 along a strut.
     """
 
     carrier: str
@@ -41,15 +43,15 @@ class Mount:
 
 
 def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, Array], ratio: float = 1.0) -> Mount:
-    """Attaches a spring or damper.
+    """Attach a spring or damper.
 
     Args:
-        axle: For messages.
+        axle: Name of the axle, for messages.
         part: `spring` or `damper`.
-        carrier: What carries its lower end, one of the kind's carriers.
+        carrier: Carrier of its lower end, one of the carriers of the kind.
         kind: The suspension.
-        points: Its points.
-        ratio: Shortening per wheel travel, where it acts along that.
+        points: Points of the axle.
+        ratio: Shortening per wheel travel, if it acts along the travel.
 
     Raises:
         ParameterError: the arm cannot carry it there.
@@ -60,7 +62,7 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
     length = float(np.linalg.norm(upper - lower))
     if length < 0.02:
         raise ParameterError(
-            f"is {1e3 * length:.1f} mm from {part}_outer; a {part} needs length", key=f"{axle}.points.{part}_inner"
+            f"is {1e3 * length:.1f} mm from {part}_outer, too short for a {part}", key=f"{axle}.points.{part}_inner"
         )
     if carrier == "knuckle":
         return Mount(carrier, 1.0, f"{part}_outer", upper, length)
@@ -76,7 +78,7 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
 
 
 def _lever(inner: list[Array], outer: Array, foot: Array, along: Array) -> float:
-    """Shortening of a spring per travel of the arm's outer joint along the spring, at the design position."""
+    """Return the shortening of a spring per travel of the arm's outer joint along it, at the design position."""
     base = inner[0]
     if len(inner) == 1:
         rod = outer - base

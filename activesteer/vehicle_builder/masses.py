@@ -1,4 +1,4 @@
-"""The chassis as what is left of the whole car."""
+"""The chassis as the rest of the whole car."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from activesteer.vehicle_builder.design import Car, Log, Solid
 
 
 def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
-    """The chassis: as the table gives it, or what is left of the whole car.
+    """Return the chassis of the table, or the rest of the whole car without its other bodies.
 
     Args:
         car: The car.
-        model: It, with any chassis.
-        log: Where assumptions go.
+        model: Model of the car with any chassis.
+        log: Log of the assumptions.
 
     Raises:
-        ParameterError: nothing possible is left.
+        ParameterError: the rest is impossible for a body.
     """
     table, others = car.table.mass, mass_properties(model, without=["chassis"])
     base = car.wheelbase_m
@@ -71,7 +71,7 @@ def _usual_inertia(mass: float, base: float, car: Car, front_fraction: float) ->
 
 
 def _cg_x(car: Car, front_fraction: float) -> float:
-    """From the weights on the contact points, which lie below the wheel centres but for camber."""
+    """Return x of the centre of gravity from the weights on the contact points, below the wheel centres."""
     rear, front = car.rear.wheel_centre_m[0], car.front.wheel_centre_m[0]
     return float(rear + front_fraction * (front - rear))
 

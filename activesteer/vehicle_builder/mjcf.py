@@ -29,14 +29,11 @@ _SHELL = (
 
 
 def mjcf_files(car: Car, trimmed: Trimmed) -> dict[str, str]:
-    """Texts of the model's files; the keyframe is empty.
+    """Return the files of the model as name to text; the keyframe is empty.
 
     Args:
         car: The car.
-        trimmed: What was trimmed.
-
-    Returns:
-        File name -> text.
+        trimmed: Result of the trim.
     """
     return {
         f"{car.name}.xml": _main(car, trimmed),

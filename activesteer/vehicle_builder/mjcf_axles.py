@@ -21,12 +21,12 @@ _GUIDED = """  <!-- {words} guide the {axle} axle, a fragment of the chassis bod
 
 
 def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
-    """Text of front_axle.xml or rear_axle.xml.
+    """Return the text of front_axle.xml or rear_axle.xml.
 
     Args:
         car: The car.
         axle: One of its axles.
-        trimmed: What was trimmed.
+        trimmed: Result of the trim.
     """
     words = axle.kind.name.replace("_", " ")
     lines = [
@@ -48,7 +48,7 @@ def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
 
 
 def corner_name(axle: Axle, side: float) -> str:
-    """Name of the left (side 1) or right corner."""
+    """Return the name of the left (side 1) or right corner."""
     return axle.corner if side > 0.0 else f"{axle.corner[0]}r"
 
 
@@ -158,7 +158,7 @@ def _carrier(car: Car, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[st
 
 
 def _in_design(axle: Axle, point: Array) -> Array:
-    """A point of the knuckle where its joints are zero; curves turn it by the static angles as the car stands."""
+    """Return a point of the knuckle at zero joints; in the standing car curves turn it by the static angles."""
     if axle.measured is None:
         return point
     curves = axle.measured.curves

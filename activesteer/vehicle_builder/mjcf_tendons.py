@@ -1,4 +1,4 @@
-"""The tendons of all axles and their classes: links, springs, dampers, and what the scene shows of them."""
+"""The tendons of all axles and their classes: links, springs, dampers, and drawn parts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _VIEWER_GUIDES = (
 
 
 def link_classes(car: Car) -> str:
-    """Default classes of the links, one per link and axle."""
+    """Return the default classes of the links, one per link and axle."""
     lines = []
     for axle in car.axles:
         for link in axle.links:
@@ -36,12 +36,12 @@ def link_classes(car: Car) -> str:
 
 
 def _class_of(axle: Axle, link: str) -> str:
-    """Class of a link: front and rear may have links of the same name."""
+    """Return the class of a link; front and rear may have links of the same name."""
     return f"{axle.name}_{link}"
 
 
 def link_tendons(car: Car) -> str:
-    """The links of all corners."""
+    """Return the links of all corners."""
     lines = []
     for axle in car.axles:
         for side in (1.0, -1.0):
@@ -56,7 +56,7 @@ def link_tendons(car: Car) -> str:
 
 
 def part_tendons(car: Car, part: str) -> str:
-    """Springs or dampers of all corners."""
+    """Return the springs or dampers of all corners."""
     lines = []
     reported = set()
     for axle in car.axles:
@@ -94,13 +94,13 @@ def part_tendons(car: Car, part: str) -> str:
 
 
 def rack_joint(axle: Axle, lever: float) -> str:
-    """What makes a spring of a guided axle longer as the rack raises its wheel without it."""
+    """Return the joint that lengthens a spring of a guided axle as the rack raises its wheel."""
     lift = 0.0 if axle.measured is None else axle.measured.rack_lift
     return f'<joint joint="rack" coef="{num(lever * lift)}"/>' if lift else ""
 
 
 def viewer_springs(car: Car) -> str:
-    """For the scene: springs that have no shape of their own, or stand on an arm."""
+    """Return springs for the scene, for springs without a shape of their own or on an arm."""
     lines = []
     for axle in car.axles:
         if axle.spring.start_m is None or axle.spring.lever != 1.0:
@@ -116,7 +116,7 @@ def viewer_springs(car: Car) -> str:
 
 
 def _viewer_guides(car: Car) -> list[str]:
-    """What holds the wheels of axles of curves where their native forces are missing: straight guides, steered."""
+    """Return straight, steered guides that hold the wheels of axles of curves without their native forces."""
     lines = []
     for axle in car.axles:
         if axle.measured is None:
@@ -136,7 +136,7 @@ def _viewer_guides(car: Car) -> list[str]:
 
 
 def spring_classes(car: Car, trimmed: Trimmed) -> str:
-    """Default classes of the springs."""
+    """Return the default classes of the springs."""
     lines = []
     for axle in car.axles:
         found = trimmed.axle(axle.name)
@@ -151,7 +151,7 @@ def spring_classes(car: Car, trimmed: Trimmed) -> str:
 
 
 def damper_classes(car: Car, trimmed: Trimmed) -> str:
-    """Default classes of the dampers."""
+    """Return the default classes of the dampers."""
     lines = []
     for axle in car.axles:
         found, length = trimmed.axle(axle.name), axle.damper.length_m

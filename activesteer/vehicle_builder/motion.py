@@ -1,4 +1,4 @@
-"""How a corner moves at the design position, to first order: its one way of travel, and what shortens with it."""
+"""First-order motion of a corner at the design position: its travel, and the shortening of its tendons."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ _ROTATION_M = 0.3
 
 @dataclass(frozen=True)
 class CornerMotion:
-    """One corner.
+    """Motion of one corner.
 
     Attributes:
         links: Names of its links.
-        firmness: Least singular value of the links' directions: how far they are from holding the wheel in one way less
-            (0: two links do the same); 0.05 to 0.5 in cars.
-        per_travel: Tendon -> shortening per wheel travel in bump, rigid links.
+        firmness: Smallest singular value of the directions of the links: 0 if two links constrain the same direction,
+            0.05 to 0.5 in cars.
+        per_travel: Tendon to shortening per wheel travel in bump, rigid links.
     """
 
     links: tuple[str, ...]
@@ -31,21 +31,21 @@ class CornerMotion:
 
 
 def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
-    """Motion of a corner, chassis and rack held, springs away.
+    """Return the motion of a corner with held chassis and rack, without springs.
 
     Args:
         model: The car.
-        corner: Its name.
+        corner: Name of the corner.
 
     Raises:
-        ModelError: the links leave no or more than one way to travel.
+        ModelError: the links do not leave exactly one degree of freedom.
     """
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     dofs, scale = _freedoms(model, corner)
     rows = {name: row[dofs] for name, row in _tendon_rows(model, data, corner).items()}
     if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_camber") >= 0:
-        # Curves guide it: springs and dampers act along the travel, and everything else follows.
+        # Curves guide the wheel: springs and dampers act along the travel, and all else follows it.
         travel = dofs.index(int(model.joint(f"{corner}_z").dofadr[0]))
         return CornerMotion((), 1.0, {name: -float(row[travel]) for name, row in rows.items()})
     links = tuple(name for name in rows if not name.endswith(("_spring", "_damper")))
@@ -71,7 +71,7 @@ def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
 
 
 def _freedoms(model: mujoco.MjModel, corner: str) -> tuple[list[int], Array]:
-    """Degrees of freedom of a corner's bodies without spin and steering, and a length for each [m]."""
+    """Return the degrees of freedom of a corner's bodies without spin and steering, and a length for each [m]."""
     dofs, scale = [], []
     for dof in range(model.nv):
         joint = model.joint(int(model.dof_jntid[dof]))
@@ -84,7 +84,7 @@ def _freedoms(model: mujoco.MjModel, corner: str) -> tuple[list[int], Array]:
 
 
 def _tendon_rows(model: mujoco.MjModel, data: mujoco.MjData, corner: str) -> dict[str, Array]:
-    """Jacobians of a corner's tendons, each of shape (nv,)."""
+    """Return the Jacobians of a corner's tendons, each of shape (nv,)."""
     rows = {}
     for tendon in range(model.ntendon):
         name = model.tendon(tendon).name

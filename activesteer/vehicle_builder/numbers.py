@@ -1,4 +1,4 @@
-"""Numbers as they are written into files for people: short, and the same on both sides of the car."""
+"""Numbers in files for people: short, and equal on both sides of the car."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 
 def num(value: float, digits: int = 6) -> str:
-    """A number with so many decimals at most, without zeros at its end."""
+    """Return a number with at most `digits` decimals, without trailing zeros."""
     text = f"{float(value):.{digits}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")
@@ -14,10 +14,10 @@ def num(value: float, digits: int = 6) -> str:
 
 
 def sig(value: float, digits: int = 6) -> str:
-    """A number with so many significant digits."""
+    """Return a number with `digits` significant digits."""
     return f"{float(value):.{digits}g}".replace("e+0", "e").replace("e+", "e")
 
 
 def vec(values: Iterable[float], digits: int = 6) -> str:
-    """Numbers with so many decimals at most, with blanks between, as MJCF takes them."""
+    """Return numbers with at most `digits` decimals, separated by blanks as in MJCF."""
     return " ".join(num(value, digits) for value in values)

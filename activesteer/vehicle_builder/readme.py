@@ -1,4 +1,4 @@
-"""The README of a new car: what it was made from, what was trimmed, and the open points."""
+"""The README of a new car: its sources, the trim, and open points."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _TEMPLATE: Final = Path(__file__).resolve().parent / "templates" / "README.md"
 
 
 def readme_text(car: Car, trimmed: Trimmed, table_name: str) -> str:
-    """Text of README.md.
+    """Return the text of README.md.
 
     Args:
         car: The car, with its assumptions.
-        trimmed: What was trimmed.
-        table_name: Name of the table's copy in the folder.
+        trimmed: Result of the trim.
+        table_name: Name of the copy of the table in the folder.
     """
     kinds = " and ".join(f"{axle.kind.name.replace('_', ' ')} {axle.name}" for axle in car.axles)
     rows = [f"| `{item.key}` | {item.value} | {item.rule} |" for item in car.assumptions]
@@ -42,7 +42,7 @@ def readme_text(car: Car, trimmed: Trimmed, table_name: str) -> str:
 
 
 def _measured(car: Car) -> str:
-    """What was read from the K&C rig, how rough it was, and what is unusual in it."""
+    """Return the section on the measurements of the K&C rig, their roughness, and unusual ones."""
     lines = []
     for axle in car.axles:
         if axle.measured is None:

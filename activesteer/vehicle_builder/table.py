@@ -1,4 +1,4 @@
-"""The table of a car as its user writes it: TOML, or CSV with the same dotted keys; what is wrong is said at once.
+"""The table of a car as its user writes it: TOML, or CSV with the same dotted keys.
 
 In a CSV file a row is a dotted key and its values: `front.wheel_centre, 0, 762.5, 297.2` is the point `wheel_centre` of
 [front.points], `mass.total_kg, 1430` the key `total_kg` of [mass]. `#` begins a comment.
@@ -26,28 +26,28 @@ NotNegative = Annotated[float, Range(0.0)]
 Point = tuple[float, ...]
 
 UNITS: Final = {"m": 1.0, "mm": 1e-3}
-"""Units of the points and their factor to metres."""
+"""Units of the points, and their factors to metres."""
 
 
 @dataclass(frozen=True)
 class LinkTable:
-    """What a table may say of a link; one of `stiffness_Npm`, `bushings_Npm` and `bushing`."""
+    """Keys of a link; one of `stiffness_Npm`, `bushings_Npm` and `bushing`."""
 
     stiffness_Npm: Positive | None = None
     """Rod and both bushings in series [N/m]."""
     bushings_Npm: tuple[float, ...] | None = None
-    """Radial stiffness of the inner and of the outer bushing [N/m]; the rod between them counts as rigid."""
+    """Radial stiffness of inner and outer bushing [N/m]; the rod between them counts as rigid."""
     bushing: str | None = None
-    """Class of its bushings: ball_joint, hard, medium, soft."""
+    """Class of the bushings: ball_joint, hard, medium, soft."""
     hardening_Npm3: NotNegative | None = None
     """Cubic part of the force [N/m3]."""
     damping_Nspm: NotNegative | None = None
-    """Of the rubber [N s/m]."""
+    """Damping of the rubber [N s/m]."""
 
 
 @dataclass(frozen=True)
 class AxleTable:
-    """What a table may say of an axle; points of its left side."""
+    """Keys of an axle; points of its left side."""
 
     type: str | None = None
     """Kind of suspension."""
@@ -56,7 +56,7 @@ class AxleTable:
     links: dict[str, LinkTable] = field(default_factory=dict)
     """Elasticity of the links."""
     tyre: str | None = None
-    """Tyre file: beside the table, or a name in models/tyres."""
+    """Tyre file: a file in the folder of the table, or a name in models/tyres."""
     toe_rad: Annotated[float, Range(-0.1, 0.1)] | None = None
     """Static toe of one wheel, positive toe-in [rad]."""
     camber_rad: Annotated[float, Range(-0.2, 0.2)] | None = None
@@ -66,11 +66,11 @@ class AxleTable:
     wheel_rate_Npm: Positive | None = None
     """Change of wheel load per wheel travel, both wheels together, links included [N/m]."""
     ride_frequency_Hz: Positive | None = None
-    """Of the sprung mass of this axle on springs and tyres [Hz]."""
+    """Natural frequency of the sprung mass of this axle on springs and tyres [Hz]."""
     spring_on: str | None = None
-    """What carries the lower end of the spring."""
+    """Carrier of the lower end of the spring."""
     damper_on: str | None = None
-    """What carries the lower end of the damper."""
+    """Carrier of the lower end of the damper."""
     spring_ratio: Annotated[float, Range(0.15, 1.6)] | None = None
     """Axle of curves: shortening of the spring per wheel travel."""
     damper_ratio: Annotated[float, Range(0.15, 1.6)] | None = None
@@ -78,7 +78,7 @@ class AxleTable:
     damper_velocity_mps: tuple[float, ...] | None = None
     """Compression velocities of the damper's curve [m/s]."""
     damper_force_N: tuple[float, ...] | None = None
-    """Forces that resist them [N]."""
+    """Forces at these velocities, against the motion [N]."""
     damper_Nspm: Positive | None = None
     """Or: mean damping around rest [N s/m]; the curve has the shape of the compact's."""
     damping_ratio: Annotated[float, Range(0.01, 2.0)] | None = None
@@ -88,7 +88,7 @@ class AxleTable:
     anti_roll_bar_Npm: NotNegative | None = None
     """Force at each wheel per difference of travel (at a strut: along it) [N/m]."""
     anti_roll_bar_Nmprad: NotNegative | None = None
-    """Or: its part of the axle's roll stiffness [N m/rad]."""
+    """Or: its contribution to the roll stiffness of the axle [N m/rad]."""
     bump_stop_m: Positive | None = None
     """Compression of the damper from the design position to the bump stop [m]."""
     rebound_stop_m: Positive | None = None
@@ -96,49 +96,49 @@ class AxleTable:
     stop_stiffness: tuple[float, ...] | None = None
     """a, b, c of the stops' force a x + b x2 + c x3, x < 0 in bump [N/m, N/m2, N/m3]."""
     wheel_mass_kg: Positive | None = None
-    """Wheel with tyre, hub flange and whatever else turns [kg]."""
+    """Wheel with tyre, hub flange and all rotating parts [kg]."""
     wheel_spin_inertia_kgm2: Positive | None = None
-    """Of the same, about its axle [kg m2]."""
+    """Inertia of the wheel about its axle [kg m2]."""
     wheel_inertia_kgm2: Positive | None = None
-    """Of the same, about a diameter [kg m2]."""
+    """Inertia of the wheel about a diameter [kg m2]."""
     knuckle_mass_kg: Positive | None = None
     """Knuckle with half of the links, spring and damper; in front with hub and brake [kg]."""
     knuckle_cg: Point | None = None
-    """Its centre of gravity, in the table's units."""
+    """Centre of gravity of the knuckle, in the table's units."""
     knuckle_inertia_kgm2: tuple[float, ...] | None = None
-    """Its inertia about it, vehicle axes [kg m2]."""
+    """Inertia of the knuckle about its centre of gravity, vehicle axes [kg m2]."""
     carrier_mass_kg: Positive | None = None
-    """Rear: what steers with the wheel: carrier, hub, brake [kg]."""
+    """Rear axle: mass that steers with the wheel: carrier, hub, brake [kg]."""
     carrier_cg: Point | None = None
-    """Its centre of gravity, in the table's units."""
+    """Centre of gravity of the carrier, in the table's units."""
     carrier_inertia_kgm2: tuple[float, ...] | None = None
-    """Its inertia [kg m2]."""
+    """Inertia of the carrier [kg m2]."""
     strut_mass_kg: Positive | None = None
-    """McPherson: what hangs on the top mount and does not travel: piston rod, half of the spring [kg]."""
+    """McPherson: mass at the top mount that does not travel: piston rod, half of the spring [kg]."""
     strut_cg: Point | None = None
-    """Its centre of gravity, in the table's units."""
+    """Centre of gravity of the strut, in the table's units."""
     strut_inertia_kgm2: tuple[float, ...] | None = None
-    """Its inertia [kg m2]."""
+    """Inertia of the strut [kg m2]."""
 
 
 @dataclass(frozen=True)
 class MassTable:
-    """The whole car as it stands, driver included; or the chassis by itself."""
+    """Masses of the whole standing car with driver, or of the chassis alone."""
 
     total_kg: Positive | None = None
     """Mass of the whole car [kg]."""
     front_fraction: Annotated[float, Range(0.2, 0.8)] | None = None
     """Fraction of the weight on the front wheels."""
     cg_height_m: Positive | None = None
-    """Height of its centre of gravity over the road [m]."""
+    """Height of the centre of gravity of the whole car over the road [m]."""
     inertia_kgm2: tuple[float, ...] | None = None
-    """Roll, pitch and yaw inertia of the whole car about it [kg m2]."""
+    """Roll, pitch and yaw inertia of the whole car about its centre of gravity [kg m2]."""
     chassis_kg: Positive | None = None
-    """Or: mass of the chassis with everything that no other body has [kg]."""
+    """Or: mass of the chassis with all parts outside the other bodies [kg]."""
     chassis_cg: Point | None = None
-    """Its centre of gravity, in the table's units."""
+    """Centre of gravity of the chassis, in the table's units."""
     chassis_inertia_kgm2: tuple[float, ...] | None = None
-    """Its inertia about it [kg m2]."""
+    """Inertia of the chassis about its centre of gravity [kg m2]."""
 
 
 @dataclass(frozen=True)
@@ -164,9 +164,9 @@ class RearSteeringTable:
     """The hinge between rear knuckle and carrier; every car of the package has one, steered or not."""
 
     axis_lower: Point | None = None
-    """A point of its axis on the left side, in the table's units."""
+    """A point of the steering axis on the left side, in the table's units."""
     axis_upper: Point | None = None
-    """A higher point of its axis."""
+    """A higher point of the axis."""
     limit_rad: Annotated[float, Range(1e-3, 0.3)] | None = None
     """Mechanical stop [rad]."""
     stiffness_Nmprad: Annotated[float, Range(1e4, 1e8)] | None = None
@@ -175,14 +175,14 @@ class RearSteeringTable:
 
 @dataclass(frozen=True)
 class CarTable:
-    """All that a table of hardpoints says of a car."""
+    """Keys of a table of hardpoints."""
 
     units: str = "m"
     """Unit of all points: m or mm."""
     origin: Point = (0.0, 0.0, 0.0)
-    """Where the point on the road below the middle of the front axle lies in the table's own coordinates."""
+    """Point on the road below the middle of the front axle, in the table's own coordinates."""
     source: str = ""
-    """Where the numbers come from, for the README."""
+    """Source of the numbers, for the README."""
     width_m: Annotated[float, Range(0.5, 4.0)] | None = None
     """Width of the body without mirrors [m]."""
     front: AxleTable = AxleTable()
@@ -194,14 +194,14 @@ class CarTable:
     powertrain: Powertrain | None = None
     aerodynamics: Aerodynamics | None = None
     rear_actuator: RearActuator | None = None
-    """What steers the rear wheels; the model's hinges where not given."""
+    """Actuator of the rear wheels. Default: the hinges of the model."""
     superposition_actuator: SuperpositionActuator | None = None
-    """What adds to the steering wheel angle; the model's servo where not given."""
+    """Actuator of the superposition. Default: the servo of the model."""
     sensors: Sensors | None = None
-    """What controllers see; the truth where not given."""
+    """Sensors of the controllers. Default: ideal sensors."""
 
     def axle(self, name: str) -> AxleTable:
-        """The axle of a name, `front` or `rear`."""
+        """Return the axle `front` or `rear`."""
         return self.front if name == "front" else self.rear
 
 
@@ -209,16 +209,16 @@ POINT_FIELDS: Final = {"knuckle_cg", "carrier_cg", "strut_cg", "chassis_cg", "ax
 
 
 def read_table(path: Path) -> tuple[CarTable, Source]:
-    """Reads a table and checks what can be said of it by itself.
+    """Read a table, and check it as far as possible without other files.
 
     Args:
         path: A .toml or .csv file.
 
     Returns:
-        The table as written, and its source for later messages.
+        The table as the user wrote it, and its source for later messages.
 
     Raises:
-        ParameterError: it cannot be read, has unknown keys, or values of the wrong kind.
+        ParameterError: the file cannot be read, has unknown keys, or values of the wrong type.
     """
     if path.suffix.lower() == ".csv":
         raw, source = _read_csv(path)
@@ -266,7 +266,7 @@ def _value(cell: str) -> float | str:
 
 
 def chosen_kinds(table: CarTable, front: str | None = None, rear: str | None = None) -> dict[str, AxleKind]:
-    """Which suspension each axle has: as asked for, else as the table says, else the default.
+    """Return the suspension of each axle: the argument, else the kind in the table, else the default.
 
     Raises:
         ParameterError: there is no such kind.
@@ -276,7 +276,7 @@ def chosen_kinds(table: CarTable, front: str | None = None, rear: str | None = N
 
 
 def in_vehicle_axes(table: CarTable) -> CarTable:
-    """The same table with all points in metres and vehicle coordinates, origin on the road below the front axle."""
+    """Return the table with all points in metres and vehicle coordinates, origin on the road below the front axle."""
     factor = UNITS[table.units]
 
     def moved(point: Point) -> Point:

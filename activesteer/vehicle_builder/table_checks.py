@@ -1,4 +1,4 @@
-"""Everything that is wrong with a table, said at once: names, missing points, contradictions, units."""
+"""Checks of a table, with all errors at once: names, missing points, contradictions, units."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PLAUSIBLE: Final = {
     "rack_limit_m": (0.02, 0.15, 1e-3, "mm"),
     "pinion_radius_m": (0.003, 0.3, 1e-3, "mm"),
 }
-"""Key -> lowest and highest value of a road car, and a unit it may be in by mistake, with its factor."""
+"""Key -> lowest and highest value of a road car, and a unit that users may have used by mistake, with its factor."""
 
 
 _ONE_OF: Final = (
@@ -33,15 +33,15 @@ _ONE_OF: Final = (
     ("damper_force_N", "damper_Nspm", "damping_ratio"),
     ("anti_roll_bar_Npm", "anti_roll_bar_Nmprad"),
 )
-"""Keys of an axle that say the same."""
+"""Keys of an axle of which one is enough."""
 _STIFFNESS: Final = ("stiffness_Npm", "bushings_Npm", "bushing")
 
 
 def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source) -> None:
-    """Checks names, number and units of all points, and units of other values, and says everything that is wrong.
+    """Check names, number and units of all points, and units of other values.
 
     Raises:
-        ParameterError: with one line for each thing that is wrong.
+        ParameterError: with one line for each error.
     """
     problems = [
         *_name_problems(table, kinds),
@@ -52,7 +52,7 @@ def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source)
         *_unit_problems(table),
     ]
     if problems:
-        raise ParameterError("\n  ".join([f"{source.name}: {len(problems)} things are wrong:", *problems]))
+        raise ParameterError("\n  ".join([f"{source.name}: {len(problems)} errors:", *problems]))
 
 
 def _axle_contradictions(axle: str, given: AxleTable) -> Iterator[str]:
@@ -108,7 +108,7 @@ def _car_contradictions(table: CarTable) -> Iterator[str]:
 
 
 def all_points(table: CarTable) -> Iterator[tuple[str, Point]]:
-    """Every point of the table by its dotted key."""
+    """Return all points of the table by dotted key."""
     for axle in ("front", "rear"):
         for name, point in table.axle(axle).points.items():
             yield f"{axle}.points.{name}", point

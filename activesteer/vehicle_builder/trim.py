@@ -1,7 +1,7 @@
-"""Lets the car stand and changes what has to change until it stands, weighs, rides and steers as the table asks.
+"""Trim: let the car stand, and adjust it until height, weight, ride and steering are those of the table.
 
-The load on an axle follows from the centre of gravity, so each spring's force is found by itself: a wheel that stands
-t too high in its arch (bump) needs a force greater by (wheel rate / motion ratio) t.
+The load on an axle follows from the centre of gravity, so the force of each spring is independent of the others: a
+wheel that stands t too high in its arch (bump) needs a force larger by (wheel rate / motion ratio) t.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from activesteer.vehicle_builder.steering_geometry import rack_per_steer_m
 from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
 
 Write = Callable[[Trimmed], Path]
-"""Writes the car's files and returns the vehicle file."""
+"""Function that writes the files of the car and returns the vehicle file."""
 
 _ROUNDS: Final = 25
 _MATCHES: Final = 8
@@ -41,22 +41,22 @@ _TRAVEL_M: Final = 1e-5
 _ANGLE_RAD: Final = 2e-6
 _RATE_FRACTION: Final = 1e-4
 _SWEEP_M: Final = np.linspace(-0.015, 0.015, 7)
-"""As in the rig's definition of the wheel rate [m]."""
+"""Wheel travels of the rig's definition of the wheel rate [m]."""
 _STEER_RAD: Final = np.radians(np.linspace(-20.0, 20.0, 9))
 _RATIO: Final = 16.0
 _STOPS_M: Final = (0.035, 0.065)
-"""Wheel travel to the stops where the table says nothing: bump, rebound [m]."""
+"""Default wheel travel to the stops: bump, rebound [m]."""
 _STOP_AT_WHEEL: Final = (40000.0, 2.4e6, 9e7)
 """Force of a stop at the wheel: a x + b x2 + c x3 [N/m, N/m2, N/m3]."""
 _CURVE_MPS: Final = (-1.5, -0.6, -0.3, -0.13, -0.05, 0.0, 0.05, 0.13, 0.3, 0.6, 1.5)
 _CURVE_N: Final = (-1750.0, -950.0, -620.0, -320.0, -130.0, 0.0, 60.0, 155.0, 310.0, 500.0, 950.0)
 _CURVE_NSPM: Final = 1900.0
-"""The front damper of the compact, and the mean of its slopes on both sides of rest."""
+"""Front damper of the compact, and mean of its slopes on both sides of rest [N s/m]."""
 
 
 @dataclass(frozen=True)
 class _Stand:
-    """How the car stands."""
+    """State of the standing car."""
 
     vehicle: Vehicle
     held: HeldCar
@@ -66,15 +66,12 @@ class _Stand:
 
 
 def trim(car: Car, write: Write, log: Log) -> Trimmed:
-    """Finds everything that `Trimmed` holds.
+    """Find all values of `Trimmed`, and write the files with them.
 
     Args:
         car: The car.
-        write: Writes its files.
-        log: Where assumptions go.
-
-    Returns:
-        What was found; the files are written with it.
+        write: Function that writes its files.
+        log: Log of the assumptions.
 
     Raises:
         ActiveSteerError: the car cannot stand.
@@ -138,7 +135,7 @@ def _compiled(mjcf: Path) -> mujoco.MjModel:
 
 
 def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
-    """Vertical stiffness of a tyre under a load [N/m]."""
+    """Return the vertical stiffness of a tyre under a load [N/m]."""
     pressure = float(tyre["INFLPRES"])
     deflection = deflection_under_load(tyre.record, load_N, 0.0, pressure, 0.0, 0.0, 0.0)
     more, less = (vertical_force(tyre.record, deflection + step, 0.0, pressure) for step in (1e-4, -1e-4))
@@ -146,7 +143,7 @@ def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
 
 
 def _wanted_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
-    """Wheel rate that the table asks for, by itself or by the ride frequency; None where it gives the spring's rate."""
+    """Return the wheel rate of the table, given or from the ride frequency; None if it gives the spring rate."""
     if axle.measured is not None and axle.measured.wheel_load_N is not None:
         return None
     if axle.table.wheel_rate_Npm is not None or axle.ride_frequency_Hz is None:
@@ -155,7 +152,7 @@ def _wanted_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
     tyre = tyre_rate_Npm(axle.tyre_parameters, load_N)
     if ride > 0.8 * tyre:
         raise ModelError(
-            f"{axle.ride_frequency_Hz:g} Hz of {sprung_kg:.0f} kg needs {ride:.0f} N/m, and the tyre alone has "
+            f"{axle.ride_frequency_Hz:g} Hz of {sprung_kg:.0f} kg needs {ride:.0f} N/m, but the tyre alone has "
             f"{tyre:.0f} N/m",
             key=f"{axle.name}.ride_frequency_Hz",
             value=axle.ride_frequency_Hz,
@@ -173,7 +170,7 @@ def _first_guess(
     if found.curves is None:
         found.wheel_x_rad, found.wheel_z_rad = -axle.camber_rad, -axle.toe_rad
     if axle.kind.strut and axle.table.anti_roll_bar_Nmprad is not None:
-        # The bar acts along the strut, whose travel is less than the wheel's.
+        # The bar acts along the strut, whose travel is smaller than that of the wheel.
         axle.anti_roll_bar_Npm /= damper**2
     bump, rebound = axle.table.bump_stop_m, axle.table.rebound_stop_m
     found.bump_stop_m = log.take(f"{axle.name}.bump_stop_m", bump, _STOPS_M[0] * damper, "35 mm at the wheel", "m")
@@ -181,10 +178,10 @@ def _first_guess(
         f"{axle.name}.rebound_stop_m", rebound, _STOPS_M[1] * damper, "65 mm at the wheel", "m"
     )
     if measured is not None and axle.table.stop_stiffness is None:
-        # They are in the measured wheel load.
+        # The measured wheel load includes them.
         found.stop_stiffness = (0.0, 0.0, 0.0)
     elif axle.table.stop_stiffness is None:
-        # The force at the wheel is r F(r z): a stop that the wheel feels as the compact's is harder by r2, r3, r4.
+        # The force at the wheel is r F(r z): for the stop force of the compact at the wheel, divide by r2, r3, r4.
         found.stop_stiffness = tuple(
             float(f"{value / damper ** (power + 2):.3g}") for power, value in enumerate(_STOP_AT_WHEEL)
         )
@@ -211,7 +208,7 @@ def _stand(vehicle_file: Path) -> _Stand:
         wheel = vehicle.model.body(f"{corner}_wheel").id
         now = turn @ (vehicle.data.xpos[wheel] - vehicle.data.xpos[chassis])
         travel.append(now[2] - design.xpos[wheel, 2])
-        # On the rig, without the moments of the tyres' own asymmetry: static toe and camber are what `kc` measures.
+        # On the rig, without the moments of asymmetric tyres: static toe and camber are those that `kc` measures.
         x, y, z = held.wheel(index).rotation[:, 1]
         inwards = -1.0 if corner.endswith("l") else 1.0
         toe.append(math.atan2(-x, y) * inwards)
@@ -220,7 +217,7 @@ def _stand(vehicle_file: Path) -> _Stand:
 
 
 def wheel_rates_Npm(held: HeldCar) -> dict[str, float]:
-    """Wheel rates by axle as the rig defines them [N/m]."""
+    """Return the wheel rates by axle, as defined for the rig [N/m]."""
     loads = []
     for travel in _SWEEP_M:
         held.equilibrium(Case(height_m=np.full(4, travel)))
@@ -233,7 +230,7 @@ def wheel_rates_Npm(held: HeldCar) -> dict[str, float]:
 def _let_stand(
     car: Car, trimmed: Trimmed, write: Write, ratios: dict[str, tuple[float, float]], wanted: dict[str, float | None]
 ) -> dict[str, float]:
-    """Newton's method by axle; returns the wheel rates."""
+    """Let the car stand by Newton's method for each axle, and return the wheel rates."""
     left_m = np.zeros(4)
     for _ in range(_ROUNDS):
         stand = _stand(write(trimmed))
@@ -246,19 +243,19 @@ def _let_stand(
             camber = float(stand.camber_rad[index : index + 2].mean()) - axle.camber_rad
             off = 0.0 if rate is None else rates[axle.name] / rate - 1.0
             if found.curves is not None:
-                # Its curves are matched as a whole.
+                # The curves are matched as a whole.
                 toe = camber = 0.0
             done &= abs(travel) < _TRAVEL_M and max(abs(toe), abs(camber)) < _ANGLE_RAD and abs(off) < _RATE_FRACTION
             stiffness = max(rates[axle.name], 0.3 * found.spring_rate_Npm * ratio**2)
             found.spring_force_N += travel * stiffness / ratio
             found.wheel_x_rad += camber
             found.wheel_z_rad += toe
-            # Only near the design position: beyond it stops and progressive links take part.
+            # Only near the design position: beyond it stops and progressive links act too.
             if rate is not None and abs(travel) < 0.01:
                 found.spring_rate_Npm -= off * rate / ratio**2
                 if found.spring_rate_Npm <= 0.0:
                     raise ModelError(
-                        f"the links alone give a wheel rate above the {rate:.0f} N/m that are asked for", key=axle.name
+                        f"the links alone give a wheel rate above the desired {rate:.0f} N/m", key=axle.name
                     )
         if done:
             return rates
@@ -270,7 +267,7 @@ def _let_stand(
 
 
 def _match_curves(car: Car, guided: tuple[Axle, ...], trimmed: Trimmed, write: Write) -> None:
-    """Curves that give the measured ones under load."""
+    """Find curves that give the measured curves under load."""
     left = 0.0
     for _ in range(_MATCHES):
         held = _stand(write(trimmed)).held
@@ -280,13 +277,13 @@ def _match_curves(car: Car, guided: tuple[Axle, ...], trimmed: Trimmed, write: W
         if left < NEAR_ENOUGH:
             return
     raise ModelError(
-        f"the curves do not settle within {_MATCHES} rounds: {1e3 * left:.3g} mrad or mm are left; is the compliance "
+        f"the curves do not converge within {_MATCHES} rounds: {1e3 * left:.3g} mrad or mm remain; is the compliance "
         "so large that the wheel load bends the axle by more than its curves?"
     )
 
 
 def _fit_steering(car: Car, trimmed: Trimmed, write: Write, log: Log) -> None:
-    """The pinion for the ratio, or the ratio of the pinion."""
+    """Find the pinion for the ratio, or the ratio of the pinion."""
     wanted = car.table.steering.ratio
     if wanted is None and car.table.steering.pinion_radius_m is None:
         wanted = _RATIO
@@ -300,7 +297,7 @@ def _fit_steering(car: Car, trimmed: Trimmed, write: Write, log: Log) -> None:
 
 
 def _ratio(held: HeldCar) -> float:
-    """Steering wheel angle over mean steer angle of the front wheels, slope within 20 deg, unloaded."""
+    """Return steering wheel angle over mean steer angle of the front wheels, slope within 20 deg, unloaded."""
     steer = []
     for angle in _STEER_RAD:
         held.equilibrium(Case("contact", steering_wheel_rad=float(angle)))

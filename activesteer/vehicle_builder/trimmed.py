@@ -1,4 +1,4 @@
-"""What is found by letting the car stand: spring forces, wheel angles, stops, dampers, pinion, chassis."""
+"""Values from the standing car: spring forces, wheel angles, stops, dampers, pinion, chassis."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class TrimmedAxle:
 
     spring_rate_Npm: float = 25000.0
     spring_force_N: float = 4000.0
-    """In the design position."""
+    """Spring force in the design position [N]."""
     wheel_x_rad: float = 0.0
-    """First Euler angle of the wheel: minus camber, less what the loaded links add."""
+    """First Euler angle of the wheel: minus camber, less the contribution of the loaded links."""
     wheel_z_rad: float = 0.0
-    """Third one: minus toe-in, less what the loaded links add."""
+    """Third Euler angle of the wheel: minus toe-in, less the contribution of the loaded links."""
     bump_stop_m: float = 0.035
     """Compression of the damper to its bump stop."""
     rebound_stop_m: float = 0.065
@@ -31,12 +31,12 @@ class TrimmedAxle:
     damper_velocity_mps: tuple[float, ...] = (-1.0, 0.0, 1.0)
     damper_force_N: tuple[float, ...] = (-1900.0, 0.0, 1900.0)
     curves: AxleCurves | None = None
-    """Of an axle of curves: those that give the measured ones on the rig, under load."""
+    """Curves of a guided axle that give the measured curves on the rig, under load."""
 
 
 @dataclass
 class Trimmed:
-    """What the trim found for both axles."""
+    """Result of the trim."""
 
     front: TrimmedAxle = field(default_factory=TrimmedAxle)
     rear: TrimmedAxle = field(default_factory=TrimmedAxle)
@@ -51,5 +51,5 @@ class Trimmed:
     """x and height of the whole car's centre of gravity."""
 
     def axle(self, name: str) -> TrimmedAxle:
-        """The axle of a name, `front` or `rear`."""
+        """Return the axle `front` or `rear`."""
         return self.front if name == "front" else self.rear

@@ -1,4 +1,4 @@
-"""The vehicle file of a new car: what MJCF cannot say, and what controllers know until the car was driven."""
+"""The vehicle file of a new car: values beyond the MJCF, and controller data until the car is identified."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ _REMARKS: Final = {
         "compact's file."
     ),
 }
-"""What is said above a table that is the same for every car."""
+"""Comments above tables, equal for every car."""
 
 
 def vehicle_text(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> str:
-    """Text of the vehicle file.
+    """Return the text of the vehicle file.
 
     Args:
         car: The car.
-        trimmed: What was trimmed.
-        model: The car compiled, for its single-track model; None: a placeholder that serves while it is trimmed.
+        trimmed: Result of the trim.
+        model: Compiled car, for its single-track model; None for a placeholder during the trim.
     """
     remarks = _REMARKS | {
         "steering": f"Ratio at the centre, unloaded; lock: the rack stops at {1e3 * car.rack_limit_m:.1f} mm.",
@@ -61,7 +61,7 @@ def vehicle_text(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> st
 
 
 def _table(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> dict[str, Any]:
-    """The vehicle file; what a car's table gives as a vehicle file has it goes over whole, whatever keys it has."""
+    """Return the vehicle file as a table; tables in the form of a vehicle file are copied with all keys."""
     compact, _ = read_toml(find_vehicle("compact"))
     limit_rad = 0.99 * car.rack_limit_m / trimmed.pinion_radius_m
     return {
@@ -96,14 +96,14 @@ def _table(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> dict[str
 
 
 def _curves(car: Car, trimmed: Trimmed) -> dict[str, Any]:
-    """Tables [curves.front] and [curves.rear], angles in degrees; none where links guide both axles."""
+    """Return the tables [curves.front] and [curves.rear], angles in degrees; none if links guide both axles."""
     guided = {axle.name: curves for axle in car.axles if (curves := trimmed.axle(axle.name).curves) is not None}
     tables = {name: in_degrees(to_table(curves, defaults=False)) for name, curves in guided.items()}
     return {"curves": tables} if tables else {}
 
 
 def _single_track(car: Car, model: mujoco.MjModel | None) -> dict[str, float]:
-    """The car as controllers see it, estimated from its tyres; the characteristic speed within 50 to 300 km/h."""
+    """Return the single-track model estimated from the tyres, with a characteristic speed of 50 to 300 km/h."""
     base = car.wheelbase_m
     mass, inertia, to_front, stiffness = 1500.0, 2300.0, 0.45 * base, {"front": 1e5, "rear": 1.5e5}
     if model is not None:

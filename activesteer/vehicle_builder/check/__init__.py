@@ -1,4 +1,4 @@
-"""What is missing or implausible in a car, before anyone drives it."""
+"""Missing and implausible parts of a car, found before it is driven."""
 
 from activesteer.vehicle_builder.check.examination import check_vehicle
 from activesteer.vehicle_builder.check.findings import CheckReport, Finding

@@ -1,4 +1,4 @@
-"""The whole check, in the order in which things can be looked at; what cannot be is said with its reason."""
+"""The whole check, in the order of its stages; a stage that fails gives its reason."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from activesteer.vehicle_builder.check.standing import standing
 
 
 def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
-    """Looks at a car before anyone drives it.
+    """Check a car before it is driven.
 
     Args:
         vehicle: A name, the path of a vehicle file, or a folder with one.
 
     Returns:
-        What was found; with an error at the first stage that the car does not get through.
+        The findings; the first stage that fails gives an error.
 
     Raises:
         ParameterError: there is no such vehicle.

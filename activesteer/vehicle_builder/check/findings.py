@@ -1,4 +1,4 @@
-"""What a check finds: one line each, with its value, what is usual, and what to do."""
+"""Findings of a check: one line each, with the value, the usual range, and advice."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 
 Level = Literal["ok", "warning", "error"]
 _ROUNDING: Final = 1e-7
-"""What is smaller is printed as 0."""
+"""Smallest value that is not printed as 0."""
 
 
 @dataclass(frozen=True)
@@ -17,11 +17,11 @@ class Finding:
 
     Attributes:
         topic: parts, geometry, standing, riding, kinematics, steering, tyres.
-        what: What was looked at.
-        level: How it is.
-        value: Its value, with unit, as words where it is no number.
-        usual: What is usual; empty where there is nothing to say.
-        advice: What to do; empty where all is well.
+        what: Subject of the finding.
+        level: Level: ok, warning or error.
+        value: Value with unit, or words.
+        usual: Usual range; may be empty.
+        advice: Advice; empty without a problem.
     """
 
     topic: str
@@ -34,7 +34,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """All that was found.
+    """All findings of a car.
 
     Attributes:
         vehicle: Name of the car.
@@ -45,15 +45,15 @@ class CheckReport:
     findings: tuple[Finding, ...]
 
     def count(self, level: Level) -> int:
-        """How many findings are of a level."""
+        """Return the number of findings of a level."""
         return sum(finding.level == level for finding in self.findings)
 
     def __getitem__(self, what: str) -> Finding:
-        """The finding whose `what` is this text."""
+        """Return the finding about a subject."""
         return next(finding for finding in self.findings if finding.what == what)
 
     def as_table(self) -> dict[str, Any]:
-        """The report as JSON values."""
+        """Return the report as JSON values."""
         return {
             "vehicle": self.vehicle,
             "errors": self.count("error"),
@@ -62,7 +62,7 @@ class CheckReport:
         }
 
     def table(self) -> str:
-        """For people: what is wrong has its advice below it."""
+        """Return the report as text, with advice below warnings and errors."""
         wide = max((len(finding.what) for finding in self.findings), default=0)
         value = max((len(finding.value) for finding in self.findings if len(finding.value) < 30), default=0)
         lines, topic = [], ""
@@ -80,7 +80,7 @@ class CheckReport:
 
 @dataclass(frozen=True)
 class Usual:
-    """What a value usually is, and what it cannot be."""
+    """Usual and possible range of a value."""
 
     low: float
     high: float
@@ -88,26 +88,26 @@ class Usual:
     maximum: float = math.inf
 
     def level(self, value: float) -> Level:
-        """How a value is: warning outside the usual range, error beyond what is possible."""
+        """Return the level of a value: warning outside the usual range, error outside the possible range."""
         if not self.minimum <= value <= self.maximum:
             return "error"
         return "ok" if self.low <= value <= self.high else "warning"
 
     def __str__(self) -> str:
-        """As it is said in the report."""
+        """Return the usual range as text."""
         return f"{self.low:g} to {self.high:g}"
 
 
 def judged(topic: str, what: str, value: float, unit: str, usual: Usual, advice: str) -> Finding:
-    """A finding about a number.
+    """Return a finding about a number.
 
     Args:
-        topic: Its topic.
-        what: What it is.
-        value: It; nan counts as a warning.
-        unit: Its unit.
-        usual: What it usually is.
-        advice: What to do where it is not.
+        topic: Topic.
+        what: Subject.
+        value: The number; nan counts as a warning.
+        unit: Unit.
+        usual: Usual and possible range.
+        advice: Advice for a value outside.
     """
     unit = "" if unit == "-" else unit
     level: Level = "warning" if math.isnan(value) else usual.level(value)

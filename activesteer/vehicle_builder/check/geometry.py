@@ -1,4 +1,4 @@
-"""Hardpoints: sides, mirror images, lengths and order of the links, and whether they hold the wheel."""
+"""Checks of the hardpoints: sides, mirror images, lengths and order of the links, constraint of the wheel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from activesteer.vehicle_builder.motion import corner_motion
 
 _MIRROR_M: Final = 1e-6
 _TOUCH_M: Final = 0.005
-"""Links whose lines pass closer than this cannot both be rods."""
+"""Smallest distance of the lines of two rods [m]."""
 _OPPOSITE: Final = {"fl": "fr", "rl": "rr"}
 _MIRRORED: Final = np.array([1.0, -1.0, 1.0])
 
@@ -33,7 +33,7 @@ class _Rod:
 
 
 def geometry(model: mujoco.MjModel) -> Iterator[Finding]:
-    """All findings about the hardpoints.
+    """Return all findings about the hardpoints.
 
     Args:
         model: The car.
@@ -102,7 +102,7 @@ def _any(what: str, wrong: list[str], advice: str) -> Finding:
 
 
 def _rods(model: mujoco.MjModel, data: mujoco.MjData) -> list[_Rod]:
-    """Links of the left side that run straight between two sites."""
+    """Return the links of the left side that run straight between two sites."""
     rods = []
     for index in range(model.ntendon):
         name = model.tendon(index).name
@@ -124,7 +124,7 @@ def _lengths(rods: list[_Rod]) -> Iterator[Finding]:
 
 
 def _order(rods: list[_Rod], points: dict[str, Array]) -> Iterator[Finding]:
-    """Links across the car have their knuckle end further out; arms their upper joint above the lower one."""
+    """Check that knuckle ends are further out than inner ends, and upper joints above lower ones."""
     crossed = [
         rod.name
         for rod in rods
@@ -166,7 +166,7 @@ def _share_a_point(one: _Rod, two: _Rod) -> bool:
 
 
 def _distance(one: _Rod, two: _Rod) -> float:
-    """Least distance of two segments [m], by alternating projection: exact for segments, which are convex."""
+    """Return the smallest distance of two segments by alternating projection, exact for convex segments [m]."""
     s, t = 0.5, 0.5
     u, v = one.end_m - one.start_m, two.end_m - two.start_m
     for _ in range(200):
@@ -176,7 +176,7 @@ def _distance(one: _Rod, two: _Rod) -> float:
 
 
 def _reach(points: dict[str, Array]) -> Iterator[Finding]:
-    """Points of a suspension lie near its wheel and inside of it."""
+    """Check that the points of a suspension are near its wheel and not outside it."""
     far, outside = [], []
     for corner in ("fl", "rl"):
         centre = points[f"{corner}_wheel_centre"]

@@ -1,4 +1,4 @@
-"""Numbers of the kinematics and compliance rig against what passenger cars have; usual.toml says that, with sources."""
+"""Check of the K&C metrics against the usual ranges of passenger cars in usual.toml, which has the sources."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from activesteer.vehicle_builder.check.findings import Finding, Usual, judged
 
 @dataclass(frozen=True)
 class UsualMetric:
-    """What is usual of one metric of the rig, in its unit."""
+    """Usual and possible range of one metric of the rig, in its unit."""
 
     topic: str
     axle: str
     name: str
     words: str
-    """What the report calls it."""
+    """Name in the report."""
     usual: tuple[float, ...]
-    """Lowest and highest; outside is a warning."""
+    """Lowest and highest usual value; a value outside is a warning."""
     possible: tuple[float, ...]
-    """Lowest and highest; beyond is an error."""
+    """Lowest and highest possible value; a value outside is an error."""
     advice: str
-    """What to do where it is outside."""
+    """Advice for a value outside."""
 
 
 @dataclass(frozen=True)
@@ -39,15 +39,15 @@ class _File:
 
 @functools.cache
 def usual_metrics() -> tuple[UsualMetric, ...]:
-    """All that usual.toml says, in its order."""
+    """Return the metrics of usual.toml, in its order."""
     return build(_File, *read_toml(Path(__file__).with_name("usual.toml"))).metric
 
 
 def moving(result: KcResult) -> Iterator[Finding]:
-    """All findings from the rig.
+    """Return all findings from the rig.
 
     Args:
-        result: What it measured.
+        result: Result of the rig.
     """
     yield from (finding for finding in _metrics(result) if finding.topic == "riding")
     front, rear = result["front", "ride_frequency"], result["rear", "ride_frequency"]
@@ -76,7 +76,7 @@ def _metrics(result: KcResult) -> Iterator[Finding]:
 
 
 def _sign(result: KcResult) -> Finding:
-    """Whether the steering wheel turned to the left turns both wheels to the left."""
+    """Check that a left turn of the steering wheel turns both wheels to the left."""
     sweep = result.curves["steering_rolling"]
     turned = sweep.steer_rad[-1, :2] - sweep.steer_rad[sweep.zero, :2]
     good = bool((turned > 0.0).all()) and float(sweep.x[-1]) > 0.0

@@ -40,14 +40,14 @@ _NEEDED: Final = {
         "rr_steer_angle", *_each("wheel_speed", "wheel_position", "wheel_axis"),
     ),
 }  # fmt: skip
-"""What loader, callback, recorder and rig look up."""
+"""Parts that loader, callback, recorder and rig look up."""
 
 
 def missing_parts(model: mujoco.MjModel) -> Iterator[Finding]:
-    """One error for each part that is missing, or one line that says that none is.
+    """Return one error for each missing part, or one line if none is missing.
 
     Args:
-        model: The model as it compiles.
+        model: The compiled model.
     """
     none = True
     for word, (kind, count) in _KINDS.items():

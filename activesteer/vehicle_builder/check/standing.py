@@ -1,4 +1,4 @@
-"""The car at rest on its tyres: loads, height, tyres and dampers, and whether it stays where it stands."""
+"""Checks of the car at rest on its tyres: loads, height, tyres, dampers, and stability."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _DAMPING: Final = Usual(500.0, 20e3, 0.0, 100e3)
 
 
 def standing(vehicle: Vehicle, car: Car) -> Iterator[Finding]:
-    """All findings about the car at rest.
+    """Return all findings about the car at rest.
 
     Args:
         vehicle: The car in static ride; it is stepped.
-        car: What it was made from.
+        car: Files of the car.
     """
     model, data = vehicle.model, vehicle.data
     load = fb.wheel_outputs(data, 4)["fz_N"].copy()
@@ -62,7 +62,7 @@ def _loads(load_N: np.ndarray, mass_kg: float) -> Iterator[Finding]:
 
 
 def _height(vehicle: Vehicle) -> Iterator[Finding]:
-    """How far the wheels stand from where the hardpoints have them."""
+    """Check the distance of the wheels from their design position."""
     model, data = vehicle.model, vehicle.data
     design = mujoco.MjData(model)
     mujoco.mj_kinematics(model, design)
@@ -176,7 +176,7 @@ def _controllers_view(car: Car, mass_kg: float, yaw_inertia: float) -> Iterator[
 
 
 def _stays(vehicle: Vehicle) -> Iterator[Finding]:
-    """Half a second at rest: what is unstable shows."""
+    """Check the stability during half a second at rest."""
     try:
         with engine_warnings_held():
             for _ in range(_STEPS):
