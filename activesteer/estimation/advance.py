@@ -118,7 +118,7 @@ def advance(known, tyres, memory, said, line):
     """Process the present measurement, and make the estimate.
 
     Args:
-        known: A record of `KNOWN`, shape (1,).
+        known: Record of `known_of`, shape (1,).
         tyres: Grids of front and rear tyres' lateral force, shape (2, loads, slip angles) [N].
         memory: A record of `MEMORY`, shape (1,); changed.
         said: Measurement; see `SAID`.

@@ -61,7 +61,7 @@ def begin(known, memory):
     """Start with a car that drives straight ahead.
 
     Args:
-        known: Record of `KNOWN`.
+        known: Record of `known_of`.
         memory: Record of `MEMORY`; state and covariance are changed.
     """
     state, covariance = memory.state, memory.covariance
@@ -163,7 +163,7 @@ def predict(known, tyres, memory, duration_s):
     """Advance the state and its covariance by an interval.
 
     Args:
-        known: Record of `KNOWN`.
+        known: Record of `known_of`.
         tyres: Grids of front and rear tyres' lateral force [N].
         memory: Record of `MEMORY`; state and covariance are changed.
         duration_s: Length of the interval [s].
@@ -216,7 +216,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     """Process a measurement.
 
     Args:
-        known: Record of `KNOWN`.
+        known: Record of `known_of`.
         tyres: Grids of front and rear tyres' lateral force [N].
         memory: Record of `MEMORY`; state and covariance are changed.
         yaw_rate_radps: Measured yaw rate [rad/s].

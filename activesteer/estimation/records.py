@@ -25,44 +25,6 @@ SAID: Final = (
 SAID_RATE, SAID_AY, SAID_AX, SAID_WHEEL, SAID_REAR, SAID_SUPERPOSITION, SAID_SPINS, SAID_PRESSURES = *range(7), 10
 """Indices in such a row; for wheel speeds and pressures the first index."""
 
-_CAR: Final = (
-    "mass_kg", "yaw_inertia_kgm2", "cg_to_front_m", "cg_to_rear_m", "front_compliance_radpN", "rear_compliance_radpN",
-    "front_load_N", "rear_load_N", "front_load_kg", "rear_load_kg", "along_load_kg", "front_relaxation_m",
-    "rear_relaxation_m", "angle_step_rad", "front_load_step_N", "rear_load_step_N", "roll_gradient_radpmps2",
-    "roll_speed_radps", "roll_damping", "roll_arm_m", "pitch_gain", "drag_kgpm", "wheel_inertia_kgm2", "steering_ratio",
-)  # fmt: skip
-_UNKNOWN: Final = (
-    "slip_angle_std_rad", "slip_angle_fraction", "slip_angle_s", "ay_offset_std_mps2", "ay_offset_s", "friction",
-    "friction_std", "friction_s", "rate_offset_std_radps", "rate_walk_rad2ps3", "lateral_density_m2ps3",
-    "yaw_density_rad2ps3", "force_std_N", "force_fraction", "force_s", "along_fraction", "rate_variance_rad2ps2",
-    "rate_fraction", "ay_variance_m2ps4", "ay_fraction", "ax_density_m2ps3", "ax_fraction", "ax_offset_std_mps2",
-    "ax_offset_density_m2ps5", "wheel_variance_m2ps2", "use_std", "use_s", "radius_std",
-)  # fmt: skip
-_TIMES: Final = ("call_s", "longest_s", "age_s")
-_CALLS: Final = ("wheel_age", "steering_age", "actuator_age")
-_WHEELS: Final = (
-    "half_track_m", "to_axle_m", "left_m", "rolling_radius_m", "drive_fraction", "torque_per_pressure_NmpPa",
-    "slip_stiffness",
-)  # fmt: skip
-KNOWN: Final = np.dtype(
-    (
-        np.record,
-        [
-            *((name, np.float64) for name in (*_CAR, *_UNKNOWN, *_TIMES)),
-            *((name, np.intp) for name in _CALLS),
-            *((name, np.float64, (4,)) for name in _WHEELS),
-        ],
-    )
-)
-"""Knowledge of an estimator.
-
-Car: for each axle its compliance, wheel load, load transfer per lateral and longitudinal acceleration, relaxation
-    length and steps of the tyre grid; roll of the body, and effect of its pitch on an accelerometer. Uncertainties: the
-    fields of `EstimatorParameters`, with the data sheets. Times: interval between two calls, longest wait of the
-    filters for a new sample, age of an inertial sample; and the number of calls by which other samples are younger.
-    Wheels: position (left positive), rolling radius, fraction of the drive, brake, and slip stiffness per load.
-"""
-
 MEMORY: Final = np.dtype(
     (
         np.record,
@@ -103,17 +65,26 @@ _SHORTEST_WAIT_S: Final = 0.005
 
 
 def known_of(setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> NDArray[Any]:
-    """Return the knowledge of an estimator: a record of `KNOWN`, shape (1,).
+    """Return the knowledge of an estimator: a record, shape (1,), with a field for each value.
+
+    Car: for each axle its compliance, wheel load, load transfer per lateral and longitudinal acceleration, relaxation
+    length and steps of the tyre grid; roll of the body, and effect of its pitch on an accelerometer. Uncertainties: the
+    fields of `EstimatorParameters`, with the data sheets. Times: interval between two calls, longest wait of the
+    filters for a new sample, age of an inertial sample; and the number of calls by which other samples are younger.
+    Wheels: position (left positive), rolling radius, fraction of the drive, brake, and slip stiffness per load.
 
     Args:
         setup: The car and its sensors.
         parameters: Uncertainties of the model.
         timestep_s: Time between two calls [s].
     """
-    known = np.zeros(1, KNOWN)
-    for values in (_car(setup), _unknown(setup, parameters), _times(setup, timestep_s), _wheels(setup)):
-        for name, value in values.items():
-            known[name] = value
+    values = _car(setup) | _uncertainties(setup, parameters) | _times(setup, timestep_s) | _wheels(setup)
+    fields = [
+        (name, np.intp if isinstance(value, int) else np.float64, np.shape(value)) for name, value in values.items()
+    ]
+    known = np.zeros(1, np.dtype((np.record, fields)))
+    for name, value in values.items():
+        known[name] = value
     return known
 
 
@@ -151,12 +122,11 @@ def _car(setup: EstimatorSetup) -> dict[str, float]:
     }
 
 
-def _unknown(setup: EstimatorSetup, parameters: EstimatorParameters) -> dict[str, float]:
-    """The parameters, with what the data sheets say of the sensors beside."""
+def _uncertainties(setup: EstimatorSetup, parameters: EstimatorParameters) -> dict[str, float]:
+    """Return the parameters, with the values of the data sheets."""
     sensors, p = setup.sensors, parameters
     wheel_noise_mps = setup.tyres[0].rolling_radius_m * sensors.wheel_speed.amount("noise")
-    own = {name: value for name, value in vars(p).items() if name in _UNKNOWN}
-    return own | {
+    return vars(p) | {
         "ay_offset_std_mps2": math.hypot(sensors.ay.amount("bias"), p.bank_std_mps2),
         "ay_offset_s": p.bank_s,
         "rate_offset_std_radps": sensors.yaw_rate.amount("bias"),

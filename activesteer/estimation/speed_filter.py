@@ -42,7 +42,7 @@ def start_speed(known, memory, speed_mps):
     """Start with a speed.
 
     Args:
-        known: Record of `KNOWN`.
+        known: Record of `known_of`.
         memory: Record of `MEMORY`; speed, offset and their variances are changed.
         speed_mps: Speed by the wheels [m/s].
     """
@@ -56,7 +56,7 @@ def predict_speed(known, memory, rate_mps2, duration_s):
     """Advance the speed by an interval.
 
     Args:
-        known: Record of `KNOWN`.
+        known: Record of `known_of`.
         memory: Record of `MEMORY`; see `start_speed`.
         rate_mps2: Rate of change of the speed, without the offset [m/s2].
         duration_s: Length of the interval [s].
@@ -82,7 +82,7 @@ def correct_speed(known, memory, duration_s):
     """Process the wheel speeds.
 
     Args:
-        known: Record of `KNOWN`.
+        known: Record of `known_of`.
         memory: Record of `MEMORY`; see `start_speed`.
         duration_s: Time since the last step [s].
 

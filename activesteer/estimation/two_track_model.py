@@ -103,7 +103,7 @@ def forces_of(known, tyres, memory, state):
     """Return the lateral forces of both axles, across their wheels [N].
 
     Args:
-        known: Record of `KNOWN`.
+        known: Record of `known_of`.
         tyres: Grids of front and rear tyres' lateral force [N].
         memory: Record of `MEMORY`: the inputs.
         state: The states.
@@ -135,7 +135,7 @@ def follow(known, tyres, memory, state, duration_s, out):
     """Advance the state by an interval, for constant inputs.
 
     Args:
-        known: Record of `KNOWN`.
+        known: Record of `known_of`.
         tyres: Grids of front and rear tyres' lateral force [N].
         memory: Record of `MEMORY`: the inputs.
         state: The states.
@@ -178,7 +178,7 @@ def follow_roll(known, memory, ay_mps2, duration_s):
     Springs and dampers carry (p + 2 D p' / w) / k in place of a_y.
 
     Args:
-        known: Record of `KNOWN`.
+        known: Record of `known_of`.
         memory: Record of `MEMORY`; roll, `loading_mps2` and `rolling_mps` are changed.
         ay_mps2: Lateral acceleration [m/s2].
         duration_s: Length of the interval [s].

@@ -32,7 +32,7 @@ def read_wheels(known, memory, said, duration_s):
     """Compute loads, forces and speeds of the wheels.
 
     Args:
-        known: Record of `KNOWN`.
+        known: Record of `known_of`.
         memory: Record of `MEMORY`; its values of the wheels, their forces and moment are changed.
         said: Measurement at the time of the filters.
         duration_s: Time since the last call [s].
