@@ -1,4 +1,4 @@
-"""Recordings: the channel table, the MCAP writer and reader, and `Recording`, the arrays of a run by channel name."""
+"""Recordings: channel table, MCAP writer and reader, and `Recording`, the arrays of a run by channel name."""
 
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.recording import Recording

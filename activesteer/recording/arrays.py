@@ -1,4 +1,4 @@
-"""Check of the arrays that enter a recording."""
+"""Checks of arrays that enter a recording."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from activesteer.errors import RecordingError
 
 
 def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.uint64]:
-    """Times in whole nanoseconds.
+    """Convert times to whole nanoseconds.
 
     Args:
         time_s: Times [s], shape (n,).
         what: Name of the argument, for the error message.
-        after_ns: What the first time must exceed [ns].
+        after_ns: Time before the first one [ns].
 
     Raises:
-        RecordingError: a time is not finite, negative, above 2**35 s, or not later than the one before it.
+        RecordingError: a time is not finite, is negative, above 2**35 s, or not later than its predecessor.
     """
     times = np.asarray(time_s, np.float64)
     if times.ndim != 1:
@@ -40,10 +40,10 @@ def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.
 
 
 def shaped(array: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return a float array of that shape; an empty one of any shape where nothing is expected.
+    """Return a float array of a given shape.
 
     Raises:
-        RecordingError: the shape is another, or the values are no numbers.
+        RecordingError: the shape differs, or a value is not a number.
     """
     try:
         numbers = np.asarray(array, np.float64)

@@ -1,4 +1,4 @@
-"""The ordered table of recorded channels: the one place where a channel name becomes a column index."""
+"""Ordered table of recorded channels: the only place that maps a channel name to a column."""
 
 from __future__ import annotations
 
@@ -12,21 +12,18 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,254}")
 _GROUP = re.compile(r"[a-z][a-z0-9_]{0,254}")
 _MAX_LETTERS = 1000
 TIME = "time_s"
-"""What the time is called in every export, and so no channel."""
+"""Name of the time column in every export; no channel may have it."""
 
 
 class ChannelTable:
     """Channels in the order of their columns.
 
-    Iterating gives `Channel` objects in column order, `table["yaw_rate_radps"]` gives one of them, and
-    `"yaw_rate_radps" in table` asks whether it exists.
+    Iteration yields `Channel` objects, `table["yaw_rate_radps"]` returns a channel, and `"yaw_rate_radps" in table`
+    tests whether it exists.
     """
 
     def __init__(self, channels: Iterable[Channel]) -> None:
-        """Take the channels in column order.
-
-        Args:
-            channels: The channels.
+        """Create the table from channels in column order.
 
         Raises:
             RecordingError: a name occurs twice, or a name or group cannot be a field or message name in a file.
@@ -63,10 +60,10 @@ class ChannelTable:
         return tuple(self._index)
 
     def index(self, name: str) -> int:
-        """Column of a channel.
+        """Return the column of a channel.
 
         Raises:
-            RecordingError: there is no such channel; the message names the nearest ones.
+            RecordingError: there is no such channel; the message names similar ones.
         """
         try:
             return self._index[name]
@@ -76,14 +73,14 @@ class ChannelTable:
             ) from None
 
     def groups(self) -> dict[str, list[int]]:
-        """Columns of each group, groups in the order of their first channel."""
+        """Return the columns of each group, ordered by the first channel of the group."""
         columns: dict[str, list[int]] = {}
         for column, channel in enumerate(self._channels):
             columns.setdefault(channel.group, []).append(column)
         return columns
 
     def __getitem__(self, name: str) -> Channel:
-        """Return the channel of that name; `RecordingError` where there is none."""
+        """Return a channel by its name; raise `RecordingError` if there is none."""
         return self._channels[self.index(name)]
 
     def __iter__(self) -> Iterator[Channel]:
@@ -91,19 +88,19 @@ class ChannelTable:
         return iter(self._channels)
 
     def __len__(self) -> int:
-        """Return how many channels there are."""
+        """Return the number of channels."""
         return len(self._channels)
 
     def __contains__(self, name: object) -> bool:
-        """Return whether a channel of that name exists."""
+        """Return whether a channel exists."""
         return name in self._index
 
     def __eq__(self, other: object) -> bool:
-        """Compare by channels and their order."""
+        """Compare channels and their order."""
         return isinstance(other, ChannelTable) and self._channels == other._channels
 
     def __hash__(self) -> int:
-        """Hash by channels and their order."""
+        """Hash channels and their order."""
         return hash(self._channels)
 
     def __repr__(self) -> str:

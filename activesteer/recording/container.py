@@ -1,8 +1,8 @@
-"""An MCAP file that takes ready-made chunks.
+"""MCAP file that is written in finished chunks.
 
-`mcap.writer.Writer` takes one message at a time: with three messages a row it costs 24 us a row under the interpreter
-lock, more than the simulation itself. Here a chunk arrives as the bytes of all its messages and the bytes of their
-index, both made with numpy; every record but that of the chunk is written by the record classes of the `mcap` library.
+`mcap.writer.Writer` takes one message at a time. With three messages per row it costs 24 us per row under the
+interpreter lock, more than the simulation. Here a chunk arrives as the bytes of all messages and of their index, both
+made with numpy. The record classes of the `mcap` library write all other records.
 
 Source: MCAP format specification, https://mcap.dev/spec.
 """
@@ -40,21 +40,21 @@ from activesteer.recording.contents import MAX_EXPANSION
 _ZSTD = zstandard.ZstdCompressionParameters.from_level(
     1, strategy=zstandard.STRATEGY_FAST, hash_log=12, min_match=5, target_length=1
 )
-"""Level 1 with a table that stays in the nearest cache: recordings of driven cars take four fifths of its time, and
-are up to 2 % larger. Level 3 takes twice the time and saves 3 %."""
+"""Level 1 with a table that fits into the nearest cache. Recordings of driven cars take four fifths of the time of
+level 1, and are up to 2 % larger. Level 3 takes twice the time and saves 3 %."""
 _RECORD_HEAD = 9
 _CHUNK_HEAD = struct.Struct("<BQQQQII")
-"""Opcode and length of a Chunk record, its two times, size and checksum of its messages, length of `compression`."""
+"""Opcode and length of a chunk record, its two times, size and checksum of its messages, length of `compression`."""
 
 
 class ChunkData(NamedTuple):
-    """The messages of one chunk, encoded.
+    """Messages of a chunk, encoded.
 
     Attributes:
         start_ns: Log time of the first message [ns].
         end_ns: Log time of the last message [ns].
         records: Message records, uncompressed.
-        indexes: For each MCAP channel id: number of messages, and its MessageIndex record.
+        indexes: MCAP channel id -> number of messages, and MessageIndex record.
     """
 
     start_ns: int
@@ -64,14 +64,14 @@ class ChunkData(NamedTuple):
 
 
 class McapFile:
-    """Write the records of one MCAP file to a stream, and its summary at the end."""
+    """Writer of the records and the summary of an MCAP file."""
 
     def __init__(self, stream: BinaryIO, library: str) -> None:
         """Write magic and header.
 
         Args:
-            stream: Where to write.
-            library: Name and version of the program that writes.
+            stream: Stream to write to.
+            library: Name and version of the writing program.
         """
         self._stream = stream
         self._position = 0
@@ -127,10 +127,10 @@ class McapFile:
         )
 
     def add_chunk(self, chunk: ChunkData) -> None:
-        """Compress and write a chunk and the index of its messages, and hand them to the operating system.
+        """Compress and write a chunk and the index of its messages, and flush the stream.
 
-        All at once: after each checksum and each write this thread has to wait for the interpreter lock, and takes it
-        from the simulation.
+        All bytes are written in one call: after each checksum and each write, this thread waits for the interpreter
+        lock and takes it from the simulation.
         """
         records = chunk.records
         compressed, compression = self._compressor.compress(records), "zstd"

@@ -1,6 +1,6 @@
-"""What a recording may contain: limits, and a schema of its metadata. Checked where one is made and where one is read.
+"""Limits and schema of a recording, checked by the writer and by the reader.
 
-A file comes from anywhere. What is accepted here, everything that reads recordings can handle: names are texts, sizes
+A file may come from anywhere. Everything that reads recordings can handle what is accepted here: names are texts, sizes
 are numbers, and a small file cannot fill memory or time.
 """
 
@@ -19,40 +19,40 @@ from activesteer.road.recorded import fail, table_of, text
 from activesteer.road.road import road_of
 
 MAX_ROWS: Final = 20_000_000
-"""Rows of a recording: five and a half hours at 1 ms, 160 MB for a channel in memory."""
+"""Largest number of rows: five and a half hours at 1 ms, 160 MB in memory per channel."""
 MAX_CHANNELS: Final = 10_000
-"""Channels of a recording; a car has some 150."""
+"""Largest number of channels; a car has about 150."""
 MAX_FILE_BYTES: Final = 2**35
-"""Size of a file: 20 million rows have some 15 GB. A file of holes may have any size, and would be read without end."""
+"""Largest size of a file; 20 million rows have about 15 GB. A sparse file of any size could take forever to read."""
 MAX_CHUNK_BYTES: Final = 2**26
-"""Size of a chunk, compressed or not: one second of a car is 1 MB."""
+"""Largest size of a chunk, compressed or not; one second of a car is 1 MB."""
 MAX_EXPANSION: Final = 200
-"""How many times larger a chunk may become when it is decompressed; what would become more is written uncompressed.
-Driving gives 2 to 4, standing still some 50."""
+"""Largest expansion of a chunk by decompression. The writer leaves a chunk uncompressed if it would exceed this ratio.
+Driving gives 2 to 4, standing still about 50."""
 MAX_OTHER_BYTES: Final = 2**28
-"""Size of everything but rows together: attachments, schemas, metadata. Models with meshes have some 50 MB."""
+"""Largest size of all attachments, schemas and metadata together; models with meshes have about 50 MB."""
 MAX_OTHER_RECORDS: Final = 20_000
-"""How many records there may be of attachments, schemas, topics and metadata together."""
+"""Largest number of attachments, schemas, topics and metadata records together."""
 MAX_FOREIGN_MESSAGES: Final = 100_000
-"""Messages of topics that are not ours, as other tools may add them."""
+"""Largest number of messages in topics of other tools."""
 MAX_BODIES: Final = 1000
-"""Bodies with poses; a car has some 30."""
+"""Largest number of bodies with poses; a car has about 30."""
 MAX_PARTS: Final = 100_000
-"""Parts of a scene; a car has some 60."""
+"""Largest number of parts of a scene; a car has about 60."""
 
 _MAX_NAME: Final = 5000
-"""Letters of the name of an entry or a controller; the latter has a path in it, which may have 4096."""
+"""Longest name of an entry or a controller; a controller name contains a path of up to 4096 letters."""
 _MAX_TEXT: Final = 100_000
 _MAX_DEPTH: Final = 16
 _MAX_ENTRIES: Final = 20_000
-"""Named values in all tables of the metadata; a run has some 150."""
+"""Largest number of named values in all tables of the metadata; a run has about 150."""
 _MAX_ELEMENTS: Final = 5_000_000
-"""Values in all lists of the metadata: a path with a point each centimetre for 20 km."""
+"""Largest number of values in all lists of the metadata: a path with a point per centimetre for 20 km."""
 _SHOWN: Final = 100
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,254}")
 
 Check = Callable[[Any, str], object]
-"""Take a value and its key; raises `RecordingError`."""
+"""Check of a value with its key; raises `RecordingError`."""
 
 
 def _name(value: Any, key: str) -> None:
@@ -74,7 +74,7 @@ def _number(low: float, high: float) -> Check:
 
 
 def _all(check: Check) -> Check:
-    """A table of which every value passes."""
+    """Check all values of a table."""
 
     def entries(value: Any, key: str) -> None:
         for name, entry in table_of(value, key).items():
@@ -84,13 +84,13 @@ def _all(check: Check) -> Check:
 
 
 def _single_track(value: Any, key: str) -> None:
-    """Numbers, and where they come from."""
+    """Check the numbers of a single-track model and their source."""
     for name, entry in table_of(value, key).items():
         (_name if name == "source" else _number(1e-9, 1e12))(entry, f"{key}.{name}")
 
 
 def _controllers(value: Any, key: str) -> None:
-    """Tables of gains, and numbers that all have in common."""
+    """Check tables of gains, and the numbers that all controllers share."""
     for name, entry in table_of(value, key).items():
         (_number(0.0, 1.0) if name in ("interval_s", "bus_delay_s") else table_of)(entry, f"{key}.{name}")
 
@@ -121,15 +121,15 @@ SCHEMA: Final[Mapping[str, Check]] = {
     "vehicle.controllers.afs.corrector": _all(_number(-1e12, 1e12)),
     "car": _all(lambda value, key: None if isinstance(value, list) else _number(1e-3, 100.0)(value, key)),
 }
-"""What the values of known keys must be; those of road, course and car are known where these are described. Every key
-may be missing, and others may hold any JSON within the limits above."""
+"""Known keys of the metadata -> check of their values. Road, course and car are checked in the modules that define
+them. Any key may be missing. Other keys may hold any JSON within the limits above."""
 
 
 def check_metadata(metadata: Mapping[str, Any]) -> None:
-    """Check metadata as JSON gives them: their size, and the values of all known keys.
+    """Check the size of metadata and the values of all known keys.
 
     Raises:
-        RecordingError: a value is not what its key stands for, or too large.
+        RecordingError: a value has the wrong type or range, or is too large.
     """
     _Sizes().check(metadata, "")
     for key, check in SCHEMA.items():
@@ -147,14 +147,14 @@ _MISSING: Final = object()
 
 
 class _Sizes:
-    """Count what there is of a tree of values."""
+    """Counter of the values in a tree."""
 
     def __init__(self) -> None:
         self._entries = self._elements = 0
 
     def check(self, value: Any, key: str, depth: int = 0) -> None:
         if depth > _MAX_DEPTH:
-            raise fail(key[:_SHOWN], f"lies more than {_MAX_DEPTH} levels deep")
+            raise fail(key[:_SHOWN], f"is nested more than {_MAX_DEPTH} levels deep")
         if isinstance(value, Mapping):
             self._entries += len(value)
             if self._entries > _MAX_ENTRIES:
@@ -176,20 +176,20 @@ class _Sizes:
 
 
 def _letters(value: str, key: str, maximum: int) -> None:
-    """A text must not be too long, and have no half of a letter, which cannot be written anywhere."""
+    """Check that a text is short enough and can be encoded in UTF-8."""
     if len(value) > maximum:
         raise fail(key[:_SHOWN], f"has {len(value)} letters, at most {maximum} are allowed")
     try:
         value.encode()
     except UnicodeEncodeError:
-        raise fail(ascii(key[:_SHOWN]), "is no text in UTF-8") from None
+        raise fail(ascii(key[:_SHOWN]), "is not a UTF-8 text") from None
 
 
 def check_metrics(metrics: Mapping[str, Any]) -> None:
-    """Check metrics: names that can be field names everywhere, and numbers.
+    """Check that metric names are identifiers and that values are plausible numbers.
 
     Raises:
-        RecordingError: a name or a value is none, or there are too many.
+        RecordingError: a name or value is wrong, or there are too many.
     """
     if len(metrics) > MAX_CHANNELS:
         raise RecordingError(f"{len(metrics)} metrics, at most {MAX_CHANNELS} are allowed")
@@ -206,10 +206,10 @@ def check_metrics(metrics: Mapping[str, Any]) -> None:
 
 
 def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
-    """Check names of bodies, parts, attachments.
+    """Check names of bodies, parts or attachments.
 
     Raises:
-        RecordingError: one is no text or empty, or there are too many.
+        RecordingError: a name is no text or empty, or there are too many.
     """
     if len(names) > maximum:
         raise RecordingError(f"{len(names)} {what}, at most {maximum} are allowed")
@@ -219,10 +219,10 @@ def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
 
 
 def check_numbers(values: Sequence[Any], what: str, low: float, high: float) -> None:
-    """Check sizes, places and colours.
+    """Check sizes, positions or colours.
 
     Raises:
-        RecordingError: one is no number within the limits; they are part of them.
+        RecordingError: a value is no number from `low` to `high`.
     """
     for value in values:
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:

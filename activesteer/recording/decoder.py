@@ -1,4 +1,4 @@
-"""The bytes of an MCAP chunk into rows of channel values and poses, a block at a time; the inverse of the encoder."""
+"""Decoder of MCAP chunks into rows of channel values and poses, the inverse of the encoder."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from activesteer.recording.protobuf import FixedMessage
 from activesteer.recording.schemas import transforms_layout
 
 _RECORD: Final = struct.Struct("<BQH")
-"""Opcode and length of a record, and the channel id of a message."""
+"""Opcode and length of a record, and channel id of a message."""
 _RECORD_HEAD: Final = 9
 _OTHERS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
-"""What else a chunk may hold: other tools repeat there what stands before it."""
+"""Other records that a chunk may hold: some tools repeat schemas and channels there."""
 
 
 class Group(NamedTuple):
-    """The channels of one topic.
+    """Channels of a topic.
 
     Attributes:
-        topic: Its name.
+        topic: Name of the topic.
         names: Names of its fields.
         columns: Columns of its fields.
         layout: Layout of its messages.
@@ -43,15 +43,15 @@ class Group(NamedTuple):
 
 
 class Block(NamedTuple):
-    """What a chunk holds.
+    """Contents of a chunk.
 
     Attributes:
         row_ns: Time of each row [ns], shape (n,).
-        columns: Values by column, as 32 or 64 bit numbers, shape (n,).
+        columns: Column -> values, 32 or 64 bit, shape (n,).
         pose_ns: Time of each set of poses [ns], shape (k,).
         positions_m: Positions of the bodies [m], shape (k, number of bodies, 3).
-        quaternions: Their orientations, w x y z, shape (k, number of bodies, 4).
-        others: Messages of other topics, by channel id.
+        quaternions: Orientations of the bodies, w x y z, shape (k, number of bodies, 4).
+        others: MCAP channel id -> messages of other topics.
     """
 
     row_ns: NDArray[np.uint64]
@@ -63,17 +63,17 @@ class Block(NamedTuple):
 
 
 class BlockDecoder:
-    """Decode the chunks of one file."""
+    """Decoder of the chunks of a file."""
 
     def __init__(
         self, groups: Mapping[int, Group], body_names: Sequence[str], transforms_id: int | None, others: Iterable[int]
     ) -> None:
-        """Lay out the messages.
+        """Prepare the layouts of the messages.
 
         Args:
-            groups: By MCAP channel id.
+            groups: MCAP channel id -> group.
             body_names: Names of the bodies.
-            transforms_id: MCAP channel id of the poses; None where there are none.
+            transforms_id: MCAP channel id of the poses; None without poses.
             others: MCAP channel ids of all other topics.
         """
         self.body_names = tuple(body_names)
@@ -93,13 +93,14 @@ class BlockDecoder:
         """Decode the messages of a chunk.
 
         Args:
-            data: The chunk, decompressed.
+            data: Decompressed chunk.
 
         Raises:
-            RecordingError: a message is not what the schema of its topic says, or the topics do not fit each other.
+            RecordingError: a message does not match the schema of its topic, a value is implausible, or topics differ
+                in their times.
         """
-        # Nearly all chunks of a file have their messages at the same places. The check of a message covers its head, so
-        # that what fits there is as good as found.
+        # Nearly all chunks of a file have their messages at the same places. The check of a message includes its head,
+        # so the places of the last chunk can be tried first.
         if len(data) == self._last_length:
             with suppress(RecordingError):
                 return self._parsed(data, self._last_starts, {})
@@ -117,7 +118,7 @@ class BlockDecoder:
             if row_ns is None:
                 row_ns, first = times[:, 0], group.topic
             elif not np.array_equal(times[:, 0], row_ns):
-                raise RecordingError(f"{group.topic} and {first} do not have the same times")
+                raise RecordingError(f"{group.topic} and {first} have different times")
             values = [run[:, place] for run in runs for place in range(run.shape[1])]
             columns.update(zip(group.columns, values, strict=True))
             if any(_too_large(run).any() for run in runs):
@@ -140,7 +141,7 @@ class BlockDecoder:
         return Block(row_ns, columns, times[:, 0], positions, quaternions, others)
 
     def _starts(self, data: bytes) -> tuple[dict[int, list[int]], dict[int, list[bytes]]]:
-        """Where the messages of each topic of ours begin, and those of other topics."""
+        """Find the messages of our topics, and those of other topics."""
         starts: dict[int, list[int]] = {number: [] for number in self._lengths}
         others: dict[int, list[bytes]] = {}
         foreign = 0
@@ -158,7 +159,7 @@ class BlockDecoder:
                     raise RecordingError(self._complaint(opcode, length, number))
                 foreign += 1
                 if foreign > MAX_FOREIGN_MESSAGES:
-                    raise RecordingError(f"more than {MAX_FOREIGN_MESSAGES} records in a chunk are none of ours")
+                    raise RecordingError(f"more than {MAX_FOREIGN_MESSAGES} records of other tools in a chunk")
                 if opcode == Opcode.MESSAGE:
                     stop = position + _RECORD_HEAD + length
                     others.setdefault(number, []).append(data[position + _RECORD_HEAD + MESSAGE_HEAD : stop])
@@ -173,7 +174,7 @@ class BlockDecoder:
         if number not in self._lengths:
             return f"a message belongs to topic {number}, which does not exist"
         needed = self._lengths[number] - _RECORD_HEAD
-        return f"{self._topics[number]}: a message has {length} bytes in place of {needed}"
+        return f"{self._topics[number]}: a message has {length} bytes instead of {needed}"
 
 
 def _too_large(values: NDArray) -> NDArray[np.bool_]:
@@ -183,7 +184,7 @@ def _too_large(values: NDArray) -> NDArray[np.bool_]:
 
 
 def _messages(data: bytes, starts: Sequence[int], length: int) -> NDArray[np.uint8]:
-    """Messages of the same length, one a row."""
+    """Return messages of equal length, one per row."""
     if not starts:
         return np.empty((0, length), np.uint8)
     whole = np.frombuffer(data, np.uint8)

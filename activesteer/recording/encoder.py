@@ -1,4 +1,4 @@
-"""Rows of channel values and poses into the bytes of an MCAP chunk, a block at a time."""
+"""Encoder of rows of channel values and poses into MCAP chunks."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from activesteer.recording.protobuf import FixedMessage, timestamps
 from activesteer.recording.schemas import state_layout, transforms_layout
 
 MESSAGE_HEAD = 22
-"""Bytes of a message record between its length and its data: channel, sequence, two times."""
+"""Length of a message record between its length and its data: channel, sequence, two times [bytes]."""
 
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 
 
 def message_record(channel_id: int, message: FixedMessage) -> FixedMessage:
-    """Frame a message as an MCAP record; its first runs are the sequence number and the two times [ns]."""
+    """Frame a message as an MCAP record. Its first runs are the sequence number and the two times [ns]."""
     record = FixedMessage()
     record.constant(struct.pack("<BQH", Opcode.MESSAGE, MESSAGE_HEAD + len(message), channel_id))
     return record.block("<u4", 1).block("<u8", 2).append(message)
@@ -37,14 +37,14 @@ def _index_record(channel_id: int, time_ns: NDArray[np.uint64], offsets: NDArray
 
 
 def one_message(channel_id: int, data: bytes) -> ChunkData:
-    """Return a chunk that holds a single message, at time zero."""
+    """Return a chunk with a single message at time zero."""
     record = message_record(channel_id, FixedMessage().constant(data))
     index = _index_record(channel_id, np.zeros(1, np.uint64), np.zeros(1, np.int64))
     return ChunkData(0, 0, bytes(record.template), {channel_id: index})
 
 
 class _Rows:
-    """A block of rows whose constant bytes stay while the numbers change from block to block."""
+    """Block of rows with constant bytes, whose numbers change from block to block."""
 
     def __init__(self, layout: FixedMessage) -> None:
         self.layout = layout
@@ -59,7 +59,7 @@ class _Rows:
 
 
 class BlockEncoder:
-    """Encode blocks of rows for one file: in each row one message for every group, poses between the rows."""
+    """Encoder of the blocks of a file: one message per row and group, and poses between the rows."""
 
     def __init__(
         self,
@@ -68,10 +68,10 @@ class BlockEncoder:
         group_ids: Mapping[str, int],
         transforms_id: int,
     ) -> None:
-        """Lay out the messages.
+        """Prepare the layouts of the messages.
 
         Args:
-            channels: The channels, in the order of the columns of `values`.
+            channels: Channels in the order of the columns of `values`.
             body_names: Names of the bodies, in the order of the second axis of the poses.
             group_ids: MCAP channel id of each group.
             transforms_id: MCAP channel id of the poses.
@@ -79,7 +79,7 @@ class BlockEncoder:
         layout = FixedMessage()
         table = list(channels)
         self._group_offsets: list[tuple[int, int]] = []
-        self._columns: list[list[int]] = []  # For each group, the columns of `values` in the order of its fields.
+        self._columns: list[list[int]] = []  # group -> columns of `values` in the order of its fields
         for group, columns in channels.groups().items():
             self._group_offsets.append((group_ids[group], len(layout)))
             self._columns.append(columns)
@@ -93,13 +93,13 @@ class BlockEncoder:
 
     @property
     def row_bytes(self) -> int:
-        """Length of a row, without its poses."""
+        """Length of a row without poses [bytes]."""
         return len(self._rows.layout)
 
     def _column_stretches(self, layout: FixedMessage) -> list[list[tuple[slice, slice]]]:
-        """For each run of channel values, which parts of it come from neighbouring columns, and from which.
+        """For each run of channel values, return its parts that come from adjacent columns.
 
-        A list of columns in their place would be copied by numpy before it is.
+        numpy would copy the values first if it were given a list of columns.
         """
         stretches: list[list[tuple[slice, slice]]] = []
         runs = iter(layout.runs)
@@ -127,13 +127,13 @@ class BlockEncoder:
         positions_m: NDArray[np.float64],
         quaternions: NDArray[np.float64],
     ) -> ChunkData:
-        """Encode a block; the arguments are as in `McapWriter.write`, with times in nanoseconds."""
+        """Encode a block. The arguments are those of `McapWriter.write`, with times in nanoseconds."""
         rows, poses = len(row_ns), len(pose_ns)
         self._encode_rows(row_ns, values)
         self._encode_poses(pose_ns, positions_m, quaternions)
         row_length, pose_length = len(self._rows.layout), len(self._poses.layout)
 
-        # In the order of time: a pose follows the row of the same instant.
+        # In order of time; a pose follows the row of the same instant.
         rows_before = np.searchsorted(row_ns, pose_ns, side="right")
         row_bytes = self._rows.block.reshape(-1).data
         pose_bytes = self._poses.block.reshape(-1).data
@@ -163,7 +163,7 @@ class BlockEncoder:
         runs = iter(self._stretches)
         sequence = np.arange(self._row_count, self._row_count + rows, dtype=np.uint32)
         self._row_count += rows
-        with np.errstate(over="ignore"):  # A diverging run may exceed what 32 bit hold: infinity is what it is then.
+        with np.errstate(over="ignore"):  # A value of a diverging run may exceed 32 bit and becomes infinite.
             for columns in self._columns:
                 next(views)[:rows, 0] = sequence
                 next(views)[:rows] = row_ns[:, None]
@@ -184,7 +184,7 @@ class BlockEncoder:
         self._pose_count += poses
         times[:poses] = pose_ns[:, None]
         stamps = timestamps(pose_ns)
-        rotations = quaternions[:, :, (1, 2, 3, 0)]  # Foxglove's order is x y z w.
+        rotations = quaternions[:, :, (1, 2, 3, 0)]  # Foxglove uses the order x y z w.
         for body in range(len(bodies) // 3):
             stamp, position, rotation = bodies[3 * body : 3 * body + 3]
             stamp[:poses] = stamps

@@ -1,7 +1,6 @@
-"""Recordings for other programs: data frames, CSV, Parquet, MATLAB. `Recording` has a method for each.
+"""Exports of recordings: data frames, CSV, Parquet, MATLAB. `Recording` has a method for each.
 
-pandas for the data frame: it is what the people of this field have, its index carries the time, and everything that it
-needs to write files (pyarrow) comes with rerun-sdk anyway. CSV and Parquet are written with pyarrow and need no pandas.
+The data frame is one of pandas with the time as its index. CSV and Parquet are written with pyarrow and need no pandas.
 """
 
 from __future__ import annotations
@@ -28,11 +27,11 @@ MATLAB_NAME_LENGTH: Final = 63
 """Longest name of a variable or field in MATLAB (`namelengthmax`)."""
 
 MATLAB_TABLES: Final = ("units", "meanings", "metrics", "metadata")
-"""Variables beside the channels."""
+"""Variables besides the channels."""
 
 
 class Exportable(Protocol):
-    """What of a recording is exported; `Recording` is one."""
+    """Interface of an exported recording."""
 
     metadata: dict[str, Any]
     metrics: dict[str, float]
@@ -58,7 +57,7 @@ class Exportable(Protocol):
 
 
 def to_dataframe(recording: Exportable) -> pd.DataFrame:
-    """A column for each channel, the time as the index.
+    """Return a data frame with a column per channel and the time as index.
 
     Returns:
         The frame, a copy; `attrs["units"]` has the units by column, `attrs["metrics"]` the metrics.
@@ -78,9 +77,9 @@ def to_dataframe(recording: Exportable) -> pd.DataFrame:
 
 
 def to_csv(recording: Exportable, path: str | os.PathLike[str]) -> Path:
-    """Write a line of names and a line for each row: `time_s`, then the channels; a file that exists is replaced.
+    """Write a line of names and a line per row: `time_s`, then the channels. An existing file is replaced.
 
-    Numbers have as many digits as are needed to read the same ones back; channels with `single` have 32 bit.
+    Numbers have enough digits to restore the same values; channels with `single` have 32 bit.
 
     Raises:
         RecordingError: the file cannot be written.
@@ -89,7 +88,7 @@ def to_csv(recording: Exportable, path: str | os.PathLike[str]) -> Path:
 
     def write(target: Path) -> None:
         with target.open("wb") as stream:
-            # pyarrow would put the names in quotes, which some readers take as part of them.
+            # pyarrow would quote the names, and some readers keep the quotes.
             stream.write((",".join((TIME, *recording.channels.names)) + "\n").encode())
             csv.write_csv(_table(recording), stream, csv.WriteOptions(include_header=False))
 
@@ -97,7 +96,7 @@ def to_csv(recording: Exportable, path: str | os.PathLike[str]) -> Path:
 
 
 def to_parquet(recording: Exportable, path: str | os.PathLike[str]) -> Path:
-    """Write `time_s` and the channels as columns; a file that exists is replaced.
+    """Write `time_s` and the channels as columns. An existing file is replaced.
 
     Channels with `single` have 32 bit. Each field carries `unit` and `meaning`, the schema `metadata` and `metrics` as
     JSON texts.
@@ -111,13 +110,13 @@ def to_parquet(recording: Exportable, path: str | os.PathLike[str]) -> Path:
 
 
 def to_mat(recording: Exportable, path: str | os.PathLike[str]) -> Path:
-    """Write a MATLAB file (version 5, as `load` of every MATLAB and Octave reads it); one that exists is replaced.
+    """Write a MATLAB file of version 5, which every MATLAB and Octave can load. An existing file is replaced.
 
-    `time_s` and every channel is a column of doubles: single ones would turn all that is computed with them single.
+    `time_s` and every channel is a column of doubles, since single precision would spread to all results.
     Structs `units`, `meanings` and `metrics` have a field for each name; `metadata` is JSON text, for `jsondecode`.
 
     Raises:
-        RecordingError: the file cannot be written, or a name is longer than MATLAB allows or taken.
+        RecordingError: the file cannot be written, or a name is taken or too long for MATLAB.
     """
     from scipy.io import savemat  # noqa: PLC0415 - slow to import
 
@@ -131,9 +130,7 @@ def to_mat(recording: Exportable, path: str | os.PathLike[str]) -> Path:
             )
     if clash := taken.intersection(recording.channels.names):
         name = clash.pop()
-        raise RecordingError(
-            f"a channel is called {name!r}, which is taken by what stands beside the channels", value=name
-        )
+        raise RecordingError(f"a channel is called {name!r}, the name of another variable in the file", value=name)
     variables: dict[str, Any] = {TIME: recording.time_s}
     variables |= {name: recording[name] for name in recording.channels.names}
     variables["units"] = {channel.name: channel.unit for channel in recording.channels}
@@ -142,7 +139,7 @@ def to_mat(recording: Exportable, path: str | os.PathLike[str]) -> Path:
     variables["metadata"] = _metadata(recording)
 
     def write(target: Path) -> None:
-        # Fields longer than 31 letters are for MATLAB 7.6 and later, of 2008.
+        # Field names longer than 31 letters need MATLAB 7.6 (2008) or later.
         savemat(target, variables, appendmat=False, long_field_names=True, do_compression=True, oned_as="column")
 
     return _written(path, write)

@@ -1,7 +1,7 @@
-"""Names of the topics and metadata records of a file, and metadata as text.
+"""Names of topics and metadata records, and metadata as text.
 
-In the order of the file: schemas and topics, attachments, the record of the run, the format record, chunks of about a
-second, the record of the result, metrics. Values of metadata are JSON text, metrics are numbers in text.
+A file holds, in this order: schemas and topics, attachments, the record of the run, the format record, chunks of about
+a second, the record of the result, metrics. Metadata values are JSON text, metrics are numbers as text.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from activesteer.files import MAX_NUMBER
 from activesteer.recording.contents import check_metadata, check_metrics
 
 FORMAT_VERSION = 1
-"""Raised when a reader of the version before could misread a file."""
+"""Version of the format; raised when an older reader could misread a file."""
 
 STATE_TOPIC, TRANSFORMS_TOPIC, SCENE_TOPIC = "/state/", "/tf", "/scene"
 RUN_RECORD, RESULT_RECORD, METRICS_RECORD = "activesteer.run", "activesteer.result", "activesteer.metrics"
-"""Names of the metadata records: what is known before the run, after it, and its metrics."""
+"""Names of the metadata records: known before the run, known after the run, metrics."""
 
 FORMAT_RECORD = "activesteer.format"
 """Name of the metadata record that marks a file as ours."""
 
 
 LIBRARY = "activesteer "
-"""How the header of our files names the program that wrote them; its version follows."""
+"""Name of the writing program in the header of a file; the version follows."""
 
 
 def is_recording_start(data: bytes) -> bool:
-    """Whether a file that begins like this is a recording of ours, be it damaged, or empty as a full disk leaves it."""
-    # Magic, opcode, length of the record, and then two texts with their lengths: profile and library.
+    """Return whether a file with this beginning is ours, even if damaged or left empty by a full disk."""
+    # Magic, opcode, length of the record, then two texts with their lengths: profile and library.
     start = len(MCAP0_MAGIC) + 9
     head = MCAP0_MAGIC + bytes([Opcode.HEADER])
     profile_end = start + 4 + int.from_bytes(data[start : start + 4], "little")
@@ -43,7 +43,7 @@ def is_recording_start(data: bytes) -> bool:
 
 
 def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict[str, str]]:
-    """Metadata as the texts that an MCAP file holds.
+    """Convert metadata to the texts of an MCAP file.
 
     Args:
         metadata: Values that JSON can represent; numpy numbers and arrays become numbers and lists.
@@ -52,16 +52,16 @@ def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict
         The values as JSON text, without the key `metrics`; and the metrics, as numbers in text.
 
     Raises:
-        RecordingError: a value cannot be represented or is not what its key stands for, or a metric is no number.
+        RecordingError: a value cannot be represented or has the wrong type, or a metric is not a number.
     """
     texts: dict[str, str] = {}
     metrics = metadata.get("metrics", {})
     if not isinstance(metrics, Mapping):
         raise RecordingError(
-            f"is a {type(metrics).__name__} in place of numbers by name", file="the metadata", key="metrics"
+            f"is a {type(metrics).__name__}, expected numbers by name", file="the metadata", key="metrics"
         )
     metrics = {name: value.item() if isinstance(value, np.generic) else value for name, value in metrics.items()}
-    # As in the rows: what is too large for a file is infinite there.
+    # As in the rows, a value that is too large for a file becomes infinite.
     metrics |= {name: math.copysign(math.inf, value) for name, value in metrics.items()
                 if isinstance(value, float) and abs(value) > MAX_NUMBER}  # fmt: skip
     check_metrics(metrics)

@@ -1,9 +1,8 @@
-"""Protobuf messages of constant length, written and read a block of rows at a time with numpy.
+"""Protobuf messages of constant length, written and read in blocks of rows with numpy.
 
-A recorded row has the same fields in every message, and `double`, `float` and padded varints have a fixed width. So
-all messages of a topic are one byte array whose constant bytes (tags, lengths, names) are filled in once, and whose
-numbers are strided views of that array: a block of rows is encoded by a handful of array assignments, and decoded the
-same way. Every protobuf library can read the result.
+Every message of a topic has the same fields, and `double`, `float` and padded varints have a fixed width. So all
+messages of a topic form one byte array. Its constant bytes (tags, lengths, names) are filled in once, and its numbers
+are strided views. A few array assignments encode or decode a block. Every protobuf library can read the result.
 
 Source: protobuf encoding specification, https://protobuf.dev/programming-guides/encoding (padded varints are legal).
 """
@@ -22,11 +21,11 @@ VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
 """Wire types."""
 
 STAMP_LENGTH = 12
-"""Bytes of a google.protobuf.Timestamp as `timestamps` writes it."""
+"""Length of a google.protobuf.Timestamp made by `timestamps` [bytes]."""
 
 _SHIFTS = np.arange(0, 35, 7, dtype=np.uint64)
 _CONTINUES = np.array([0x80, 0x80, 0x80, 0x80, 0], np.uint64)
-"""Of a varint padded to five bytes: where the seven bits of each byte are in the number, and that others follow."""
+"""For a varint padded to five bytes: shifts of its seven-bit groups, and the bits that mark a following byte."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Run:
 
 
 def varint(value: int) -> bytes:
-    """Shortest varint of a number >= 0."""
+    """Return the shortest varint of a number >= 0."""
     out = bytearray()
     while value > 0x7F:
         out.append(value & 0x7F | 0x80)
@@ -57,12 +56,12 @@ def varint(value: int) -> bytes:
 
 
 def tag(field: int, wire_type: int) -> bytes:
-    """Field tag: number and wire type."""
+    """Return a field tag: number and wire type."""
     return varint(field << 3 | wire_type)
 
 
 def timestamps(time_ns: NDArray[np.uint64]) -> NDArray[np.uint8]:
-    """Timestamps as google.protobuf.Timestamp, each number a varint padded to five bytes.
+    """Encode times as google.protobuf.Timestamp, each number as a varint padded to five bytes.
 
     Args:
         time_ns: Time since zero [ns], shape (n,), below 2**35 s.
@@ -79,11 +78,11 @@ def timestamps(time_ns: NDArray[np.uint64]) -> NDArray[np.uint8]:
 
 
 class FixedMessage:
-    """A message whose every instance has the same length: constant bytes, and numbers at known places.
+    """Message of constant length: constant bytes, and numbers at fixed places.
 
     Attributes:
         template: The message with all numbers zero.
-        runs: Where the numbers are, in the order in which they were added.
+        runs: Places of the numbers, in the order of addition.
     """
 
     def __init__(self) -> None:
@@ -106,7 +105,7 @@ class FixedMessage:
         return self.raw(dtype)
 
     def raw(self, dtype: str) -> FixedMessage:
-        """Append one untagged number, joined to the run before it where the distance is the same."""
+        """Append an untagged number; extend the last run if the distance is the same."""
         offset = len(self.template)
         if self.runs:
             last = self.runs[-1]
@@ -141,13 +140,13 @@ class FixedMessage:
         return self
 
     def allocate(self, rows: int) -> NDArray[np.uint8]:
-        """Return a writeable block of messages with all numbers zero, shape (rows, length)."""
+        """Return a writeable block of messages with zeros, shape (rows, length)."""
         block = np.empty((rows, len(self.template)), np.uint8)
         block[:] = np.frombuffer(self.template, np.uint8)
         return block
 
     def views(self, block: NDArray[np.uint8]) -> list[NDArray]:
-        """Return the numbers of a contiguous block as views, one of shape (rows, count) for each run."""
+        """Return the numbers of a contiguous block as views, one of shape (rows, count) per run."""
         length = len(self.template)
         if not len(block):  # numpy takes no offset into an empty buffer
             return [np.empty((0, run.count), run.dtype) for run in self.runs]
@@ -173,14 +172,14 @@ class FixedMessage:
         wrong = np.flatnonzero(((block ^ template) & constant).any(axis=1))
         if len(wrong):
             raise RecordingError(
-                f"message {wrong[0]} does not have the fields that its schema lists, in their order",
+                f"message {wrong[0]} does not match its schema",
                 key=what, value=int(wrong[0]),
             )  # fmt: skip
         return self.views(block)
 
     @cached_property
     def _constants(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """The message with all numbers zero, and a mask that is zero where the numbers are."""
+        """Return the message with zeros, and a mask that is zero at the numbers."""
         mask = np.full(len(self.template), 255, np.uint8)
         for run in self.runs:
             width = np.dtype(run.dtype).itemsize

@@ -1,4 +1,4 @@
-"""Read a recording from an MCAP file, whole, cut short or damaged; all sizes that it declares are limited."""
+"""Reader of MCAP files: whole, cut or damaged. All sizes that a file declares are limited."""
 
 from __future__ import annotations
 
@@ -55,23 +55,24 @@ from activesteer.recording.schemas import WORLD, state_fields
 from activesteer.signals import Channel as SignalChannel
 
 MAX_LOADED_VALUES: Final = 2**25
-"""Values that are read at once, 256 MiB; those of a longer recording stay in the file until they are needed."""
+"""Largest number of values that are loaded at once, 256 MiB. Values of a longer recording stay in the file until they
+are needed."""
 _END_OF_TIME_NS: Final = 2**35 * 10**9
 
 
 class Contents(NamedTuple):
-    """What a file holds.
+    """Contents of a file.
 
     Attributes:
         channels: The channels.
         time_s: Time of each row [s], shape (n,).
-        values: Channel values, shape (n, number of channels), or the rows of a long recording, still in the file.
+        values: Channel values, shape (n, number of channels); or the rows of a long recording, still in the file.
         poses: Poses of the bodies; None where they are still in the file.
-        metadata: Metadata without metrics; `complete` tells whether the file was ended properly.
+        metadata: Metadata without metrics; `complete` tells whether the file ends properly.
         metrics: Metrics by name.
         attachments: Attachments by name.
-        scene: What the car looks like: solids in body frames, and links between bodies.
-        damage: What is broken, and where; empty for a sound file. All above is then what comes before it.
+        scene: Shape of the car: solids in body frames, and links between bodies.
+        damage: Description of the damage; empty for a sound file. All other fields then hold the part before it.
     """
 
     channels: ChannelTable
@@ -86,16 +87,13 @@ class Contents(NamedTuple):
 
 
 def read_mcap(path: Path) -> Contents:
-    """Read a file that `McapWriter` wrote.
+    """Read a file written by `McapWriter`.
 
-    A file that ends too early, as that of a killed process does, gives all its whole blocks. A damaged one gives what
-    comes before the damage, and says so in `damage`.
-
-    Args:
-        path: The file.
+    A file that ends too early, as after a killed process, gives all its complete blocks. A damaged file gives the part
+    before the damage, and describes the damage in `damage`.
 
     Raises:
-        RecordingError: the file cannot be opened, is no MCAP file or none of ours, or is damaged before its first row.
+        RecordingError: the file cannot be opened, is no recording of ours, or is damaged before its first row.
     """
     descriptor = opened(path)
     kept = False
@@ -105,7 +103,7 @@ def read_mcap(path: Path) -> Contents:
             raise RecordingError(f"{shown_path(path)} is not an MCAP file", value=path)
         if size > MAX_FILE_BYTES:
             raise RecordingError(
-                f"{shown_path(path)} has {size} bytes, a recording at most {MAX_FILE_BYTES}",
+                f"{shown_path(path)} has {size} bytes, at most {MAX_FILE_BYTES} are allowed",
                 value=size,
                 allowed=MAX_FILE_BYTES,
             )
@@ -131,7 +129,7 @@ def _decode(descriptor: int, records: Records) -> Contents:
     topics: dict[str, Channel] = {}
     for topic in records.topics.values():
         if topic.topic in topics:
-            raise RecordingError(f"two topics are called {topic.topic!r:.100}")
+            raise RecordingError(f"two topics have the name {topic.topic!r:.100}")
         topics[topic.topic] = topic
     channels, groups = _channels(records, topics)
     transforms, scene = topics.get(TRANSFORMS_TOPIC), topics.get(SCENE_TOPIC)
@@ -171,7 +169,7 @@ def _content(descriptor: int, start: int, length: int) -> bytes:
 
 
 class _Rows:
-    """What the chunks give: their places, all times, and the blocks themselves as long as they are few."""
+    """Collector of chunks: their places, all times, and the blocks themselves if they are few."""
 
     def __init__(self, channels: int) -> None:
         self._width = max(channels, 1)
@@ -182,7 +180,7 @@ class _Rows:
         self._last_ns = [-1, -1]
 
     def add(self, place: Place, data: bytes, decoder: BlockDecoder) -> Block:
-        """Check a chunk and take what it gives; the place has no rows yet."""
+        """Check a chunk and keep its contents; `place` has no rows yet."""
         block = decoder.decode(data)
         for kind, time_ns in enumerate((block.row_ns, block.pose_ns)):
             if not len(time_ns):
@@ -210,7 +208,7 @@ class _Rows:
     def collected(
         self, descriptor: int, decoder: BlockDecoder, channels: list[SignalChannel]
     ) -> tuple[NDArray[np.float64] | FileRows, Poses | None]:
-        """All values and poses, or where to get them later."""
+        """Return all values and poses, or an object that reads them later."""
         if self._blocks is None:
             return FileRows(descriptor, decoder, channels, self._places), None
         sets = sum(place.poses for place in self._places)
@@ -256,7 +254,7 @@ def _metadata(records: Records) -> tuple[dict[str, Any], dict[str, float]]:
         elif record.name == METRICS_RECORD:
             metrics.update((name, float(number)) for name, number in record.metadata.items())
     if found is None:
-        raise RecordingError("no recording of activesteer, or cut off before its first row")
+        raise RecordingError("not a recording of activesteer, or cut off before its first row")
     if found > FORMAT_VERSION:
         raise RecordingError(
             f"format version {found}; this version of activesteer reads up to {FORMAT_VERSION}",

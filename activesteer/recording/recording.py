@@ -1,4 +1,4 @@
-"""A recorded run: arrays by channel name, poses, metadata, metrics, and the files that it was made from."""
+"""Recorded run: arrays by channel name, poses, metadata, metrics, and source files."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class Recording:
     `recording["yaw_rate_radps"]` is the channel as a read-only array over `recording.time_s`.
 
     Attributes:
-        metadata: What is needed to run it again, and how it ended; JSON values. `complete` is false where the file
+        metadata: Everything needed to repeat the run, and how it ended; JSON values. `complete` is false if the file
             was not ended properly, as after a killed process.
-        metrics: Metrics by name, in the unit that ends their names.
-        attachments: Files kept with the run, by name.
-        scene: What the car looks like: solids in body frames, and links between bodies.
+        metrics: Metrics by name, in the unit at the end of the name.
+        attachments: Name -> file kept with the run.
+        scene: Shape of the car: solids in body frames, and links between bodies.
 
     Example:
         >>> import activesteer
@@ -60,17 +60,17 @@ class Recording:
         attachments: Mapping[str, bytes] | None = None,
         scene: Iterable[ScenePart] = (),
     ) -> None:
-        """Take the arrays of a run. They are not copied where they are already floats, and must not change any more.
+        """Create a recording from arrays. Float arrays are not copied, and must not change afterwards.
 
         Args:
-            channels: The channels, in the order of the columns of `values`.
+            channels: Channels in the order of the columns of `values`.
             time_s: Time of each row [s], increasing, >= 0, shape (n,). Kept in whole nanoseconds, as in a file.
             values: Channel values, shape (n, number of channels); or the rows of a file, which are read when needed.
-            poses: Poses of the bodies; none where omitted.
-            metadata: Metadata; a key `metrics` in it is taken as the metrics.
+            poses: Poses of the bodies; none by default.
+            metadata: Metadata; its key `metrics` becomes the metrics.
             metrics: Metrics by name.
-            attachments: Files to keep, by name.
-            scene: What the car looks like: solids in body frames, and links between bodies.
+            attachments: Name -> file to keep.
+            scene: Shape of the car: solids in body frames, and links between bodies.
 
         Raises:
             RecordingError: a shape or a time is wrong, or a channel occurs twice.
@@ -96,16 +96,15 @@ class Recording:
     def open(cls, path: str | Path, *, recover: bool = False) -> Self:
         """Read a recording from an MCAP file.
 
-        A file that ends too early, as that of a killed process does, opens with all its whole blocks and
+        A file that ends too early, as after a killed process, opens with all complete blocks and with
         `metadata["complete"]` false.
 
         Args:
             path: The file.
-            recover: Whether to return, from a damaged file, what comes before the damage.
+            recover: Whether to return the part of a damaged file before the damage.
 
         Raises:
-            RecordingError: the file cannot be opened, is no recording, or is damaged; the message says how much of it
-                can be read.
+            RecordingError: the file cannot be opened, is no recording, or is damaged; the message says what is left.
         """
         contents = read_mcap(Path(path))
         if contents.damage and not recover:
@@ -134,14 +133,14 @@ class Recording:
             raise RecordingError(f"{path}: {error}", value=error.value, allowed=error.allowed) from None
 
     def save(self, path: str | Path, *, overwrite: bool = True) -> None:
-        """Write the recording to an MCAP file; channels with `single` are kept to 32 bit, all others exactly.
+        """Write the recording to an MCAP file. Channels with `single` are stored with 32 bit, all others exactly.
 
         Args:
             path: The file.
-            overwrite: Whether a recording that exists may be replaced; any other file never is.
+            overwrite: Whether an existing recording may be replaced; any other file never is.
 
         Raises:
-            RecordingError: the file cannot be written, or a metadata value cannot be kept as JSON.
+            RecordingError: the file cannot be written, or a metadata value cannot be stored as JSON.
         """
         with McapWriter(
             path,
@@ -196,14 +195,14 @@ class Recording:
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """All channel values, shape (n, number of channels), read-only; of a long recording that is much memory."""
+        """All channel values, shape (n, number of channels), read-only. A long recording takes much memory."""
         return _frozen(self._values.values()) if isinstance(self._values, FileRows) else self._values
 
     def at(self, rows: NDArray[np.intp]) -> Recording:
-        """The same run with some of its rows, in memory; all poses are kept.
+        """Return the same run with some of its rows, in memory, and with all poses.
 
         Args:
-            rows: Which ones, ascending.
+            rows: Row numbers, ascending.
         """
         values = self._values.at(rows) if isinstance(self._values, FileRows) else self._values[rows]
         return Recording(
@@ -212,14 +211,14 @@ class Recording:
         )  # fmt: skip
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
-        """Return a channel over time, shape (n,), read-only; `RecordingError` where there is none of that name."""
+        """Return a channel over time, shape (n,), read-only; raise `RecordingError` if there is none."""
         column = self._channels.index(name)
         if isinstance(self._values, FileRows):
             return _frozen(self._values.channel(column))
         return self._values[:, column]
 
     def __contains__(self, name: object) -> bool:
-        """Return whether a channel of that name exists."""
+        """Return whether a channel exists."""
         return name in self._channels
 
     def __len__(self) -> int:

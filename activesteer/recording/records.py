@@ -1,4 +1,4 @@
-"""The records of an MCAP file up to the first one that is broken; all sizes that they declare are limited."""
+"""Records of an MCAP file up to the first broken one. All sizes that they declare are limited."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ _READ: Final = {
     Opcode.METADATA: Metadata,
     Opcode.ATTACHMENT: Attachment,
 }
-"""Records that are kept; chunks are read later, and all others only repeat what these say."""
+"""Records that are kept; chunks are read later, and all others repeat information."""
 _REFUSED: Final = (0, Opcode.FOOTER, Opcode.MESSAGE)
-"""No record, what stands only behind the end, and a message outside of a chunk."""
+"""Records that cannot stand here: none, the footer, and a message outside a chunk."""
 
 
 @dataclass
 class Records:
-    """The records of a file, chunks as places.
+    """Records of a file, chunks as places.
 
     Attributes:
-        position: End of the records that were read.
-        crc: Checksum of all bytes up to there.
-        complete: The end of the data section was reached; what follows only repeats what is there.
-        damage: What is broken, and where.
-        reason: The error that says so, where it is one of ours.
+        position: End of the last record.
+        crc: Checksum of all bytes up to `position`.
+        complete: Whether the end of the data section was reached; the rest only repeats information.
+        damage: Description of the damage.
+        reason: The error behind the damage, if it is one of ours.
     """
 
     position: int = len(MCAP0_MAGIC)
@@ -60,10 +60,10 @@ class Records:
     _count: int = 0
 
     def read_next(self, descriptor: int, size: int) -> None:
-        """Read one record, and put the position behind it; where that fails, to where the record would have ended.
+        """Read one record and move the position to its end, also if the record is broken.
 
         Raises:
-            RecordingError: it is not allowed here, too large, or broken.
+            RecordingError: the record is not allowed here, too large, or broken.
         """
         start, self.position = self.position, size + 1
         head = read_bytes(descriptor, start, min(_RECORD.size, size - start))
@@ -78,7 +78,7 @@ class Records:
             self._bytes, self._count = self._bytes + length, self._count + 1
             if self._bytes > MAX_OTHER_BYTES or self._count > MAX_OTHER_RECORDS:
                 raise RecordingError(
-                    "attachments, schemas and metadata are larger than those of a recording may be",
+                    "attachments, schemas and metadata are too large",
                     value=self._bytes, allowed=MAX_OTHER_BYTES,
                 )  # fmt: skip
             self._take(opcode, read_bytes(descriptor, first, length))
@@ -88,7 +88,7 @@ class Records:
             declared = DataEnd.read(ReadDataStream(BytesIO(read_bytes(descriptor, first, length)))).data_section_crc
             self.complete = True
             if declared not in (0, self.crc):
-                raise RecordingError(f"the checksum of the file is {self.crc} in place of {declared}")
+                raise RecordingError(f"the checksum of the file is {self.crc} instead of {declared}")
         self.crc = zlib.crc32(head, self.crc)
         for piece in range(first, self.position, _PIECE_BYTES):
             self.crc = zlib.crc32(read_bytes(descriptor, piece, min(_PIECE_BYTES, self.position - piece)), self.crc)
@@ -106,19 +106,19 @@ class Records:
 
 
 def opened(path: Path) -> int:
-    """A file descriptor of a file; anything else may never end.
+    """Open a regular file and return its descriptor; a device or pipe may never end.
 
     Raises:
-        RecordingError: it cannot be read, or is no file.
+        RecordingError: the file cannot be read, or is not a regular file.
     """
     with reading(path, RecordingError):
-        # Opening a pipe must not wait for whoever writes to it.
+        # Without O_NONBLOCK, opening a pipe would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):
         return descriptor
     os.close(descriptor)
-    what = "a folder, whose recordings are DIR/*.mcap" if stat.S_ISDIR(mode) else "a device or a pipe"
+    what = "a folder; name its recordings as DIR/*.mcap" if stat.S_ISDIR(mode) else "a device or a pipe"
     raise RecordingError(f"cannot read {shown_path(path)}: it is {what}", value=path)
 
 
@@ -135,8 +135,8 @@ def read_records(descriptor: int, size: int) -> Records:
         try:
             records.read_next(descriptor, size)
         except (RecordingError, *BROKEN) as error:
-            # A record that reaches beyond the end of the file is what a killed process leaves behind. A file that
-            # goes on behind it, or that was ended properly, is damaged.
+            # A killed process leaves a record that reaches beyond the end of the file. A file that continues after
+            # the record, or ends properly, is damaged.
             ended = os.pread(descriptor, len(MCAP0_MAGIC), size - len(MCAP0_MAGIC)) == MCAP0_MAGIC
             if records.position <= size or ended:
                 records.damage = f"bytes {start} to {min(records.position, size)} cannot be read: {words_of(error)}"
@@ -146,7 +146,7 @@ def read_records(descriptor: int, size: int) -> Records:
 
 
 def words_of(error: BaseException) -> str:
-    """What an error of ours or of a library says of broken bytes."""
+    """Describe an error of ours or of a library in words."""
     if isinstance(error, RecordingError):
         return str(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

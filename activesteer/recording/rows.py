@@ -1,4 +1,4 @@
-"""Rows of a recording that stay in their file until somebody needs them: a channel at a time, or a block at a time."""
+"""Rows of a recording that stay in their file until they are needed, by channel or by block."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from activesteer.road.recorded import LIMIT_M
 from activesteer.signals import Channel
 
 MAX_CACHED_BYTES: Final = 3 * 2**27
-"""Channels of all open files together that stay in memory, as they are in the files."""
+"""Largest size of the cached channels of all open files together."""
 _READ_BYTES: Final = 2**27
-"""How much is read at once: neighbours of the channel that was asked for come with it, since the whole file has to be
-decompressed for a single one."""
+"""Size of one reading. Adjacent channels are read together, since any channel requires the whole file to be
+decompressed."""
 _SMALL_BYTES: Final = 2**16
-"""A chunk up to this size may be as small as it likes when compressed."""
+"""Up to this size, a chunk may be compressed by any ratio."""
 
 BROKEN: Final = (
     McapError, struct.error, UnicodeDecodeError, ValueError, OverflowError, RuntimeError, MemoryError,
     zstandard.ZstdError, OSError,
 )  # fmt: skip
-"""What broken bytes make the libraries raise."""
+"""Exceptions that the libraries raise for broken bytes."""
 
 
 class Poses(NamedTuple):
-    """Poses of the bodies in the world, over time.
+    """Poses of the bodies in the world over time.
 
     Attributes:
         time_s: Time [s], shape (k,).
@@ -57,22 +57,22 @@ class Poses(NamedTuple):
     quaternions: NDArray[np.float64]
 
     def usable(self) -> NDArray[np.bool_]:
-        """Which sets can be drawn, shape (k,): all bodies within reach, and turned by some angle."""
+        """Return which sets of poses can be drawn, shape (k,): plausible positions, quaternions with a direction."""
         near = (np.abs(self.positions_m) <= LIMIT_M).all(axis=(1, 2))
         size = np.linalg.norm(self.quaternions, axis=2)
         return near & ((size > _SMALLEST) & (size < 1.0 / _SMALLEST)).all(axis=1)
 
 
 _SMALLEST: Final = 1e-6
-"""Length of a quaternion that still tells a direction."""
+"""Smallest length of a quaternion that still has a direction."""
 
 
 class Place(NamedTuple):
-    """Where a chunk is in its file, and what it holds.
+    """Place and contents of a chunk.
 
     Attributes:
         start: First byte of the content of its record.
-        length: Length of that [byte].
+        length: Length of the content [bytes].
         crc: Checksum of its messages.
         rows: Number of rows.
         poses: Number of sets of poses.
@@ -86,10 +86,10 @@ class Place(NamedTuple):
 
 
 def read_bytes(descriptor: int, start: int, length: int) -> bytes:
-    """Bytes of an open file.
+    """Read bytes of an open file.
 
     Raises:
-        RecordingError: they are not there.
+        RecordingError: the file is shorter.
     """
     pieces = []
     while length > 0:
@@ -102,13 +102,13 @@ def read_bytes(descriptor: int, start: int, length: int) -> bytes:
 
 
 def messages_of(content: bytes) -> tuple[bytes, int]:
-    """The messages of a chunk, decompressed, and their checksum; what the record declares is a limit, not a wish.
+    """Decompress a chunk; return its messages and their checksum. The declared size is an upper limit.
 
     Args:
         content: Content of its record.
 
     Raises:
-        RecordingError: it is larger than allowed, or not what it declares to be.
+        RecordingError: the chunk is too large, or differs from its declaration.
     """
     try:
         chunk = Chunk.read(ReadDataStream(BytesIO(content)))
@@ -119,10 +119,10 @@ def messages_of(content: bytes) -> tuple[bytes, int]:
     except BROKEN as error:
         raise RecordingError(f"{type(error).__name__}: {error}") from None
     if len(data) != size:
-        raise RecordingError(f"a chunk has {len(data)} bytes in place of {size}")
+        raise RecordingError(f"a chunk has {len(data)} bytes instead of {size}")
     crc = zlib.crc32(data)
     if chunk.uncompressed_crc not in (0, crc):
-        raise RecordingError(f"a checksum is {crc} in place of {chunk.uncompressed_crc}")
+        raise RecordingError(f"a checksum is {crc} instead of {chunk.uncompressed_crc}")
     return data, crc
 
 
@@ -130,17 +130,17 @@ def _decompressed(compression: str, data: bytes, size: int) -> bytes:
     if compression == "":
         return data
     if compression == "zstd":
-        # A frame may declare another size than its record, and would get as much memory.
+        # A frame may declare another size than its record, and that size would be allocated.
         if zstandard.frame_content_size(data) not in (-1, size):
-            raise RecordingError("a chunk is not as large as it declares to be")
+            raise RecordingError("a chunk declares a wrong size")
         return zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES).decompress(data, max_output_size=size)
     if compression == "lz4":
         return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
-    raise RecordingError(f"a chunk is compressed by {compression!r:.40}; known are zstd and lz4")
+    raise RecordingError(f"a chunk has the compression {compression!r:.40}; known are zstd and lz4")
 
 
 def values_of(blocks: Iterable[Block], rows: int, channels: int) -> NDArray[np.float64]:
-    """All values of blocks with so many rows, shape (rows, channels), columns contiguous."""
+    """Return all values of blocks, shape (rows, channels), columns contiguous."""
     values = np.empty((rows, channels), order="F")
     done = 0
     for block in blocks:
@@ -152,7 +152,7 @@ def values_of(blocks: Iterable[Block], rows: int, channels: int) -> NDArray[np.f
 
 
 def poses_of(blocks: Iterable[Block], sets: int, body_names: tuple[str, ...]) -> Poses:
-    """All poses of blocks with so many sets of them."""
+    """Return all poses of blocks."""
     bodies = len(body_names)
     poses = Poses(np.empty(sets), body_names, np.empty((sets, bodies, 3)), np.empty((sets, bodies, 4)))
     done = 0
@@ -166,18 +166,18 @@ def poses_of(blocks: Iterable[Block], sets: int, body_names: tuple[str, ...]) ->
 
 
 class FileRows:
-    """The rows of an open file. The file may be replaced or deleted meanwhile; one that is changed is an error."""
+    """Rows of an open file. The file may be replaced or deleted meanwhile; a changed file raises an error."""
 
     def __init__(
         self, descriptor: int, decoder: BlockDecoder, channels: Sequence[Channel], places: list[Place]
     ) -> None:
-        """Take over the file.
+        """Take over an open file.
 
         Args:
-            descriptor: File descriptor; closed with this object.
+            descriptor: File descriptor; closed together with this object.
             decoder: Decoder of its chunks.
             channels: The channels.
-            places: Its chunks, all of them checked.
+            places: Its chunks, all checked.
         """
         self._descriptor = descriptor
         self._decoder = decoder
@@ -188,7 +188,7 @@ class FileRows:
         weakref.finalize(self, _release, descriptor, self._token)
 
     def blocks(self) -> Iterator[Block]:
-        """The chunks one after the other.
+        """Yield the chunks.
 
         Raises:
             RecordingError: the file was changed since it was opened.
@@ -212,7 +212,7 @@ class FileRows:
         return self._decoder.body_names
 
     def channel(self, column: int) -> NDArray[np.float64]:
-        """The values of a channel, shape (n,)."""
+        """Return the values of a channel, shape (n,)."""
         found = _cache.get(self._token, column)
         if found is None:
             columns = self._neighbours(column)
@@ -220,7 +220,7 @@ class FileRows:
         return found.astype(np.float64)
 
     def at(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
-        """The values of all channels in some rows, in ascending order, shape (len(rows), number of channels)."""
+        """Return the values of all channels in ascending rows, shape (len(rows), number of channels)."""
         values = np.empty((len(rows), len(self._types)), order="F")
         done = before = 0
         for block in self.blocks():
@@ -231,15 +231,15 @@ class FileRows:
         return values
 
     def values(self) -> NDArray[np.float64]:
-        """The values of all channels, shape (n, number of channels)."""
+        """Return the values of all channels, shape (n, number of channels)."""
         return values_of(self.blocks(), self._rows, len(self._types))
 
     def poses(self) -> Poses:
-        """The poses of all bodies."""
+        """Return the poses of all bodies."""
         return poses_of(self.blocks(), sum(place.poses for place in self._places), self._decoder.body_names)
 
     def _neighbours(self, column: int) -> list[int]:
-        """The columns that are read with one: as many as one reading takes, in fixed pieces of the table."""
+        """Return the columns that are read together with a column."""
         width = max(1, _READ_BYTES // (4 * max(self._rows, 1)))  # most channels have 32 bit
         first = column - column % width
         return list(range(first, min(first + width, len(self._types))))
@@ -258,7 +258,7 @@ class FileRows:
 
 
 class _Cache:
-    """Channels of open files; those that were not used for the longest time go first."""
+    """Cache of channels of open files; the least recently used ones are dropped first."""
 
     def __init__(self) -> None:
         self._arrays: OrderedDict[tuple[int, int], NDArray] = OrderedDict()

@@ -1,4 +1,4 @@
-"""What runs are called that are shown beside each other."""
+"""Names of runs that are shown together."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from activesteer.recording.recording import Recording
 
 
 def run_names(sources: Sequence[str | Path], recordings: Iterable[Recording]) -> list[str]:
-    """A name for each run: its controller where that tells all of them apart, else its file, with its folder if needed.
+    """Return a name for each run: its controller if all differ, else its file, with the folder if needed.
 
     Args:
-        sources: File of each run, or what else it is called.
+        sources: File or other name of each run.
         recordings: The runs.
 
     Returns:
         The names, in the same order.
     """
-    # A user's controller is given as file and class; the class is enough.
+    # A user's controller is named by file and class; the class is enough.
     controllers = [
         str(run.metadata.get("controller", "run")).rpartition(":")[2]
         + ("+truth" if run.metadata.get("controller_uses_truth") else "")

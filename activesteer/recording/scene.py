@@ -1,4 +1,4 @@
-"""What a car looks like: solids in body frames, links between bodies; kept as one foxglove.SceneUpdate."""
+"""Scene of a recording: solids in body frames and links between bodies, stored as a foxglove.SceneUpdate."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from activesteer.recording.schemas import SCENE_SCHEMA, foxglove_schema
 
 _FIELDS = {"box": "cubes", "cylinder": "cylinders", "sphere": "spheres"}
 LINK_KINDS: Final = ("link", "spring", "damper")
-"""What a `Link` can be."""
+"""Kinds of a `Link`."""
 _MAX_SIZE_M: Final = 1e4
-"""No part is larger, and none further from the origin of its body [m]."""
+"""Largest size of a part, and largest distance from the origin of its body [m]."""
 _LINK_KEY: Final = "activesteer.link"
-"""Key of an entity's metadata that makes it a link."""
+"""Key in the metadata of an entity that makes it a link."""
 
 
 class Primitive(NamedTuple):
-    """A solid that is fixed in the frame of a body.
+    """Solid that is fixed in the frame of a body.
 
     Attributes:
         body: Name of the body, or `world`.
@@ -45,15 +45,13 @@ class Primitive(NamedTuple):
 
 
 class Link(NamedTuple):
-    """A part that spans bodies, such as a suspension link: straight from one point that is fixed in a body to the next.
-
-    It has no frame of its own, so where it is at an instant follows from the poses of its bodies.
+    """Straight part through points of bodies, such as a suspension link; the poses of the bodies move it.
 
     Attributes:
-        name: Its name.
+        name: Name of the part.
         kind: `link`, `spring` or `damper`.
-        points: Name of the body, and the point in its frame [m]; two or more.
-        radius_m: Radius to draw it with [m].
+        points: Name of the body and point in its frame [m]; at least two.
+        radius_m: Radius in pictures [m].
         rgba: Colour and opacity, 0 to 1.
     """
 
@@ -65,12 +63,12 @@ class Link(NamedTuple):
 
 
 ScenePart = Primitive | Link
-"""What a scene is made of."""
+"""Part of a scene."""
 
 
 @cache
 def _scene_class() -> Any:
-    """Return the message class, which protobuf makes at run time."""
+    """Return the message class, which protobuf creates at run time."""
     pool = DescriptorPool()
     for file in FileDescriptorSet.FromString(foxglove_schema()).file:
         pool.Add(file)
@@ -80,14 +78,11 @@ def _scene_class() -> Any:
 def encode_scene(parts: Iterable[ScenePart]) -> bytes:
     """Serialise a scene as a foxglove.SceneUpdate.
 
-    Every body with solids becomes an entity that is locked to its frame. A link becomes an entity without a solid, its
-    ends in the entity's metadata: a message of Foxglove has no solid that spans two frames.
-
-    Args:
-        parts: Solids and links.
+    Every body with solids becomes an entity that is locked to its frame. A link becomes an entity without a solid, with
+    its points in the metadata: Foxglove has no solid that spans two frames.
 
     Raises:
-        RecordingError: a kind is unknown, a name is none, or a number is missing, no number or out of range.
+        RecordingError: a kind is unknown, a name is wrong, or a number is missing or out of range.
     """
     update = _scene_class()()
     entities: dict[str, Any] = {}
@@ -111,12 +106,11 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
         if primitive.kind == "cylinder":
             solid.bottom_scale = solid.top_scale = 1.0
         try:
-            (w, x, y, z), (r, g, b, a) = primitive.quaternion, primitive.rgba
-            for vector, values in ((solid.size, primitive.size_m), (solid.pose.position, primitive.position_m)):
-                vector.x, vector.y, vector.z = (float(value) for value in values)
             for target, names, values in (
-                (solid.pose.orientation, "xyzw", (x, y, z, w)),
-                (solid.color, "rgba", (r, g, b, a)),
+                (solid.size, "xyz", primitive.size_m),
+                (solid.pose.position, "xyz", primitive.position_m),
+                (solid.pose.orientation, "wxyz", primitive.quaternion),
+                (solid.color, "rgba", primitive.rgba),
             ):
                 for name, value in zip(names, values, strict=True):
                     setattr(target, name, float(value))
@@ -128,7 +122,7 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
         if isinstance(part, Link):
             _add_link(update, part)
     data = update.SerializeToString()
-    decode_scene(data)  # What a reader would refuse is refused here.
+    decode_scene(data)  # refuses here what a reader would refuse
     return data
 
 
@@ -167,15 +161,12 @@ def _link_of(table: dict[str, Any]) -> Link:
 
 
 def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
-    """Read a scene back: primitives, those of each body in the order box, cylinder, sphere, and then the links.
-
-    Args:
-        data: A serialised foxglove.SceneUpdate.
+    """Read a scene: the solids of each body in the order box, cylinder, sphere, and then the links.
 
     Raises:
-        RecordingError: it cannot be drawn; see `check_scene`.
-        google.protobuf.message.DecodeError: it is none.
-        ValueError, TypeError, KeyError: a link in it is broken.
+        RecordingError: the scene cannot be drawn; see `check_scene`.
+        google.protobuf.message.DecodeError: the data are no scene.
+        ValueError, TypeError, KeyError: a link is broken.
     """
     update = _scene_class().FromString(data)
     if len(update.entities) > MAX_PARTS:
@@ -204,7 +195,7 @@ def check_scene(parts: Sequence[ScenePart]) -> None:
     """Check that a scene can be drawn.
 
     Raises:
-        RecordingError: a kind is unknown, a name is none, or a number is out of range.
+        RecordingError: a kind is unknown, a name is wrong, or a number is out of range.
     """
     check_names([part.body if isinstance(part, Primitive) else part.name for part in parts], "parts", MAX_PARTS)
     for part in parts:

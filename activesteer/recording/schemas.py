@@ -1,6 +1,6 @@
-"""What the messages of a recording look like: one message of our own for each group, poses and scene by Foxglove.
+"""Schemas of the messages: one message of ours per group of channels; poses and scene are messages of Foxglove.
 
-Each topic carries its schema as a protobuf `FileDescriptorSet`, so that other tools decode it without this package.
+Each topic carries its schema as a protobuf `FileDescriptorSet`, so other tools can decode it without this package.
 
 Source of the `foxglove` messages: foxglove-sdk, schemas/proto (names and field numbers).
 """
@@ -21,7 +21,7 @@ from activesteer.signals import Channel
 TRANSFORMS_SCHEMA = "foxglove.FrameTransforms"
 SCENE_SCHEMA = "foxglove.SceneUpdate"
 WORLD = "world"
-"""Name of the frame that all poses refer to."""
+"""Name of the frame of all poses."""
 
 _SCALARS = {
     "double": FieldDescriptorProto.TYPE_DOUBLE,
@@ -77,7 +77,7 @@ def _define(package: str, name: str, fields: str, enum: Sequence[str] = ()) -> D
     """Return the descriptor of a message; `fields` in the notation of a .proto file, `enum` its nested `Type`."""
     message = DescriptorProto(name=name)
     for repeated, kind, field_name, number in _FIELD.findall(fields):
-        # A JSON name of its own keeps two names that differ in case only (`a_n`, `a_N`) apart.
+        # An explicit JSON name separates names that differ in case only (`a_n`, `a_N`).
         field = message.field.add(name=field_name, number=int(number), json_name=field_name)
         field.label = FieldDescriptorProto.LABEL_REPEATED if repeated else FieldDescriptorProto.LABEL_OPTIONAL
         if kind in _SCALARS:
@@ -95,7 +95,7 @@ def _define(package: str, name: str, fields: str, enum: Sequence[str] = ()) -> D
 
 @cache
 def foxglove_schema() -> bytes:
-    """Serialised `FileDescriptorSet` with the Foxglove messages for poses and scene."""
+    """Return a serialised `FileDescriptorSet` with the Foxglove messages for poses and scene."""
     files = FileDescriptorSet()
     timestamp_pb2.DESCRIPTOR.CopyToProto(files.file.add())
     duration_pb2.DESCRIPTOR.CopyToProto(files.file.add())
@@ -108,12 +108,12 @@ def foxglove_schema() -> bytes:
 
 
 def state_schema_name(group: str) -> str:
-    """Full name of the message that carries the channels of a group."""
+    """Return the full name of the message for the channels of a group."""
     return f"activesteer.{group.capitalize()}"
 
 
 def state_schema(group: str, channels: Iterable[Channel]) -> bytes:
-    """Serialised `FileDescriptorSet` of a group: one field for each channel, numbered from 1 in their order."""
+    """Return the serialised `FileDescriptorSet` of a group: one field per channel, numbered from 1."""
     fields = ", ".join(
         f"{'float' if channel.single else 'double'} {channel.name} = {number}"
         for number, channel in enumerate(channels, start=1)
@@ -124,7 +124,7 @@ def state_schema(group: str, channels: Iterable[Channel]) -> bytes:
 
 
 def state_fields(schema: bytes, schema_name: str) -> tuple[list[str], FixedMessage]:
-    """Read what `state_schema` wrote.
+    """Read a schema of `state_schema`.
 
     Args:
         schema: Serialised `FileDescriptorSet`.
@@ -134,7 +134,7 @@ def state_fields(schema: bytes, schema_name: str) -> tuple[list[str], FixedMessa
         Field names in their order, and the layout of the messages.
 
     Raises:
-        RecordingError: the schema is not one of a group of channels.
+        RecordingError: the schema does not describe a group of channels.
         google.protobuf.message.DecodeError: it is no schema at all.
     """
     for file in FileDescriptorSet.FromString(schema).file:
@@ -155,7 +155,7 @@ def _layout(message: DescriptorProto) -> FixedMessage:
 
 
 def state_layout(channels: Iterable[Channel]) -> FixedMessage:
-    """Layout of the message of a group, see `state_schema`."""
+    """Return the layout of the message of a group; see `state_schema`."""
     layout = FixedMessage()
     for number, channel in enumerate(channels, start=1):
         layout.number(number, "<f4" if channel.single else "<f8")
@@ -163,9 +163,9 @@ def state_layout(channels: Iterable[Channel]) -> FixedMessage:
 
 
 def transforms_layout(body_names: Iterable[str]) -> FixedMessage:
-    """Layout of `foxglove.FrameTransforms`: every body a child of `world`.
+    """Return the layout of `foxglove.FrameTransforms`: every body is a child of `world`.
 
-    Its runs are, for each body in order: the timestamp (bytes), the position x y z, the quaternion x y z w.
+    For each body in order, its runs are the timestamp (bytes), the position x y z, and the quaternion x y z w.
     """
     layout = FixedMessage()
     for name in body_names:

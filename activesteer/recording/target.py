@@ -1,4 +1,4 @@
-"""The place where a recording is going to be written: whether it may be, and that nobody else writes there."""
+"""Target of a recording: check that it may be written, and lock it against other writers."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _START_BYTES: Final = 64
 
 
 def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Say now what would be wrong with writing a recording there; touches nothing.
+    """Check that a recording can be written, without changing anything.
 
     Args:
         path: The file.
-        overwrite: Whether a recording that exists may be replaced; any other file never is.
+        overwrite: Whether an existing recording may be replaced; any other file never is.
 
     Raises:
-        RecordingError: its folder does not exist or may not be written to, or something is there that is not replaced.
+        RecordingError: the folder does not exist or is not writeable, or an existing file may not be replaced.
     """
     path = Path(path)
     if not path.parent.is_dir():
@@ -32,7 +32,7 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
         raise RecordingError(f"cannot write {path}: Is a directory", value=path)
     if not os.access(path if path.exists() else path.parent, os.W_OK):
         raise RecordingError(f"cannot write {path}: Permission denied", value=path)
-    if not path.is_file():  # nothing there, or a device
+    if not path.is_file():  # missing, or a device
         return
     if not overwrite:
         raise RecordingError(f"cannot write {path}: it exists already", value=path)
@@ -40,26 +40,25 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
         ours = is_recording_start(stream.read(_START_BYTES))
     if not ours:
         raise RecordingError(
-            f"cannot write {path}: it exists already and is no recording of activesteer; delete it, or choose another "
-            "name",
+            f"cannot write {path}: it exists already and is no recording of activesteer; delete or rename it",
             value=path,
         )
 
 
 def open_target(path: Path, *, overwrite: bool) -> BinaryIO:
-    """A new file that no one else can write to as long as it is open; it takes the place of one that exists.
+    """Create a locked file in place of an existing one.
 
-    Whoever has opened the old one keeps it: it is deleted, not changed.
+    A process that has opened the old file keeps it, because it is deleted and not changed.
 
     Raises:
-        RecordingError: see `check_target`; or another program is writing it.
+        RecordingError: see `check_target`; or another program is writing the file.
     """
     check_target(path, overwrite=overwrite)
     with writing(path, RecordingError):
         if path.is_file():
             with path.open("rb") as old:
                 _lock(old, path)
-                with suppress(PermissionError):  # A file that may be written to in a folder that may not.
+                with suppress(PermissionError):  # a writeable file in a folder that is not
                     Path(os.path.realpath(path)).unlink()
         stream = path.open("wb" if overwrite else "xb")
     try:
@@ -78,4 +77,4 @@ def _lock(stream: BinaryIO, path: Path) -> None:
             f"cannot write {shown_path(path)}: another run or program is writing it", value=path
         ) from None
     except OSError:
-        return  # A file system without locks.
+        return  # a file system without locks

@@ -1,4 +1,4 @@
-"""Write a recording to an MCAP file while the run goes on."""
+"""Writer of a recording, which streams blocks into an MCAP file during the run."""
 
 from __future__ import annotations
 
@@ -56,20 +56,19 @@ from activesteer.version import __version__
 
 _ROWS_PER_CHUNK = 1000
 _CHUNK_BYTES = MAX_CHUNK_BYTES // 8
-"""Size of a chunk of very wide rows, without poses."""
+"""Size of a chunk of very wide rows without poses."""
 _ERROR_LETTERS = 2000
-_BLOCKS_IN_FLIGHT = 1  # More would be lost when the process is killed, and held when the disk is slow.
+_BLOCKS_IN_FLIGHT = 1  # More blocks would be lost by a kill, and would fill memory with a slow disk.
 
 
 class McapWriter:
-    """Stream channel values and poses into an MCAP file, readable up to the last block at any moment.
+    """Stream of channel values and poses into an MCAP file, which is readable up to the last block at any moment.
 
-    `write` encodes on the calling thread; compressing and writing run in one thread of their own, because zstd and
-    file output release the interpreter lock and the simulation need not wait. An error of that thread is raised by the
-    next `write` or `close`.
+    `write` encodes in the calling thread. A thread of its own compresses and writes, because zstd and file output
+    release the interpreter lock. The next `write` or `close` raises an error of that thread.
 
-    As a context manager it closes the file in every case; after an exception the file is marked with
-    `complete = false` and the error.
+    The context manager closes the file in every case. After an exception it marks the file with `complete = false` and
+    the error.
     """
 
     def __init__(
@@ -87,15 +86,15 @@ class McapWriter:
 
         Args:
             path: File to write.
-            channels: What is recorded, in the order of the columns of `values`. Those of one group share a topic.
+            channels: Channels in the order of the columns of `values`; the channels of a group share a topic.
             body_names: Names of the bodies whose poses are recorded.
-            metadata: What is needed to run it again; values must be representable in JSON.
-            attachments: Files to keep with the recording, by name.
-            scene: What the car looks like: solids in body frames, and links between bodies.
-            overwrite: Whether a recording that exists may be replaced; any other file never is.
+            metadata: Everything needed to repeat the run; values must be representable in JSON.
+            attachments: Name -> file to keep with the recording.
+            scene: Shape of the car: solids in body frames, and links between bodies.
+            overwrite: Whether an existing recording may be replaced; any other file never is.
 
         Raises:
-            RecordingError: the file cannot be written, or a channel, body, metadata value or primitive is not usable.
+            RecordingError: the file cannot be written, or a channel, body, metadata value or primitive is invalid.
         """
         self.path = Path(path)
         self.channels = ChannelTable(channels)
@@ -127,7 +126,7 @@ class McapWriter:
             self._begin(texts, metrics, attachments or {}, scene_data)
         except BaseException as error:
             self._abandon()
-            if self.path.is_file():  # It holds no rows, and cannot be opened.
+            if self.path.is_file():  # without rows, it cannot be opened
                 with suppress(OSError):
                     self.path.unlink()
             if isinstance(error, OSError):
@@ -159,7 +158,7 @@ class McapWriter:
         self._file.add_metadata(RUN_RECORD, texts)
         if metrics:
             self._file.add_metadata(METRICS_RECORD, metrics)
-        # Last, so that its presence tells the reader that all that comes before it is there too.
+        # Written last: its presence tells the reader that the records before it are complete.
         self._file.add_metadata(FORMAT_RECORD, {"version": str(FORMAT_VERSION)})
         self._encoder = BlockEncoder(self.channels, self.body_names, group_ids, transforms_id)
         if scene_id is not None:
@@ -174,7 +173,7 @@ class McapWriter:
         positions_m: ArrayLike = (),
         quaternions: ArrayLike = (),
     ) -> None:
-        """Write one block, best about one simulated second. The arrays may be reused as soon as it returns.
+        """Write a block, best of about one simulated second. The arrays may be reused after the call.
 
         A value above `MAX_NUMBER` is written as infinity of its sign.
 
@@ -186,8 +185,7 @@ class McapWriter:
             quaternions: Their orientations, w x y z, shape (k, number of bodies, 4).
 
         Raises:
-            RecordingError: a shape or a time is wrong, the file is closed, or this or an earlier block could not be
-                written.
+            RecordingError: a shape or a time is wrong, the file is closed, or a block could not be written.
         """
         if self._closed:
             raise RecordingError(f"{self.path} is closed", value=self.path)
@@ -195,7 +193,7 @@ class McapWriter:
         pose_ns = nanoseconds(pose_time_s, "pose_time_s", self._last_pose_ns)
         rows, poses, bodies = len(row_ns), len(pose_ns), len(self.body_names)
         values = shaped(values, "values", (rows, len(self.channels)))
-        if (huge := np.abs(values) > MAX_NUMBER).any():  # of a run that diverges
+        if (huge := np.abs(values) > MAX_NUMBER).any():  # the run diverges
             values = np.where(huge, np.copysign(np.inf, values), values)
         positions = shaped(positions_m, "positions_m", (poses, bodies, 3))
         turns = shaped(quaternions, "quaternions", (poses, bodies, 4))
@@ -206,7 +204,7 @@ class McapWriter:
         piece_rows = min(_ROWS_PER_CHUNK, max(1, _CHUNK_BYTES // max(1, self._encoder.row_bytes)))
         for start in range(0, max(rows, min(poses, 1)), piece_rows):
             stop = start + piece_rows
-            # Poses up to the last row of the piece go with it; the last piece takes all that remain.
+            # A piece takes the poses up to its last row; the last piece takes all others.
             pose_stop = poses if stop >= rows else int(np.searchsorted(pose_ns, row_ns[stop - 1], side="right"))
             piece, pose_piece = slice(start, stop), slice(pose_done, pose_stop)
             pose_done = pose_stop
@@ -230,14 +228,14 @@ class McapWriter:
         return self.path
 
     def close(self, metadata: Mapping[str, object] | None = None) -> None:
-        """Write what is known after the run, and end the file. Closing twice does nothing.
+        """Write what is known after the run, and end the file. A second call does nothing.
 
         Args:
-            metadata: More metadata, such as how the run ended; its key `metrics` holds the metrics by name.
+            metadata: Further metadata, such as how the run ended; the key `metrics` holds the metrics by name.
 
         Raises:
-            RecordingError: a metadata value cannot be kept, and the file is still open; or something could not be
-                written, and what was written before is in the file.
+            RecordingError: a metadata value cannot be stored, and the file stays open; or the file could not be
+                written, and it holds what was written before.
         """
         if self._closed:
             return
@@ -258,14 +256,14 @@ class McapWriter:
             self._abandon()
 
     def _check_place(self) -> None:
-        """Look whether what was written can be found where it was asked for."""
+        """Check that the written file is still at its path."""
         try:
             there = os.path.samestat(self.path.stat(), os.fstat(self._stream.fileno()))
         except FileNotFoundError:
             there = False
         if not there:
             raise RecordingError(
-                f"{shown_path(self.path)} was deleted or replaced while it was written: nothing is saved",
+                f"{shown_path(self.path)} was deleted or replaced during the run: nothing is saved",
                 value=self.path,
             )
 
@@ -281,14 +279,14 @@ class McapWriter:
             self.close()
             return
         try:
-            # An exception of another's may say anything at any length.
+            # An exception of user code may have a text of any length.
             text = f"{type(error).__name__}: {error}"[:_ERROR_LETTERS].encode(errors="replace").decode()
             self.close({"complete": False, "error": text})
         except RecordingError as second:
             error.add_note(f"The recording could not be ended properly either: {second}")
 
     def _await(self, maximum: int) -> None:
-        """Wait until at most that many blocks are still being written; raise what went wrong with them."""
+        """Wait until at most `maximum` blocks are being written; raise an error of their writing."""
         while len(self._pending) > maximum:
             end_ns, future = self._pending[0]
             try:
@@ -305,8 +303,8 @@ class McapWriter:
         return RecordingError(f"cannot write {self.path}: {error.strerror or error}{saved}", value=self.path)
 
     def _abandon(self) -> None:
-        """Give up thread and file without ending the file properly."""
+        """Release thread and file without ending the file properly."""
         self._closed = True
         self._thread.shutdown(wait=True, cancel_futures=True)
-        with suppress(OSError):  # Whoever called has the first error in hand.
+        with suppress(OSError):  # the caller handles the first error
             self._stream.close()
