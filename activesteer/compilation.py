@@ -1,12 +1,12 @@
-"""Compiling to native code, and keeping what was compiled: numba's decorators, with a key that holds the content.
+"""Native code with a disk cache: numba's decorators, keyed by the content of the sources.
 
-numba keeps compiled functions on disk and compiles again when the file of a function changes; it does not notice a
-change in another file whose functions or constants were compiled in, nor another version of the engine. Here the key is
-the content of the file and of every file of the package that it imports, directly or not, with the versions of numba,
-llvmlite, numpy and mujoco. Where the files lie is numba's choice: `NUMBA_CACHE_DIR`, `__pycache__` beside the source,
-the user's cache; where none of them can be written, every start compiles anew.
+numba keeps compiled functions on disk and compiles again if the file of a function changes. It does not notice a change
+in another file whose functions or constants were compiled in, nor another version of the engine. Here the key is the
+content of the file and of every file of the package that it imports, directly or not, with the versions of numba,
+llvmlite, numpy and mujoco. numba chooses the folder: `NUMBA_CACHE_DIR`, `__pycache__` beside the source, or the user's
+cache. If none of them can be written, every start compiles anew.
 
-The logger `activesteer` says when compiling begins (INFO) and when nothing can be kept (WARNING), each once.
+The logger `activesteer` reports the start of compilation (INFO) and a missing cache folder (WARNING), each once.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from numba.np import linalg
 
 _VERSIONS: Final = ("numba", "llvmlite", "numpy", "mujoco")
 _KEPT: Final = 4
-"""Compiled states of a function that are kept: some branches and versions that are worked on in turn."""
+"""Compiled states kept per function: enough for some branches and versions used in turn."""
 _IMPORT: Final = re.compile(r"^\s*(?:from\s+([\w.]+)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+([\w.]+))", re.MULTILINE)
 _LOGGER: Final = logging.getLogger("activesteer")
 
 
 def _import_array_functions() -> None:
-    """Lets numba import these without scipy.linalg, which takes longer than all of them.
+    """Let numba import its array functions without scipy.linalg, which takes longer than all of them.
 
-    numba only looks whether it is there, and looks again when it compiles something that needs it.
+    numba only checks here whether it exists, and checks again when it compiles something that needs it.
     """
     look = getattr(linalg, "ensure_blas", None)
     linalg.ensure_blas = lambda: None
@@ -52,9 +52,9 @@ _import_array_functions()
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """Decorator: the function as native code, compiled at its first call and kept on disk.
+    """Decorator: compile a function at its first call and keep the native code on disk.
 
-    Division by zero gives what IEEE 754 says, as in numpy; it does not raise.
+    Division by zero follows IEEE 754, as in numpy, and does not raise.
     """
     dispatcher: Any = njit(error_model="numpy")(function)
     if hasattr(dispatcher, "enable_caching"):  # a plain function where numba is switched off
@@ -63,16 +63,16 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Decorator: native code that becomes part of each compiled function that calls it."""
+    """Decorator: make native code part of each compiled function that calls it."""
     return njit(inline="always", error_model="numpy")(function)
 
 
 def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[Callable[..., Any]], CFunc]:
-    """Decorator: the function as a C function that the engine can call, compiled now and kept on disk.
+    """Decorator: compile a function now to a C function that the engine can call, and keep it on disk.
 
     Args:
-        result: Type that it returns.
-        arguments: Types of its arguments.
+        result: Type of the result.
+        arguments: Types of the arguments.
     """
 
     def decorate(function: Callable[..., Any]) -> CFunc:
@@ -87,14 +87,14 @@ def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[C
 def compiled_call(
     result: types.Type, *arguments: types.Type, others_run: bool = True
 ) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator: the function as native code of one signature, compiled now.
+    """Decorator: compile a function now to native code with one signature.
 
-    It is called from Python alone, with arguments by position, and does not look for their types first.
+    Call it from Python only, with positional arguments; it does not inspect their types first.
 
     Args:
-        result: Type that it returns.
-        arguments: Types of its arguments; what it is called with is converted.
-        others_run: Whether other threads may run in the meantime; to let them costs more than a small function.
+        result: Type of the result.
+        arguments: Types of the arguments; what is passed is converted.
+        others_run: Let other threads run during the call; this costs more than a small function does.
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
@@ -108,7 +108,7 @@ def compiled_call(
 
 
 class _ContentCache(FunctionCache):
-    """numba's cache of one function, under a name that holds the content of all its sources."""
+    """numba's cache of one function, under a name with the content key of all its sources."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
@@ -155,7 +155,7 @@ def _say_uncached() -> None:
 
 
 def content_key(source: Path) -> str:
-    """What identifies the code compiled from a file: all sources behind it, and the versions of what compiles them.
+    """Return a key of the code compiled from a file: all sources behind it, and the versions of the compilers.
 
     Args:
         source: A file of a package.
@@ -171,7 +171,7 @@ def content_key(source: Path) -> str:
 
 @functools.cache
 def _sources_key(source: Path) -> str:
-    """Digest of all sources behind a file, its own included."""
+    """Return the digest of all sources behind a file, including its own."""
     package = source.parent
     while (package.parent / "__init__.py").is_file():
         package = package.parent
@@ -190,7 +190,7 @@ def _sources_key(source: Path) -> str:
 
 
 def processor() -> str:
-    """The processor of this machine as the compiler calls it; with another, last digits may differ."""
+    """Return the compiler's name of this processor; another processor may change last digits."""
     return get_host_cpu_name()
 
 
@@ -210,7 +210,7 @@ def _content(file: Path) -> bytes:
 
 @functools.cache
 def _imported(file: Path, package: Path) -> tuple[Path, ...]:
-    """The files of the package that a file imports from."""
+    """Return the files of the package that a file imports from."""
     return tuple(_imports(_content(file).decode(), package))
 
 

@@ -1,4 +1,4 @@
-"""The one table of axes, signs and orders. SI units and radians everywhere inside the package.
+"""Axes, signs and orders of the whole package. SI units and radians are used everywhere inside it.
 
 Axes follow ISO 8855: x forward, y left, z up; a left turn, a left steer and a left yaw are positive.
 Roll is positive to the right (rotation about +x), pitch is positive nose down (rotation about +y).
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-"""Numbers of double precision, of any shape."""
+"""Array of float64, of any shape."""
 
 CORNERS: Final = ("fl", "fr", "rl", "rr")
 """Corner names in the order of every per-corner array: front left, front right, rear left, rear right."""
@@ -34,23 +34,23 @@ CURVE_STEP_S: Final = 0.02
 """Time between two values of a channel that a study keeps over time [s]: enough for a picture."""
 
 SYSTEM_LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering", "afs": "3 active front steering"}
-"""What the runs of the three systems are called, numbered as in the paper's figures."""
+"""Labels of the three systems, numbered as in the paper's figures."""
 
 RUN_COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00")
-"""Colours of the three systems, then of other runs; colour-blind readers can tell them apart (Okabe and Ito, 2008)."""
+"""Colours of the three systems, then of other runs, distinguishable by colour-blind readers (Okabe and Ito, 2008)."""
 RUN_COLOURS_ON_DARK: Final = ("#c9ccd1", "#f0843c", "#4aa8e0", "#2bbd8e", "#e39cc4", "#f0b429")
-"""The same hues where the background is dark."""
+"""The same hues for a dark background."""
 RUN_DASHES: Final = ((), (7.0, 2.0), (7.0, 1.5, 1.5, 1.5), (3.0, 1.5), (10.0, 3.0), (1.5, 1.0))
-"""Dashes and gaps of their curves, in widths of the line: they tell them apart in grey, and show the curve below."""
+"""Dashes and gaps of their curves, in line widths: they tell curves apart in grey and show the curve below."""
 
 
 class RunLook(NamedTuple):
-    """How a run looks, wherever it is drawn.
+    """Appearance of a run in all pictures.
 
     Attributes:
-        label: What its curve is called.
-        place: Its colour's place in `RUN_COLOURS`.
-        dashes: Dashes and gaps of its curve, in widths of the line; none is a full line.
+        label: Label of its curve.
+        place: Place of its colour in `RUN_COLOURS`.
+        dashes: Dashes and gaps of its curve, in line widths; empty for a full line.
     """
 
     label: str
@@ -59,24 +59,24 @@ class RunLook(NamedTuple):
 
     @property
     def colour(self) -> str:
-        """Its colour on a light background, `#rrggbb`."""
+        """Colour on a light background, `#rrggbb`."""
         return RUN_COLOURS[self.place]
 
     @property
     def on_dark(self) -> str:
-        """Its colour on a dark one."""
+        """Colour on a dark background."""
         return RUN_COLOURS_ON_DARK[self.place]
 
 
 def run_looks(names: Iterable[str]) -> dict[str, RunLook]:
-    """How runs look that are shown together.
+    """Assign a look to each of several runs that are shown together.
 
     Args:
         names: Names of the runs; `none`, `ars` and `afs` are the three systems.
 
     Returns:
-        By name, in the order in which they are drawn: the systems in the paper's, always in the same colours, then the
-        others, which take a system's colour only where the others are used up and that system is not there.
+        Looks by name, in drawing order: the systems in the paper's order, always in the same colours, then the others.
+        Another run takes a system's colour only if all others are used up and that system is not shown.
     """
     given = list(dict.fromkeys(names))
     known = [name for name in SYSTEM_LABELS if name in given]
@@ -89,7 +89,7 @@ def run_looks(names: Iterable[str]) -> dict[str, RunLook]:
 
 
 def yaw_of(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Yaw angle of a body, the heading of its x axis in the road plane.
+    """Return the yaw angle of a body, the heading of its x axis in the road plane.
 
     Args:
         quaternions: Orientations w x y z, of length 1, shape (..., 4).

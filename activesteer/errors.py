@@ -1,4 +1,4 @@
-"""The errors a user of activesteer can meet: one base, one child per kind of input that can be wrong."""
+"""The errors a user of activesteer can meet: one base, one child for each kind of wrong input."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 MAX_SHOWN: Final = 200
-"""How much of a value an error message repeats [characters]."""
+"""Characters of a value that an error message repeats."""
 _MAX_MESSAGE: Final = 1000
-"""Longest message of an error [characters]; the middle of a longer one is left out."""
+"""Characters of the longest error message; the middle of a longer one is left out."""
 _GAP: Final = " ... "
 
 
@@ -20,14 +20,14 @@ class ActiveSteerError(Exception):
     """Base of every error that activesteer raises on purpose; its message is one line, made from its attributes.
 
     Attributes:
-        problem: What is wrong, and what to do.
-        file: Name of the file that it is in; None where there is none.
+        problem: The problem and its remedy.
+        file: Name of the file with the problem; None without a file.
         line: Line in the file, from 1.
         key: Dotted key, option or argument that is wrong.
-        value: What was given there.
-        allowed: What may be given: a `config.Range`, or the names that exist.
-        overridden: The value came from an override, not from the file.
-        recording: What a run recorded until it failed with this error; None elsewhere.
+        value: The value given there.
+        allowed: Allowed values: a `config.Range`, or the names that exist.
+        overridden: True if the value came from an override, not from the file.
+        recording: Recording of a run until it failed with this error; None elsewhere.
     """
 
     recording: Any = None
@@ -43,7 +43,7 @@ class ActiveSteerError(Exception):
         allowed: Any = None,
         overridden: bool = False,
     ) -> None:
-        """See the attributes."""
+        """Make the message; see the attributes."""
         where = [f"{file}, line {line}" if line else file] if file and not overridden else []
         if key:
             where.append(f"override {key}" if overridden else key)
@@ -69,15 +69,15 @@ class TyreFileError(ActiveSteerError):
 
 
 class ControllerError(ActiveSteerError):
-    """A controller cannot be loaded, or returned something that is no steering command."""
+    """A controller cannot be loaded, or returned something other than a steering command."""
 
 
 class DriverError(ActiveSteerError):
-    """A driver cannot be loaded, or returned something that is no command."""
+    """A driver cannot be loaded, or returned something other than a driver command."""
 
 
 class SimulationDiverged(ActiveSteerError):  # noqa: N818 - an event of the physics, named as one
-    """The state became non-finite, or the engine raised a warning; what was recorded is kept."""
+    """The state became non-finite, or the engine raised a warning; the recording so far is kept."""
 
 
 class RecordingError(ActiveSteerError):
@@ -89,26 +89,26 @@ class PlaybackError(ActiveSteerError):
 
 
 class StudyError(ActiveSteerError):
-    """A study cannot be begun, gone on with, or shown."""
+    """A study cannot be started, resumed or shown."""
 
 
 def not_installed(error: type[ActiveSteerError], what: str, package: str, extra: str) -> ActiveSteerError:
-    """What needs a package that is not there.
+    """Return an error for a missing package.
 
     Args:
         error: Class of the error.
-        what: What needs it.
-        package: Which package.
-        extra: The extra of activesteer that brings it.
+        what: The feature that needs the package.
+        package: The package.
+        extra: The extra of activesteer that installs it.
 
     Returns:
-        The error, to be raised; its value is the package, what is allowed the extra.
+        The error, to be raised; its value is the package.
     """
     return error(f"{what} needs {package}; pip install 'activesteer[{extra}]'", value=package, allowed=extra)
 
 
 def shown(value: object) -> str:
-    """A value as an error message repeats it: as Python writes it, a path as it is; of a long one beginning and end."""
+    """Return a value as an error message repeats it: its Python form, or a path as text, shortened in the middle."""
     if isinstance(value, os.PathLike):
         return _shortened(_printable(os.fsdecode(value)), MAX_SHOWN)
     try:
@@ -119,15 +119,15 @@ def shown(value: object) -> str:
 
 
 def nearest_names(name: str, known: Iterable[str], maximum: int = 5) -> str:
-    """Words for an error message: which existing names come closest to a wrong one.
+    """Return words for an error message: the existing names closest to a wrong one.
 
     Args:
         name: The name that does not exist.
         known: The names that do.
-        maximum: How many to offer.
+        maximum: Number of names to offer.
 
     Returns:
-        ``"did you mean 'a' or 'b'?"`` where something is close, else all names in a list, or of many the first ones.
+        ``"did you mean 'a' or 'b'?"`` if a name is close, else the list of all names, or the first ones of a long list.
     """
     names = sorted(known)
     close = difflib.get_close_matches(name[:MAX_SHOWN], names, n=maximum, cutoff=0.5)
@@ -145,7 +145,7 @@ _REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = 20
 
 
 def _one_line(text: str) -> str:
-    """Line breaks become blanks, and what cannot be printed becomes its escape sequence."""
+    """Replace line breaks by blanks, and what cannot be printed by its escape sequence."""
     line = re.sub(r"[ \t]*[\r\n]\s*", " ", _shortened(text.strip(), 4 * _MAX_MESSAGE))
     return _shortened(_printable(line), _MAX_MESSAGE)
 

@@ -1,20 +1,21 @@
-"""Anti-lock control of the four wheels: pressure in cycles about what the road bears.
+"""Anti-lock control of the four wheels: pressure in cycles around the limit of the road.
 
-A wheel that is braked harder than the road bears loses speed quickly, since its inertia is small beside the car's: that
-shows by its deceleration before its slip is large, on any road, without knowing where the friction has its peak. So
-each wheel goes round
+A wheel that is braked harder than the road permits loses speed quickly, since its inertia is small compared with the
+car's. Its deceleration shows this before its slip is large, on any road, without knowing the slip at peak friction.
+Each wheel runs through the phases
 
     OFF -> RELEASE -> RECOVER -> BUILD -> RELEASE ...
 
-RELEASE lowers the pressure to a fraction of what the friction bore (`friction_Nm`, from pressure and deceleration of
-the wheel), on ice further, where that leaves too little torque to speed the wheel up, and still further if the wheel
-does not gain speed; RECOVER waits until it rolls with the car again; BUILD begins just below what was borne and rises
-slowly, the faster the longer it lasts, as on a road that has become better. A wheel whose limit comes above what the
-driver asks for is OFF. A car that is nearly at rest is handed over to him by pressures that rise slowly.
+RELEASE lowers the pressure to a fraction of the friction torque (`friction_Nm`, from pressure and deceleration of the
+wheel). On ice it lowers the pressure further, if that leaves too little torque to speed the wheel up, and still further
+if the wheel does not gain speed. RECOVER waits until the wheel rolls with the car again. BUILD starts just below the
+last friction torque and rises slowly, and faster the longer it lasts, as on a road with increasing friction. A wheel
+whose limit exceeds the driver's demand is OFF. Near standstill, slowly rising pressures hand the car over to the
+driver.
 
 Source of the cycle by wheel deceleration: Bosch, Automotive Handbook, chapter on ABS; Pasillas-Lepine (2006), Hybrid
-modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms. Shares, thresholds and rates are
-chosen.
+modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms. Fractions, thresholds and rates
+are chosen.
 """
 
 from __future__ import annotations
@@ -26,15 +27,16 @@ from activesteer.compilation import compiled
 OFF, RELEASE, RECOVER, BUILD = 0.0, 1.0, 2.0, 3.0
 
 _REGAINS_mps2: Final = 3.0
-"""A wheel that gains speed on the car by more than this is recovering; by less it rolls with it in any case [m/s2]."""
+"""A wheel that accelerates relative to the car by more than this is recovering; below it, the wheel rolls with the car.
+"""
 _PATIENCE_S: Final = 0.03
-"""Time that a released wheel gets to gain speed before its pressure is taken down further [s]."""
+"""Time in which a released wheel must gain speed before its pressure is lowered further [s]."""
 _SETTLES_S: Final = 0.08
-"""Time in which the wheel follows the first pressure of building up, as the tyre's carcass winds up [s]."""
+"""Time in which the wheel follows the first pressure of BUILD, while the tyre's carcass winds up [s]."""
 _KEPT: Final = 0.9
-"""What a wheel that is released again so soon is still trusted to bear, as a fraction of what it bore before."""
+"""Friction torque of a wheel that is released again so soon, as a fraction of the previous one."""
 _IMPATIENCE_S: Final = 0.25
-"""Time after which building up becomes faster by its own amount [s]."""
+"""Time in which the rate of BUILD increases by its initial value [s]."""
 
 
 @compiled
@@ -57,11 +59,11 @@ def _release(setup, state, wheel):
 
 @compiled
 def _wheel(setup, state, wheel, car_mps2):
-    """One interval of one wheel."""
+    """Advance one wheel by one interval."""
     per_pressure = setup.torque_per_pressure_NmpPa[wheel]
     slip = (state.reference_mps - state.wheel_mps[wheel]) / state.reference_mps
     gain = state.wheel_mps2[wheel] - car_mps2
-    # A wheel that stands gains on a car that brakes, too, and yet does not come back.
+    # A locked wheel also gains speed relative to a braking car, but does not recover.
     regains = gain > _REGAINS_mps2 and (slip < setup.largest_slip or state.wheel_mps2[wheel] > 0.0)
     phase = state.phase[wheel]
     state.phase_s[wheel] += setup.interval_s
@@ -74,7 +76,7 @@ def _wheel(setup, state, wheel, car_mps2):
         if (gain < -threshold and slip > minimum) or (slip > setup.largest_slip and gain < _REGAINS_mps2):
             _release(setup, state, wheel)
         elif phase == OFF:
-            # Less than the highest where the car has become faster again, after a hand-over.
+            # The limit is below the highest pressure if the car has become faster again after a hand-over.
             highest = setup.full_pedal_pressure_Pa
             state.limit_Pa[wheel] = min(state.limit_Pa[wheel] + setup.hand_over_Paps * setup.interval_s, highest)
         else:
@@ -103,13 +105,13 @@ def _wheel(setup, state, wheel, car_mps2):
 
 @compiled
 def antilock(setup, state, ax_mps2, steered_Pa):
-    """One decision for all wheels.
+    """Decide once for all wheels.
 
     Args:
         setup: A `BRAKE_SETUP`.
         state: Its `BRAKE_STATE`; `limit_Pa`, the phases and `side_Pa` are advanced.
-        ax_mps2: Longitudinal acceleration as measured [m/s2].
-        steered_Pa: Difference of the sides that the controller steers against, beyond the driver's [Pa].
+        ax_mps2: Measured longitudinal acceleration [m/s2].
+        steered_Pa: Side-to-side difference that the controller steers against, in addition to the driver's [Pa].
     """
     highest = setup.full_pedal_pressure_Pa
     slow = state.reference_mps < setup.lowest_speed_mps
@@ -132,7 +134,7 @@ def antilock(setup, state, ax_mps2, steered_Pa):
 
 @compiled
 def _hold_sides_together(setup, state, steered_Pa):
-    """The front wheel with more grip is let off the other's pressure only as fast as a driver can steer against it."""
+    """Limit the front wheel with more grip: it may exceed the other by what a driver can steer against."""
     if state.phase[0] == OFF and state.phase[1] == OFF:
         state.side_Pa = setup.side_difference_Pa
         return

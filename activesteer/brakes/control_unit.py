@@ -1,4 +1,4 @@
-"""One step of the brakes: what is asked, what the control unit makes of it at its own rate, what the wheels get."""
+"""One step of the brakes: demand, control unit at its own rate, pressures."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from activesteer.compilation import compiled
 
 @compiled
 def step_brakes(setup, state, speeds_radps, ax_mps2, pedal, drive_Nm, asked_Nm, steered_Pa):
-    """One step.
+    """Make one step.
 
     Args:
         setup: A `BRAKE_SETUP`.
         state: Its `BRAKE_STATE`.
-        speeds_radps: Rotational speeds of the wheels as measured [rad/s], order of `CORNERS`.
-        ax_mps2: Longitudinal acceleration as measured [m/s2].
+        speeds_radps: Measured rotational speeds of the wheels [rad/s], order of `CORNERS`.
+        ax_mps2: Measured longitudinal acceleration [m/s2].
         pedal: Brake pedal position, 0 to 1.
-        drive_Nm: Drive torque that driver and controller ask for [Nm].
-        asked_Nm: Brake torques that the controller asks for [Nm], order of `CORNERS`.
-        steered_Pa: Difference of the sides that the controller steers against [Pa].
+        drive_Nm: Drive torque that driver and controller demand [Nm].
+        asked_Nm: Brake torques that the controller demands [Nm], order of `CORNERS`.
+        steered_Pa: Side-to-side difference that the controller steers against [Pa].
 
     Returns:
-        The drive torque that is left [Nm].
+        The drive torque that traction control leaves [Nm].
     """
     ask(setup, state, pedal, asked_Nm)
     state.steps_left -= 1.0

@@ -1,4 +1,4 @@
-"""Pressures of the wheel brakes: behind what is asked of them by a lag, no faster than booster, valves and pump."""
+"""Pressures of the wheel brakes: a lag behind their demand, with the rate limits of booster, valves and pump."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from activesteer.compilation import compiled
 
 @compiled
 def ask(setup, state, pedal, asked_Nm):
-    """Pressures that driver and controller ask for together: at least none, at most the highest.
+    """Add the pressures that driver and controller demand, between 0 and the highest.
 
     Args:
         setup: A `BRAKE_SETUP`.
         state: Its `BRAKE_STATE`; `demand_Pa` is written.
         pedal: Brake pedal position, 0 to 1.
-        asked_Nm: Brake torques that the controller asks for [Nm], order of `CORNERS`.
+        asked_Nm: Brake torques that the controller demands [Nm], order of `CORNERS`.
     """
     highest = setup.full_pedal_pressure_Pa
     for wheel in range(4):
@@ -25,14 +25,14 @@ def ask(setup, state, pedal, asked_Nm):
 
 @compiled
 def flow(setup, state, pedal):
-    """One step of the pressures.
+    """Advance the pressures by one step.
 
     The torque of a brake is its torque per pressure, 2 mu_pad A_piston r_effective, times the pressure.
 
     Args:
         setup: A `BRAKE_SETUP`.
         state: Its `BRAKE_STATE`; `pressure_Pa` is advanced.
-        pedal: Brake pedal position, 0 to 1: up to its pressure the pedal feeds a brake, beyond it the pump does.
+        pedal: Brake pedal position, 0 to 1; up to its pressure the pedal feeds a brake, beyond it the pump does.
     """
     fed = pedal * setup.full_pedal_pressure_Pa
     for wheel in range(4):

@@ -1,4 +1,4 @@
-"""What the native brakes know and remember: records of float64, at addresses that stay."""
+"""Constants and state of the native brakes: records of float64, at addresses that stay."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ BRAKE_SETUP: Final = np.dtype(
         ],
     )
 )
-"""What stays as it is during a run; names as in the vehicle file, `follow` is the fraction of a pressure's way to its
-demand that it goes in a step."""
+"""Constants of a run; names as in the vehicle file. `follow` is the fraction of the difference between pressure and
+demand that closes in one step."""
 
 PER_WHEEL: Final = (
     "demand_Pa", "pressure_Pa", "limit_Pa", "allowed_Pa", "traction_Pa", "phase", "phase_s", "friction_Nm",
@@ -44,19 +44,18 @@ ALONE: Final = (
 BRAKE_STATE: Final = np.dtype(
     (np.record, [*((name, np.float64, _FOUR) for name in PER_WHEEL), *((name, np.float64) for name in ALONE)])
 )
-"""What changes, saved and restored with the engine's state:
+"""Variables, saved and restored with the engine's state.
 
-demand_Pa: pressure that driver and controller ask for;
-pressure_Pa: pressure in the wheel brake; limit_Pa: what the anti-lock system allows the wheel by itself, allowed_Pa:
-with regard to the others; traction_Pa: what traction control wants; phase, phase_s: phase of the anti-lock control, see
-`antilock`, and time in it; friction_Nm: torque of the road by the wheel's motion; borne_Nm: the one that the wheel bore
-last; regained_mps2: the fastest that it has regained speed in its recovery; wheel_mps, wheel_mps2: speed and
-acceleration of its circumference.
+demand_Pa: pressure that driver and controller demand;
+pressure_Pa: pressure in the wheel brake; limit_Pa: anti-lock limit of the wheel by itself; allowed_Pa: limit with
+regard to the other wheels; traction_Pa: demand of traction control; phase, phase_s: phase of the anti-lock control, see
+`antilock`, and time in it; friction_Nm: torque of the road from the wheel's motion; borne_Nm: last friction torque of
+the wheel at its limit; regained_mps2: largest acceleration of the wheel in its recovery; wheel_mps, wheel_mps2: speed
+and acceleration of its circumference.
 
-drive_limit_Nm: what traction control leaves of the drive torque, traction_Nm:
-its integral, tcs_active: whether it acts; reference_mps: estimated speed of the car; offset_mps2: estimated error of
-the acceleration; side_Pa: how much the pressures of the front wheels may differ; steps_left: steps until the next
-decision.
+drive_limit_Nm: limit of the drive torque by traction control; traction_Nm: its integral; tcs_active: whether traction
+control acts; reference_mps: estimated speed of the car; offset_mps2: estimated error of the acceleration; side_Pa:
+allowed difference of the front wheels' pressures; steps_left: steps until the next decision.
 """
 
 PLACES: Final = {name: len(CORNERS) * index for index, name in enumerate(PER_WHEEL)} | {
@@ -65,7 +64,7 @@ PLACES: Final = {name: len(CORNERS) * index for index, name in enumerate(PER_WHE
 """Field of a `BRAKE_STATE` -> its (first) place among the numbers."""
 
 NO_LIMIT_NM: Final = 1e9
-"""Drive torque limit that limits nothing [N m]."""
+"""Drive torque limit without effect [N m]."""
 
 
 def brake_setup(
@@ -75,12 +74,12 @@ def brake_setup(
     drive_fraction: Sequence[float],
     inertia_kgm2: Sequence[float],
 ) -> NDArray[Any]:
-    """The brakes of a car.
+    """Build the constants of a car's brakes.
 
     Args:
         brakes: The table of the vehicle file.
         timestep_s: Step of the engine [s].
-        rolling_radius_m: Radius of each wheel by which its rotation is taken for a speed [m].
+        rolling_radius_m: Radius of each wheel that turns its rotation into a speed [m].
         drive_fraction: Fraction of the drive torque of each wheel.
         inertia_kgm2: Inertia of each wheel about its axis [kg m2].
 
@@ -104,7 +103,7 @@ def brake_setup(
 
 
 def reset(state: NDArray[Any], setup: NDArray[Any], speed_mps: float) -> None:
-    """Released brakes on a car that rolls at a speed.
+    """Release the brakes of a car that rolls at a speed.
 
     Args:
         state: A `BRAKE_STATE`, shape (1,).

@@ -1,8 +1,8 @@
-"""The speed of the car as a control unit estimates it, from the wheels and the longitudinal acceleration.
+"""The control unit's estimate of the car's speed, from the wheels and the longitudinal acceleration.
 
-While no brake works, the wheels that are not driven roll. While one does, the fastest wheel is nearest to the car's
-speed; from the last such instant on the acceleration is integrated. It is the specific force along the inclined body:
-what it has of gravity on a slope is learned while the car rolls.
+While no brake acts, the wheels that are not driven give the speed. While a brake acts, the fastest wheel is closest to
+the car's speed, and the acceleration is integrated from the last unbraked instant on. The measured acceleration is the
+specific force along the inclined body; its part from gravity on a slope is learned while the car rolls.
 """
 
 from __future__ import annotations
@@ -12,20 +12,21 @@ from typing import Final
 from activesteer.compilation import compiled
 
 _SLACK_mps2: Final = 0.2
-"""What the estimate loses beside the measured deceleration, so that the fastest wheel takes it up again [m/s2]."""
+"""Additional deceleration of the estimate, so that the fastest wheel corrects it upwards [m/s2]."""
 _CATCH_UP_mps2: Final = 2.0
-"""How fast it does: a wheel that swings on its suspension is for an instant faster than the car [m/s2]."""
+"""Largest rate of that correction; a wheel that swings on its suspension is for an instant faster than the car [m/s2].
+"""
 _LEARN_S: Final = 0.5
-"""Time constant with which the offset of the acceleration is learned [s]."""
+"""Time constant of the learned offset of the acceleration [s]."""
 _LARGEST_OFFSET_mps2: Final = 3.0
-"""No road is steeper than this [m/s2]."""
+"""Largest offset; no road is steeper than this [m/s2]."""
 _SMOOTH_S: Final = 0.005
 """Time constant of the wheel accelerations [s]."""
 
 
 @compiled
 def follow_wheels(setup, state, speeds_radps):
-    """Speeds and accelerations of the wheels' circumferences, and what the road bears, after an interval.
+    """Update circumferential speeds and accelerations of the wheels, and their friction torques, after an interval.
 
     Args:
         setup: A `BRAKE_SETUP`.
@@ -46,13 +47,13 @@ def follow_wheels(setup, state, speeds_radps):
 
 @compiled
 def follow_car(setup, state, ax_mps2, braked):
-    """The reference speed, after an interval.
+    """Update the reference speed after an interval.
 
     Args:
         setup: A `BRAKE_SETUP`.
         state: Its `BRAKE_STATE`; `reference_mps` and `offset_mps2` are advanced.
-        ax_mps2: Longitudinal acceleration as measured [m/s2].
-        braked: Whether a brake works or is asked to.
+        ax_mps2: Measured longitudinal acceleration [m/s2].
+        braked: Whether a brake is applied or demanded.
     """
     fastest, slowest, rolling, free = -1e9, 1e9, 0.0, 0.0
     for wheel in range(4):
@@ -62,7 +63,7 @@ def follow_car(setup, state, ax_mps2, braked):
             rolling += state.wheel_mps[wheel]
             free += 1.0
     if braked:
-        # Brakes do not make a car faster; where a slope does, its wheels show it.
+        # Brakes do not make a car faster; if a slope does, the wheels show it.
         rate_mps2 = min(ax_mps2 - state.offset_mps2, 0.0) - _SLACK_mps2
         integrated = state.reference_mps + rate_mps2 * setup.interval_s
         caught_up = min(fastest, integrated + _CATCH_UP_mps2 * setup.interval_s)

@@ -1,4 +1,4 @@
-"""Traction control: the driven wheels are kept near the speed of the car, by the engine and by their brakes."""
+"""Traction control: engine and brakes keep the driven wheels near the speed of the car."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from activesteer.compilation import compiled
 
 @compiled
 def traction(setup, state, torque_Nm, braked):
-    """One decision.
+    """Decide once.
 
-    Together the driven wheels may turn faster than the car rolls by a fraction of its speed and a little more. What is
-    beyond takes back the drive torque, by a proportional and an integral part, the latter from the torque at which it
-    began. Of two wheels of an axle the faster one is braked, so that the differential gives the other its torque.
+    The mean speed of the driven wheels may exceed that of the car by a fraction and a constant. A proportional and an
+    integral part reduce the drive torque by the excess; the integral starts from the torque at that instant. Of two
+    wheels of an axle the faster one is braked, so that the differential passes its torque to the other.
 
     Args:
         setup: A `BRAKE_SETUP`.
         state: Its `BRAKE_STATE`; `drive_limit_Nm`, `traction_Nm` and `traction_Pa` are advanced.
-        torque_Nm: Drive torque that driver and controller ask for [Nm].
-        braked: Whether a brake works or is asked to.
+        torque_Nm: Drive torque that driver and controller demand [Nm].
+        braked: Whether a brake is applied or demanded.
     """
     turning, other = 0.0, 0.0
     for wheel in range(4):

@@ -1,4 +1,4 @@
-"""What may go wrong with actuators and sensors of a car, and when: the description; `vehicle.faults` lets it act."""
+"""Faults of actuators and sensors, and their times. Here they are described; `vehicle.faults` activates them."""
 
 from activesteer.faults.fault import ACTUATORS, ANGLE_SENSOR, KINDS, SENSORS, Fault, check_faults
 from activesteer.faults.text import fault_table

@@ -1,4 +1,4 @@
-"""One fault: which part, what happens to it, when, and how much."""
+"""One fault: the part, its kind, its time and its size."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ class Actuator(NamedTuple):
 
     Attributes:
         members: The engine's actuators that it stands for.
-        unit: Unit of a size, as names end in it.
-        by_ratio: Whether their angle is the steering ratio times that of a road wheel, which a size is given at.
+        unit: Unit of a size, as the suffix of a key.
+        by_ratio: True if its angle is the steering ratio times that of the road wheel; a size is given at the road
+            wheel.
     """
 
     members: tuple[str, ...]
@@ -28,21 +29,21 @@ class Actuator(NamedTuple):
 
     @property
     def is_brake(self) -> bool:
-        """Whether it brakes: its demand is a torque, and it has one stop only."""
+        """True for a brake: its demand is a torque, and it has one stop only."""
         return self.unit == "Nm"
 
 
 ANGLE_SENSOR: Final = "steering_wheel_sensor"
-"""The sensor through which controllers know of the driver's demand, where it is not ideal."""
+"""Sensor that tells controllers the driver's demand if the sensor is not ideal."""
 
 
 class Sensor(NamedTuple):
     """A signal of `Measurement` as faults name it.
 
     Attributes:
-        field: Its name there.
-        wheel: Place in it, where it is a tuple of the four wheels.
-        unit: Its unit, as names end in it.
+        field: Its name in `Measurement`.
+        wheel: Its place if the field is a tuple of the four wheels.
+        unit: Its unit, as the suffix of a key.
     """
 
     field: str
@@ -54,7 +55,7 @@ _UNITS: Final = ("radps", "mps2", "mps", "rad", "Pa", "Nm")
 
 
 def _sensors() -> dict[str, Sensor]:
-    """The signals that a controller gets, but for the time."""
+    """Return the signals that a controller gets, except the time."""
     found: dict[str, Sensor] = {}
     for field in Measurement._fields:
         name, _, unit = field.rpartition("_")
@@ -74,9 +75,9 @@ ACTUATORS: Final = {
     "superposition": Actuator(("superposition",), by_ratio=True),
     **{f"{corner}_brake": Actuator((f"{corner}_brake",), "Nm") for corner in CORNERS},
 }
-"""Part -> which actuators it stands for."""
+"""Part -> its actuators."""
 SENSORS: Final = _sensors()
-"""Part -> which signal it stands for."""
+"""Part -> its signal."""
 
 KINDS: Final = {
     "stuck": "an actuator stays where it is, a brake at its torque, a sensor at its last reading",
@@ -87,7 +88,7 @@ KINDS: Final = {
     "delayed": "demand or reading comes late",
     "dropout": "demand or reading is missing and taken for zero",
 }
-"""Kind of fault -> what it does."""
+"""Kind of fault -> its effect."""
 
 _SIZES: Final = ("size_rad", "size_radps", "size_mps", "size_mps2", "size_Nm", "size_Pa")
 
@@ -97,36 +98,37 @@ class Fault:
     """A fault of one part."""
 
     part: str
-    """What fails: `rear`, `rear_left`, `rear_right`, `superposition`, `fl_brake` and the others, or a sensor as
-    `yaw_rate_sensor`."""
+    """Faulty part: `rear`, `rear_left`, `rear_right`, `superposition`, `fl_brake` and the other brakes, or a sensor
+    such as `yaw_rate_sensor`."""
     kind: str
-    """What happens: `stuck`, `runaway`, `float`, `offset`, `reversed`, `delayed` or `dropout`."""
+    """Effect: `stuck`, `runaway`, `float`, `offset`, `reversed`, `delayed` or `dropout`."""
     start_s: Annotated[float, Range(0.0)]
-    """When it begins [s]."""
+    """Start [s]."""
     end_s: Annotated[float, Range(0.0)] | None = None
-    """When the part works again [s]; never where not given."""
+    """Time from which the part works again [s]; default never."""
     side: str | None = None
-    """To which stop a steering actuator runs away: `left` or `right`."""
+    """Stop that a steering actuator runs away to: `left` or `right`."""
     size_rad: float | None = None
-    """Offset of an actuator (at the road wheel) or an angle sensor, or what such a sensor reads at runaway [rad]."""
+    """Offset of an actuator (at the road wheel) or an angle sensor, or the reading of such a sensor at runaway [rad].
+    """
     size_radps: float | None = None
-    """The same of a yaw rate or wheel speed sensor [rad/s]."""
+    """The same for a yaw rate or wheel speed sensor [rad/s]."""
     size_mps: float | None = None
-    """The same of a speed sensor [m/s]."""
+    """The same for a speed sensor [m/s]."""
     size_mps2: float | None = None
-    """The same of an acceleration sensor [m/s2]."""
+    """The same for an acceleration sensor [m/s2]."""
     size_Nm: float | None = None
     """Offset of a brake [N m]."""
     size_Pa: float | None = None
-    """The same of a brake pressure sensor [Pa]."""
+    """The same for a brake pressure sensor [Pa]."""
     delay_s: Annotated[float, Range(0.001, 10.0)] | None = None
-    """How late demand or reading come [s]."""
+    """Delay of the demand or reading [s]."""
 
     def __post_init__(self) -> None:
-        """The part can fail so, and has all that says how, and nothing else.
+        """Check that the part can fail in this way, and that exactly the keys of this kind are given.
 
         Raises:
-            ManeuverError: it cannot or has not.
+            ManeuverError: it cannot, a key is missing, or a key has no effect.
         """
         if self.part not in ACTUATORS and self.part not in SENSORS:
             names = [*ACTUATORS, *SENSORS]
@@ -168,7 +170,7 @@ class Fault:
 
     @property
     def _needed(self) -> str | None:
-        """The key that says how much."""
+        """Key that gives the size."""
         if self.kind == "delayed":
             return "delay_s"
         if self.kind == "runaway" and self.part in ACTUATORS:
@@ -183,12 +185,12 @@ class Fault:
 
     @property
     def size(self) -> float:
-        """How much, in the unit of the part; 0 where nothing is to be said."""
+        """Size in the unit of the part; 0 if the kind has none."""
         return next((value for name in _SIZES if (value := getattr(self, name)) is not None), 0.0)
 
     @property
     def name(self) -> str:
-        """The fault without its time, as it is written on the command line."""
+        """The fault without its time, as written on the command line."""
         needed = self._needed
         if needed is None:
             return f"{self.part}:{self.kind}"
@@ -196,22 +198,22 @@ class Fault:
         return f"{self.part}:{self.kind}={value}" if needed == "side" else f"{self.part}:{self.kind}={value:g}{unit}"
 
     def shares_a_part_with(self, other: Fault) -> bool:
-        """Whether both act on the same thing."""
+        """Return True if both faults act on the same part."""
         if self.part in ACTUATORS and other.part in ACTUATORS:
             return bool({*ACTUATORS[self.part].members} & {*ACTUATORS[other.part].members})
         return self.part == other.part
 
 
 def check_faults(faults: Sequence[Fault], duration_s: float, fail: Any) -> None:
-    """Every fault begins before the end, and no two act on a part at the same time.
+    """Check that every fault begins before the end, and that no two act on a part at the same time.
 
     Args:
         faults: The faults.
         duration_s: Length of the manoeuvre [s].
-        fail: Makes the error of a key, as `config.Source.fail`.
+        fail: Makes the error of a key, such as `config.Source.fail`.
 
     Raises:
-        ManeuverError: they do not.
+        ManeuverError: a fault begins too late, or two overlap.
     """
     for number, fault in enumerate(faults):
         if fault.start_s >= duration_s:

@@ -17,17 +17,17 @@ _WHEN: Final = "@START[-END]"
 
 
 def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
-    """A fault as a table of a manoeuvre file has it; what it says is checked there.
+    """Read a fault into the table that a manoeuvre file has; the table is checked there.
 
     Args:
-        text: Part, kind, how much with its unit, and when [s].
-        start_s: When it begins where the text is not to say it [s].
+        text: Part, kind, size with its unit, and time [s].
+        start_s: Start if the text must not give it [s].
 
     Returns:
         The table.
 
     Raises:
-        ParameterError: it is not written so.
+        ParameterError: the text has another form.
     """
     found = _FAULT.fullmatch(text.strip())
     if found is None or (found["start"] is None) is (start_s is None):

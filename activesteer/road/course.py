@@ -1,4 +1,4 @@
-"""What a driver follows: a path, and the lanes and cones beside it."""
+"""A course for a driver: a path, and the lanes and cones beside it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from activesteer.road.path import MIN_CHORD_M, Path
 from activesteer.road.recorded import fail, number, numbers, sequence, table_of, text
 
 CONE_RADIUS_M: Final = 0.145
-"""Half of the square base of a traffic cone of `CONE_HEIGHT_M` [m]."""
+"""Half the side of the square base of a traffic cone of height `CONE_HEIGHT_M` [m]."""
 CONE_HEIGHT_M: Final = 0.5
 _ON_SIDE_M: Final = 1e-3
-"""How near to the side of a lane a cone marks it [m]."""
+"""Largest distance of a cone from the side of a lane that the cone marks [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Course:
         path: Path of the centre of gravity.
         lanes: Lanes that the car has to stay in, in the order of travel.
         cones_m: World x and y of the cones [m], shape (number of cones, 2).
-        last_gate_x_m: Where the last gate ends [m]; None for a path without gates.
+        last_gate_x_m: World x of the end of the last gate [m]; None for a path without gates.
     """
 
     path: Path
@@ -39,24 +39,24 @@ class Course:
 
     @property
     def first_gate_x_m(self) -> float:
-        """Where the first lane begins, or the first cone stands where there are no lanes [m]; 0 without both."""
+        """Start of the first lane, or the first cone if there are no lanes [m]; 0 without both."""
         if self.lanes:
             return min(lane.start_x_m for lane in self.lanes)
         return float(self.cones_m[:, 0].min()) if len(self.cones_m) else 0.0
 
     def on_lane_side(self) -> NDArray[np.bool_]:
-        """Which cones stand on the side of a lane, so that they mark its width; shape (number of cones,)."""
+        """Return which cones stand on the side of a lane; shape (number of cones,)."""
         return self._outward() != 0.0
 
     def cone_centres_m(self) -> Array:
-        """World x and y of the middle of the cones' bases [m], shape (number of cones, 2).
+        """Return world x and y of the centres of the cones' bases [m], shape (number of cones, 2).
 
-        A lane is measured between its cones, so that those beside it stand outside it.
+        The cones that mark a lane stand outside it, since a lane is measured between its cones.
         """
         return np.column_stack([self.cones_m[:, 0], self.cones_m[:, 1] + CONE_RADIUS_M * self._outward()])
 
     def _outward(self) -> Array:
-        """1 for a cone on the left side of a lane, -1 on the right one, 0 elsewhere; shape (number of cones,)."""
+        """Return 1 for a cone on the left side of a lane, -1 on the right, 0 elsewhere; shape (number of cones,)."""
         x, y = self.cones_m.T
         outward = np.zeros(len(x))
         for lane in self.lanes:
@@ -66,7 +66,7 @@ class Course:
         return outward
 
     def to_table(self) -> dict[str, Any]:
-        """The same as plain tables, ready for JSON; kept with a recording as `course`."""
+        """Return the course as plain tables, ready for JSON; a recording keeps it as `course`."""
         return {
             "path": {"x_m": self.path.x_m.tolist(), "y_m": self.path.y_m.tolist()},
             "lanes": [lane._asdict() for lane in self.lanes],
@@ -76,13 +76,13 @@ class Course:
 
     @classmethod
     def from_table(cls, table: object) -> Course:
-        """The course that `to_table` describes; heading and curvature of its path are those between its points.
+        """Build the course that `to_table` describes; differences between its points give heading and curvature.
 
         Args:
-            table: What a recording holds.
+            table: The table in a recording.
 
         Raises:
-            RecordingError: a key of it is missing, of the wrong type or out of range.
+            RecordingError: a key is missing, of the wrong type or out of range.
         """
         course = table_of(table, "course")
         path = table_of(course.get("path"), "course.path")
@@ -104,10 +104,10 @@ class Course:
 
 
 def course_of(metadata: Mapping[str, Any]) -> Course | None:
-    """The course of a recorded run; None where its manoeuvre has none.
+    """Return the course of a recorded run; None if its manoeuvre has no course.
 
     Raises:
-        RecordingError: there is one that is wrong.
+        RecordingError: the recorded course is invalid.
     """
     table = metadata.get("course")
     return None if table is None else Course.from_table(table)

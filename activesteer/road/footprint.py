@@ -1,4 +1,4 @@
-"""The ground that a car covers: what a recording says of its outline."""
+"""The outline of a car on the ground, from the metadata of a recording."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from typing import Any, Final, NamedTuple
 from activesteer.road.recorded import number, numbers, table_of
 
 FRONT_OVERHANG_M: Final = 0.85
-"""From the front axle to the front end of the body; usual for the class, as recordings do not give it [m]."""
+"""Distance from the front axle to the front end of the body [m]; usual for the class, since recordings do not hold it.
+"""
 REAR_OVERHANG_M: Final = 0.75
-"""From the rear axle to the rear end of the body; usual for the class [m]."""
+"""Distance from the rear axle to the rear end of the body [m]; usual for the class."""
 _RANGE_M: Final = (0.01, 100.0)
 
 
 class Footprint(NamedTuple):
-    """Sizes of a car; the defaults are usual ones, for drawing a car whose recording does not give its own.
+    """Dimensions of a car. The defaults are usual ones, for drawing a car whose recording holds none.
 
     Attributes:
-        width_m: Width of its body [m].
-        wheelbase_m: Distance of the axles [m].
+        width_m: Width of the body [m].
+        wheelbase_m: Distance between the axles [m].
         tyre_width_m: Width of the front and of the rear tyres [m].
     """
 
@@ -29,20 +30,20 @@ class Footprint(NamedTuple):
 
     @property
     def front_m(self) -> float:
-        """Front end of the body, ahead of the front axle [m]."""
+        """Position of the front end of the body, ahead of the front axle [m]."""
         return FRONT_OVERHANG_M
 
     @property
     def rear_m(self) -> float:
-        """Rear end of the body, ahead of the front axle and so below 0 [m]."""
+        """Position of the rear end of the body, ahead of the front axle and therefore negative [m]."""
         return -self.wheelbase_m - REAR_OVERHANG_M
 
     @classmethod
     def from_table(cls, table: object) -> Footprint:
-        """The sizes in the table `car` of the metadata.
+        """Read the dimensions from the table `car` of the metadata.
 
         Raises:
-            RecordingError: one is missing, of the wrong type or out of range.
+            RecordingError: a dimension is missing, of the wrong type or out of range.
         """
         car = table_of(table, "car")
         width, wheelbase = (number(car.get(key), f"car.{key}", *_RANGE_M) for key in ("width_m", "wheelbase_m"))
@@ -51,10 +52,10 @@ class Footprint(NamedTuple):
 
 
 def footprint_of(metadata: Mapping[str, Any]) -> Footprint | None:
-    """The sizes of the car of a recorded run; None where they were not recorded.
+    """Return the dimensions of the car of a recorded run; None if they were not recorded.
 
     Raises:
-        RecordingError: they are there and wrong.
+        RecordingError: the recorded dimensions are invalid.
     """
     table = metadata.get("car")
     return None if table is None else Footprint.from_table(table)

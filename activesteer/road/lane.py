@@ -1,4 +1,4 @@
-"""A lane on the road: laid out by the manoeuvre, evaluated by the analysis."""
+"""A lane on the road, laid out by the manoeuvre and evaluated by the analysis."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ class Lane(NamedTuple):
     """A section between two rows of cones, along the world's x.
 
     Attributes:
-        name: What it is called.
-        start_x_m: Where it begins [m].
-        end_x_m: Where it ends [m].
+        name: Its name.
+        start_x_m: Its start [m].
+        end_x_m: Its end [m].
         right_y_m: Its right edge [m].
         left_y_m: Its left edge [m].
     """
@@ -26,6 +26,6 @@ class Lane(NamedTuple):
     left_y_m: float
 
     def outline_m(self) -> NDArray[np.float64]:
-        """Its corners, once round: world x and y [m], shape (5, 2)."""
+        """Return its corners as a closed line: world x and y [m], shape (5, 2)."""
         (start, end), (right, left) = self[1:3], self[3:]
         return np.array([(start, right), (end, right), (end, left), (start, left), (start, right)])

@@ -1,4 +1,4 @@
-"""A path on the road: asked for by the manoeuvre, followed by the driver."""
+"""A path on the road, set by the manoeuvre and followed by the driver."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from activesteer.conventions import Array
 from activesteer.errors import ManeuverError
 
 SPACING_M: Final = 0.5
-"""Distance of two points of a path: a car at 100 km/h passes one in 18 ms."""
+"""Distance between two points of a path [m]: a car at 100 km/h covers it in 18 ms."""
 MIN_CHORD_M: Final = 1e-6
-"""Two points in a row that are nearer than this are the same point [m]."""
+"""Smallest distance between two points in a row; below it they count as the same point [m]."""
 _FINE: Final = 20
-"""Points per spacing with which the length of the curve is measured."""
+"""Points per spacing used to measure the length of the curve."""
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Points of equal distance along a curve; beyond both ends it goes on straight.
+    """Points at equal distances along a curve, continued straight beyond both ends.
 
     Attributes:
         s_m: Arc length [m], from 0, shape (n,).
         x_m: World x [m], shape (n,).
         y_m: World y, left positive [m], shape (n,).
-        heading_rad: Direction of travel [rad], counted on beyond half a turn, shape (n,).
+        heading_rad: Direction of travel [rad], unwrapped, shape (n,).
         curvature_1pm: Curvature, left positive [1/m], shape (n,).
     """
 
@@ -41,16 +41,16 @@ class Path:
 
     @classmethod
     def through(cls, x_m: ArrayLike, y_m: ArrayLike) -> Path:
-        """The smooth curve through points: a cubic spline over the chord length.
+        """Lay a smooth curve through points: a cubic spline over the chord length.
 
-        Between points of very uneven distance a spline swings out; a gap belongs where the path is straight.
+        A spline overshoots between points of very uneven distance; leave gaps where the path is straight.
 
         Args:
             x_m: World x of the points in the order of travel [m], at least two.
             y_m: World y [m], as many.
 
         Returns:
-            The path, its points `SPACING_M` apart (a little less, so that they end with the last point).
+            The path. Its points are `SPACING_M` apart, or slightly less, so that the last one is the last point given.
 
         Raises:
             ManeuverError: there are too few points, one is not finite, or two in a row are the same.
@@ -84,7 +84,7 @@ class Path:
 
     @classmethod
     def between(cls, x_m: Array, y_m: Array) -> Path:
-        """The path whose points are known: arc length, heading and curvature by differences between them.
+        """Make a path of known points; differences between them give arc length, heading and curvature.
 
         Args:
             x_m: World x of the points in the order of travel [m], at least two, no two in a row the same.
@@ -100,10 +100,10 @@ class Path:
         return float(self.s_m[-1])
 
     def extended(self, by_m: float) -> tuple[Array, Array]:
-        """Points with one more, straight on beyond the end.
+        """Append one point, straight ahead beyond the end.
 
         Args:
-            by_m: How far beyond [m].
+            by_m: Distance beyond the end [m].
 
         Returns:
             World x and y [m], shape (n + 1,) each.
@@ -114,6 +114,6 @@ class Path:
 
 
 def _first(wrong: Sequence[bool] | NDArray[np.bool_]) -> int:
-    """Number of the first point that is wrong, counted from 1; 0 where none is."""
+    """Return the number of the first wrong point, counted from 1; 0 if there is none."""
     found = np.flatnonzero(wrong)
     return int(found[0]) + 1 if found.size else 0

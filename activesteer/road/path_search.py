@@ -1,4 +1,4 @@
-"""Where a car is along a path, and where the path is ahead of it: native, since a driver asks with every look."""
+"""Position of a car along a path, and points of the path ahead: native code, since a driver needs it in each step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from activesteer.road.path import SPACING_M, Path
 
 
 class PathSearch:
-    """Places along a path, also before its beginning and beyond its end.
+    """Positions along a path, also before its start and beyond its end.
 
     Attributes:
         line: The path as `nearest` and `point_at` take it: distance of its points [m], their world x and y [m], heading
@@ -20,7 +20,7 @@ class PathSearch:
     """
 
     def __init__(self, path: Path) -> None:
-        """Prepares what the kernels take.
+        """Prepare the arguments of the kernels.
 
         Args:
             path: The path; its points have equal distances.
@@ -29,7 +29,7 @@ class PathSearch:
         self.line = spacing, path.x_m, path.y_m, float(path.heading_rad[0]), float(path.heading_rad[-1])
 
     def at(self, s_m: Array) -> tuple[Array, Array]:
-        """Points at arc lengths, also before the beginning and beyond the end.
+        """Return points at arc lengths, also before the start and beyond the end.
 
         Args:
             s_m: Arc lengths [m], shape (k,).
@@ -40,23 +40,23 @@ class PathSearch:
         return _points_at(s_m, *self.line)
 
     def nearest(self, x_m: float, y_m: float, around_m: float, window_m: float) -> float:
-        """Arc length of the point of the path nearest to a point, looked for around a place where it was before.
+        """Find the arc length of the point of the path nearest to a given point, near its last position.
 
         Args:
             x_m: World x of the point [m].
             y_m: World y of the point [m].
-            around_m: Arc length to look around [m].
-            window_m: How far to look to either side [m].
+            around_m: Arc length to search around [m].
+            window_m: Search distance to either side [m].
 
         Returns:
-            Arc length [m]; below 0 or above the length where the path goes on straight.
+            Arc length [m]; below 0 or above the length on the straight continuation of the path.
         """
         return nearest(x_m, y_m, around_m, window_m, *self.line)
 
 
 @compiled
 def point_at(s, spacing, xs, ys, heading_first, heading_last):
-    """One point: linear between points, straight beyond the ends."""
+    """Return one point: linear between points, straight beyond the ends."""
     last = len(xs) - 1
     place = s / spacing
     if place <= 0.0:
@@ -92,7 +92,7 @@ def nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
         if distance < minimum:
             best, minimum, before, after = index, distance, previous, math.inf
         previous = distance
-    # The parabola through the three nearest points: the result moves on smoothly between them.
+    # A parabola through the three nearest points, so that the result moves smoothly between points.
     bend = before - 2.0 * minimum + after
     shift = 0.5 * (before - after) / bend if 0.0 < bend < math.inf else 0.0
     return around - window + (best + min(max(shift, -1.0), 1.0)) * SPACING_M

@@ -1,4 +1,4 @@
-"""Values from the metadata of a recording, each checked for type and range: a file may have been damaged or edited."""
+"""Values from the metadata of a recording, checked for type and range, since a file may be damaged or edited."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from numpy.typing import NDArray
 from activesteer.errors import RecordingError, shown
 
 LIMIT_M: Final = 1e6
-"""No place or size on a road is further from 0 than this [m]."""
+"""Largest distance of a place from 0, and largest size, on a road [m]."""
 _MAX_ELEMENTS: Final = 1_000_000
 
 
 def fail(key: str, problem: str) -> RecordingError:
-    """An error that says where in the metadata the problem is."""
+    """Return an error that names the place in the metadata."""
     return RecordingError(problem, file="the metadata", key=key)
 
 
 def table_of(value: object, key: str) -> Mapping[str, Any]:
-    """The value, which must be a table."""
+    """Return the value if it is a table, else raise."""
     if not isinstance(value, Mapping):
         raise fail(key, f"is {shown(value)}, expected a table")
     return value
 
 
 def sequence(value: object, key: str) -> Sequence[Any]:
-    """The value, which must be a list."""
+    """Return the value if it is a list, else raise."""
     if not isinstance(value, list | tuple):
         raise fail(key, f"is {shown(value)}, expected a list")
     if len(value) > _MAX_ELEMENTS:
@@ -37,7 +37,7 @@ def sequence(value: object, key: str) -> Sequence[Any]:
 
 
 def number(value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M) -> float:
-    """The value [m], which must be a number from `low` to `high`."""
+    """Return the value [m] if it is a number from `low` to `high`, else raise."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise fail(key, f"is {shown(value)}, expected a number from {low:g} to {high:g} m")
     return float(value)
@@ -46,7 +46,7 @@ def number(value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M
 def numbers(
     value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M, count: int | None = None
 ) -> NDArray[np.float64]:
-    """The value [m], which must be a list of numbers from `low` to `high`; `count` of them where that is given."""
+    """Return the value [m] if it is a list of numbers from `low` to `high`, `count` of them if given; else raise."""
     listed = sequence(value, key)
     if count is not None and len(listed) != count:
         raise fail(key, f"has {len(listed)} values, expected {count}")
@@ -54,7 +54,7 @@ def numbers(
 
 
 def text(value: object, key: str) -> str:
-    """The value, which must be a text."""
+    """Return the value if it is a text, else raise."""
     if not isinstance(value, str):
         raise fail(key, f"is {shown(value)}, expected a text")
     return value

@@ -1,8 +1,8 @@
-"""The road: asked for by the manoeuvre, felt by the vehicle.
+"""The road that the manoeuvre sets and the vehicle drives on.
 
-A road is plane. Its friction may differ from place to place, in world axes of the recording: x along the track from
-where the centre of gravity is when the recording starts, y to the left. What counts for a wheel is the friction at its
-contact point. While the car settles before the recording, it rolls on `mu` alone.
+A road is plane. Its friction may differ from place to place, in the world axes of the recording: x along the track from
+the initial position of the centre of gravity, y to the left. For a wheel, the friction at its contact point counts.
+While the car settles before the recording, it rolls on `mu` alone.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ _SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right"
 
 @dataclass(frozen=True)
 class RoadPatch:
-    """A stretch of the track with a friction of its own; keys of a table [[road.patches]]."""
+    """A stretch of the track with its own friction; keys of a table [[road.patches]]."""
 
     start_m: float
-    """Where it begins, along x [m]; the beginning belongs to it."""
+    """Start along x, included [m]."""
     end_m: float
-    """Where it ends [m]; the end does not belong to it."""
+    """End along x, not included [m]."""
     mu: Friction
-    """Friction relative to the one of the tyre files [-]."""
+    """Friction relative to that in the tyre files [-]."""
     side: str = "both"
     """`both`, `left` (y > 0) or `right` (y <= 0)."""
 
     def __post_init__(self) -> None:
-        """Checks the place.
+        """Check the place.
 
         Raises:
             ManeuverError: the patch ends before it begins, or its side has an unknown name.
@@ -50,7 +50,7 @@ class RoadPatch:
 
 
 class Area(NamedTuple):
-    """A rectangle of the road, x from start to before the end, y from beyond the right border to the left one [m]."""
+    """A rectangle of the road: x from start (included) to end, y from right to left border (included) [m]."""
 
     start_m: float
     end_m: float
@@ -59,7 +59,7 @@ class Area(NamedTuple):
     mu: float
 
     def clipped(self, start_m: float, end_m: float, right_m: float, left_m: float) -> Area | None:
-        """What of it lies within a rectangle [m]; None where nothing does."""
+        """Return its part within a rectangle [m]; None if they do not overlap."""
         start, end = max(self.start_m, start_m), min(self.end_m, end_m)
         right, left = max(self.right_m, right_m), min(self.left_m, left_m)
         return Area(start, end, right, left, self.mu) if start < end and right < left else None
@@ -67,33 +67,33 @@ class Area(NamedTuple):
 
 @dataclass(frozen=True)
 class Road:
-    """What the wheels roll on; keys of the table [road] in a manoeuvre file."""
+    """The road under the wheels; keys of the table [road] in a manoeuvre file."""
 
     OVERRULED: ClassVar = {"mu": {"mu_left": None, "mu_right": None}}
 
     mu: Friction = 1.0
-    """Friction relative to the one of the tyre files [-]."""
+    """Friction relative to that in the tyre files [-]."""
     grade: Annotated[float, Range(-0.5, 0.5)] = 0.0
     """Rise over run in the direction of travel [-]; positive is uphill."""
     mu_left: Friction | None = None
-    """Friction where y > 0 [-]; `mu` where not given."""
+    """Friction where y > 0 [-]; default `mu`."""
     mu_right: Friction | None = None
-    """Friction where y <= 0 [-]; `mu` where not given."""
+    """Friction where y <= 0 [-]; default `mu`."""
     patches: tuple[RoadPatch, ...] = ()
-    """Stretches with a friction of their own; where two overlap, the later one counts."""
+    """Stretches with their own friction; where two overlap, the later one counts."""
 
     def areas(self) -> tuple[Area, ...]:
-        """Where the friction is not `mu`; where areas overlap, the later one counts."""
+        """Return the areas whose friction is not `mu`; where areas overlap, the later one counts."""
         sides = (("left", self.mu_left), ("right", self.mu_right))
         split = [Area(-math.inf, math.inf, *_SIDES[side], mu) for side, mu in sides if mu is not None]
         return (*split, *(Area(it.start_m, it.end_m, *_SIDES[it.side], it.mu) for it in self.patches))
 
 
 def road_of(metadata: Mapping[str, Any]) -> Road:
-    """The road of a recorded run; a plain one where it was not recorded.
+    """Return the road of a recorded run; a default road if it was not recorded.
 
     Raises:
-        RecordingError: it was, and a key of it is unknown, missing, of the wrong type or out of range.
+        RecordingError: a recorded key is unknown, missing, of the wrong type or out of range.
     """
     maneuver = table_of(metadata.get("maneuver", {}), "maneuver")
     table = table_of(maneuver.get("road", {}), "maneuver.road")

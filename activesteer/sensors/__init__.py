@@ -1,4 +1,4 @@
-"""Sensors: from the true motion of the car to what its controllers get."""
+"""Sensors between the true motion of the car and its controllers."""
 
 from activesteer.sensors.block import SensorBlock
 from activesteer.sensors.parameters import Sensors

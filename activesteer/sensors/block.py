@@ -1,4 +1,4 @@
-"""The sensors of a car: their constants, their memory, and how the native step reads through them."""
+"""The sensors of a car: their constants, their memory, and the native step through them."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ class SensorBlock:
     """The sensors of one car.
 
     Attributes:
-        chains: What each sensor is, records of `CHAIN`.
-        memory: All that they remember, as one array: what is put back into it continues bit for bit.
-        outputs: What they say: the members of `Measurement` without its time, a view of the memory.
+        chains: Constants of each sensor, records of `CHAIN`.
+        memory: Memory of all sensors as one array; a run continues from it bit for bit.
+        outputs: Current readings: the members of `Measurement` without its time, a view of the memory.
     """
 
     def __init__(self, sensors: Sensors, timestep_s: float) -> None:
-        """Draws what is drawn once a run.
+        """Draw the random constants of a run.
 
         Args:
-            sensors: What the vehicle file says.
+            sensors: Table of the vehicle file.
             timestep_s: Step of the simulation [s].
         """
         # The speed comes from the wheels; every other number has the sensor that its field is named after.
@@ -55,26 +55,26 @@ class SensorBlock:
         self.outputs = self.memory[: len(MEASURED)]
 
     def reset(self, truth: Measurement) -> None:
-        """Begins anew, as if the truth had been what it is for long.
+        """Start anew, as if the truth had been constant for long.
 
         Args:
-            truth: What is there.
+            truth: The true measurement.
         """
         self.memory[:] = 0.0
         self.say(truth)
         for chain, value in zip(self.chains, self.outputs[1:], strict=True):
             own = self.memory[chain["memory"] :][: LINE + chain["ring"]]
             own[[FILTERED, HELD, SPEED]] = value
-            own[PHASE] = 0.5  # as far to the next edge forwards as backwards
+            own[PHASE] = 0.5  # halfway between two edges
             own[LINE:] = value
 
     def say(self, measurement: Measurement) -> None:
-        """Has them say something else until the next step, as where a fault acts on what they say."""
+        """Replace the readings until the next step, for example by those of a faulty sensor."""
         parts = (part if isinstance(part, tuple) else (part,) for part in measurement[1:])
         self.outputs[:] = [number for part in parts for number in part]
 
     def measurement(self, time_s: float) -> Measurement:
-        """What they now say.
+        """Return the current readings.
 
         Args:
             time_s: Time of the measurement [s].
@@ -85,14 +85,15 @@ class SensorBlock:
 
 
 def speed_radii(front_fraction: float, rolling_radii_m: Sequence[float]) -> tuple[float, ...]:
-    """What the rotational speed of each wheel adds to the speed of the car [m].
+    """Return the factor of each wheel's rotational speed in the speed of the car [m].
 
     Args:
         front_fraction: Fraction of the drive torque at the front axle.
         rolling_radii_m: Effective rolling radii, order of `CORNERS` [m].
 
     Returns:
-        The rolling radii over their number where the axle is not driven, else 0; where both are driven, all four count.
+        For an axle that is not driven, the rolling radii over the number of such wheels, else 0. If both axles are
+        driven, all four wheels count.
     """
     counts = [
         fraction == 0.0 for fraction in (front_fraction, front_fraction, 1.0 - front_fraction, 1.0 - front_fraction)
@@ -103,7 +104,7 @@ def speed_radii(front_fraction: float, rolling_radii_m: Sequence[float]) -> tupl
 
 
 def _chain(sensor: Sensor, place: int, seed: int, index: int, timestep_s: float) -> tuple[float, ...]:
-    """A record of `CHAIN`; each sensor draws from its own stream, whatever the others are."""
+    """Return a record of `CHAIN`; each sensor has its own random stream, whatever the others are."""
     period = max(1, round((sensor.sample_time_s or 0.0) / timestep_s))
     bandwidth_Hz = sensor.bandwidth_Hz or 0.0
     fraction = 1.0 - math.exp(-2.0 * math.pi * bandwidth_Hz * timestep_s) if bandwidth_Hz else 1.0
@@ -126,17 +127,17 @@ def _chain(sensor: Sensor, place: int, seed: int, index: int, timestep_s: float)
 
 @inlined
 def measured(chains, memory, wheel_radii_m, timestep_s, truth):
-    """What the sensors say after one more step.
+    """Return the readings of the sensors after one more step.
 
     Args:
         chains: As in `SensorBlock`.
-        memory: Likewise; it is changed.
-        wheel_radii_m: What each wheel's speed adds to the car's, see `speed_radii`; all 0 where that is the true one.
+        memory: As in `SensorBlock`; it is changed.
+        wheel_radii_m: Factors of the wheel speeds, see `speed_radii`; all 0 if the true speed is used.
         timestep_s: Step of the simulation [s].
         truth: Members of a true `Measurement`.
 
     Returns:
-        The members of `Measurement`; they stand in the outputs too.
+        The members of `Measurement`; the outputs hold them too.
     """
     outputs = truth[1:]
     store_numbers(memory.ctypes.data, outputs)

@@ -1,6 +1,6 @@
-"""The table [sensors] of a vehicle file: what each sensor adds to the truth, by a preset and by single values.
+"""The table [sensors] of a vehicle file: the errors of each sensor, by a preset and by single values.
 
-A value that is not given is that of the preset: no error of any kind for `ideal`, those of `production` in `presets`.
+The default of each key comes from the preset: no error of any kind for `ideal`, those in `presets` for `production`.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from activesteer.sensors.sensor_kinds import (
 )
 
 RANDOM: Final = ("noise", "bias", "drift")
-"""How the keys begin whose values are drawn from the seed."""
+"""First words of the keys whose values are drawn from the seed."""
 
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the car's controllers see of it; `ideal` where nothing else is given."""
+    """Sensors between the car and its controllers; default `ideal`."""
 
     KEY_HINTS: ClassVar = {
         "noise": "each sensor has its own, as sensors.yaw_rate.noise_degps",
@@ -35,9 +35,9 @@ class Sensors:
     }
 
     preset: Literal["ideal", "production"] = "ideal"
-    """Values of all keys that are not given."""
+    """Default of all keys."""
     seed: Annotated[int, Range(0, 2**32 - 1)] | None = None
-    """Decides noise, bias and drift; 0 where not given. It has no effect where no sensor has any of these."""
+    """Seed of noise, bias and drift; default 0. It has no effect if no sensor has any of these."""
     yaw_rate: RateSensor = RateSensor()
     """Yaw rate."""
     ax: AccelerationSensor = AccelerationSensor()
@@ -55,14 +55,14 @@ class Sensors:
     brake_pressure: PressureSensor = PressureSensor()
     """Pressure in each wheel brake."""
     speed_from_wheels: bool | None = None
-    """Whether the speed is that of the wheels that are not driven (of all, where all are) times their rolling radius;
-    else it is the car's own."""
+    """Whether the speed is that of the wheels that are not driven (of all wheels if all are driven) times their rolling
+    radius; else it is the car's own."""
 
     def __post_init__(self) -> None:
-        """Puts in what the preset says.
+        """Fill in the values of the preset.
 
         Raises:
-            ParameterError: there is a seed and nothing to draw from it.
+            ParameterError: there is a seed but nothing random.
         """
         for name, preset in PRESETS[self.preset].items():
             object.__setattr__(self, name, _filled(getattr(self, name), preset))
@@ -77,17 +77,17 @@ class Sensors:
             )
 
     def all(self) -> dict[str, Sensor]:
-        """The sensors by name."""
+        """Return the sensors by name."""
         return {field.name: sensor for field in fields(self) if isinstance(sensor := getattr(self, field.name), Sensor)}
 
     @property
     def is_ideal(self) -> bool:
-        """Whether what comes out is the truth."""
+        """True if the measurement is the truth."""
         return not self.speed_from_wheels and all(sensor.is_ideal for sensor in self.all().values())
 
 
 def _filled(given: Any, preset: Any) -> Any:
-    """The given values, those of the preset where there is none."""
+    """Return the given values, and those of the preset for missing ones."""
     if not isinstance(preset, Sensor):
         return preset if given is None else given
     return replace(preset, **{key: value for key, value in vars(given).items() if value is not None})

@@ -1,4 +1,4 @@
-"""What sensors are like that a car of today has.
+"""Sensors of a present-day car.
 
 Sources:
     SMI700: Robert Bosch GmbH, product information sheet of the SMI700, combined inertial sensor for vehicle dynamics
@@ -6,7 +6,7 @@ Sources:
         11, 18, 21 or 77 Hz, offset within 3 deg/s and 50 mg over temperature and life.
     LWS: messages of a BMW's steering angle sensor as read from its bus (ms4x.net, CAN id 0x1F5): every 10 ms, steps of
         0.04394 deg, +-1440 deg.
-    Assumption: of the class, not checked against a source.
+    Assumption: typical of the class, not checked against a source.
 """
 
 from __future__ import annotations
@@ -83,4 +83,4 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "speed_from_wheels": True,
     },
 }
-"""Preset -> key -> what it is where the vehicle file does not say."""
+"""Preset -> key -> default value."""

@@ -1,4 +1,4 @@
-"""The kinds of sensors and their keys: what each of them adds to the truth."""
+"""The kinds of sensors and the keys of their errors."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _Bandwidth = Annotated[float, Range(0.1, 1e4)]
 
 @dataclass(frozen=True)
 class Sensor:
-    """What all sensors have; the rest has the unit of what is measured.
+    """Keys that all sensors have; the other keys carry the unit of the measured quantity.
 
-    In this order: bias and drift are added, the sum goes through the bandwidth, is sampled, gets its noise, is limited,
-    quantised, and comes out after the delay.
+    The order is: bias and drift are added; the sum is low-pass filtered, sampled, given its noise, limited and
+    quantised; the result appears after the delay.
     """
 
     bandwidth_Hz: _Bandwidth | None = None
@@ -26,15 +26,15 @@ class Sensor:
     sample_time_s: _SampleTime | None = None
     """Time between two samples, in whole steps of the simulation; the output is held between [s]."""
     delay_s: _Delay | None = None
-    """From the sample to when it comes out, in whole steps of the simulation [s]."""
+    """Delay from the sample to the output, in whole steps of the simulation [s]."""
 
     @property
     def is_ideal(self) -> bool:
-        """Whether what comes out is the truth."""
+        """True if the output is the truth."""
         return not any(getattr(self, field.name) for field in fields(self))
 
     def amount(self, word: str) -> float:
-        """The value of the key that begins with a word and ends in the unit; 0 where it is not given."""
+        """Return the value of the key that begins with a word and ends in the unit; 0 if it is not given."""
         return next((getattr(self, field.name) for field in fields(self) if field.name.startswith(word)), None) or 0.0
 
 
@@ -51,19 +51,20 @@ class RateSensor(Sensor):
     quantum_radps: _Amount | None = None
     """Step of quantisation [rad/s]."""
     limit_radps: _Amount | None = None
-    """Where it saturates, to either side [rad/s]."""
+    """Saturation to either side [rad/s]."""
 
 
 @dataclass(frozen=True)
 class WheelSpeedSensor(RateSensor):
     """A sensor of the rotational speed of a wheel; all four are alike.
 
-    With teeth, the edges of a pulse wheel that pass between two samples are counted and their time is measured; where
-    none passes, the wheel is not faster than the time since the last one allows. The sign of rotation is known.
+    With teeth, the sensor counts the edges of a pulse wheel that pass between two samples and measures their time. If
+    no edge passes, the reading is at most the speed that the time since the last edge allows. The sign of rotation is
+    known.
     """
 
     teeth: Annotated[int, Range(0, 1000)] | None = None
-    """Edges that pass in a turn; 0 for a sensor without a pulse wheel."""
+    """Edges per turn; 0 for a sensor without a pulse wheel."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class AccelerationSensor(Sensor):
     quantum_mps2: _Amount | None = None
     """Step of quantisation [m/s2]."""
     limit_mps2: _Amount | None = None
-    """Where it saturates, to either side [m/s2]."""
+    """Saturation to either side [m/s2]."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ class PressureSensor(Sensor):
     quantum_Pa: _Amount | None = None
     """Step of quantisation [Pa]."""
     limit_Pa: _Amount | None = None
-    """Where it saturates, to either side [Pa]."""
+    """Saturation to either side [Pa]."""
 
 
 @dataclass(frozen=True)
@@ -111,4 +112,4 @@ class AngleSensor(Sensor):
     quantum_rad: _Amount | None = None
     """Step of quantisation [rad]."""
     limit_rad: _Amount | None = None
-    """Where it saturates, to either side [rad]."""
+    """Saturation to either side [rad]."""

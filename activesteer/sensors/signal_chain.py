@@ -1,6 +1,6 @@
-"""What one sensor makes of the truth in one step, as native code: bias, drift, bandwidth, samples, noise, limit, steps.
+"""One step of one sensor as native code: bias, drift, bandwidth, sampling, noise, limit, quantisation.
 
-Noise is a function of the seed and of the number of the sample: there is no generator whose state has to be kept.
+Noise is a function of the seed and of the number of the sample, so there is no generator whose state has to be kept.
 
 Sources:
     Steele, Lea, Flood 2014, Fast splittable pseudorandom number generators (SplitMix64); Box and Muller 1958.
@@ -25,14 +25,14 @@ CHAIN: Final = np.dtype(
         ],
     )
 )
-"""What a sensor is: place of its memory, steps between samples, length of its delay line; fraction of the way that the
-low-pass goes in a step, rms of the noise, offset, rms of the drift of a sample, step and limit (0 for none), teeth
+"""Constants of a sensor: place of its memory, steps between samples, length of its delay line; fraction of the low-pass
+filter per step, rms of the noise, offset, rms of the drift per sample, quantisation step and limit (0 for none), teeth
 (0 for none), key of its random numbers."""
 
 FILTERED, DRIFT, HELD, STEPS, SAMPLES, PHASE, EDGES, AGE, SPAN, SPEED, LINE = range(11)
-"""Places in a sensor's memory: low-pass, offset that has drifted, last sample, steps and samples so far; of the pulse
+"""Places in a sensor's memory: low-pass filter, drifted offset, last sample, steps and samples so far. For the pulse
 wheel: angle since an edge in teeth, edges since the last sample, time since the last edge, time since the last edge of
-the sample before, last speed; then the delay line."""
+the sample before, last speed. Then the delay line."""
 
 _GOLDEN: Final = np.uint64(0x9E3779B97F4A7C15)
 _FIRST: Final = np.uint64(0xBF58476D1CE4E5B9)
@@ -45,7 +45,7 @@ _UNIT: Final = 2.0**-53
 
 @inlined
 def _uniform(key, number):
-    """A random number in (0, 1], of a key and a running number."""
+    """Return a random number in (0, 1] for a key and a running number."""
     x = key + (number + _ONE) * _GOLDEN
     x = (x ^ (x >> _S30)) * _FIRST
     x = (x ^ (x >> _S27)) * _SECOND
@@ -54,7 +54,7 @@ def _uniform(key, number):
 
 @inlined
 def normals(key, number):
-    """Two independent random numbers of the normal distribution, of a key and a running number."""
+    """Return two independent random numbers of the normal distribution for a key and a running number."""
     first = np.uint64(number) * _TWO
     size = math.sqrt(-2.0 * math.log(_uniform(key, first)))
     angle = 2.0 * math.pi * _uniform(key, first + _ONE)
@@ -63,7 +63,7 @@ def normals(key, number):
 
 @inlined
 def _pass_teeth(chain, memory, speed_radps, timestep_s):
-    """Turns the pulse wheel on by a step; see `WheelSpeedSensor`."""
+    """Turn the pulse wheel by one step; see `WheelSpeedSensor`."""
     at = chain.memory
     turned = speed_radps * timestep_s * chain.teeth / (2.0 * math.pi)
     phase = memory[at + PHASE] + turned
@@ -75,17 +75,17 @@ def _pass_teeth(chain, memory, speed_radps, timestep_s):
         memory[at + AGE] += timestep_s
     else:
         memory[at + EDGES] += passed
-        # An edge lies at whole teeth: forwards the phase is what has gone by since, backwards what is left of one.
+        # Edges lie at whole teeth. Forwards, the phase is the angle since the last edge; backwards, the rest to one.
         memory[at + AGE] = (phase if turned > 0.0 else 1.0 - phase) / abs(turned) * timestep_s
 
 
 @inlined
 def _pulse_speed(chain, memory):
-    """Speed from the edges since the last sample [rad/s]."""
+    """Return the speed from the edges since the last sample [rad/s]."""
     at = chain.memory
     pitch = 2.0 * math.pi / chain.teeth
     edges = memory[at + EDGES]
-    # Where it has turned back within a tooth, the same edge is passed twice, perhaps at once.
+    # If the wheel turns back within a tooth, it passes the same edge twice, perhaps at once.
     if edges != 0.0 and memory[at + SPAN] > memory[at + AGE]:
         memory[at + SPEED] = pitch * edges / (memory[at + SPAN] - memory[at + AGE])
         memory[at + SPAN], memory[at + EDGES] = memory[at + AGE], 0.0
@@ -97,16 +97,16 @@ def _pulse_speed(chain, memory):
 
 @inlined
 def passed_on(chain, memory, truth, timestep_s):
-    """What a sensor says after one more step.
+    """Return the reading of a sensor after one more step.
 
     Args:
         chain: Record of `CHAIN`.
         memory: Memory of all sensors.
-        truth: What is there.
+        truth: True value.
         timestep_s: Step of the simulation [s].
 
     Returns:
-        What comes out, in the unit of the truth.
+        The reading, in the unit of the truth.
     """
     at = chain.memory
     if chain.teeth > 0.0:

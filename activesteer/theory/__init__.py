@@ -1,1 +1,1 @@
-"""Formulas that need no multibody car: known to controllers, driver, figures and identification alike."""
+"""Formulas that need no multibody car, shared by controllers, driver, figures and identification."""

@@ -1,4 +1,4 @@
-"""In which share of a population something holds, how sure that is, and what it is called."""
+"""The share of a population in which something holds, its confidence interval and the verdict."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from activesteer.errors import ParameterError
 CONFIDENCE_QUANTILE: Final = 1.959963984540054
 """Of the normal distribution, for 95 %."""
 HOLDS_FROM: Final = 0.8
-"""A claim holds whose share is at least this with 97.5 % confidence."""
+"""A claim holds if its share is at least this, with 97.5 % confidence."""
 FAILS_UP_TO: Final = 0.2
-"""A claim does not hold whose share is at most this with 97.5 % confidence."""
+"""A claim does not hold if its share is at most this, with 97.5 % confidence."""
 
 
 class ShareVerdict(StrEnum):
-    """What a share says of a claim."""
+    """Verdict of a share on a claim."""
 
     HOLDS = "holds"
     DEPENDS = "depends"
@@ -25,17 +25,17 @@ class ShareVerdict(StrEnum):
 
 
 def wilson_interval(passed: int, number: int) -> tuple[float, float]:
-    """The 95 % confidence interval of a share.
+    """Return the 95 % confidence interval of a share.
 
     Args:
-        passed: How many passed.
-        number: Of how many.
+        passed: Number that passed.
+        number: Total number.
 
     Returns:
-        Lower and upper end; 0 and 1 where there are none.
+        Lower and upper end; 0 and 1 for a total of 0.
 
     Raises:
-        ParameterError: more passed than there are, or one is below 0.
+        ParameterError: `passed` is negative or larger than `number`.
 
     Source: E. B. Wilson, Journal of the American Statistical Association 22 (1927), 209-212.
     """
@@ -53,7 +53,7 @@ def wilson_interval(passed: int, number: int) -> tuple[float, float]:
 
 
 def share_verdict(low: float, high: float) -> ShareVerdict:
-    """The verdict that an interval allows."""
+    """Return the verdict for a confidence interval."""
     if low >= HOLDS_FROM:
         return ShareVerdict.HOLDS
     return ShareVerdict.DOES_NOT_HOLD if high <= FAILS_UP_TO else ShareVerdict.DEPENDS

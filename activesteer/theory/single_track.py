@@ -28,12 +28,12 @@ _Positive = Annotated[float, Range(1e-9)]
 IDENTIFY: Final = "identify"
 IDENTIFIED: Final = "identified"
 SOURCES: Final = ("file", IDENTIFY, IDENTIFIED)
-"""Where the numbers of a single-track model come from."""
+"""Origins of the parameters of a single-track model."""
 
 
 @dataclass(frozen=True)
 class SingleTrackParameters:
-    """What the single-track model knows of a car; keys of the table [single_track] in a vehicle file."""
+    """Parameters of the single-track model; keys of the table [single_track] in a vehicle file."""
 
     mass_kg: _Positive
     """Mass m [kg]."""
@@ -48,16 +48,16 @@ class SingleTrackParameters:
     rear_stiffness_Nprad: _Positive
     """Cornering stiffness of the rear axle with its suspension, C_H [N/rad]."""
     characteristic_speed_mps: _Positive | None = None
-    """Characteristic speed v_ch from a test of the car [m/s]; eq. 4 where not given."""
+    """Characteristic speed v_ch from a test of the car [m/s]; default by eq. 4."""
     source: str = "file"
-    """`file`: the numbers are as given, whatever the car carries; `identify`: the car is driven before the run and the
-    numbers found replace them; `identified`: they were found so."""
+    """`file`: the parameters are as given, whatever the car carries. `identify`: the car is driven before the run, and
+    the identified parameters replace them. `identified`: they are the result of such a drive."""
 
     def __post_init__(self) -> None:
-        """Checks the source.
+        """Check the source.
 
         Raises:
-            ParameterError: it has an unknown name.
+            ParameterError: `source` has an unknown name.
         """
         if self.source not in SOURCES:
             raise ParameterError(
@@ -66,7 +66,7 @@ class SingleTrackParameters:
 
 
 def characteristic_speed(wheelbase_m: float, understeer_gradient_radpmps2: float) -> float:
-    """Speed at which an understeering car answers with half the yaw rate of a neutral one, sqrt(l/EG).
+    """Return the speed at which an understeering car reaches half the yaw rate of a neutral one, sqrt(l/EG).
 
     Args:
         wheelbase_m: l [m].
@@ -82,16 +82,16 @@ class SingleTrack:
     """The linear single-track model of a car.
 
     Attributes:
-        parameters: What it knows of the car.
+        parameters: Its parameters.
         wheelbase_m: l [m].
         characteristic_speed_mps: v_ch [m/s]; infinite for a neutral car.
     """
 
     def __init__(self, parameters: SingleTrackParameters) -> None:
-        """Computes what does not depend on speed.
+        """Compute everything that does not depend on speed.
 
         Args:
-            parameters: What it knows of the car.
+            parameters: The parameters of the car.
 
         Raises:
             ParameterError: the car oversteers, so that it has no characteristic speed, and none is given.
@@ -117,7 +117,7 @@ class SingleTrack:
         self._yaw_inertia_kgm2 = p.yaw_inertia_kgm2
 
     def yaw_rate_gain(self, speed_mps: float) -> float:
-        """Steady-state yaw rate per front steer angle, eq. 3 [1/s].
+        """Return the steady-state yaw rate per front steer angle, eq. 3 [1/s].
 
         Args:
             speed_mps: Speed v [m/s].
@@ -126,7 +126,7 @@ class SingleTrack:
         return speed_mps / self.wheelbase_m / (1.0 + ratio * ratio)
 
     def rear_prediction(self, speed_mps: _Speed) -> tuple[_Speed, _Speed, _Speed]:
-        """Coefficients of the rear angle that keeps the sideslip angle at zero, eq. 5.
+        """Return the coefficients of the rear angle that keeps the sideslip angle at zero, eq. 5.
 
             G(s) = delta_H(s)/delta_V(s) = (K_H + K_H T_z s) / (1 + T_1 s)
 
@@ -134,12 +134,12 @@ class SingleTrack:
         and positive at high speed. K_H T_z is returned in place of T_z, which is infinite where K_H is zero.
 
         Args:
-            speed_mps: Speed v > 0 [m/s]; one, or an array.
+            speed_mps: Speed v > 0 [m/s]; one number or an array.
 
         Returns:
             K_H [-], K_H T_z [s], T_1 [s].
         """
-        # Every step of a run comes here: what does not depend on speed is computed beforehand.
+        # Called in every step of a run; everything that does not depend on speed is computed beforehand.
         square = speed_mps * speed_mps
         denominator = self._rear_moment_kgm * square + self._front_moment_Nm
         ratio = self._stiffness_ratio
@@ -148,7 +148,7 @@ class SingleTrack:
         return gain, -ratio * lag, lag
 
     def state_space(self, speed_mps: float) -> control.StateSpace:
-        """The model at a speed, eqs. 1 and 2.
+        """Return the model at a speed, eqs. 1 and 2.
 
         Args:
             speed_mps: Speed v > 0 [m/s].
@@ -178,7 +178,7 @@ class SingleTrack:
         )
 
     def matrices(self, speed_mps: float) -> tuple[np.ndarray, np.ndarray]:
-        """System and input matrix of eqs. 1 and 2, shape (2, 2) each; states yaw rate and sideslip angle."""
+        """Return system and input matrix of eqs. 1 and 2, shape (2, 2) each; states yaw rate and sideslip angle."""
         p, v = self.parameters, speed_mps
         cv, ch, lv, lh = p.front_stiffness_Nprad, p.rear_stiffness_Nprad, p.cg_to_front_m, p.cg_to_rear_m
         m, jz = p.mass_kg, p.yaw_inertia_kgm2

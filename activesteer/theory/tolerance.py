@@ -1,20 +1,20 @@
-"""The tolerance function: how much of a corrector is active at an error."""
+"""The tolerance function: the activity of a corrector over the error."""
 
 from __future__ import annotations
 
 
 def tolerance(error_radps: float, deadband_start_radps: float, deadband_end_radps: float) -> float:
-    """Activity of a corrector: 0 up to the start of the band, 1 from its end, a smooth cubic between (Fig. 9).
+    """Return the activity of a corrector: 0 inside the dead band, 1 from its end, a smooth cubic between (Fig. 9).
 
     Args:
         error_radps: Yaw rate error, either sign [rad/s].
-        deadband_start_radps: Error up to which nothing is corrected, c_off [rad/s].
-        deadband_end_radps: Error from which all of it is, c_in [rad/s].
+        deadband_start_radps: Error up to which the corrector is inactive, c_off [rad/s].
+        deadband_end_radps: Error from which the corrector is fully active, c_in [rad/s].
 
     Returns:
         Activity, 0 to 1.
 
-    Source: Dorsch 2012, Fig. 9; the cubic is ours, the figure shows no formula.
+    Source: Dorsch 2012, Fig. 9; the cubic is ours, since the figure shows no formula.
     """
     size = error_radps if error_radps >= 0.0 else -error_radps
     if size <= deadband_start_radps:

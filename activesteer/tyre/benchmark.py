@@ -1,4 +1,4 @@
-"""What one evaluation of a tyre costs: a compiled scalar call, and a row of the vectorised one."""
+"""Time of one evaluation of a tyre: a compiled scalar call, and a row of the vectorised call."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 
 _CALLS: Final = 100_000
 _ROUNDS: Final = 5
-"""Every figure is the best of this many rounds: what disturbs a machine only ever makes it slower."""
+"""Each figure is the best of this many rounds, since disturbances only slow a machine down."""
 
 
 @compiled
 def _scalar_calls(tyre, count, pressure_Pa):
-    """The sum of all five outputs of `count` scalar calls, each with inputs of its own."""
+    """Return the sum of all five outputs of `count` scalar calls with different inputs."""
     p, total = tyre[0], 0.0
     for index in range(count):
-        # Small changes, so that no call can be left out or moved out of the loop.
+        # Small changes, so that the compiler cannot omit a call or move it out of the loop.
         fraction = (index % 1000) * 0.001
         fx, fy, mx, my, mz = magic_formula(
             p, 3000.0 + 2000.0 * fraction, 0.1 * fraction - 0.05, 0.08 - 0.16 * fraction, 0.02, pressure_Pa, 20.0, 0.9
@@ -33,11 +33,11 @@ def _scalar_calls(tyre, count, pressure_Pa):
 
 
 def bench(params: TyreParameters, rounds: int = _ROUNDS) -> dict[str, float]:
-    """Measures the full evaluation, combined slip with camber, all five outputs, on one core.
+    """Measure the full evaluation (combined slip with camber, all five outputs) on one core.
 
     Args:
         params: The tyre.
-        rounds: How often everything is measured; the best counts.
+        rounds: Number of measurements; the best counts.
 
     Returns:
         `scalar_us`: microseconds per call of the compiled function from compiled code, as in the engine's callback;

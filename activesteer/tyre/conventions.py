@@ -1,7 +1,7 @@
-"""Where programs that use the same tyre file differ: what the file's formula leaves to them.
+"""Conventions in which programs with the same tyre file differ, because the file leaves them open.
 
-A .tir file holds coefficients, not a program. The defaults here are what this package means by them; the alternatives
-are what other codes do, so that a car can be compared with one of theirs, force by force.
+A .tir file holds coefficients, not a program. The defaults are the conventions of this package. The alternatives are
+those of other codes, so that a car can be compared with one of theirs, force by force.
 """
 
 from __future__ import annotations
@@ -19,39 +19,41 @@ _CHOICES: Final = {
     "rolling_radius": ("file", "third_of_deflection"),
     "trail_load": ("nominal", "scaled"),
 }
-"""Words that a key takes; the first is the default, the second stands as 1 in the tyre's record."""
+"""Allowed words of a key; the first is the default, the second is 1 in the tyre's record."""
 
 
 @dataclass(frozen=True)
 class TyreConventions:
-    """How a tyre's coefficients are evaluated; keys of the table [tyres.conventions] in a vehicle file."""
+    """Evaluation of a tyre's coefficients; keys of the table [tyres.conventions] in a vehicle file."""
 
     camber: bool = True
-    """Whether camber enters the formula. Without it, it still acts by geometry: contact point, direction of forces."""
+    """Whether camber enters the formula. Without it, camber still acts by geometry: contact point and direction of
+    forces."""
     relaxation: bool = True
-    """Whether slip builds up over the relaxation length. Without it forces follow slip within 20 mm of road, except at
+    """Whether slip builds up over the relaxation length. Without it, forces follow slip within 20 mm of road, except at
     walking speed, where the standing tyre needs its carcass."""
     combined_slip: str = "weights"
-    """`weights`: the cosine functions of the formula, which a file without R.. coefficients leaves at 1;
+    """`weights`: the cosine functions of the formula, which are 1 without R.. coefficients in the file;
     `friction_ellipse`: longitudinal and lateral force scaled down to an ellipse by the ratio of the slips."""
     friction_scales: str = "formula"
-    """What the road's friction scales: `formula`: all that LMUX and LMUY do; `peaks`: only the peaks D_x and D_y, not
-    shifts, trail and residual moment."""
+    """Effect of the road's friction. `formula`: it scales all that LMUX and LMUY scale. `peaks`: it scales the peaks
+    D_x and D_y only, not shifts, trail and residual moment."""
     slip_velocity: str = "contact_point"
-    """Whose lateral velocity is the slip: `contact_point` (has a part from the rate of camber) or `wheel_centre`."""
+    """Point whose lateral velocity is the slip: `contact_point` (with a part from the camber rate) or `wheel_centre`.
+    """
     rolling_radius: str = "file"
-    """Effective rolling radius: `file`: from BREFF, DREFF, FREFF; `third_of_deflection`: R_0 less a third of the
+    """Effective rolling radius. `file`: from BREFF, DREFF, FREFF. `third_of_deflection`: R_0 less a third of the
     deflection."""
     trail_load: str = "nominal"
-    """Load that the pneumatic trail is related to: `nominal`: FNOMIN; `scaled`: LFZO FNOMIN."""
+    """Reference load of the pneumatic trail. `nominal`: FNOMIN. `scaled`: LFZO FNOMIN."""
     speed_offset_mps: float = 0.0
-    """Added to the speed by which slip velocities are divided [m/s], against division by zero; 0.1 m/s makes slips
-    0.45 % smaller at 80 km/h."""
+    """Speed added to the divisor of slip velocities [m/s], against division by zero; 0.1 m/s makes slips 0.45 % smaller
+    at 80 km/h."""
     reference_friction: float = 1.0
-    """Friction of the road to which the file's peaks belong: the road's friction is divided by it [-]."""
+    """Friction of the road to which the file's peaks belong; the road's friction is divided by it [-]."""
 
     def __post_init__(self) -> None:
-        """Checks the values.
+        """Check the values.
 
         Raises:
             ParameterError: a word is unknown, or a number out of range.
@@ -73,7 +75,7 @@ class TyreConventions:
             )
 
     def numbers(self) -> dict[str, float]:
-        """What the kernels read of the conventions, by the field of the tyre's record."""
+        """Numbers for the kernels, by field of the tyre's record."""
         second = {key: float(getattr(self, key) == words[1]) for key, words in _CHOICES.items()}
         return {
             "CAMBER_OFF": float(not self.camber),

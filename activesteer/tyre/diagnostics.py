@@ -1,4 +1,4 @@
-"""What is unusual in a tyre, each remark with its reason."""
+"""Remarks on unusual values of a tyre, each with its reason."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 
 _BAR_PA: Final = 1e5
 FRICTION_RANGE: Final = (0.6, 1.6)
-"""Peak friction of road tyres between ice and a slick on a dry road is wider; on a test drum it is this."""
+"""Peak friction of road tyres on a test drum; between ice and a slick on a dry road the range is wider."""
 CORNERING_RANGE_PRAD: Final = (8.0, 25.0)
 """Cornering stiffness over load of passenger, light truck and sports car tyres at the nominal load [1/rad]."""
 SLIP_RANGE: Final = (8.0, 60.0)
@@ -24,16 +24,16 @@ TRAIL_RANGE_M: Final = (0.005, 0.08)
 RELAXATION_RANGE_M: Final = (0.1, 1.5)
 """Lateral relaxation length at the nominal load: one to three contact lengths."""
 STRAIGHT_AHEAD_FRACTION: Final = 0.05
-"""Side force straight ahead, over the load, from which a car on four such tyres clearly pulls."""
+"""Lateral force straight ahead, over the load, from which a car on four such tyres clearly pulls."""
 NOMINAL_LOAD_N: Final = (1000.0, 12_000.0)
-"""Nominal loads of car tyres; motorcycles and trucks lie outside."""
+"""Nominal loads of car tyres; those of motorcycles and trucks lie outside."""
 STATIC_DEFLECTION: Final = (0.03, 0.15)
 """Deflection under the nominal load, over the free radius."""
 _BOOKKEEPING: Final = (
     "N_TIRE_STATES", "USER_SUB_ID", "USE_MODE", "ROAD_INCREMENT", "ROAD_DIRECTION", "HMAX_LOCAL", "TIME_SWITCH_INTEG",
     "SWITCH_INTEG", "FE_METHOD", "FUNCTION_NAME", "FILE_VERSION",
 )  # fmt: skip
-"""Keys that steer another program and say nothing about the tyre."""
+"""Keys that control another program and say nothing about the tyre."""
 _SECTIONS: Final = {
     "LONGITUDINAL_COEFFICIENTS": (("RBX1", "RCX1"), "combined slip does not reduce the longitudinal force"),
     "LATERAL_COEFFICIENTS": (("RBY1", "RCY1"), "combined slip does not reduce the lateral force"),
@@ -44,7 +44,7 @@ _SECTIONS: Final = {
 
 
 def remarks(params: TyreParameters) -> list[tuple[str, str]]:
-    """What is unusual in a tyre, each with the reason or the consequence; an empty list for an ordinary tyre."""
+    """Return the unusual properties of a tyre, each with its reason or consequence; empty for an ordinary tyre."""
     parts = (_missing, _scales, _frame, _ranges, _levels, _curvatures, _asymmetry)
     return [remark for part in parts for remark in part(params)]
 

@@ -1,4 +1,4 @@
-"""`MagicFormula`: a tyre to be asked for its forces, one operating point or arrays of them."""
+"""`MagicFormula`: forces of a tyre at one operating point or at arrays of them."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ def _roll() -> _Column:
 
 @dataclass(frozen=True)
 class TyreForces:
-    """Forces and moments in ISO-W axes at the contact point, and what they came from.
+    """Forces and moments in ISO-W axes at the contact point, with intermediate quantities.
 
-    Every quantity has the shape that the inputs broadcast to. Relaxation lengths, radii and contact patch are
-    worked out when they are first asked for.
+    Every quantity has the common shape of the inputs. Relaxation lengths, radii and contact patch are computed on first
+    use.
     """
 
     _tyre: NDArray[np.record] = field(repr=False)
@@ -85,7 +85,7 @@ class TyreForces:
     deflection_m = _roll()
     """Vertical deflection [m]."""
     spin_radps = _roll()
-    """Rotational speed of the wheel that belongs to the slip [rad/s]."""
+    """Rotational speed of the wheel at this slip [rad/s]."""
     contact_length_m = _roll()
     """Length of the contact patch [m]."""
     contact_width_m = _roll()
@@ -100,11 +100,11 @@ class TyreForces:
 
     @property
     def limits(self) -> NDArray[np.int64]:
-        """Which inputs were evaluated at their limit: sums of `Limit` values."""
+        """Inputs evaluated at their limit: sums of `Limit` values."""
         return self._flags.reshape(self.shape)
 
     def saturated(self, limit: Limit) -> NDArray[np.bool_]:
-        """Where an input was evaluated at its limit."""
+        """True if an input was evaluated at its limit."""
         return (self.limits & int(limit)) != 0
 
 
@@ -141,15 +141,15 @@ class MagicFormula:
         road_friction: ArrayLike = 1.0,
         turn_slip_1pm: ArrayLike = 0.0,
     ) -> TyreForces:
-        """Forces and moments at one operating point or at arrays of them, which broadcast.
+        """Return forces and moments at one operating point, or at arrays of them, which broadcast.
 
         Args:
             fz_N: Load [N]; zero or less gives no forces.
             kappa: Longitudinal slip, positive drives, -1 is a locked wheel.
             alpha_rad: Slip angle [rad], ISO-W: positive gives a negative lateral force.
             gamma_rad: Camber [rad], positive about +x.
-            pressure_Pa: Inflation pressure [Pa]; None is that of the file.
-            vx_mps: Speed along the heading [m/s]; None is the speed of the measurement.
+            pressure_Pa: Inflation pressure [Pa]; None for the pressure in the file.
+            vx_mps: Speed along the heading [m/s]; None for the speed of the measurement.
             road_friction: Friction of the road relative to that of the file.
             turn_slip_1pm: Yaw rate over speed [1/m], positive to the left; MF 6.x only.
 
@@ -157,9 +157,9 @@ class MagicFormula:
             Forces, moments and intermediate quantities in the common shape of the inputs.
 
         Raises:
-            ParameterError: an input is not finite, shapes do not broadcast, or turn slip is asked of an MF 5.2 tyre.
+            ParameterError: an input is not finite, shapes do not broadcast, or turn slip is given for an MF 5.2 tyre.
 
-        Validity: the ranges of the file; beyond them the value at the limit, and `limits` says so.
+        Validity: the ranges of the file. Beyond them, the value at the limit is returned and `limits` says so.
         Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 4.3.2.
         """
         pressure = self.parameters["INFLPRES"] if pressure_Pa is None else pressure_Pa

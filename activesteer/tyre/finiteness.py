@@ -1,4 +1,4 @@
-"""Whether a tyre is finite inside its own range: a file may be readable, and still describe no tyre at all."""
+"""Test that a tyre is finite inside its own range: a readable file need not describe a tyre."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from activesteer.tyre.kernels.rows import (
 )
 
 _MAX_FORCE: Final = 1e12
-"""Beyond this [N, Nm, m ...] nothing is a tyre's, and what an engine makes of it is soon not finite either."""
+"""No result of a tyre exceeds this [N, Nm, m ...]; beyond it, the engine's state soon overflows too."""
 _ENORMOUS: Final = 1e7
-"""In SI no coefficient of a tyre is greater: pressures and stiffnesses are some 1e6."""
+"""No coefficient of a tyre is larger in SI: pressures and stiffnesses are some 1e6."""
 _TURN_SLIP_1PM: Final = 0.1
 _MF52: Final = 52.0
 
 
 def is_finite(tyre: np.record) -> bool:
-    """Whether forces, radii and relaxation lengths are finite over the tyre's ranges, rolling and at rest.
+    """Return True if forces, radii and relaxation lengths are finite over the tyre's ranges, rolling and at rest.
 
     Args:
         tyre: A `TYRE_RECORD`.
@@ -40,14 +40,14 @@ def is_finite(tyre: np.record) -> bool:
 
 
 def culprit(tyre: np.record, names: Iterable[str]) -> str | None:
-    """The enormous coefficient whose default in its place makes a tyre finite, the greatest one where several do.
+    """Return the enormous coefficient whose default makes the tyre finite; the largest one if there are several.
 
     Args:
         tyre: A tyre that is not finite.
         names: Coefficients to try.
 
     Returns:
-        Its name; None where no single one is to blame.
+        Its name; None if no single coefficient is the cause.
     """
     enormous = (name for name in names if abs(tyre[name]) > _ENORMOUS)
     for name in sorted(enormous, key=lambda name: -abs(tyre[name])):
@@ -72,7 +72,7 @@ def _is_finite(record: bytes) -> bool:
 
 @compiled
 def _on_road(tyre, deflection_m, camber_rad, speed_mps, slip, across_mps, closing_mps):
-    """The tyre as the engine calls it, without relaxation states."""
+    """Evaluate the tyre as the engine does, without relaxation states."""
     p = tyre[0]
     cos, sin = math.cos(camber_rad), math.sin(camber_rad)
     spin = (1.0 + slip) * speed_mps / p.UNLOADED_RADIUS
@@ -83,7 +83,7 @@ def _on_road(tyre, deflection_m, camber_rad, speed_mps, slip, across_mps, closin
 
 
 def _motions(p: np.record) -> Iterator[tuple[float, ...]]:
-    """Wheels that stand, roll, slide and fall, pressed down to a little and to a third of the tyre's height."""
+    """Yield wheels that stand, roll, slide and fall, pressed down by a little and by a third of the tyre's height."""
     height = p.UNLOADED_RADIUS - p.RIM_RADIUS
     return product(
         (0.02 * height, 0.3 * height),
@@ -96,7 +96,7 @@ def _motions(p: np.record) -> Iterator[tuple[float, ...]]:
 
 
 def _operating_points(p: np.record) -> np.ndarray:
-    """Corners, middle and what lies between, of the ranges of a tyre file, shape (n, len(INPUT_COLUMNS))."""
+    """Return corners, middle and points between of the ranges of a tyre file, shape (n, len(INPUT_COLUMNS))."""
     loads = {max(p.FZMIN, 0.01 * p.FZMAX), min(max(p.FNOMIN, p.FZMIN), p.FZMAX), p.FZMAX}
     slips, angles = (
         (low, 0.1 * low, 0.0, 0.1 * high, high) for low, high in ((p.KPUMIN, p.KPUMAX), (p.ALPMIN, p.ALPMAX))

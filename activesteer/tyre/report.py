@@ -1,4 +1,4 @@
-"""What a tyre is: its key figures over load, as numbers and in words."""
+"""Key figures of a tyre over load, as numbers and in words."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def _slips(low: float, high: float) -> np.ndarray:
 
 
 def key_figures(params: TyreParameters) -> dict[str, Any]:
-    """Numbers that characterise a tyre, for a table or as JSON.
+    """Return numbers that characterise a tyre, for a table or as JSON.
 
     Args:
         params: The tyre.
 
     Returns:
-        What the tyre is (`file`, `version`, `fittyp`, `side`, `size`, `nominal_load_N`, `pressure_Pa`,
+        Identification (`file`, `version`, `fittyp`, `side`, `size`, `nominal_load_N`, `pressure_Pa`,
         `unloaded_radius_m` ...), the ranges of validity, and under `over_load` one list per quantity, in the order of
-        `over_load["load_N"]`: peak friction and the slip where it is reached, stiffnesses, trail, relaxation lengths
+        `over_load["load_N"]`: peak friction and the slip at the peak, stiffnesses, trail, relaxation lengths
         and radii, without camber, at the file's pressure and speed of measurement.
     """
     nominal = params["FNOMIN"]
@@ -90,7 +90,7 @@ def _over_load(params: TyreParameters, loads: np.ndarray) -> dict[str, list[floa
 
 
 def size(params: TyreParameters) -> str | None:
-    """The size in words, as 205/55 R16; None where the file states no dimensions of its own."""
+    """Return the size in words, such as 205/55 R16; None if the file has no dimensions of its own."""
     if not {"WIDTH", "RIM_RADIUS", "ASPECT_RATIO"} <= params.given.keys():
         return None
     rim = 2.0 * params["RIM_RADIUS"] / _INCH_M
@@ -118,7 +118,7 @@ _TABLE: Final = (
 
 
 def describe(params: TyreParameters) -> str:
-    """What a tyre is and what is unusual in it, as text for a terminal.
+    """Describe a tyre and its unusual properties as text for a terminal.
 
     Args:
         params: The tyre.

@@ -1,4 +1,4 @@
-"""`TyreParameters`: the coefficients of one tyre, and how it is mounted and evaluated."""
+"""`TyreParameters`: the coefficients of one tyre, its mounting and its conventions."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ class TyreParameters(Mapping[str, float]):
     """Coefficients of one tyre, in SI and radians; a read-only mapping from key to value, defaults included.
 
     Attributes:
-        given: What the file states, by key in upper case, in SI.
-        source: The file, None where there is none.
+        given: Values in the file, by key in upper case, in SI.
+        source: The file; None without one.
         side: Side of the vehicle that the coefficients belong to.
         mounted: Side of the vehicle that the tyre is mounted on; on the other side everything is mirrored.
-        slip_tangent: Whether alpha* = tan(alpha) and gamma* = sin(gamma); else the angles themselves.
+        slip_tangent: True for alpha* = tan(alpha) and gamma* = sin(gamma), False for the angles themselves.
         texts: Values of the file that are words, by (section, key).
         unused: Numbers of the file that no formula of the package uses, by (section, key).
         tables: Rows of numbers, by section.
-        conventions: What the file leaves to the program that reads it.
+        conventions: Choices that the file leaves to the program.
     """
 
     given: Mapping[str, float]
@@ -58,7 +58,7 @@ class TyreParameters(Mapping[str, float]):
     conventions: TyreConventions = TyreConventions()
 
     def __post_init__(self) -> None:
-        """Check the values and work out what the file leaves open.
+        """Check the values and derive what the file leaves open.
 
         Raises:
             ParameterError: a key is missing, unknown, or outside its range, or the tyre is not finite inside its own.
@@ -78,7 +78,7 @@ class TyreParameters(Mapping[str, float]):
             )
 
     def __reduce__(self) -> tuple[type[TyreParameters], tuple[object, ...]]:
-        """Travels between processes by what it was made from: read-only views cannot be copied."""
+        """Pickle the tyre by its constructor's arguments, since read-only views cannot be copied."""
         texts, unused, tables = dict(self.texts), dict(self.unused), dict(self.tables)
         made_from = (dict(self.given), self.source, self.side, self.mounted, self.slip_tangent, texts, unused, tables)
         return TyreParameters, (*made_from, self.conventions)
@@ -90,7 +90,7 @@ class TyreParameters(Mapping[str, float]):
 
     @property
     def record(self) -> np.record:
-        """What the kernels take, a new `TYRE_RECORD` at every call."""
+        """Record for the kernels, a new `TYRE_RECORD` at every call."""
         record = np.zeros(1, TYRE_RECORD)[0]
         for coefficient in COEFFICIENTS:
             record[coefficient.name] = self[coefficient.name]
@@ -108,13 +108,13 @@ class TyreParameters(Mapping[str, float]):
         return record
 
     def mounted_on(self, side: Side) -> TyreParameters:
-        """The same tyre on a side of the vehicle: mirrored where its coefficients belong to the other one."""
+        """Return the same tyre on a side of the vehicle, mirrored if its coefficients belong to the other side."""
         if side not in ("LEFT", "RIGHT"):
             raise ParameterError(f"is {side!r}; allowed are 'LEFT' and 'RIGHT'", key="side", value=side)
         return replace(self, mounted=side)
 
     def with_values(self, **changes: float) -> TyreParameters:
-        """A copy with other values of some keys, in SI.
+        """Return a copy with other values of some keys, in SI.
 
         Raises:
             ParameterError: a key does not exist, or a value is not allowed.
@@ -122,7 +122,7 @@ class TyreParameters(Mapping[str, float]):
         return replace(self, given={**self.given, **changes})
 
     def __getitem__(self, key: str) -> float:
-        """Value of a key in SI, the default where the file does not give it."""
+        """Return the value of a key in SI, or its default if the file does not give it."""
         values: Mapping[str, float] = self.__dict__["_values"]
         try:
             return values[key]
@@ -132,7 +132,7 @@ class TyreParameters(Mapping[str, float]):
             ) from None
 
     def __iter__(self) -> Iterator[str]:
-        """Every key, in the order of the table."""
+        """Iterate over every key, in the order of the table."""
         return iter(BY_NAME)
 
     def __len__(self) -> int:
@@ -140,12 +140,12 @@ class TyreParameters(Mapping[str, float]):
         return len(BY_NAME)
 
     def __contains__(self, key: object) -> bool:
-        """Whether a key exists, given in the file or not."""
+        """Return True if the key exists, given in the file or not."""
         return key in BY_NAME
 
 
 def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
-    """Every coefficient: the given value, else the default, else what stands in for it."""
+    """Return every coefficient: the given value, the default, or the quantity that replaces it."""
     for key, value in given.items():
         if key not in BY_NAME:
             raise ParameterError(f"no tyre coefficient; {nearest_names(key, BY_NAME)}", file=source, key=key, value=key)
@@ -184,7 +184,7 @@ def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
 
 
 def _fill(values: dict[str, float], given: Mapping[str, float], source: str) -> None:
-    """Work out the coefficients that have no fixed default."""
+    """Compute the coefficients that have no fixed default."""
     pressure = given.get("NOMPRES", given.get("INFLPRES", DEFAULT_PRESSURE_PA))
     stand_ins = {
         "NOMPRES": pressure,
@@ -197,7 +197,7 @@ def _fill(values: dict[str, float], given: Mapping[str, float], source: str) -> 
     for key, value in stand_ins.items():
         if key not in given:
             values[key] = value
-    # Stiffness at the nominal load and the coefficients of the force over deflection say the same (Besselink 2010, 4).
+    # Stiffness at the nominal load and the coefficients of force over deflection are equivalent (Besselink 2010, 4).
     r0, fz0 = values["UNLOADED_RADIUS"], values["FNOMIN"]
     if not (r0 > 0.0 and fz0 > 0.0):
         return

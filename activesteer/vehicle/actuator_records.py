@@ -1,4 +1,4 @@
-"""The actuators' records in the block of the native forces (`force_block`): where they stand, and what they say."""
+"""Access to the actuators' records in the block of the native forces (`force_block`)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from activesteer.vehicle.toe_link_screws import SCREW
 
 
 class ActuatorRecords:
-    """Views of the records of a compiled car: what is written into them acts from the next step on."""
+    """Views of the records of a compiled car; a change acts from the next step on."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        """Finds the block.
+        """Find the block.
 
         Args:
             model: The car, compiled and with its block.
@@ -32,11 +32,11 @@ class ActuatorRecords:
         self._rear = [find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in ("rl_steer", "rr_steer")]
 
     def of(self, actuator: int) -> NDArray[Any]:
-        """The `ACTUATOR` record of an actuator, shape (1,)."""
+        """Return the `ACTUATOR` record of an actuator, shape (1,)."""
         return self._actuators[actuator : actuator + 1]
 
     def screw(self, actuator: int) -> tuple[NDArray[Any], ...]:
-        """The records of link and screw of an actuator, that of its motor alone where no link follows, or nothing."""
+        """Return the records of link and screw of an actuator, of its motor alone if no link follows, or nothing."""
         record = self.of(actuator)
         place = int(record["record"][0])
         if record["kind"] == fb.KIND_SCREW:
@@ -49,13 +49,13 @@ class ActuatorRecords:
         return self._links[place : place + 1], *self.screw(screw)
 
     def rear_screws(self) -> Iterator[tuple[NDArray[Any], ...]]:
-        """Records of link and screw of every rear wheel that has a screw."""
+        """Return the records of link and screw of every rear wheel that has a screw."""
         for actuator in self._rear:
             if records := self.screw(actuator):
                 yield records
 
     def rear_states_at(self, angle_rad: float) -> dict[int, float]:
-        """Activations of the rear steering actuators that have arrived at an angle [rad], by their addresses."""
+        """Return activations of the rear steering actuators at rest at an angle [rad], by their addresses."""
         states: dict[int, float] = {}
         for actuator in self._rear:
             address = int(self._model.actuator_actadr[actuator])

@@ -1,9 +1,9 @@
-"""An axle guided by curves instead of links: what a K&C rig measures of it, as the vehicle file holds it.
+"""Curve axles: an axle described by the curves that a K&C rig measures, in place of links.
 
 The wheel centre's height is free. Its other five coordinates (forwards, outwards, camber, caster, toe) follow curves
-over the height and, at a steered axle, over the rack; what forces add to that is elastic, with the energy of a 5 x 5
-stiffness about the curves. So the path of the wheel and the forces belong together by themselves (virtual work): the
-slope of a curve hands the side force to the springs, the rack feels the trail. `native_guide` has the forces.
+over the height and, at a steered axle, over the rack. Forces deflect the wheel from the curves against a 5 x 5
+stiffness. Path and forces are consistent by virtual work: the slope of a curve passes part of the lateral force to the
+springs, and the rack feels the trail. `native_curve_axle` has the forces.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from activesteer.config import Range
 from activesteer.errors import ParameterError
 
 COORDINATES: Final = ("x", "y", "camber", "caster", "toe")
-"""Order of the five guided coordinates in every array: slides along x and y, hinges about x, y and z."""
+"""Order of the five coordinates in every array: slides along x and y, hinges about x, y and z."""
 OVER_TRAVEL: Final = ("forward_m", "outwards_m", "camber_rad", "caster_rad", "toe_rad")
 OVER_RACK: Final = ("rack_forward_m", "rack_outwards_m", "rack_camber_rad", "rack_caster_rad", "rack_steer_rad")
-"""Fields with the curves of these coordinates."""
+"""Fields with the curves of these coordinates over the rack."""
 _TRAVEL_SIGNS: Final = np.array([1.0, 1.0, -1.0, -1.0, -1.0])
 _RACK_SIGNS: Final = np.array([1.0, 1.0, -1.0, -1.0, 1.0])
-"""From the signs of the file to those of the left wheel's joints: camber and toe-in are negative rotations there."""
+"""Signs from the file to the left wheel's joints, where camber and toe-in are negative rotations."""
 _POINTS: Final = Range(5, 41)
 _ENTRIES: Final = 15
 
@@ -34,47 +34,48 @@ class AxleCurves:
     """The curves of one axle: left wheel, cubic splines through the points, straight beyond their ends."""
 
     travel_m: tuple[float, ...]
-    """Height of the wheel centre over the design position, positive in bump, increasing [m]."""
+    """Height of the wheel centre above the design position, positive in bump, increasing [m]."""
     toe_rad: tuple[float, ...]
     """Toe angle of one wheel, positive toe-in, static toe included [rad]."""
     camber_rad: tuple[float, ...]
     """Camber, negative with the top inwards, static camber included [rad]."""
     outwards_m: tuple[float, ...]
-    """Way of the wheel centre outwards: half of the track's change at the wheel centres [m]."""
+    """Displacement of the wheel centre outwards: half of the track change at the wheel centres [m]."""
     forward_m: tuple[float, ...]
-    """Way of the wheel centre forwards [m]."""
+    """Displacement of the wheel centre forwards [m]."""
     caster_rad: tuple[float, ...]
     """Rotation of the knuckle in side view, positive with the top to the rear, from the design position [rad]."""
     load_N: tuple[float, ...]
-    """What the wheel carries beside its spring, its stops and the anti-roll bar: the rest of the measured load [N]."""
+    """Measured wheel load less the loads of spring, stops and anti-roll bar [N]."""
     stiffness: tuple[float, ...]
-    """Of the left wheel at its centre, against forces along x and y and moments about x, y and z: upper triangle of the
-    symmetric 5 x 5 matrix, row by row [N/m, N, N m/rad]."""
+    """Stiffness of the left wheel at its centre, against forces along x and y and moments about x, y and z: upper
+    triangle of the symmetric 5 x 5 matrix, row by row [N/m, N, N m/rad]."""
     hardening: tuple[float, ...] = ()
-    """Springs that harden beside it, none or two: five numbers a each; such a spring is longer by t = a . e where the
-    wheel is displaced by e, and pushes back with a (s t2 + t3), as a soft bushing along a does."""
+    """Directions a of additional hardening springs, none or two, five numbers each. A wheel displacement e lengthens
+    such a spring by t = a . e, and the spring pushes back with a (s t2 + t3), as a soft bushing along a does."""
     hardening_square: tuple[float, ...] = (0.0, 0.0)
-    """s of both: it makes them softer to one side than to the other."""
+    """Coefficient s of both; it makes them softer to one side than to the other."""
     damping_ratio: Annotated[float, Range(0.0, 0.5)] = 0.2
-    """Of each way in which the wheel swings on the elastic part; of rubber and joints in the compact 0.1 to 0.35."""
+    """Damping ratio of each mode of the wheel on the elastic part; rubber and joints of the compact have 0.1 to 0.35.
+    """
     rack_m: tuple[float, ...] = ()
-    """Travel of the rack, positive steers left, increasing; none where the rack does not steer the axle [m]."""
+    """Travel of the rack, positive steers left, increasing; empty if the rack does not steer the axle [m]."""
     rack_steer_rad: tuple[float, ...] = ()
     """Steer angle of the left wheel from straight ahead, positive to the left [rad]."""
     rack_camber_rad: tuple[float, ...] = ()
     """Change of the left wheel's camber [rad]."""
     rack_outwards_m: tuple[float, ...] = ()
-    """Way of the left wheel's centre outwards [m]."""
+    """Displacement of the left wheel's centre outwards [m]."""
     rack_forward_m: tuple[float, ...] = ()
-    """Way of the left wheel's centre forwards [m]."""
+    """Displacement of the left wheel's centre forwards [m]."""
     rack_caster_rad: tuple[float, ...] = ()
     """Rotation of the left knuckle in side view [rad]."""
 
     def __post_init__(self) -> None:
-        """Checks lengths, order, and that the stiffness holds the wheel.
+        """Check lengths, order, and that the stiffness holds the wheel.
 
         Raises:
-            ParameterError: something does not fit.
+            ParameterError: a check fails.
         """
         _check_curves(self, "travel_m", (*OVER_TRAVEL, "load_N"))
         if self.is_steered or any(getattr(self, name) for name in OVER_RACK):
@@ -93,21 +94,21 @@ class AxleCurves:
 
     @property
     def is_steered(self) -> bool:
-        """Whether the rack steers the axle."""
+        """True if the rack steers the axle."""
         return bool(self.rack_m)
 
     def stiffness_matrix(self) -> NDArray[np.float64]:
-        """The stiffness of the left wheel in the order of `COORDINATES`, shape (5, 5)."""
+        """Stiffness of the left wheel in the order of `COORDINATES`, shape (5, 5)."""
         matrix = np.zeros((5, 5))
         matrix[np.triu_indices(5)] = self.stiffness
         return matrix + np.triu(matrix, 1).T
 
     def over_travel(self) -> NDArray[np.float64]:
-        """Left wheel's joints, and `load_N`, at the points of travel, shape (6, n)."""
+        """Return the left wheel's joints, and `load_N`, at the points of travel, shape (6, n)."""
         return np.array([*_joints(self, OVER_TRAVEL, _TRAVEL_SIGNS), self.load_N])
 
     def over_rack(self) -> NDArray[np.float64]:
-        """Left wheel's joints at the points of the rack, shape (5, n)."""
+        """Return the left wheel's joints at the points of the rack, shape (5, n)."""
         return np.array(_joints(self, OVER_RACK, _RACK_SIGNS))
 
 
@@ -116,13 +117,13 @@ def _joints(curves: AxleCurves, names: tuple[str, ...], signs: NDArray[np.float6
 
 
 def _scaled(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """With rotations taken at an arm of 0.3 m, so that all entries are of one kind."""
+    """Scale rotations by an arm of 0.3 m, so that all entries have one unit."""
     arms = np.array([1.0, 1.0, 0.3, 0.3, 0.3])
     return matrix / np.outer(arms, arms)
 
 
 def upper_triangle(matrix: NDArray[np.float64]) -> tuple[float, ...]:
-    """A symmetric 5 x 5 matrix as `AxleCurves.stiffness` has it."""
+    """Return a symmetric 5 x 5 matrix in the form of `AxleCurves.stiffness`."""
     return tuple(float(f"{value:.7g}") for value in matrix[np.triu_indices(5)])
 
 
@@ -141,18 +142,18 @@ def _check_curves(curves: AxleCurves, over: str, names: tuple[str, ...]) -> None
 
 @dataclass(frozen=True)
 class Curves:
-    """Axles that are guided by curves."""
+    """Curve axles of a car."""
 
     front: AxleCurves | None = None
-    """The front axle; links of the model where not given."""
+    """The front axle; default the links of the model."""
     rear: AxleCurves | None = None
-    """The rear axle; links of the model where not given."""
+    """The rear axle; default the links of the model."""
 
     def __post_init__(self) -> None:
-        """Checks that the rack steers in front.
+        """Check that the rack steers in front.
 
         Raises:
-            ParameterError: it does not.
+            ParameterError: the rack does not steer the front axle, or it steers the rear axle.
         """
         if self.front is not None and not self.front.is_steered:
             raise ParameterError("the rack has to steer the front wheels: curves over rack_m are needed", key="front")
@@ -160,5 +161,5 @@ class Curves:
             raise ParameterError("the rack steers the front wheels alone", key="rear.rack_m")
 
     def axle(self, corner: str) -> AxleCurves | None:
-        """The curves of a corner's axle."""
+        """Return the curves of a corner's axle."""
         return self.front if corner.startswith("f") else self.rear

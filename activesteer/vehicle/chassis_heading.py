@@ -1,4 +1,4 @@
-"""Turning the whole car on the road."""
+"""Rotation of the whole car on the road."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 
 YAW_DOF: Final = 5
-"""Place of the yaw rate among the velocities, of a model whose first joint is the free joint of the chassis."""
+"""Place of the yaw rate among the velocities, in a model whose first joint is the free joint of the chassis."""
 
 
 def turn_chassis_back(data: mujoco.MjData, half_rad: float) -> None:
-    """Turns orientation and velocity of the chassis about the world's z axis; where it stands is left as it is.
+    """Turn orientation and velocity of the chassis about the world's z axis; its position stays.
 
     Args:
         data: State of the car, whose first joint is the free joint of the chassis; changed.

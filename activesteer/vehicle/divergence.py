@@ -1,4 +1,4 @@
-"""A run that has gone wrong, and the engine's own words about it."""
+"""Detection of a diverged run, with the engine's warnings."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from activesteer.vehicle.recorded_arrays import engine_arrays
 
 @contextlib.contextmanager
 def engine_warnings_held() -> Iterator[None]:
-    """While this lasts, the engine's warnings are left to `Vehicle.check`, not written to a file in the user's folder.
+    """Leave the engine's warnings to `Vehicle.check`; by default it writes them to a file in the user's folder.
 
-    A handler that someone else has installed stays in force.
+    A handler that another part of the program has installed stays in force.
     """
     if mujoco.get_mju_user_warning() is not None:
         yield
@@ -33,7 +33,7 @@ def engine_warnings_held() -> Iterator[None]:
 
 
 def raise_if_diverged(model: mujoco.MjModel, data: mujoco.MjData, commands: Array, speed_mps: float) -> None:
-    """Looks for warnings of the engine and for what is not finite, commands first.
+    """Look for warnings of the engine and for values that are not finite, commands first.
 
     Args:
         model: The car.

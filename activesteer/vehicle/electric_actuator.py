@@ -1,4 +1,4 @@
-"""What all electric actuators have: a motor with its supply and loops, and a gear with friction."""
+"""Common parts of all electric actuators: a motor with its supply and control loops, and a gear with friction."""
 
 from __future__ import annotations
 
@@ -9,40 +9,40 @@ from activesteer.config import Range
 
 Positive = Annotated[float, Range(1e-9)]
 STOP_BEYOND: Final = 1.03
-"""Where the end stops are, over the travel at the limit: an assumption."""
+"""Position of the end stops over the travel at the limit: an assumption."""
 
 
 @dataclass(frozen=True)
 class ElectricActuator:
-    """A motor behind a gear; what is not given is the preset's."""
+    """A motor behind a gear; defaults come from the preset."""
 
     gear: Annotated[float, Range(0.1, 200.0)] | None = None
-    """Turns of the motor per turn of what it drives."""
+    """Turns of the motor per turn of the driven part."""
     friction_torque_Nm: Annotated[float, Range(0.0, 10.0)] | None = None
     """Dry friction at the motor without load: bearings, seals, brush [N m]."""
     load_friction: Annotated[float, Range(0.0, 20.0)] | None = None
-    """Friction over the load's torque at the motor; of a thread tan(friction angle) / tan(lead angle): 1 and more locks
-    itself."""
+    """Friction over the load's torque at the motor. For a thread: tan(friction angle) / tan(lead angle); at 1 and more
+    it is self-locking."""
     rotor_inertia_kgm2: Annotated[float, Range(1e-7, 1e-2)] | None = None
-    """All that turns with the motor [kg m2]."""
+    """Inertia of everything that turns with the motor [kg m2]."""
     peak_torque_Nm: Positive | None = None
-    """Most torque of the motor: its current limit [N m]."""
+    """Highest torque of the motor, by its current limit [N m]."""
     stall_torque_Nm: Positive | None = None
-    """Torque at rest without that limit, at nominal voltage: where its line begins [N m]."""
+    """Torque at rest without that limit, at nominal voltage [N m]."""
     no_load_speed_radps: Positive | None = None
-    """Speed at which it has none left, at nominal voltage [rad/s]."""
+    """Speed at which no torque is left, at nominal voltage [rad/s]."""
     speed_limit_radps: Positive | None = None
-    """Speed that its controller asks for at most [rad/s]."""
+    """Highest speed demand of its controller [rad/s]."""
     nominal_voltage_V: Positive | None = None
-    """Voltage to which these belong [V]."""
+    """Voltage of these values [V]."""
     supply_voltage_V: Annotated[float, Range(0.0, 1000.0)] | None = None
-    """Voltage that it gets; 0: unpowered [V]."""
+    """Supply voltage; 0: unpowered [V]."""
     supply_power_W: Annotated[float, Range(0.0, 1e5)] | None = None
-    """Most mechanical power that the supply allows the motor [W]."""
+    """Highest mechanical power that the supply allows the motor [W]."""
     position_gain_1ps: Annotated[float, Range(1.0, 300.0)] | None = None
-    """Position loop: speed asked for over the error of the position [1/s]."""
+    """Position loop: speed demand per position error [1/s]."""
     speed_gain_1ps: Annotated[float, Range(5.0, 700.0)] | None = None
-    """Speed loop: how fast an error of the speed goes where the motor is strong enough [1/s]."""
+    """Speed loop: rate at which a speed error decays, if the motor is strong enough [1/s]."""
 
     @property
     def voltage_ratio(self) -> float:
@@ -50,7 +50,7 @@ class ElectricActuator:
         return known(self.supply_voltage_V) / known(self.nominal_voltage_V)
 
     def motor_numbers(self) -> dict[str, float]:
-        """What of a `SCREW` record follows from these."""
+        """Fields of a `SCREW` record that follow from these."""
         ratio = self.voltage_ratio
         return {
             "inertia_kgm2": known(self.rotor_inertia_kgm2),
@@ -67,6 +67,6 @@ class ElectricActuator:
 
 
 def known(value: float | None) -> float:
-    """A value of which the preset has taken care."""
+    """Return a value that the preset has filled in."""
     assert value is not None
     return value

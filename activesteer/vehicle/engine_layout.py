@@ -1,8 +1,8 @@
-"""Where MuJoCo keeps its arrays: byte offsets inside mjModel and mjData, found at run time.
+"""Byte offsets of MuJoCo's arrays inside mjModel and mjData, measured at run time.
 
-A native callback receives bare pointers to both structs. Their layout is no part of MuJoCo's Python interface and
-changes between versions, so it is measured: the words of a struct are compared with the addresses that the bindings'
-numpy views report, and with distinctive values planted in a small model. A second model confirms every finding.
+A native callback receives bare pointers to both structs. Their layout is not part of MuJoCo's Python interface and
+changes between versions, so it is measured: the words of a struct are compared with the addresses of the bindings'
+numpy views, and with distinctive values in a small model. A second model confirms every result.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from activesteer.errors import ModelError
 
 _WORD_BYTES: Final = 8
 _MODEL_BYTES: Final = 8192
-"""How far to look into mjModel: all its members are sizes, options and pointers, a few kilobytes."""
+"""Bytes of mjModel to search: its members are sizes, options and pointers, a few kilobytes."""
 _DATA_BYTES: Final = 262_144
-"""How far to look into mjData: solver statistics lie before the pointers (160 KB in MuJoCo 4.0)."""
+"""Bytes of mjData to search: solver statistics lie before the pointers (160 KB in MuJoCo 4.0)."""
 
 _DATA_ARRAYS: Final = (
     "qvel",
@@ -43,7 +43,7 @@ _DATA_ARRAYS: Final = (
 
 
 class EngineLayout(NamedTuple):
-    """Byte offsets inside mjModel (`m_`) and mjData (`d_`): pointers to arrays, but for the first two and the last."""
+    """Byte offsets inside mjModel (`m_`) and mjData (`d_`): pointers to arrays, except the first two and the last."""
 
     m_nnumericdata: int
     m_timestep: int
@@ -67,7 +67,7 @@ class EngineLayout(NamedTuple):
 
 
 def _probe(numbers: int, timestep_s: float) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """A small model that has every array we look for, a known count of custom numbers and a known time step."""
+    """Return a small model that has every array in question, a known count of custom numbers and a known time step."""
     xml = f"""
     <mujoco>
       <option timestep="{timestep_s!r}"/>
@@ -86,12 +86,12 @@ def _probe(numbers: int, timestep_s: float) -> tuple[mujoco.MjModel, mujoco.MjDa
 
 
 def _words(address: int, size_bytes: int) -> NDArray[np.uint64]:
-    # A view, not a copy: nothing is touched before _find looks at it, block by block, and stops at the match.
+    # A view, not a copy: _find reads it block by block and stops at the match.
     return np.ctypeslib.as_array((ctypes.c_uint64 * (size_bytes // _WORD_BYTES)).from_address(address))
 
 
 def _find(address: int, wanted: int, limit_bytes: int, what: str) -> int:
-    """Byte offset of the only word that equals `wanted`, scanning forward and stopping at the first match."""
+    """Return the byte offset of the only word that equals `wanted`; the forward scan stops at the first match."""
     words = _words(address, limit_bytes)
     block = 256
     for start in range(0, len(words), block):
@@ -119,15 +119,15 @@ def _measure(model: mujoco.MjModel, data: mujoco.MjData, numbers: int) -> Engine
 
 @functools.cache
 def engine_layout() -> EngineLayout:
-    """The offsets, found once in a process; see `measure_engine_layout`."""
+    """Return the offsets, measured once per process; see `measure_engine_layout`."""
     return measure_engine_layout()
 
 
 def measure_engine_layout() -> EngineLayout:
-    """Finds the offsets and confirms them on a second, different model.
+    """Measure the offsets and confirm them on a second, different model.
 
     Returns:
-        The offsets for the MuJoCo that is installed.
+        The offsets for the installed MuJoCo.
 
     Raises:
         ModelError: the structures do not look as expected in this MuJoCo version.

@@ -14,23 +14,23 @@ _ITERATIONS: Final = 40
 _DIFFERENCE: Final = 1e-7
 """Step of the finite differences [m, rad]: links of 1e7 N/m change their force by 1 N."""
 _LARGEST_STEP: Final = 0.02
-"""Most that a coordinate may move in one iteration [m, rad], so that stops are met from outside."""
+"""Largest change of a coordinate in one iteration [m, rad], so that stops are approached from outside."""
 _ROUNDING_N: Final = 1e-4
-"""Residual force below which a step that gets no closer ends the search [N, N m]."""
+"""Residual force below which a step without improvement ends the search [N, N m]."""
 _TOLERANCE_N: Final = 1e-7
 """Residual force at which the search ends [N, N m]; weight is 1.4e4."""
 
 
 def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.intp]) -> None:
-    """Moves the car into static equilibrium, by Newton's method on the forces at rest.
+    """Move the car into static equilibrium, by Newton's method on the forces at rest.
 
-    The car must stand near the position that is sought. Velocities and activations are set to zero: the tyres carry
-    their load and no side force but the one of their own asymmetry.
+    The car must stand near the equilibrium. Velocities and activations are set to zero: the tyres carry their load, and
+    no lateral force except that of their own asymmetry.
 
     Args:
         model: The model.
         data: Its state; `qpos` is the first guess and becomes the result.
-        held: Degrees of freedom to leave alone: position and heading on the road, rotation of the wheels.
+        held: Fixed degrees of freedom: position and heading on the road, rotation of the wheels.
 
     Raises:
         ModelError: no equilibrium was found.
@@ -67,7 +67,7 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
         if np.abs(residual).max() < _ROUNDING_N and (
             largest < 1e-12 or np.abs(smaller).max() >= np.abs(residual).max()
         ):
-            # The last digits: rounding decides, no step gets closer.
+            # Only rounding is left; no step improves the result.
             return
         residual = smaller
     worst = int(free[np.abs(residual).argmax()])
@@ -80,6 +80,6 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
 
 
 def _residual(model: mujoco.MjModel, data: mujoco.MjData, free: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Generalised force that is not balanced, at rest, shape (free.size,)."""
+    """Return the generalised force that is not balanced, at rest, shape (free.size,)."""
     mujoco.mj_forward(model, data)
     return data.qfrc_smooth[free].copy()

@@ -1,8 +1,7 @@
-"""Faults of actuators and sensors in a car: the one place where they act.
+"""Activation of faults of actuators and sensors in a car.
 
-What an actuator's fault needs is written into the model when the fault begins, and taken out when it ends; in between
-a step costs nothing more. Only a sensor's fault, and a delay, do something every step. A car without faults is stepped
-by its own `step`.
+An actuator's fault is written into the model when it begins, and removed when it ends; the steps between cost nothing
+more. Only a sensor's fault, and a delay, act in every step. A car without faults is stepped by its own `step`.
 """
 
 from __future__ import annotations
@@ -30,10 +29,10 @@ class Stretch(NamedTuple):
     """Steps between which no fault begins or ends.
 
     Attributes:
-        first: The first one.
-        last: The one behind the last.
-        step: What steps the car in them.
-        angle_fails: Whether the steering angle sensor fails in them.
+        first: The first step.
+        last: The step after the last one.
+        step: Function that steps the car.
+        angle_fails: True if the steering angle sensor fails.
     """
 
     first: int
@@ -46,14 +45,14 @@ class Faults:
     """The faults of a run."""
 
     def __init__(self, vehicle: Vehicle, faults: Sequence[Fault] = ()) -> None:
-        """Looks up what they act on; nothing is changed yet, but that brakes listen to sensors that may fail.
+        """Look up the faulty parts. Nothing is changed yet, except that brakes use sensors that may fail.
 
         Args:
             vehicle: The car.
-            faults: What happens to it; times count from the start of the recording.
+            faults: Its faults; times count from the start of the recording.
 
         Raises:
-            ManeuverError: one is of a part that this car does not have.
+            ManeuverError: this car does not have one of the parts.
         """
         self._vehicle = vehicle
         self._acting: list[_ActuatorFault | _SensorFault] = []
@@ -69,14 +68,14 @@ class Faults:
                 self._acting += [_ActuatorFault(fault, name, vehicle) for name in members]
 
     def stretches(self, first: int, last: int) -> Iterator[Stretch]:
-        """The steps from one to another, divided where a fault begins or ends.
+        """Divide a range of steps where a fault begins or ends.
 
         Args:
-            first: Number of the first step of the recording.
-            last: Of the one behind the last.
+            first: First step, counted from the start of the recording.
+            last: Step after the last one.
 
         Yields:
-            The stretches. What acts in one is put into the model before it is yielded.
+            The stretches; the faults of a stretch are in the model before it is yielded.
         """
         if not self._acting:
             yield Stretch(first, last, self._vehicle.step)
@@ -89,7 +88,7 @@ class Faults:
             yield Stretch(begin, end, self._watched(watching, begin) if watching else self._vehicle.step, angle_fails)
 
     def act(self, step: int) -> None:
-        """Puts into the model what acts from a step on, and takes out what does not."""
+        """Activate the faults of a step in the model, and remove the others."""
         for acting in self._acting:
             acting.release()
             if step == acting.ends:
@@ -100,17 +99,17 @@ class Faults:
         self._vehicle.note_faults(len({acting.fault for acting in active}))
 
     def release(self) -> None:
-        """Takes all faults out of the model."""
+        """Remove all faults from the model."""
         for acting in self._acting:
             acting.release()
         self._vehicle.note_faults(0)
 
     def save_state(self) -> list[Any]:
-        """What the faults have to remember."""
+        """Return the memory of the faults."""
         return copy.deepcopy([acting.memory for acting in self._acting])
 
     def restore_state(self, state: list[Any]) -> None:
-        """Goes back to a saved state."""
+        """Restore a saved state."""
         for acting, memory in zip(self._acting, copy.deepcopy(state), strict=True):
             acting.memory = memory
 
@@ -138,11 +137,11 @@ class _ActuatorFault:
     """A fault of one of the engine's actuators.
 
     Attributes:
-        fault: What happens.
-        begins: Step at which it begins; `ends`: that from which on the part works again.
+        fault: The fault.
+        begins: Step at which it begins; `ends`: step from which the part works again.
         listens: Step from which on it must know the demands.
-        watches: Whether it has something to do every step.
-        memory: The last demands, of a delay; that at which a brake sticks.
+        watches: Whether it acts in every step.
+        memory: The last demands for a delay, or the demand at which a brake sticks.
     """
 
     def __init__(self, fault: Fault, name: str, vehicle: Vehicle) -> None:
@@ -168,19 +167,19 @@ class _ActuatorFault:
         self.memory: deque[float] = deque(maxlen=max(1, delay))
 
     def engage(self) -> None:
-        """Lets the fault act."""
+        """Activate the fault."""
         record, kind = self._record, self.fault.kind
         if self._screw and kind == "stuck":
             self._screw[-1]["seized"] = 1.0
         elif len(self._screw) == 2 and kind == "float":
-            # The nut is off its thread, and plays as far as the end stops let it.
+            # The nut is off its thread and moves freely between the end stops.
             self._screw[0]["backlash_m"] = 4.0 * self._screw[1]["stop_m"]
         elif kind == "stuck" and ACTUATORS[self.fault.part].is_brake:
             if not self.memory:
                 self.memory.append(float(self._ctrl[self._index]))
             record["scale"], record["offset"] = 0.0, self.memory[0]
         elif kind == "stuck":
-            # No rate: the servo holds the angle that it has reached, with its stiffness and its strength.
+            # Without a rate the servo holds its present angle, with its stiffness and its strength.
             record["rate_limit"] = 0.0
         elif kind == "float":
             self._model.actuator_gainprm[self._index] = self._model.actuator_biasprm[self._index] = 0.0
@@ -193,25 +192,25 @@ class _ActuatorFault:
             record["scale"], record["offset"] = 0.0, stop if kind == "runaway" else 0.0
 
     def release(self) -> None:
-        """The actuator works as built."""
+        """Restore the actuator as built."""
         index = self._index
         self._record[:], self._model.actuator_gainprm[index], self._model.actuator_biasprm[index] = self._healthy
         for part, healthy in zip(self._screw, self._healthy_screw, strict=True):
             part[:] = healthy
 
     def recover(self) -> None:
-        """A servo that was afloat begins where it is, and comes back to its demand with its own lag and rate."""
+        """Start a servo that was free at its present angle; it returns to its demand with its own lag and rate."""
         if self.fault.kind == "float" and not self._screw:
             angle = self._data.qpos[self._model.jnt_qposadr[self._model.actuator_trnid[self._index, 0]]]
             self._data.act[self._model.actuator_actadr[self._index]] = angle
 
     def before_step(self) -> None:
-        """Gives the actuator the demand of a while ago."""
+        """Give the actuator the delayed demand."""
         if self._record["scale"] == 0.0:
             self._record["offset"] = self.memory[0] if self.memory else self._ctrl[self._index]
 
     def after_step(self) -> None:
-        """Keeps the demand."""
+        """Keep the demand."""
         self.memory.append(float(self._ctrl[self._index]))
 
 
@@ -226,21 +225,21 @@ class _SensorFault:
         self._place = Measurement._fields.index(self._sensor.field)
         self.begins, self.ends = _steps(fault, timestep_s)
         delay = round((fault.delay_s or 0.0) / timestep_s)
-        # A sensor that sticks must know its last reading.
+        # A stuck sensor needs its last reading.
         self.listens = self.begins - max(1, delay)
         self.memory: deque[float] = deque(maxlen=delay + 1 if delay else 1)
 
     def engage(self) -> None:
-        """Nothing: a sensor's fault changes nothing in the car."""
+        """Do nothing: a sensor's fault changes nothing in the car."""
 
     def recover(self) -> None:
-        """Nothing, when it ends."""
+        """Do nothing."""
 
     def release(self) -> None:
-        """Nothing, likewise."""
+        """Do nothing."""
 
     def read(self, measurement: Measurement, *, active: bool) -> Measurement:
-        """What comes out for what would have."""
+        """Return the faulty reading for a true one."""
         whole: Any = measurement[self._place]
         index = self._sensor.wheel
         good = whole if index is None else whole[index]
@@ -265,7 +264,7 @@ class _SensorFault:
 
 
 def _steps(fault: Fault, timestep_s: float) -> tuple[int, int]:
-    """First step at which a fault acts, and the first one at which it does not any more."""
+    """Return the first step of a fault, and the first step after it."""
     begins = round(fault.start_s / timestep_s)
     never = 2**62
     return begins, never if fault.end_s is None else max(begins + 1, round(fault.end_s / timestep_s))

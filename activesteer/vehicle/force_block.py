@@ -1,11 +1,11 @@
-"""The parameters of the native forces, as they lie in a model's custom numeric data.
+"""The parameters of the native forces, in a model's custom numeric data.
 
 One block of numbers per model holds everything the callbacks need: sizes, indices, tyres, dampers, drag, the areas of
 the road and the dynamics of the actuators. So the compiled code is the same for every car and can be cached on disk,
-and models of one process may differ. It is made of records whose fields are float64, an index too, since that is all
-that the engine keeps: a `HEADER`, and behind it the sections. A field that is called as an array of the engine (`act`,
-`qpos`, `userdata`), or as what these are counted by (`body`, `dof`, `tendon`), is a place in it. The block is the last
-custom numeric of the model and ends with its own start and a marker, by which the callbacks recognise a model of ours.
+and models in one process may differ. The block consists of records whose fields are float64, indices too, since the
+engine stores nothing else: a `HEADER`, then the sections. A field named after an array of the engine (`act`, `qpos`,
+`userdata`), or after an index of such arrays (`body`, `dof`, `tendon`), is a place in the array. The block is the last
+custom numeric of the model and ends with its own start and a marker, by which the callbacks recognise our models.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ MARKER: Final = 20121121.0
 """Last number of the block; the date of the conference of the paper that this project starts from."""
 TRAILER_SIZE: Final = 2
 MAX_CHAIN: Final = 32
-"""Most degrees of freedom between the world and a wheel."""
+"""Largest number of degrees of freedom between the world and a wheel."""
 MAX_CURVE_POINTS: Final = 12
 POWERS: Final = 5
 """Coefficients of a polynomial without a constant term."""
 
 
 def _record(*fields: str | tuple[str, int]) -> np.dtype[Any]:
-    """A record of numbers, and of rows of numbers where a length is given."""
+    """Return a record type of numbers, and of rows of numbers where a length is given."""
     return np.dtype(
         (
             np.record,
@@ -47,40 +47,39 @@ WHEEL: Final = _record(
     "body", "root", "act_x", "act_y", "act_z", "mu", "pressure_Pa", "low_speed_mps", "low_speed_damping_Nspm",
     "spin_dof", "drive_fraction", "chain_length", ("chain", MAX_CHAIN),
 )  # fmt: skip
-"""One for each wheel, with the degrees of freedom between the world and it; its tyre has the same place among them."""
+"""A wheel, with the degrees of freedom between the world and it; its tyre has the same place in its section."""
 
 DAMPER: Final = _record(
     "tendon", "row", "length", "points", ("chain", MAX_CHAIN), ("velocity_mps", MAX_CURVE_POINTS),
     ("force_N", MAX_CURVE_POINTS),
 )  # fmt: skip
-"""One for each damper: a tendon, its place in the sparse tendon Jacobian, and a piecewise linear curve, velocities
-positive in compression, forces positive where they push apart."""
+"""A damper: a tendon, its place in the sparse tendon Jacobian, and a piecewise linear curve, velocities positive in
+compression, forces positive when they push apart."""
 
 ACTUATOR: Final = _record(
     "kind", "act", "low", "high", "scale", "offset", "lag_s", "rate_limit", "userdata", "stiffness", "drive_fraction",
     "dof", "tendon", "vibration", "wound_limit", "record",
 )  # fmt: skip
-"""One for each actuator, in the model's order: its `KIND`, and what its kind needs. `low` and `high` bound its command;
-`scale` and `offset` stand between the command and what is made of it, see `IN_ORDER`; at `userdata` the callback leaves
-the rate of a tyre's state; `dof` or `tendon` is what a brake or friction acts on, the other one below 0; `record` is
-the place among `links` or `screws`."""
+"""An actuator, in the model's order: its `KIND`, and the fields of that kind. `low` and `high` bound its command;
+`scale` and `offset` change the command, see `IN_ORDER`; the callback writes the rate of a tyre's state to `userdata`; a
+brake or friction acts on `dof` or `tendon`, the other one is negative; `record` is the place among `links` or
+`screws`."""
 KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE, KIND_FRICTION, KIND_DRIVE = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
-"""What an actuator is; without a dynamics of ours `KIND_NONE`."""
+"""Kinds of actuators; `KIND_NONE` has no dynamics of ours."""
 KIND_LINK, KIND_SCREW, KIND_MOTOR = 6.0, 7.0, 8.0
 IN_ORDER: Final = {"scale": 1.0, "offset": -0.0}
-"""Of an actuator without a fault; adding -0.0 changes nothing, not even the sign of a zero."""
+"""Values for an actuator without a fault; adding -0.0 changes nothing, not even the sign of a zero."""
 
 AREA: Final = _record("start_m", "end_m", "right_m", "left_m", "mu")
-"""One for each area of the road with a friction of its own: a rectangle in world axes, the later one counts where they
-overlap. They count while the header's `areas_felt` is 1, which `Vehicle.rebase` sets: before, the road has no origin
-yet."""
+"""An area of the road with its own friction: a rectangle in world axes; where areas overlap, the later one counts.
+Areas count while the header's `areas_felt` is 1, which `Vehicle.rebase` sets, since the road has no origin before."""
 
 LINK: Final = _record(
     "tendon", "rest_m", "stiffness_Npm", "backlash_m", "act", "screw_act", "sign", "userdata",
     ("angle", POWERS),
 )  # fmt: skip
-"""One for each toe link with a screw in it (`toe_link_screws`), with the coefficients of angle over travel. `act` is by
-how much it is longer, `screw_act` the position of its screw; at `userdata` its angle is left for its sensor."""
+"""A toe link with a screw in it (`toe_link_screws`), with the coefficients of angle over travel. `act` is its change of
+length, `screw_act` the position of its screw; the callback writes its angle to `userdata` for its sensor."""
 
 SCREW: Final = _record(
     "act", "motor_act", "command", "lead_mprad", "inertia_kgm2", "position_gain_1ps", "speed_gain_1ps",
@@ -88,25 +87,26 @@ SCREW: Final = _record(
     "tolerance_m", "seized", "userdata", "n_links", ("links", 2), "column", "column_stiffness_Npm", "column_rest_m",
     "column_arm_m", ("travel", POWERS),
 )  # fmt: skip
-"""One for each screw and its motor, with the places of its links and the coefficients of travel over angle. The
-superposition's motor has such a record too: its travel is an angle [rad], and it has the steering column for links. At
-`userdata` torque and whether it is at a limit are left for its sensor; `command` is the actuator that is asked."""
+"""A screw and its motor, with the places of its links and the coefficients of travel over angle. The superposition's
+motor
+has such a record too: its travel is an angle [rad], and its link is the steering column. The callback writes torque and
+limit flag to `userdata` for its sensor; `command` is the actuator whose command it follows."""
 
-GUIDE: Final = _record(
+CURVE_AXLE_WHEEL: Final = _record(
     "qpos", "dof", "side", "rack", "rack_dof", "travel_table", "rack_table", ("stiffness", 25), ("damping", 25),
     ("held_stiffness", 25), ("held_damping", 25), ("square", 2), ("hardening", 10), ("travel_slope", 5),
     ("rack_slope", 5),
 )  # fmt: skip
-"""One for each wheel that curves guide (`native_guide`): addresses, sign of its side, where among `curves` its tables
-begin; stiffness and damping, row by row, and the part of them that the engine's tendons hold; what hardens beside them,
-slopes of the curves in the design position."""
+"""A wheel of a curve axle (`native_curve_axle`): addresses, sign of its side, start of its tables among `curves`;
+stiffness and damping, row by row, and the part of them in the engine's tendons; hardening springs, and slopes of the
+curves in the design position."""
 
 CURVE_TABLE: Final = _record("start_m", "per_m", "intervals", "count")
-"""Head of a table of curves; behind it the curves as cubics on even intervals."""
+"""Head of a table of curves; the curves follow as cubics on even intervals."""
 
 _SECTIONS: Final[Mapping[str, Any]] = {
     "wheels": WHEEL, "tyres": TYRE_RECORD, "dampers": DAMPER, "actuators": ACTUATOR, "areas": AREA, "links": LINK,
-    "screws": SCREW, "guides": GUIDE, "curves": np.float64,
+    "screws": SCREW, "curve_axle_wheels": CURVE_AXLE_WHEEL, "curves": np.float64,
 }  # fmt: skip
 HEADER: Final = _record(
     "n_dofs", "n_bodies", "n_userdata", "n_activations", "n_controls", "n_tendons", "n_tendon_jacobian",
@@ -114,36 +114,36 @@ HEADER: Final = _record(
     ("aero_point_m", 3), "engine_torque_Nm", "engine_power_W", "engine_limit_radps", "engine_drag_Nm", "gear",
     "areas_felt", "screw_sensors", "n_screw_sensors", *_SECTIONS, *(f"n_{name}" for name in _SECTIONS),
 )  # fmt: skip
-"""Sizes of the engine's arrays, the chassis and where drag acts on it, the numbers of `powertrain.drive_limits`, where
-in `sensordata` the screws' sensors begin, and start and number of each section, counted in numbers from the block's
-start."""
+"""Sizes of the engine's arrays, the chassis and the point where drag acts on it, the arguments of
+`powertrain.drive_limits`, the first place of the screws' sensors in `sensordata`, and start and number of each section,
+counted in numbers from the block's start."""
 
 WHEEL_OUTPUT: Final = _record(
     "fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm", "slip_ratio", "slip_angle_rad", "inclination_rad",
     "deflection_x_rate_mps", "deflection_y_rate_mps", "deflection_z_rate_radps", "loaded_radius_m", "limited",
     "friction_utilisation", "mu", "contact_x_m", "contact_y_m",
 )  # fmt: skip
-"""What the callback writes for each wheel at the beginning of mjData.userdata. Behind these stand the force of each
-damper and what the sensors of screws and motors say, and last, which it does not write, how many faults act."""
+"""Outputs of the callback for each wheel, at the beginning of mjData.userdata. After them come the force of each damper
+and the readings of screws and motors, and last, not written by the callback, the number of active faults."""
 USERDATA_PER_WHEEL: Final = WHEEL_OUTPUT.itemsize // 8
 
 
 def output_slot(wheel: int, name: str) -> int:
-    """Where in `userdata` a field of a wheel's `WHEEL_OUTPUT` stands."""
+    """Return the place in `userdata` of a field of a wheel's `WHEEL_OUTPUT`."""
     assert WHEEL_OUTPUT.names is not None
     return wheel * USERDATA_PER_WHEEL + WHEEL_OUTPUT.names.index(name)
 
 
 def wheel_outputs(data: mujoco.MjData, count: int) -> NDArray[Any]:
-    """What the callback wrote for each of so many wheels, a view of `WHEEL_OUTPUT` records."""
+    """Return the callback's outputs for a number of wheels, a view of `WHEEL_OUTPUT` records."""
     return data.userdata[: count * USERDATA_PER_WHEEL].view(WHEEL_OUTPUT)
 
 
 def new_header(model: mujoco.MjModel, chassis: int, chassis_dofs: list[int]) -> NDArray[Any]:
-    """A header with the sizes of a model.
+    """Return a header with the sizes of a model.
 
     Args:
-        model: The model, compiled without the block: sizes and addresses are those that it will have with it.
+        model: The model, compiled without the block; the block does not change its sizes and addresses.
         chassis: Index of the body that drag acts on.
         chassis_dofs: Degrees of freedom between the world and it.
 
@@ -159,7 +159,7 @@ def new_header(model: mujoco.MjModel, chassis: int, chassis_dofs: list[int]) -> 
 
 
 def filled(record_type: np.dtype[Any], /, **values: Any) -> NDArray[Any]:
-    """One record, shape (1,), 0 where nothing is given; a row may be shorter than its room."""
+    """Return one record, shape (1,), 0 where nothing is given; a row may be shorter than its field."""
     record = np.zeros(1, record_type)
     for name, value in values.items():
         if record[name].ndim > 1:
@@ -170,11 +170,11 @@ def filled(record_type: np.dtype[Any], /, **values: Any) -> NDArray[Any]:
 
 
 def pack(header: NDArray[Any], sections: Mapping[str, list[NDArray[Any]]]) -> NDArray[np.float64]:
-    """The block without its trailer.
+    """Return the block without its trailer.
 
     Args:
         header: As from `new_header`; starts and numbers of the sections are written into it.
-        sections: Records of each section, in pieces; what is not given is empty.
+        sections: Records of each section, in pieces; missing ones are empty.
 
     Returns:
         The numbers.
@@ -191,17 +191,17 @@ def pack(header: NDArray[Any], sections: Mapping[str, list[NDArray[Any]]]) -> ND
 
 
 def with_trailer(block: NDArray[np.float64], start: int) -> NDArray[np.float64]:
-    """The block as it goes into the model, given the index at which it will start in `numeric_data`."""
+    """Return the block as it goes into the model, for the index of its start in `numeric_data`."""
     return np.concatenate([block, (float(start), MARKER)])
 
 
 def header_of(model: mujoco.MjModel) -> NDArray[Any]:
-    """The header in a model of ours, shape (1,): a view, what is written into it acts from the next step on."""
+    """Return the header of one of our models, shape (1,): a view; a change acts from the next step on."""
     return _view(model, 0, HEADER, 1)
 
 
 def section_of(model: mujoco.MjModel, name: str) -> NDArray[Any]:
-    """The records of a section of a model of ours; a view too."""
+    """Return the records of a section of one of our models, a view too."""
     header = header_of(model)[0]
     return _view(model, int(header[name]), np.dtype(_SECTIONS[name]), int(header[f"n_{name}"]))
 

@@ -1,4 +1,4 @@
-"""What a car carries, and factors on the car as modelled: applied to the model before it is compiled."""
+"""Load of a car, and factors on the car as modelled, applied to the model before it is compiled."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from activesteer.vehicle.parameters import Factors, Load, VehicleParameters
 _AXLES: Final = (CORNERS[:2], CORNERS[2:])
 _BOOT_M: Final = (0.0, 0.0, 0.6)
 _TANK_M: Final = (0.4, 0.0, 0.35)
-"""Where payload and fuel are if no position is given: from the road below the middle of the rear axle, vehicle axes."""
+"""Default position of payload and fuel, relative to the road below the middle of the rear axle, vehicle axes [m]."""
 
 
 def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Loads the car.
+    """Load the car.
 
-    Masses are points that are fixed to the chassis. The site `cg`, which motion is given for, moves with the centre of
-    gravity of the whole car. A car that nothing is loaded on stays exactly as it is.
+    Masses are points fixed to the chassis. The site `cg`, whose motion is recorded, moves with the centre of gravity of
+    the whole car. A car without load stays exactly as it is.
 
     Args:
         spec: The model; changed.
         parameters: Load and factors.
 
     Raises:
-        ModelError: there is no chassis, or it would weigh nothing.
+        ModelError: there is no chassis, or its mass would not be positive.
     """
     chassis = spec.body("chassis")
     if chassis is None:
@@ -51,7 +51,7 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
             value=factors.mass,
         )
     mass = scale * float(body.mass[0])
-    # The whole empty car's moves by what is asked for; only the chassis is moved.
+    # The shift is that of the whole empty car's centre of gravity; only the chassis' is moved.
     move_m = np.array([load.cg_forward_change_m, 0.0, load.cg_height_change_m])
     cg = body.ipos + move_m * factors.mass * before.mass_kg / mass
     axes = np.empty(9)
@@ -73,7 +73,7 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
 
 
 def _points(bare: mujoco.MjModel, load: Load) -> list[tuple[float, Array]]:
-    """Masses on the car and where they are, vehicle axes [kg], [m]."""
+    """Return the masses on the car and their positions, vehicle axes [kg], [m]."""
     data = mujoco.MjData(bare)
     mujoco.mj_kinematics(bare, data)
     front, rear = (data.xpos[[bare.body(f"{corner}_wheel").id for corner in pair], 0].mean() for pair in _AXLES)
@@ -85,7 +85,7 @@ def _points(bare: mujoco.MjModel, load: Load) -> list[tuple[float, Array]]:
 
 
 def _scale_springs(spec: mujoco.MjSpec, bare: mujoco.MjModel, factors: Factors) -> None:
-    """Springs and anti-roll bars of other rates; what a spring carries in the design position stays."""
+    """Change the rates of springs and anti-roll bars; the force of a spring in the design position stays."""
     for tendon in spec.tendons:
         if tendon.name.endswith("_anti_roll_bar"):
             tendon.stiffness = factors.anti_roll_bar * np.asarray(tendon.stiffness)

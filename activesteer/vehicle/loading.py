@@ -19,7 +19,7 @@ from activesteer.errors import ModelError
 from activesteer.road.road import Road
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.guide_model import fit_guides, guide_records
+from activesteer.vehicle.curve_axle_model import curve_axle_records, fit_curve_axles
 from activesteer.vehicle.load import apply_load
 from activesteer.vehicle.named_parts import find
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, VehicleParameters
@@ -33,11 +33,11 @@ SLIP_RATES: Final = {
     "slip_y": "deflection_y_rate_mps",
     "slip_z": "deflection_z_rate_radps",
 }
-"""Relaxation state of a tyre, as its actuator is called behind the corner -> the output that holds its rate."""
+"""Relaxation state of a tyre, by the suffix of its actuator -> the output that holds its rate."""
 
 
 _compiled: deque[tuple[tuple[Any, ...], mujoco.MjModel]] = deque(maxlen=4)
-"""Cars compiled last, each behind everything that it was compiled from: a car is often driven several times."""
+"""Cars compiled last, by everything that they were compiled from: a car is often driven several times."""
 
 
 def load_model(
@@ -48,25 +48,25 @@ def load_model(
     timestep_s: float,
     content: Mapping[str, bytes] | None = None,
 ) -> mujoco.MjModel:
-    """Compiles a car, or copies it where it was compiled lately.
+    """Compile a car, or copy it if it was compiled recently.
 
     Args:
         mjcf: The model file.
-        parameters: What MJCF cannot say.
+        parameters: Parameters beyond the MJCF.
         tyres: Tyres of the front and of the rear axle.
         road: Friction and grade.
         timestep_s: Step of the engine [s].
-        content: Content of the model's files by name, which tells a changed file; without it nothing is copied.
+        content: Content of the model's files by name, which reveals a changed file; without it nothing is copied.
 
     Returns:
         The model, ready for the native forces.
 
     Raises:
-        ModelError: the MJCF does not compile, or lacks something that a car must have.
+        ModelError: the MJCF does not compile, or lacks a part that a car must have.
     """
     if not content:
         return _compile(mjcf, parameters, tyres, road, timestep_s)
-    # Not what a vehicle file has besides: controllers and their single-track model are no part of the car.
+    # Controllers and their single-track model are in the vehicle file, but are not part of the car.
     physical = [getattr(parameters, field.name) for field in fields(VehicleParameters)]
     made_from = (mjcf, dict(content), physical, tyres, road, timestep_s)
     for known, model in _compiled:
@@ -89,16 +89,16 @@ def _compile(
         spec.option.timestep = timestep_s
         angle = math.atan(road.grade)
         spec.option.gravity = [-GRAVITY_MPS2 * math.sin(angle), 0.0, -GRAVITY_MPS2 * math.cos(angle)]
-        # A state that is not finite must end the run; the engine would start again from its reference position.
+        # A state that is not finite must end the run; by default the engine would restart from its reference position.
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-        # What is implicit is so by `integrator`; what the native step then integrates is not to be damped again.
+        # `integrator` makes damping implicit; the step must not be damped a second time.
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
         spec.nuserdata = len(CORNERS) * (fb.USERDATA_PER_WHEEL + 1) + 1
         if parameters.rear_actuator.is_screw:
             fit_screws(spec, parameters.rear_actuator.resolved())
         if parameters.superposition_actuator.is_geared:
             fit_motor(spec)
-        fit_guides(spec, parameters.curves)
+        fit_curve_axles(spec, parameters.curves)
         _fit_actuators(spec, parameters)
         apply_load(spec, parameters)
         block = _force_block(spec.compile(), parameters, tyres, road)
@@ -110,7 +110,7 @@ def _compile(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Gives drive, brakes, friction and servos what MJCF does not say; forces follow the activation at a step's end."""
+    """Add to drive, brakes, friction and servos what MJCF lacks; forces follow the activation at a step's end."""
     for actuator in spec.actuators:
         if actuator.name.endswith("_drive"):
             actuator.dyntype = mujoco.mjtDyn.mjDYN_USER
@@ -125,7 +125,7 @@ def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
 
 
 def _friction(actuator: str, parameters: VehicleParameters) -> tuple[float, float]:
-    """Force [N] and stiffness [N/m] of the dry friction that an actuator stands for."""
+    """Return force [N] and stiffness [N/m] of the dry friction that an actuator stands for."""
     friction = parameters.friction
     if actuator == "rack_friction":
         return friction.rack_N, friction.rack_stiffness_Npm
@@ -134,7 +134,7 @@ def _friction(actuator: str, parameters: VehicleParameters) -> tuple[float, floa
 
 
 def chain_to(model: mujoco.MjModel, body: int) -> list[int]:
-    """Degrees of freedom between the world and a body, nearest to the body first."""
+    """Return the degrees of freedom between the world and a body, nearest to the body first."""
     while model.body_dofnum[body] == 0:
         body = int(model.body_parentid[body])
         if body == 0:
@@ -164,7 +164,7 @@ def _force_block(
     header["screw_sensors"], header["n_screw_sensors"] = sensor_range(model)
     for name in ("rack_friction", *(f"{corner}_damper_friction" for corner in CORNERS)):
         if _friction(name, parameters)[0] > 0.0:
-            # Friction in the vehicle file is not to be lost because the model has no place for it.
+            # Friction in the vehicle file must not get lost because the model has no actuator for it.
             find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
     mounted = {corner: _tyre(corner, tyres) for corner in CORNERS}
     sections: dict[str, list[NDArray[Any]]] = {
@@ -173,7 +173,7 @@ def _force_block(
         "dampers": [_damper(model, corner, parameters) for corner in CORNERS],
         "areas": [np.array([area], fb.AREA) for area in road.areas()],
     }
-    sections["guides"], sections["curves"] = guide_records(model, parameters.curves)
+    sections["curve_axle_wheels"], sections["curves"] = curve_axle_records(model, parameters.curves)
     places: dict[str, tuple[float, int]] = {}
     if parameters.rear_actuator.is_screw:
         screws = screw_records(model, parameters.rear_actuator.resolved())
@@ -255,7 +255,7 @@ def _damper(model: mujoco.MjModel, corner: str, parameters: VehicleParameters) -
 def _actuator(
     model: mujoco.MjModel, index: int, parameters: VehicleParameters, places: Mapping[str, tuple[float, int]]
 ) -> NDArray[Any]:
-    """The record of one actuator for the callback that gives its rate."""
+    """Return the record of one actuator for the callback that computes its rate."""
     if int(model.actuator_dyntype[index]) != _USER_DYNAMICS:
         return fb.filled(fb.ACTUATOR, kind=fb.KIND_NONE, **fb.IN_ORDER)
     name, act = model.actuator(index).name, model.actuator_actadr[index]
@@ -267,7 +267,7 @@ def _actuator(
 
 
 def _dynamics(model: mujoco.MjModel, index: int, name: str, parameters: VehicleParameters) -> dict[str, float]:
-    """Kind of an actuator, and the fields that it needs."""
+    """Return the kind of an actuator, and its fields."""
     corner, _, state = name.partition("_")
     if state in SLIP_RATES:
         return {"kind": fb.KIND_SLIP, "userdata": fb.output_slot(CORNERS.index(corner), SLIP_RATES[state])}
@@ -299,5 +299,5 @@ def _dry_friction(model: mujoco.MjModel, index: int, name: str, parameters: Vehi
     if int(model.actuator_trntype[index]) == mujoco.mjtTrn.mjTRN_TENDON:
         vibration = parameters.friction.vibration_mps / math.sqrt(VIBRATION_AT_MPS)
         return fields | {"tendon": part, "dof": -1.0, "vibration": vibration}
-    # The rack: what shakes the wheels up and down hardly moves it.
+    # Vertical vibration of the wheels hardly moves the rack.
     return fields | {"tendon": -1.0, "dof": int(model.jnt_dofadr[part])}

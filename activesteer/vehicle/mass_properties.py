@@ -12,7 +12,7 @@ from activesteer.conventions import Array
 
 
 class MassProperties(NamedTuple):
-    """Of a group of bodies.
+    """Mass properties of a group of bodies.
 
     Attributes:
         mass_kg: Mass [kg].
@@ -28,11 +28,11 @@ class MassProperties(NamedTuple):
 def mass_properties(
     model: mujoco.MjModel, data: mujoco.MjData | None = None, *, without: Collection[str] = ()
 ) -> MassProperties:
-    """Mass properties of a car.
+    """Return the mass properties of a car.
 
     Args:
         model: The car.
-        data: Where its bodies are; the design position where not given.
+        data: State with the positions of its bodies; default the design position.
         without: Names of bodies that are left out.
 
     Returns:
@@ -53,7 +53,7 @@ def mass_properties(
 
 
 def point_mass_inertia(offset_m: Array) -> Array:
-    """Inertia tensor, per mass, of a point mass about a point that it is `offset_m` away from [m2] (Steiner)."""
+    """Return the inertia tensor, per mass, of a point mass at a distance `offset_m` from a point [m2] (Steiner)."""
     return np.asarray(offset_m @ offset_m * np.eye(3) - np.outer(offset_m, offset_m))
 
 

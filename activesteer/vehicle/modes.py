@@ -1,9 +1,9 @@
-"""Modes of a linearised car and what they are called: after the parts that take part in them.
+"""Modes of a linearised car, named after the parts that take part in them.
 
-The participation of state i in mode k is |w_ki v_ik|, w and v being left and right eigenvectors, divided by the sum
+The participation of state i in mode k is |w_ki v_ik|, with the left and right eigenvectors w and v, divided by the sum
 over all states; it does not depend on the units of the states. Bounce, roll and pitch each name the one mode in which
-they take part most, every other mode has the name of another part that takes part most. Where two modes come close, as
-roll and yaw/sideslip of a fast car, they mix, and exchange their names.
+they take part most. Every other mode has the name of another part, the one that takes part most. If two modes are
+close, such as roll and yaw/sideslip of a fast car, they mix and exchange their names.
 
 Source: Perez-Arriaga, Verghese and Schweppe, Selective modal analysis, IEEE Trans. Power Apparatus and Systems 101
 (1982), participation factors.
@@ -49,13 +49,13 @@ _PARTS: Final = (
     ("superposition gear", r"(d_)?superposition"),
     ("steering wheel", r"(d_)?steering_wheel"),
 )
-"""Parts of a car and the states (see `LocalState`) that belong to them; other states are their own part."""
+"""Parts of a car and their states (see `LocalState`); each other state is its own part."""
 
 _BODY_PARTS: Final = ("bounce", "roll", "pitch")
 """Motions of the body that have one mode each."""
 
 _MIN_LIKENESS: Final = 0.9
-"""How much alike left and right must move for a mode to count as parallel or opposite."""
+"""Least similarity of left and right for a mode to count as parallel or opposite."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Mode:
     """One mode, or a conjugate pair.
 
     Attributes:
-        name: After the part that takes part most; with `parallel` or `opposite` where it is one of the wheels.
+        name: Name of the part that takes part most; with `parallel` or `opposite` for wheels.
         eigenvalue_1ps: s [1/s], imaginary part not negative.
         participation: Participation factors of the parts, largest first; the sum is 1.
         shape: Right eigenvector, complex, shape (n,).
@@ -83,11 +83,11 @@ class Mode:
 
     @property
     def damping_ratio(self) -> float:
-        """Damping ratio [-]; 1 for a mode that only decays."""
+        """Damping ratio [-]; 1 for a mode that decays without oscillation."""
         return -self.eigenvalue_1ps.real / abs(self.eigenvalue_1ps)
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values, without the vectors."""
+        """Return JSON values, without the vectors."""
         s = self.eigenvalue_1ps
         return {
             "name": self.name, "natural_frequency_Hz": self.natural_frequency_Hz, "damping_ratio": self.damping_ratio,
@@ -96,7 +96,7 @@ class Mode:
 
 
 def find_modes(a: NDArray[np.float64], states: tuple[str, ...], timestep_s: float) -> list[Mode]:
-    """Modes of a system in discrete time.
+    """Find the modes of a system in discrete time.
 
     Args:
         a: System matrix of one step, shape (n, n).
@@ -130,7 +130,7 @@ def find_modes(a: NDArray[np.float64], states: tuple[str, ...], timestep_s: floa
             names[maximum] = part
     modes = []
     for index, sums in by_mode.items():
-        # ln of a negative real z would stand for half a turn a step: such a mode is beyond what the steps resolve.
+        # ln of a negative real z means half a turn per step: the steps do not resolve such a mode.
         s = complex(np.log(complex(values[index]))) / timestep_s
         name = names.get(index)
         if name is None:
@@ -148,7 +148,7 @@ def _part_of(state: str) -> str:
 
 
 def _sides(shape: NDArray[np.complex128], participation: NDArray[np.float64], states: tuple[str, ...]) -> str:
-    """Whether left and right wheels move alike or against each other, where it is the wheels that move."""
+    """Return ` parallel` or ` opposite` for a mode in which left and right wheels move alike or oppositely."""
     top = states[int(participation.argmax())]
     match = re.search(r"(?<![a-z])([fr])([lr])_", top)
     if match is None:
@@ -159,7 +159,7 @@ def _sides(shape: NDArray[np.complex128], participation: NDArray[np.float64], st
         return ""
     one, two = shape[states.index(top)], shape[states.index(other)]
     alike = float((one.conjugate() * two).real) * 2.0 / float(abs(one) ** 2 + abs(two) ** 2)
-    # Coordinates of both sides point the same way in vehicle axes: wheels that steer alike turn alike.
+    # Coordinates of both sides have the same directions in vehicle axes, so wheels that steer alike turn alike.
     if abs(alike) < _MIN_LIKENESS:
         return ""
     return ", parallel" if alike > 0.0 else ", opposite"

@@ -8,10 +8,10 @@ from activesteer.errors import ModelError, nearest_names
 
 
 def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    """Index of a named thing.
+    """Return the index of a named object.
 
     Raises:
-        ModelError: there is none of this name.
+        ModelError: no object has this name.
     """
     index = mujoco.mj_name2id(model, kind, name)
     if index < 0:
@@ -29,15 +29,15 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
 
 
 def is_there(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
-    """Whether something has this name."""
+    """Return True if an object has this name."""
     return mujoco.mj_name2id(model, kind, name) >= 0
 
 
 def sensor_columns(model: mujoco.MjModel, name: str) -> slice:
-    """Where a sensor's values stand in `sensordata`.
+    """Return the places of a sensor's values in `sensordata`.
 
     Raises:
-        ModelError: there is none of this name.
+        ModelError: no sensor has this name.
     """
     index = find(model, mujoco.mjtObj.mjOBJ_SENSOR, name)
     start = int(model.sensor_adr[index])
@@ -45,9 +45,9 @@ def sensor_columns(model: mujoco.MjModel, name: str) -> slice:
 
 
 def tendon_arms(model: mujoco.MjModel, name: str) -> dict[str, float]:
-    """Joint -> what a fixed tendon gains in length per coordinate of it; empty where there is no such tendon.
+    """Return, for each joint of a fixed tendon, the change of length per coordinate; empty if there is no such tendon.
 
-    The units are those of the joints: m/rad for one that turns, 1 for one that slides.
+    The units are those of the joints: m/rad for a hinge, 1 for a slide.
     """
     tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name)
     if tendon < 0:

@@ -1,6 +1,6 @@
 """The dynamics of servos, drive, brakes and dry friction: rates of their activations, for the native callbacks.
 
-`entry` is an actuator's `ACTUATOR` record, `command` what it is asked for, `state` its activation.
+`entry` is an actuator's `ACTUATOR` record, `command` its demand, `state` its activation.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from activesteer.vehicle.powertrain import CLUTCH_OPEN, drive_limits
 
 @inlined
 def servo_rate(entry, command, state):
-    """First-order lag behind the limited command, its rate limited."""
+    """Return the rate of a servo: a first-order lag behind the limited command, with a rate limit."""
     rate = (min(max(command, entry.low), entry.high) - state) / entry.lag_s
     return min(max(rate, -entry.rate_limit), entry.rate_limit)
 
 
 @inlined
 def drive_rate(wheels, header, entry, qvel, command, state, timestep_s):
-    """Rate of a wheel's drive torque: a first-order lag, within what the engine can give at the speed of its wheels."""
+    """Return the rate of a wheel's drive torque: a first-order lag, within the limits of the engine."""
     if header.gear == CLUTCH_OPEN:
         return (command - state) / timestep_s
     speed = 0.0
@@ -39,16 +39,16 @@ def drive_rate(wheels, header, entry, qvel, command, state, timestep_s):
     torque = state - (command - state) * math.expm1(-timestep_s / entry.lag_s)
     fraction = entry.drive_fraction
     if fraction == 0.0:
-        # Not driven: nothing is commanded, and what came past the engine before dies away.
+        # Not driven: the command is 0, and torque set without the engine decays.
         return (torque - state) / timestep_s
     return (min(max(torque, fraction * low), fraction * high) - state) / timestep_s
 
 
 @inlined
 def brake_rate(entry, qvel, command, state, timestep_s):
-    """Elasto-plastic friction: the pads wind up with the wheel and slip where the torque reaches the demand."""
+    """Return the rate of elasto-plastic friction: the pads wind up with the wheel and slip at the demanded torque."""
     speed = qvel[int(entry.dof)]
-    # The drag of pads, bearings and seals is always there; it is also what keeps a car from creeping at rest.
+    # Drag of pads, bearings and seals acts always; it also keeps a car at rest from creeping.
     limit = min(max(command, entry.low), entry.high) / entry.stiffness
     wound = min(max(state + timestep_s * speed, -limit), limit)
     return (wound - state) / timestep_s
@@ -56,8 +56,8 @@ def brake_rate(entry, qvel, command, state, timestep_s):
 
 @inlined
 def dry_friction_rate(entry, qvel, ten_velocity, state, timestep_s):
-    """Dry friction of a damper, which the road shakes, or of the rack."""
+    """Return the rate of the dry friction of a damper on a vibrating road, or of the rack."""
     speed = ten_velocity[int(entry.tendon)] if entry.tendon >= 0.0 else qvel[int(entry.dof)]
-    # The free joint of the chassis is the first (`Vehicle` sees to it): its velocity in the world.
+    # The free joint of the chassis comes first (`Vehicle` checks it): its velocity in the world.
     vibration = entry.vibration * (qvel[0] * qvel[0] + qvel[1] * qvel[1]) ** 0.25
     return friction_rate(state, speed, vibration, entry.wound_limit, timestep_s)

@@ -1,8 +1,8 @@
-"""The native callbacks: tyres, dampers, drag and axles of curves as passive forces, and the dynamics of our actuators.
+"""The native callbacks: tyres, dampers, drag and curve axles as passive forces, and the dynamics of our actuators.
 
 Compiled once by numba, cached on disk, called by the engine without any Python. They are pure functions of the state:
-what they leave in `userdata` is scratch for the recorder, written anew at every evaluation. Models without our block
-are left alone.
+their output in `userdata` is scratch for the recorder, written anew at every evaluation. Models without our block are
+left alone.
 
 Forces reach the joints by the transposed Jacobian: for every degree of freedom between the world and the body, the
 scalar product of its motion axis (`cdof`, about the centre of mass of the tree) with the wrench about the same point.
@@ -22,7 +22,7 @@ from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.engine_layout import EngineLayout, engine_layout
 from activesteer.vehicle.native_actuators import brake_rate, drive_rate, dry_friction_rate, servo_rate
-from activesteer.vehicle.native_guide import guides
+from activesteer.vehicle.native_curve_axle import add_curve_axle_forces
 from activesteer.vehicle.native_memory import array_at, f64_pointer, records_at, word
 from activesteer.vehicle.native_screws import screw_rate
 
@@ -38,7 +38,7 @@ _outputs_at: Final = records_at(fb.WHEEL_OUTPUT)
 
 @inlined
 def _our_block(model, m_count, m_numbers):
-    """Address of the block of a model of ours, or 0."""
+    """Return the address of the block of one of our models, or 0."""
     count = word(model + m_count)
     address = word(model + m_numbers)
     numbers = carray(f64_pointer(address), (count,))
@@ -49,7 +49,7 @@ def _our_block(model, m_count, m_numbers):
 
 @inlined
 def _apply(qfrc, cdof, chain, fx, fy, fz, tx, ty, tz):
-    """Adds J^T w for a wrench about the tree's centre of mass."""
+    """Add J^T w for a wrench about the tree's centre of mass."""
     for index in range(chain.size):
         dof = int(chain[index])
         axis = 6 * dof
@@ -61,7 +61,7 @@ def _apply(qfrc, cdof, chain, fx, fy, fz, tx, ty, tz):
 
 @inlined
 def _interpolate(x, xs, ys, count):
-    """Piecewise linear curve, continued with the slope of its ends."""
+    """Evaluate a piecewise linear curve, continued with the slope of its ends."""
     index = 1
     while index < count - 1 and x > xs[index]:
         index += 1
@@ -70,7 +70,7 @@ def _interpolate(x, xs, ys, count):
 
 @inlined
 def _road_mu(block, header, mu, x, y):
-    """Friction of the road at a place [m], world axes; `mu` where no area says otherwise."""
+    """Return the friction of the road at a place [m], world axes; `mu` outside all areas."""
     if header.areas_felt == 0.0:
         return mu
     areas = _areas_at(block, header.areas, header.n_areas)
@@ -174,7 +174,7 @@ def _dampers(block, header, ten_velocity, jacobian, userdata, qfrc):
 
 @inlined
 def _drag(header, xpos, xmat, com, cvel, cdof, qfrc):
-    """Aerodynamic drag: against the velocity of the pressure point, in the plane of the road."""
+    """Add aerodynamic drag: against the velocity of the pressure point, in the plane of the road."""
     body = int(header.chassis_body)
     root = int(header.chassis_root)
     ax, ay, az = header.aero_point_m[0], header.aero_point_m[1], header.aero_point_m[2]
@@ -192,7 +192,7 @@ def _drag(header, xpos, xmat, com, cvel, cdof, qfrc):
 
 
 def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0915 - three functions in one
-    """Compiles the three callbacks, or loads them from numba's cache.
+    """Compile the three callbacks, or load them from numba's cache.
 
     The offsets are closure variables on purpose: numba makes those part of the cache key.
     """
@@ -225,7 +225,7 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0
         _dampers(block, header, ten_velocity, jacobian, userdata, qfrc)
         _drag(header, xpos, xmat, com, cvel, cdof, qfrc)
         qpos = array_at(data, d_qpos, int(header.n_coordinates))
-        guides(block, header, qpos, array_at(data, d_qvel, dofs), qfrc)
+        add_curve_axle_forces(block, header, qpos, array_at(data, d_qvel, dofs), qfrc)
 
     @compiled_callback(types.double, types.intp, types.intp, types.intc)
     def actuator_rate(model, data, actuator):
@@ -269,7 +269,7 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0
             return
         header = _headers_at(block, 0, 1)[0]
         count, start = int(header.n_screw_sensors), int(header.screw_sensors)
-        # Behind them stands how many faults act.
+        # The number of active faults follows them.
         said = array_at(data, d_userdata, int(header.n_userdata))[-1 - count : -1]
         array_at(data, d_sensordata, start + count)[start:] = said
 
@@ -278,7 +278,7 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0
 
 @compiled_callback(types.double)
 def _no_clock():
-    """For a clock that the engine reads some twenty times a step, to add up what nobody looks at."""
+    """Replace the clock that the engine reads some twenty times a step for statistics that nobody uses."""
     return 0.0
 
 
@@ -287,10 +287,10 @@ _installed: list[Any] = []
 
 
 def install_native_forces() -> None:
-    """Installs the callbacks in this process; does nothing where they are installed already.
+    """Install the callbacks in this process, if they are not installed already.
 
     Raises:
-        ModelError: another part of the program has put a callback of its own in their place.
+        ModelError: another part of the program has replaced them by its own callback.
     """
     slots = (
         ("mjcb_passive", mujoco.get_mjcb_passive(), mujoco.set_mjcb_passive),
@@ -315,7 +315,7 @@ def install_native_forces() -> None:
 
 
 def remove_native_forces() -> None:
-    """Takes our callbacks out of this process, as for a measurement of the bare engine; others' are left."""
+    """Remove our callbacks from this process, for example to measure the bare engine; those of others stay."""
     if any(mujoco.get_mjcb_passive() is ours for ours in _installed):
         mujoco.set_mjcb_passive(None)
     if any(mujoco.get_mjcb_act_dyn() is ours for ours in _installed):

@@ -10,14 +10,14 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_memory import records_at
 
 _CONTACT_S: Final = 3e-4
-"""Time in which a screwed link finds its place in the play; of 0, the linearised car would have no such mode [s]."""
+"""Time in which a screwed link settles in its play; at 0, the linearised car would lack this mode [s]."""
 _links_at: Final = records_at(fb.LINK)
 _screws_at: Final = records_at(fb.SCREW)
 
 
 @inlined
 def _polynomial(coefficients, x):
-    """Value of a polynomial without a constant term."""
+    """Evaluate a polynomial without a constant term."""
     value = 0.0
     for power in range(fb.POWERS - 1, -1, -1):
         value = (value + coefficients[power]) * x
@@ -26,7 +26,7 @@ def _polynomial(coefficients, x):
 
 @inlined
 def _played(link, screw_m, longer_m):
-    """By how much a link is longer where its screw stands, within the play, as the length asks that it has."""
+    """Return the change of a link's length within its play: no force if possible, else an end of the play."""
     half = 0.5 * link.backlash_m
     return min(max(longer_m, screw_m - half), screw_m + half)
 
@@ -41,7 +41,7 @@ def _link_rate(link, state, act, ten_length, userdata, timestep_s):
 
 @inlined
 def _motor_load(links, screw, act, ten_length):
-    """Torque of the load at the motor, positive where it helps forwards, and the sum of its parts' magnitudes [N m]."""
+    """Return the load torque at the motor, positive if driving forwards, and the sum of its parts' sizes [N m]."""
     lead = screw.lead_mprad
     if screw.n_links == 0.0:
         stretch = ten_length[int(screw.column)] - screw.column_rest_m
@@ -59,7 +59,7 @@ def _motor_load(links, screw, act, ten_length):
 
 @inlined
 def _motor_limits(screw, speed):
-    """Least and greatest torque that current, voltage and power allow at a speed [N m]."""
+    """Return the least and the greatest torque that current, voltage and power allow at a speed [N m]."""
     high = min(screw.peak_Nm, max(screw.stall_Nm - screw.slope_Nmsprad * speed, 0.0))
     low = -min(screw.peak_Nm, max(screw.stall_Nm + screw.slope_Nmsprad * speed, 0.0))
     if speed > 0.0:
@@ -71,7 +71,7 @@ def _motor_limits(screw, speed):
 
 @inlined
 def _motor_rate(links, screw, asked, act, ctrl, ten_length, userdata, speed, timestep_s):
-    """Rate of a motor's speed: position and speed loop within current, voltage and power, load, dry friction."""
+    """Return the rate of a motor's speed: both loops within current, voltage and power, load, dry friction."""
     said = int(screw.userdata)
     userdata[said] = userdata[said + 1] = 0.0
     if screw.seized != 0.0:
@@ -85,12 +85,12 @@ def _motor_rate(links, screw, asked, act, ctrl, ten_length, userdata, speed, tim
     wanted = min(max(screw.position_gain_1ps * missing, -limit), limit)
     load, carried = _motor_load(links, screw, act, ten_length)
     friction = screw.friction_Nm + screw.load_friction * carried
-    # The speed loop, its integral part settled: what the speed asked for needs against load and friction.
+    # The speed loop with a settled integral part: the torque that the demanded speed needs against load and friction.
     target = speed - (wanted - speed) * math.expm1(-screw.speed_gain_1ps * timestep_s)
     per_torque = timestep_s / screw.inertia_kgm2
     needed = (target - speed) / per_torque - load + math.copysign(friction, target)
     if abs(missing) * lead <= screw.tolerance_m and abs(load) <= friction:
-        # It is there, and the screw holds by itself: no current.
+        # The position is reached and the screw is self-locking: no current.
         needed = 0.0
     low, high = _motor_limits(screw, speed)
     torque = min(max(needed, low), high)
@@ -108,7 +108,7 @@ def _motor_rate(links, screw, asked, act, ctrl, ten_length, userdata, speed, tim
 
 @inlined
 def screw_rate(block, header, actuators, entry, act, ctrl, ten_length, userdata, timestep_s):
-    """Rate of a screwed link's change of length, of a screw's position, or of its motor's speed."""
+    """Return the rate of a screwed link's change of length, of a screw's position, or of its motor's speed."""
     state = act[int(entry.act)]
     if entry.kind == fb.KIND_LINK:
         link = _links_at(block, header.links, header.n_links)[int(entry.record)]

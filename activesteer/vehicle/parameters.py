@@ -1,4 +1,4 @@
-"""What a vehicle file says beside its MJCF: width, tyres, dampers, friction, brakes, powertrain, steering, drag."""
+"""The part of a vehicle file beyond its MJCF: width, tyres, dampers, friction, brakes, powertrain, steering, drag."""
 
 from __future__ import annotations
 
@@ -33,29 +33,29 @@ _MASS_HINTS: Final = {
     **dict.fromkeys(("load_kg", "payload", "passengers", "luggage_kg"), _MASS_HINT),
     **dict.fromkeys(("cg_m", "cg_height", "cg_height_m"), _GRAVITY_HINT),
 }
-"""What people look for in vain -> which keys do it."""
+"""Keys that users look for in vain -> the keys that have the effect."""
 Position = Annotated[tuple[float, ...], Range(-20.0, 20.0)]
 
 
 @dataclass(frozen=True)
 class TyreFitment:
-    """Which tyres the car wears and how they behave near standstill."""
+    """Tyres of the car, and their behaviour near standstill."""
 
     front: str
     """Tyre file of the front wheels, a name in models/tyres or a path."""
     rear: str
     """Tyre file of the rear wheels."""
     front_pressure_Pa: Positive | None = None
-    """Inflation pressure; the one in the tyre file where not given [Pa]."""
+    """Inflation pressure; default from the tyre file [Pa]."""
     rear_pressure_Pa: Positive | None = None
-    """Inflation pressure; the one in the tyre file where not given [Pa]."""
+    """Inflation pressure; default from the tyre file [Pa]."""
     low_speed_mps: Annotated[float, Range(0.1, 5.0)] = 2.0
-    """Speed below which the standstill behaviour fades in [m/s]: there relaxation takes longer than a body swing."""
+    """Speed below which the standstill terms fade in [m/s]: there relaxation takes longer than a body oscillation."""
     low_speed_damping_Nspm: NotNegative = 1500.0
-    """Viscous coefficient of the contact patch at rest [N s/m]: a third of critical for a wheel of 1 kg m2 that swings
-    on a carcass of 450 kN/m, 2 sqrt(k J) / R = 4400 N s/m."""
+    """Viscous coefficient of the contact patch at rest [N s/m]: a third of critical for a wheel of 1 kg m2 that
+    oscillates on a carcass of 450 kN/m, 2 sqrt(k J) / R = 4400 N s/m."""
     conventions: TyreConventions = TyreConventions()
-    """What a tyre file leaves to the program that reads it; ours where not given."""
+    """Conventions that a tyre file leaves open; default those of this package."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,10 @@ class DamperCurve:
     velocity_mps: tuple[float, ...]
     """Compression velocities, increasing [m/s]."""
     force_N: tuple[float, ...]
-    """Forces that resist them [N]."""
+    """Forces that resist these velocities [N]."""
 
     def __post_init__(self) -> None:
-        """Checks the points.
+        """Check the points.
 
         Raises:
             ParameterError: there are too few or too many, or the velocities do not increase.
@@ -92,12 +92,12 @@ class Dampers:
 
 
 VIBRATION_AT_MPS: Final = 80.0 / 3.6
-"""Speed of the car to which `Friction.vibration_mps` belongs [m/s]."""
+"""Speed of the car at which `Friction.vibration_mps` holds [m/s]."""
 
 
 @dataclass(frozen=True)
 class Friction:
-    """Dry friction, which opposes motion whatever its speed: elastic until it slips; see `dry_friction`."""
+    """Dry friction, independent of speed: elastic until it slips; see `dry_friction`."""
 
     front_damper_N: NotNegative = 0.0
     """Seal, piston and rod guide of a front damper or strut, along it [N]."""
@@ -106,50 +106,50 @@ class Friction:
     rack_N: NotNegative = 0.0
     """Rack in its guide and seals, pinion, assist motor, along the rack [N]."""
     damper_stiffness_Npm: Annotated[float, Range(1.0, 1e6)] = 1e5
-    """Force over travel before a damper slips [N/m]: a seal's lip gives way by some tenths of a millimetre."""
+    """Force over travel before a damper slips [N/m]: a seal's lip deflects by some tenths of a millimetre."""
     vibration_mps: Annotated[float, Range(0.0, 1.0)] = 0.0
     """RMS of the damper speed that a road's roughness causes at 80 km/h [m/s]; it grows with the root of the speed."""
     rack_stiffness_Npm: Annotated[float, Range(1.0, 1e7)] = 2e6
-    """The same of the rack [N/m]."""
+    """The same for the rack [N/m]."""
 
 
 @dataclass(frozen=True)
 class Powertrain:
-    """Engine, gearbox and differentials: torque at the driven wheels and where it goes; see `powertrain`."""
+    """Engine, gearbox and differentials: torque at the driven wheels and its distribution; see `powertrain`."""
 
     front_fraction: Fraction
     """Fraction of the drive torque at the front axle; each axle's part is split evenly [-]."""
     max_torque_Nm: Positive
-    """Most drive torque at all wheels together, in first gear [N m]."""
+    """Highest drive torque at all wheels together, in first gear [N m]."""
     max_power_W: Positive
-    """Most power at all wheels together: the engine's less the losses of the gears [W]."""
+    """Highest power at all wheels together: the engine's less the losses of the gears [W]."""
     engine_brake_torque_Nm: NotNegative
     """Drag of the engine at all wheels together, in first gear [N m]; less in the longer gears of higher speeds."""
     max_wheel_speed_radps: Positive = 250.0
     """Mean speed of the driven wheels at which the engine is at its rev limit in top gear [rad/s]."""
     inertia_kgm2: NotNegative = 0.0
-    """Inertia of engine and gears at all driven wheels together, in a gear that stands for all [kg m2]."""
+    """Inertia of engine and gears at all driven wheels together, in one gear that represents all [kg m2]."""
     lag_s: Annotated[float, Range(0.001, 2.0)] = 0.1
-    """Time constant of the torque behind its demand: filling of the engine, twist of the driveline [s]."""
+    """Time constant of the torque relative to its demand: filling of the engine, twist of the driveline [s]."""
 
     @property
     def wheel_fractions(self) -> tuple[float, float, float, float]:
-        """Fraction of the drive torque that each wheel gets [-], order of `CORNERS`."""
+        """Fraction of the drive torque at each wheel [-], order of `CORNERS`."""
         front, rear = 0.5 * self.front_fraction, 0.5 * (1.0 - self.front_fraction)
         return front, front, rear, rear
 
 
 @dataclass(frozen=True)
 class Steering:
-    """The overall steering ratio, by which driver and controllers relate both ends of the steering."""
+    """The overall steering ratio, with which driver and controllers relate steering wheel and road wheels."""
 
     ratio: Positive
     """Steering wheel angle over mean road-wheel angle around straight ahead [-]."""
     steering_wheel_limit_rad: Positive
     """Lock angle of the steering wheel to either side [rad]."""
     assist_fraction: Annotated[float, Range(0.0, 0.99)] = 0.35
-    """Fraction of the column's torque that the power assist carries and the hands do not feel [-]; 0.35 is what the
-    compact's column is made for (its README). Only `hand_torque_Nm` and the hands' own limit depend on it."""
+    """Fraction of the column's torque that the power assist carries and the hands do not feel [-]; 0.35 belongs to the
+    compact's column (its README). Only `hand_torque_Nm` and the torque limit of the hands depend on it."""
 
 
 @dataclass(frozen=True)
@@ -161,37 +161,37 @@ class Aerodynamics:
     air_density_kgpm3: NotNegative = 1.2
     """At 20 deg C and sea level [kg/m3]."""
     pressure_point_m: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """Where drag acts, vehicle axes [m]."""
+    """Point where drag acts, vehicle axes [m]."""
 
 
 @dataclass(frozen=True)
 class Load:
-    """What the car carries beside what is in its model: masses at points of the chassis; see `load`."""
+    """Load of the car in addition to its model: masses at points of the chassis; see `load`."""
 
     KEY_HINTS: ClassVar = _MASS_HINTS
 
     payload_kg: Annotated[float, Range(0.0, 2000.0)] = 0.0
-    """Persons and luggage beside the driver [kg]."""
+    """Persons and luggage in addition to the driver [kg]."""
     payload_position_m: Position | None = None
-    """Their centre of gravity, vehicle axes [m]; above the middle of the rear axle, 0.6 m high, where not given."""
+    """Their centre of gravity, vehicle axes [m]; default above the middle of the rear axle, 0.6 m high."""
     roof_kg: Annotated[float, Range(0.0, 500.0)] = 0.0
     """Load on the roof [kg], over the middle of the wheelbase."""
     roof_height_m: Annotated[float, Range(0.5, 4.0)] = 1.6
     """Height of its centre of gravity above the road [m]."""
     fuel_kg: Annotated[float, Range(-100.0, 200.0)] = 0.0
-    """Fuel beside that in the model [kg]; negative is less."""
+    """Fuel in addition to that in the model [kg]; negative is less."""
     fuel_position_m: Position | None = None
-    """The tank, vehicle axes [m]; 0.4 m ahead of the rear axle, 0.35 m high, where not given."""
+    """Position of the tank, vehicle axes [m]; default 0.4 m ahead of the rear axle, 0.35 m high."""
     cg_height_change_m: Annotated[float, Range(-0.3, 0.3)] = 0.0
-    """The empty car's centre of gravity is moved up by this [m]; it is the chassis' that moves."""
+    """Upward shift of the empty car's centre of gravity [m], by moving that of the chassis."""
     cg_forward_change_m: Annotated[float, Range(-0.5, 0.5)] = 0.0
-    """The same forward [m]."""
+    """Forward shift of it [m]."""
 
     def __post_init__(self) -> None:
-        """Checks the positions.
+        """Check the positions.
 
         Raises:
-            ParameterError: one is not three numbers.
+            ParameterError: a position does not have three numbers.
         """
         for name in ("payload_position_m", "fuel_position_m"):
             position = getattr(self, name)
@@ -201,38 +201,39 @@ class Load:
 
 @dataclass(frozen=True)
 class Factors:
-    """Factors on the car as modelled, 1 each; see `load`."""
+    """Factors on the car as modelled, default 1; see `load`."""
 
     KEY_HINTS: ClassVar = dict.fromkeys(("mass_kg", "payload_kg"), _MASS_HINT)
 
     mass: Annotated[float, Range(0.5, 2.0)] = 1.0
-    """On the mass of the empty car: the chassis takes all of the difference, its inertia in proportion to its mass."""
+    """Factor on the mass of the empty car: the chassis takes all of the difference, its inertia in proportion to its
+    mass."""
     yaw_inertia: Annotated[float, Range(0.5, 2.0)] = 1.0
-    """On the yaw inertia of the empty car, as if masses of the chassis were moved along it, so that its pitch inertia
+    """Factor on the yaw inertia of the empty car, as if masses were moved along the chassis, so that its pitch inertia
     changes by the same amount."""
     spring_rate: Annotated[float, Range(0.2, 5.0)] = 1.0
-    """On the rates of the springs; what they carry in the design position stays, and so does the ride height."""
+    """Factor on the rates of the springs; their forces in the design position stay, and so does the ride height."""
     anti_roll_bar: Annotated[float, Range(0.0, 10.0)] = 1.0
-    """On the stiffnesses of the anti-roll bars."""
+    """Factor on the stiffnesses of the anti-roll bars."""
     damper: Annotated[float, Range(0.0, 10.0)] = 1.0
-    """On the forces of the dampers' curves."""
+    """Factor on the forces of the dampers' curves."""
     tyre_friction: Annotated[float, Range(0.1, 2.0)] = 1.0
-    """On the tyres' LMUX and LMUY."""
+    """Factor on the tyres' LMUX and LMUY."""
     tyre_cornering_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
-    """On the tyres' LKY."""
+    """Factor on the tyres' LKY."""
     front_cornering_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
-    """On that of the front tyres beside it."""
+    """Additional factor on LKY of the front tyres."""
     rear_cornering_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
-    """On that of the rear tyres beside it."""
+    """Additional factor on LKY of the rear tyres."""
     tyre_slip_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
-    """On the tyres' LKX."""
+    """Factor on the tyres' LKX."""
     tyre_vertical_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
-    """On the tyres' LCZ."""
+    """Factor on the tyres' LCZ."""
     servo_lag: Annotated[float, Range(0.1, 5.0)] = 1.0
-    """On the lag of the model's servos of rear wheels and superposition; a screw and a motor have none."""
+    """Factor on the lag of the model's servos of rear wheels and superposition; a screw and a motor have none."""
 
     def on_tyres(self, front: TyreParameters, rear: TyreParameters) -> tuple[TyreParameters, TyreParameters]:
-        """The tyres of both axles with their own scale factors multiplied; themselves where nothing is to be scaled."""
+        """Return the tyres of both axles with their scale factors multiplied; unchanged if all factors are 1."""
         stiffnesses = self.front_cornering_stiffness, self.rear_cornering_stiffness
         fitted = self._on_tyre(front, stiffnesses[0])
         return fitted, fitted if rear is front and len({*stiffnesses}) == 1 else self._on_tyre(rear, stiffnesses[1])
@@ -251,7 +252,7 @@ class Factors:
 
 @dataclass(frozen=True)
 class VehicleParameters:
-    """A vehicle file without what belongs to controllers and driver."""
+    """A vehicle file without the tables for controllers and driver."""
 
     KEY_HINTS: ClassVar = {
         **_MASS_HINTS,
@@ -265,7 +266,7 @@ class VehicleParameters:
 
     name: str
     mjcf: str
-    """The model, relative to models/mjcf or a path."""
+    """The model, a name in models/mjcf or a path."""
     width_m: Annotated[float, Range(0.5, 4.0)]
     """Width of the body without mirrors [m]: lanes are made for it, and cones touched by it."""
     tyres: TyreFitment
@@ -275,25 +276,25 @@ class VehicleParameters:
     steering: Steering
     aerodynamics: Aerodynamics
     rear_actuator: RearActuator = RearActuator()
-    """The model's hinges where not given."""
+    """Rear steering actuator; default the model's hinges."""
     superposition_actuator: SuperpositionActuator = SuperpositionActuator()
-    """The model's servo where not given."""
+    """Superposition actuator; default the model's servo."""
     friction: Friction = Friction()
-    """None where not given."""
+    """Dry friction; default none."""
     curves: Curves = Curves()
-    """Axles that curves guide instead of links; none where not given."""
+    """Curve axles in place of links; default none."""
     sensors: Sensors = Sensors()
-    """Ideal where not given."""
+    """Sensors; default ideal."""
     load: Load = Load()
-    """Nothing where not given."""
+    """Load; default none."""
     factors: Factors = Factors()
-    """All 1 where not given."""
+    """Factors; default 1."""
 
     def __post_init__(self) -> None:
-        """No factor without effect.
+        """Refuse a factor without effect.
 
         Raises:
-            ParameterError: one is on the lag of servos where there are none.
+            ParameterError: there is a factor on the lag of servos but no servo.
         """
         lag = self.factors.servo_lag
         if lag != 1.0 and self.rear_actuator.is_screw and self.superposition_actuator.is_geared:

@@ -1,17 +1,17 @@
-"""What an engine can give at the wheels it drives, in the gear that suits the speed best.
+"""Torque of an engine at its driven wheels, in the gear that suits the speed best.
 
-The driver always finds the gear in which the engine gives most. Over all gears that is a constant torque, the first
-gear's, up to the speed at which the engine reaches its greatest power, and constant power above:
+The driver always uses the gear with the highest torque. Over all gears that is a constant torque, the first gear's, up
+to the speed at which the engine reaches its highest power, and constant power above:
 
     T(u) = min(T_max, P / u)          u: mean speed of the driven wheels in the direction of the gear
 
-Mean, because a differential hands on equal torques and turns with the mean of the speeds behind it; so power in is
-power out, whatever a single wheel does. At the speed limit (top gear, rev limiter) the torque fades to zero. With the
-foot off, the engine drags. The gear shortens its drag as it does its torque, T_drag(u) = T_drag min(1, P / (T_max u)),
-and near standstill the clutch opens. Against the gear, as when rolling back on a hill, the clutch slips: the drive
-pulls with up to T_max and does not drag.
+The mean counts because a differential passes on equal torques and turns with the mean of the speeds behind it; so power
+in is power out, whatever a single wheel does. At the speed limit (top gear, rev limiter) the torque fades to zero. With
+the throttle released, the engine drags. The gear scales its drag as it does its torque, T_drag(u) = T_drag min(1, P /
+(T_max u)), and near standstill the clutch opens. Against the gear, as when rolling back on a hill, the clutch slips:
+the drive pulls with up to T_max and does not drag.
 
-Engine and gears turn with the driven wheels, which so have more inertia, but not while the clutch is open.
+Engine and gears turn with the driven wheels and increase their inertia, except while the clutch is open.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from activesteer.compilation import compiled, compiled_call
 from activesteer.vehicle.parameters import Powertrain
 
 CLUTCH_OPEN: Final = 0
-"""The gear in which the engine is apart from the wheels; what torques they get is no matter of the engine."""
+"""The gear in which the engine is disconnected from the wheels, whose torques then do not depend on the engine."""
 
 _FADE: Final = 0.02
 """Fraction of the speed limit over which the torque fades to zero."""
 _CLUTCH_SLIPS_radps: Final = 6.0
-"""Speed of the wheels below which the clutch slips, and the engine drags the less the slower they turn [rad/s]: that of
+"""Speed of the wheels below which the clutch slips, and the drag of the engine falls with the speed [rad/s]: that of
 idling at 800 1/min in first gear."""
 
 
@@ -37,14 +37,14 @@ idling at 800 1/min in first gear."""
 def drive_limits(
     speed_radps: float, gear: int, torque_Nm: float, power_W: float, limit_radps: float, drag_Nm: float
 ) -> tuple[float, float]:
-    """Least and greatest torque of the drive.
+    """Return the least and the greatest torque of the drive.
 
     Args:
         speed_radps: Mean speed of the driven wheels, forward positive [rad/s].
         gear: 1 forward, -1 reverse.
-        torque_Nm: Most torque at all wheels together, T_max [N m].
-        power_W: Most power at the wheels, P [W].
-        limit_radps: Speed at which the drive gives no torque any more [rad/s].
+        torque_Nm: Highest torque at all wheels together, T_max [N m].
+        power_W: Highest power at the wheels, P [W].
+        limit_radps: Speed above which the drive gives no torque [rad/s].
         drag_Nm: Drag of the engine at all wheels together, in first gear, T_drag [N m].
 
     Returns:
@@ -72,10 +72,10 @@ def _limits_Nm(speed_radps, gear, numbers):
 
 
 class Drive:
-    """The drive as its driver knows it: what it can give at the speed that the wheels have."""
+    """The drive as its driver knows it: its torque limits at the present speed of the wheels."""
 
     def __init__(self, parameters: Powertrain) -> None:
-        """The limits and fractions of the parameters."""
+        """Take limits and fractions from the parameters."""
         self._share = parameters.wheel_fractions
         self._limits = (
             parameters.max_torque_Nm,
@@ -85,7 +85,7 @@ class Drive:
         )
 
     def speed_radps(self, wheel_speeds_radps: tuple[float, float, float, float]) -> float:
-        """Mean speed of the driven wheels [rad/s], by what each gets of the torque.
+        """Return the mean speed of the driven wheels [rad/s], weighted by their fractions of the torque.
 
         Args:
             wheel_speeds_radps: Speeds of the four wheels [rad/s], order of `CORNERS`.
@@ -95,7 +95,7 @@ class Drive:
         return fl * a + fr * b + rl * c + rr * d
 
     def limits_Nm(self, speed_radps: float, gear: int) -> tuple[float, float]:
-        """Least and greatest torque at all wheels together, forward positive [N m].
+        """Return the least and the greatest torque at all wheels together, forward positive [N m].
 
         Args:
             speed_radps: Mean speed of the driven wheels [rad/s].

@@ -1,7 +1,7 @@
-"""What steers the rear wheels, as a vehicle file says: the model's hinges, or screws in the toe links.
+"""The rear steering actuator in a vehicle file: the model's hinges, or screws in the toe links.
 
-The presets of the screws are classes of actuators, not products. What is published of products (angles, arrangement,
-kind of screw) is in docs/actuators.md; forces, speeds, motors and friction are assumptions of the class.
+The presets of the screws are classes of actuators, not products. Published data of products (angles, arrangement, kind
+of screw) are in docs/actuators.md; forces, speeds, motors and friction are assumptions for the class.
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ _HINGE: Final = "hinge"
 
 @dataclass(frozen=True)
 class RearActuator(ElectricActuator):
-    """The rear steering actuator; with `hinge` all other keys belong to the model and have no effect here."""
+    """The rear steering actuator. With `hinge` the other keys have no effect."""
 
     preset: Literal["hinge", "screw_3deg", "screw_10deg"] = "hinge"
-    """`hinge`: the model's own; `screw_3deg`, `screw_10deg`: screws in the toe links, which the keys below change."""
+    """`hinge`: the model's own; `screw_3deg`, `screw_10deg`: screws in the toe links, with the keys below as overrides.
+    """
     arrangement: Literal["per_side", "central"] | None = None
-    """Whether each side has an actuator, or one in the middle moves both toe links."""
+    """One actuator at each side, or one in the middle that moves both toe links."""
     limit_rad: Annotated[float, Range(math.radians(0.5), math.radians(15.0))] | None = None
-    """Greatest wheel angle to either side that it takes as a demand; the end stops lie 3 % beyond [rad]."""
+    """Largest wheel angle to either side as a demand; the end stops lie 3 % beyond [rad]."""
     lead_m: Annotated[float, Range(1e-4, 0.05)] | None = None
     """Travel per turn of the screw [m]."""
     screw_stiffness_Npm: Annotated[float, Range(1e5, 1e10)] | None = None
@@ -37,10 +38,10 @@ class RearActuator(ElectricActuator):
     """Error of the screw's position at which the motor is switched off, if the screw then holds by itself [m]."""
 
     def __post_init__(self) -> None:
-        """No key without effect.
+        """Refuse a key without effect.
 
         Raises:
-            ParameterError: the hinge is given what only a screw has.
+            ParameterError: a key of screws is given for the hinge.
         """
         given = [item.name for item in fields(self) if item.name != "preset" and getattr(self, item.name) is not None]
         if self.preset == _HINGE and given:
@@ -52,22 +53,22 @@ class RearActuator(ElectricActuator):
 
     @property
     def is_screw(self) -> bool:
-        """Whether screws move the toe links."""
+        """True if screws move the toe links."""
         return self.preset != _HINGE
 
     @property
     def is_central(self) -> bool:
-        """Whether one screw in the middle moves both toe links."""
+        """True if one screw in the middle moves both toe links."""
         return self.is_screw and self.resolved().arrangement == "central"
 
     def smooth(self) -> Self:
-        """The same without play, dry friction and tolerance of the position, within which slopes mean nothing."""
+        """Return it without play, dry friction and position tolerance, within which slopes mean nothing."""
         if not self.is_screw:
             return self
         return replace(self, backlash_m=0.0, friction_torque_Nm=0.0, load_friction=0.0, position_tolerance_m=0.0)
 
     def resolved(self) -> Self:
-        """The same with the preset's value for every key that is not given."""
+        """Return it with the preset's value for every missing key."""
         values = PRESETS[self.preset]
         return replace(self, **{key: value for key, value in values.items() if getattr(self, key) is None})
 
@@ -122,4 +123,4 @@ PRESETS: Final = {
         "supply_power_W": 500.0,
     },
 }
-"""Preset -> what its keys are where they are not given."""
+"""Preset -> defaults of its keys."""

@@ -1,7 +1,7 @@
-"""What turns the front superposition, as a vehicle file says: the model's servo, or a motor with gear and lock.
+"""The superposition actuator in a vehicle file: the model's servo, or a motor with gear and lock.
 
-The gear adds its angle between steering wheel and rack, so all three carry the same torque: what the superposition
-needs the hands must hold. Motor and gear take the place of the servo's lag and rate limit; its stiffness stays.
+The gear adds its angle between steering wheel and rack, so all three carry the same torque: the hands must hold the
+torque of the superposition. Motor and gear replace the servo's lag and rate limit; its stiffness stays.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from activesteer.vehicle.named_parts import tendon_arms
 
 NAME: Final = "superposition"
 MOTOR: Final = "_motor"
-"""How the state beside an actuator is called that is the speed of its motor; so is its sensor."""
+"""Suffix of the state beside an actuator that is the speed of its motor, and of its sensor."""
 _COLUMN: Final = "steering_column"
 
 
 @dataclass(frozen=True)
 class SuperpositionActuator(ElectricActuator):
-    """The superposition's actuator; with `servo` all other keys belong to the model and have no effect here."""
+    """The superposition actuator. With `servo` the other keys have no effect."""
 
     preset: Literal["servo", "strain_wave"] = "servo"
-    """`servo`: the model's own; `strain_wave`: a motor and a strain-wave gear, which the other keys change."""
+    """`servo`: the model's own; `strain_wave`: a motor and a strain-wave gear, with the other keys as overrides."""
     lock_torque_Nm: Annotated[float, Range(0.0, 50.0)] | None = None
-    """What the electromagnetic lock at the motor holds where there is no supply [N m]."""
+    """Holding torque of the electromagnetic lock at the motor without supply [N m]."""
     position_tolerance_rad: Annotated[float, Range(0.0, 0.1)] | None = None
     """Error of the angle behind the gear at which the motor is switched off, if the gear then holds by itself [rad]."""
 
     def __post_init__(self) -> None:
-        """No key without effect.
+        """Refuse a key without effect.
 
         Raises:
-            ParameterError: the servo is given what only a motor has.
+            ParameterError: a key of the motor is given for the servo.
         """
         given = [item.name for item in fields(self) if item.name != "preset" and getattr(self, item.name) is not None]
         if not self.is_geared and given:
@@ -51,17 +51,17 @@ class SuperpositionActuator(ElectricActuator):
 
     @property
     def is_geared(self) -> bool:
-        """Whether a motor turns it through a gear."""
+        """True if a motor turns it through a gear."""
         return self.preset != "servo"
 
     def smooth(self) -> Self:
-        """The same without dry friction and tolerance of the angle, within which slopes mean nothing."""
+        """Return it without dry friction and angle tolerance, within which slopes mean nothing."""
         if not self.is_geared:
             return self
         return replace(self, friction_torque_Nm=0.0, load_friction=0.0, position_tolerance_rad=0.0)
 
     def resolved(self) -> Self:
-        """The same with the preset's value for every key that is not given."""
+        """Return it with the preset's value for every missing key."""
         return replace(self, **{key: value for key, value in STRAIN_WAVE.items() if getattr(self, key) is None})
 
 
@@ -85,11 +85,11 @@ STRAIN_WAVE: Final = {
     "lock_torque_Nm": 2.0,
     "position_tolerance_rad": 1e-3,
 }
-"""What the keys of the preset `strain_wave` are where they are not given."""
+"""Defaults of the preset `strain_wave`."""
 
 
 def fit_motor(spec: mujoco.MjSpec) -> None:
-    """Gives the superposition of a model a motor: a state without a force, and a sensor of torque and limits.
+    """Give the superposition of a model a motor: a state without a force, and a sensor of torque and limits.
 
     Raises:
         ModelError: the model has no superposition, or it does not turn the column.
@@ -106,11 +106,11 @@ def fit_motor(spec: mujoco.MjSpec) -> None:
 
 
 def motor_record(model: mujoco.MjModel, actuator: SuperpositionActuator) -> NDArray[Any]:
-    """What the callbacks need: a `SCREW` record.
+    """Return the `SCREW` record for the callbacks.
 
     Args:
         model: The model with the motor, compiled.
-        actuator: What the vehicle file says, with all keys.
+        actuator: The actuator with all keys.
     """
     index, column = model.actuator(NAME).id, model.tendon(_COLUMN).id
     values = actuator.motor_numbers() | {
@@ -120,7 +120,7 @@ def motor_record(model: mujoco.MjModel, actuator: SuperpositionActuator) -> NDAr
         "lead_mprad": 1.0 / known(actuator.gear),
         "stop_m": STOP_BEYOND * float(model.actuator_ctrlrange[index, 1]),
         "tolerance_m": known(actuator.position_tolerance_rad),
-        # What it says stands last of all sensors, before how many faults act.
+        # Its readings are the last of all sensors, before the number of active faults.
         "userdata": float(model.nuserdata - 3),
         "column": float(column),
         "column_stiffness_Npm": float(model.tendon_stiffness[column]),

@@ -1,7 +1,7 @@
-"""How a rear wheel steers when its toe link gets longer: solved from the model's own hardpoints.
+"""Steer angle of a rear wheel over the length of its toe link, solved from the model's own hardpoints.
 
-The chassis is held, the damper keeps its length, all other links keep theirs; for each length of the toe link the
-position of the corner is found in which no link carries anything (Newton's method).
+The chassis is fixed, and the damper and all other links keep their lengths. For each length of the toe link, Newton's
+method finds the position of the corner in which no link carries a force.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ _DIFFERENCE: Final = 1e-7
 _ITERATIONS: Final = 30
 _TOLERANCE_M: Final = 1e-10
 _BEYOND: Final = 1.05
-"""So much further than the limit the mapping is solved."""
+"""Range of the solution over the limit."""
 _FIT: Final = 2e-3
-"""Most error of the polynomials, over the range."""
+"""Largest error of the polynomials, over the range."""
 
 
 class ToeLinkMap(NamedTuple):
     """Steer angle and length of a toe link, both from the design position.
 
     Attributes:
-        travel_of_angle: Coefficients of angle, its square ...: longer by how much [m], shape (DEGREE,).
-        angle_of_travel: The same the other way [rad].
-        travel_m: Greatest change of length within the limit, to either side [m].
+        travel_of_angle: Coefficients of the change of length over the angle, its square ... [m], shape (DEGREE,).
+        angle_of_travel: Coefficients of the inverse map [rad].
+        travel_m: Largest change of length within the limit, to either side [m].
     """
 
     travel_of_angle: NDArray[np.float64]
@@ -40,28 +40,28 @@ class ToeLinkMap(NamedTuple):
     travel_m: float
 
     def mirrored(self) -> ToeLinkMap:
-        """That of the other side: there an angle to the left is what one to the right is here."""
+        """Return the map of the other side, where angles have the opposite sign."""
         signs = np.array([(-1.0) ** (power + 1) for power in range(DEGREE)])
         # travel(-angle), and minus the angle that belongs to a travel.
         return ToeLinkMap(self.travel_of_angle * signs, -self.angle_of_travel, self.travel_m)
 
 
 def evaluated(coefficients: NDArray[np.float64], x: NDArray[np.float64] | float) -> NDArray[np.float64]:
-    """Value of a polynomial without a constant term."""
+    """Evaluate a polynomial without a constant term."""
     return np.asarray(np.polynomial.polynomial.polyval(x, np.concatenate(([0.0], coefficients))), dtype=np.float64)
 
 
 def toe_link_map(model: mujoco.MjModel, corner: str, link: str, limit_rad: float) -> ToeLinkMap:
-    """Solves the mapping of a corner.
+    """Solve the map of a corner.
 
     Args:
         model: The car, compiled, without a hinge between knuckle and wheel.
         corner: `rl` or `rr`.
         link: Name of the tendon of the toe link.
-        limit_rad: To which angle on either side it is needed [rad].
+        limit_rad: Largest angle on either side [rad].
 
     Returns:
-        The mapping.
+        The map.
 
     Raises:
         ModelError: the link does not steer the wheel so far.
@@ -100,7 +100,7 @@ def _fit(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class _Corner:
-    """The coordinates of a corner and the lengths that bind them."""
+    """The coordinates of a corner and the lengths that constrain them."""
 
     def __init__(self, model: mujoco.MjModel, corner: str, link: str) -> None:
         self._model, self._data = model, mujoco.MjData(model)
@@ -140,7 +140,7 @@ class _Corner:
         return missing
 
     def angles(self, travels_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Steer angles at several lengths [rad], each search begun where the one before ended."""
+        """Return the steer angles at several lengths [rad]; each search starts from the previous solution."""
         middle = len(travels_m) // 2
         outwards = [self._along(travels_m[middle:]), self._along(travels_m[middle::-1])]
         return np.concatenate([outwards[1][:0:-1], outwards[0]])
@@ -150,7 +150,7 @@ class _Corner:
         return [self._solved(float(travel)) for travel in travels_m]
 
     def angle(self, travel_m: float) -> float:
-        """Steer angle from that of the design position, left positive [rad]."""
+        """Return the steer angle relative to the design position, left positive [rad]."""
         self._restart()
         return self._solved(travel_m)
 

@@ -1,17 +1,17 @@
-"""Screws in the toe links of a car whose model has hinges: what is changed in the model, what the callbacks need.
+"""Screws in the toe links of a car whose model has hinges: changes of the model, and records for the callbacks.
 
-The hinge between knuckle and carrier goes, and each toe link gets an actuator along it. A link of stiffness k that is
-longer by z carries -k (L - L_0 - z): the tendon has the first part, the actuator k z. Beside it stand two states
+The hinge between knuckle and carrier is removed, and each toe link gets an actuator along it. A link of stiffness k
+that is longer by z carries -k (L - L_0 - z): the tendon has the first part, the actuator k z. There are two more states
 without a force: position of the screw, speed of the motor. With free play, z is anywhere within the play about the
-screw's position: where the link carries nothing if that is possible, at an end of the play otherwise.
+screw's position: at the length without force if that is possible, at an end of the play otherwise.
 
 A screw on a motor of speed w, with the lead l per radian of the motor and the links' tension T, has
 
-    J dw/dt = M + l T - friction        |friction| <= M_0 + r l |T|, all of it at rest if that suffices
+    J dw/dt = M + l T - friction        |friction| <= M_0 + r l |T|, as much as needed at rest
     dz/dt = l w
 
-so that it locks itself where r >= 1. M is what the speed loop needs, within current, voltage and power; its integral
-part counts as settled, so that it knows load and friction.
+so that it is self-locking if r >= 1. M is the torque that the speed loop needs, within current, voltage and power; its
+integral part counts as settled, so that it includes load and friction.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ from activesteer.vehicle.toe_link_kinematics import toe_link_map
 
 CORNERS: Final = ("rl", "rr")
 LINKS: Final = ("toe_link", "tie_rod")
-"""What a rear toe link may be called behind its corner."""
+"""Names of a rear toe link after its corner."""
 SCREW: Final = "_screw"
-"""How the state beside an actuator is called that is its screw's: of its own side, or `rear_screw` in the middle."""
+"""Suffix of the state beside an actuator that is its screw's position: one per side, or `rear_screw` in the middle."""
 
 
 def fit_screws(spec: mujoco.MjSpec, actuator: RearActuator) -> None:
-    """Changes a model.
+    """Change a model.
 
     Args:
         spec: The model with hinges.
-        actuator: What the vehicle file says, with all keys.
+        actuator: The actuator with all keys.
 
     Raises:
         ModelError: the rear suspension has no toe link whose stiffness is one number, or no hinge.
@@ -89,7 +89,7 @@ def _add(spec: mujoco.MjSpec, name: str, tendon: str, gain: float, actuator: Rea
 
 
 def toe_link_of(spec: Any, corner: str) -> Any:
-    """The tendon that is the toe link of a rear corner.
+    """Return the tendon that is the toe link of a rear corner.
 
     Raises:
         ModelError: there is none.
@@ -103,7 +103,7 @@ def toe_link_of(spec: Any, corner: str) -> Any:
 
 @dataclass(frozen=True)
 class Screws:
-    """The records of a car's screws, and where its actuators find them.
+    """The records of a car's screws, and their places for its actuators.
 
     Attributes:
         links: A `LINK` record for each rear wheel.
@@ -117,11 +117,11 @@ class Screws:
 
 
 def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
-    """Solves the kinematics and collects what the callbacks need.
+    """Solve the kinematics and build the records for the callbacks.
 
     Args:
         model: The model with screws, compiled.
-        actuator: What the vehicle file says, with all keys.
+        actuator: The actuator with all keys.
 
     Raises:
         ModelError: the toe links do not steer the wheels so far.
@@ -157,7 +157,7 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
         links.append(link)
     for index, part in enumerate(parts):
         places[part + SCREW], places[part + MOTOR] = (fb.KIND_SCREW, index), (fb.KIND_MOTOR, index)
-        # One for both: what moves the left link out moves the right one in.
+        # One screw for both: it moves the left link out and the right one in.
         travel = maps[index].travel_of_angle if not central else (0.5 * (left.travel_of_angle - right.travel_of_angle))
         moved = [0, 1] if central else [index]
         screw = fb.filled(
@@ -179,9 +179,9 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
 
 
 def sensor_range(model: mujoco.MjModel) -> tuple[int, int]:
-    """Where in `sensordata` the sensors begin that a callback fills, and how many numbers they have.
+    """Return the first place in `sensordata` of the sensors that a callback fills, and the number of their values.
 
-    They, and behind them how many faults act, are the end of `userdata`.
+    Their values, and then the number of active faults, are the end of `userdata`.
     """
     ours = np.flatnonzero(model.sensor_type == int(mujoco.mjtSensor.mjSENS_USER))
     return (int(model.sensor_adr[ours[0]]), int(model.sensor_dim[ours].sum())) if ours.size else (0, 0)

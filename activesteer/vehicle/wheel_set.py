@@ -1,4 +1,4 @@
-"""The four wheels in the engine: what couples them to the drive, how they roll, how heavy they are to turn."""
+"""The four wheels in the engine: their coupling to the drive, rolling radii and inertias."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ class WheelSet:
     """The wheels of a car, in the order of `CORNERS`.
 
     Attributes:
-        torques: How torques come to them.
+        torques: Controls of drive and brakes.
         spins: Their degrees of freedom of rotation.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, powertrain: Powertrain) -> None:
-        """Looks them up.
+        """Look the wheels up.
 
         Args:
             model: The car.
             data: Its state.
-            powertrain: What drives them.
+            powertrain: The drive.
 
         Raises:
-            ModelError: the model lacks a part of one.
+            ModelError: the model lacks a part of a wheel.
         """
 
         def found(kind: mujoco.mjtObj, ending: str) -> list[int]:
@@ -55,24 +55,24 @@ class WheelSet:
         self._armature_kgm2: list[float] = model.dof_armature[self.spins].tolist()
 
     def engage(self, gear: float) -> None:
-        """Couples the engine to the driven wheels, each of which then carries its part of the inertia, or frees it."""
+        """Couple the engine to the driven wheels, each of which then carries its part of the inertia, or free them."""
         inertia_kgm2 = 0.0 if gear == CLUTCH_OPEN else self._powertrain.inertia_kgm2
         for dof, own, fraction in zip(self.spins, self._armature_kgm2, self._powertrain.wheel_fractions, strict=True):
             self._model.dof_armature[dof] = own + fraction * inertia_kgm2
 
     def apply(self, torques: WheelTorques) -> None:
-        """Torques of the wheels, one by one: past the engine, so at once and whatever that can give."""
+        """Set the torques of single wheels, at once and without the limits of the engine."""
         if len(torques.drive_Nm) != len(CORNERS) or len(torques.brake_Nm) != len(CORNERS):
             raise ValueError(f"{torques!r}: four torques each are needed")
         self._ctrl[self.torques.drives] = torques.drive_Nm
         self._ctrl[self.torques.brakes] = torques.brake_Nm
 
     def heights_m(self) -> Array:
-        """Heights of the wheels' centres, shape (4,) [m]: what they roll on, roughly."""
+        """Return the heights of the wheels' centres, shape (4,) [m]: roughly their rolling radii."""
         return self._data.xpos[self._bodies, 2]
 
     def effective_radii_m(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
-        """Rolling radii under the present loads, those of standing still where the sensors are fitted.
+        """Return the rolling radii under the present loads; with fitted sensors, the car stands still.
 
         Args:
             tyres: Tyres of the front and of the rear axle.
@@ -84,7 +84,7 @@ class WheelSet:
         ]
 
     def inertias_kgm2(self) -> list[float]:
-        """What each turns with against the rest of the car."""
+        """Return the inertia of each wheel with everything that turns with it."""
         mass_matrix = np.zeros((self._model.nv, self._model.nv))
         mujoco.mj_fullM(self._model, self._data, mass_matrix)
         return mass_matrix.diagonal()[self.spins].tolist()

@@ -9,7 +9,7 @@ import numpy as np
 
 from activesteer.rigs.kc.definitions import Axle, metric
 from activesteer.rigs.kc.sweep import INWARDS
-from activesteer.vehicle.guide_model import GUIDE
+from activesteer.vehicle.curve_axle_model import HOLDING_TENDON
 
 _TRAIL_M: Final = 0.03
 
@@ -123,7 +123,7 @@ def _bushes_Npmm(axle: Axle) -> np.ndarray:
     rates = []
     for index in range(model.ntendon):
         name = model.tendon(index).name
-        if name.startswith(f"{axle.name[0]}l_") and not name.endswith(("_spring", "_damper", GUIDE)):
+        if name.startswith(f"{axle.name[0]}l_") and not name.endswith(("_spring", "_damper", HOLDING_TENDON)):
             rates.append(2e-3 * float(model.tendon_stiffness[index]))
     return np.array(rates or [np.nan])
 

@@ -1,1 +1,1 @@
-"""Tyre property files: reading, writing, and what their coefficients mean."""
+"""Tyre property files: reading, writing, and the meaning of their coefficients."""

@@ -1,7 +1,7 @@
-"""What every key of a .tir file means: its section, default, quantity and meaning. One line a coefficient.
+"""Section, default, quantity and meaning of every key of a .tir file, one line each.
 
-The columns of a line are: key, default, quantity, meaning. A default of `!` means that the file has to give the key;
-`-` means that it may be absent and that something else stands in for it (`parameters.parameter_array` says what).
+The columns of a line are: key, default, quantity, meaning. A default of `!` means that the file must give the key;
+`-` means that it may be absent and that another quantity replaces it (see `parameters.parameter_array`).
 The quantity decides how `[UNITS]` of a file is applied; `1` is a pure number.
 
 Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, appendix 3; the names are those of the TNO/Siemens MF-Tyre
@@ -21,7 +21,7 @@ class Coefficient(NamedTuple):
     Attributes:
         name: Key as in the file, upper case.
         section: Section that the writer puts it in.
-        default: Value in SI where the file does not give it; None where another quantity stands in.
+        default: Default in SI; None if another quantity replaces it.
         required: Whether a file without the key is refused.
         quantity: Kind of quantity, as in `units.DIMENSIONS`; `1` is a pure number.
         meaning: One line.
@@ -52,4 +52,4 @@ COEFFICIENTS: tuple[Coefficient, ...] = _parse(TABLE)
 """Every numeric key that the package knows, in the order of the table."""
 
 BY_NAME: dict[str, Coefficient] = {coefficient.name: coefficient for coefficient in COEFFICIENTS}
-"""The same, by key."""
+"""The same records by key."""

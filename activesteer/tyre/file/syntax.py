@@ -1,4 +1,4 @@
-"""The syntax of .tir files: sections, keys, values, table rows and comments. Knows nothing about tyres."""
+"""The syntax of .tir files: sections, keys, values, table rows and comments. This module knows nothing about tyres."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from activesteer.errors import TyreFileError
 from activesteer.files import MAX_NUMBER, read_bytes
 
 MAX_BYTES = 4_000_000
-"""Longest file that is read; real ones have some tens of kilobytes."""
+"""Size of the largest file that is read; real ones have some tens of kilobytes."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d{1,4})?\Z")
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]*\Z")
@@ -37,7 +37,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Syntax:
-    """What stands in a .tir file, in its order.
+    """Content of a .tir file, in its order.
 
     Attributes:
         entries: Keys and values.
@@ -52,14 +52,14 @@ def read_text(path: Path) -> str:
     """Read a file of limited size as Latin-1, in which every byte is a character.
 
     Raises:
-        TyreFileError: the file cannot be read, or is no text of the size of a tyre file.
+        TyreFileError: the file cannot be read, or is not a text of the size of a tyre file.
     """
     raw = read_bytes(path, TyreFileError, MAX_BYTES)
     return raw.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
 
 
 def number(text: str) -> float | None:
-    """The finite number that a text stands for (Fortran's D exponent included), None where it is no number."""
+    """Return the finite number in a text (Fortran's D exponent included), None if it is not a number."""
     if not _NUMBER.match(text):
         return None
     value = float(text.replace("d", "e").replace("D", "e"))
@@ -80,7 +80,7 @@ def _without_comment(line: str) -> str:
 
 
 def _value(text: str) -> float | str:
-    """A number where it reads as one, else the text without its quotes."""
+    """Return a number if the text is one, else the text without its quotes."""
     found = number(text)
     if found is not None:
         return found
@@ -129,7 +129,7 @@ def parse(text: str, source: str) -> Syntax:
             continue
         row = [number(word) for word in line.replace(",", " ").split()]
         if any(value is None for value in row):
-            # Before the first key it may be any file, whose content is not ours to print.
+            # Without a key it may be any file; its content must not be printed.
             what = repr(line[:60]) if entries else "this"
             raise TyreFileError(
                 f"{what} is neither KEY = value, [SECTION], {{heading}} nor a row of numbers", file=source, line=count

@@ -1,7 +1,7 @@
-"""Reads .tir tyre property files: MF 5.2, 6.0, 6.1, 6.2 and PAC2002, into SI.
+"""Reader of .tir tyre property files: MF 5.2, 6.0, 6.1, 6.2 and PAC2002, into SI.
 
-Nothing in a file is executed, and nothing is sized by what it claims; whatever is wrong ends in a `TyreFileError`
-that names the file, the line, the key, the value and what is allowed.
+Nothing in a file is executed, and no memory is allocated by what a file claims. A bad file ends in a `TyreFileError`
+that names the file, the line, the key, the value and the allowed range.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ALIASES: dict[str, str] = {
     "PECPC1": "PECP1",
     "FITTYPE": "FITTYP",
 }
-"""Names that other programs give to the same coefficients (PAC2002, and LFZ0 written with a zero)."""
+"""Names of other programs for the same coefficients (PAC2002, and LFZ0 written with a zero)."""
 
 _PAC2002_FITTYP = 6.0
 
@@ -44,8 +44,8 @@ def load_tir(path: str | Path, mounted: Side | None = None, *, slip_tangent: boo
 
     Args:
         path: The .tir file.
-        mounted: Side of the vehicle that the tyre is mounted on; None is the side that the file is for.
-        slip_tangent: Whether alpha* = tan(alpha) and gamma* = sin(gamma); else the angles themselves.
+        mounted: Side of the vehicle that the tyre is mounted on; None for the side that the file is for.
+        slip_tangent: True for alpha* = tan(alpha) and gamma* = sin(gamma), False for the angles themselves.
 
     Returns:
         The coefficients in SI and radians.
@@ -68,7 +68,7 @@ def load_tir(path: str | Path, mounted: Side | None = None, *, slip_tangent: boo
 def tir_from_text(
     text: str, source: Path, mounted: Side | None = None, *, slip_tangent: bool = False
 ) -> TyreParameters:
-    """Read a tyre property file that is in memory already; see `load_tir`. The source is the name in messages."""
+    """Read a tyre property file from memory; see `load_tir`. The source is the name in messages."""
     syntax = parse(text, str(source))
     units = _units(syntax.entries, source)
     lines: dict[str, Entry] = {}
@@ -106,7 +106,7 @@ def tir_from_text(
 
 
 def _place(lines: dict[str, Entry], name: str, entry: Entry, source: Path) -> None:
-    """Keep one entry per coefficient: that of its own section before others; two different ones are an error."""
+    """Keep one entry per coefficient, preferably from its own section; two different values are an error."""
     before = lines.get(name)
     if before is None or before.value == entry.value:
         lines[name] = entry
@@ -126,7 +126,7 @@ def _place(lines: dict[str, Entry], name: str, entry: Entry, source: Path) -> No
 
 
 def _units(entries: tuple[Entry, ...], source: Path) -> dict[str, float]:
-    """Size in SI of the units that the file states."""
+    """Return the sizes in SI of the file's units."""
     sizes: dict[str, float] = {}
     for entry in entries:
         if entry.section != "UNITS" or entry.key not in BASE_UNITS:
@@ -146,7 +146,7 @@ def _units(entries: tuple[Entry, ...], source: Path) -> dict[str, float]:
 
 
 def _version_without_fittyp(words: Mapping[str, str], source: Path) -> float:
-    """PAC2002 files state no FITTYP; files of other tyre models are refused."""
+    """Return the version of a PAC2002 file, which has no FITTYP; refuse files of other tyre models."""
     model = words.get("PROPERTY_FILE_FORMAT", "PAC2002").upper()
     if not model.startswith(("PAC2002", "USER", "MF")):
         raise TyreFileError(
@@ -160,7 +160,7 @@ def _version_without_fittyp(words: Mapping[str, str], source: Path) -> float:
 
 
 def _side(words: Mapping[str, str], source: Path) -> Side:
-    """Side of the vehicle that the file is for; a symmetric tyre counts as a left one."""
+    """Return the side of the vehicle that the file is for; a symmetric tyre counts as a left one."""
     side = words.get("TYRESIDE", "LEFT").upper()
     if side == "RIGHT":
         return "RIGHT"

@@ -40,7 +40,7 @@ BASE_UNITS: dict[str, dict[str, float]] = {
     "TIME": _TIME,
     "PRESSURE": _PRESSURE,
 }
-"""Keys of `[UNITS]`, the names that each takes (in lower case), and the size of the unit in SI."""
+"""Keys of `[UNITS]`, the unit names that each accepts (in lower case), and the size of the unit in SI."""
 
 DIMENSIONS: dict[str, dict[str, int]] = {
     "1": {},
@@ -60,11 +60,11 @@ DIMENSIONS: dict[str, dict[str, int]] = {
 
 
 def si_factor(quantity: str, units: Mapping[str, float]) -> float:
-    """Factor that turns a file's number into SI.
+    """Return the factor from a file's number to SI.
 
     Args:
         quantity: A key of `DIMENSIONS`.
-        units: Size in SI of the base units that the file states, by key of `BASE_UNITS`; what is missing is SI.
+        units: Sizes in SI of the file's base units, by key of `BASE_UNITS`; missing ones are SI.
     """
     if quantity == "pressure" and "PRESSURE" in units:
         return units["PRESSURE"]

@@ -1,4 +1,4 @@
-"""Writes .tir files: every number that the tyre states, in SI, so that reading gives the same parameters again."""
+"""Writer of .tir files: all numbers of the tyre, in SI, so that reading the file gives the same parameters again."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _OWN_SECTIONS = ("MDI_HEADER", "UNITS")
 
 
 def tir_text(parameters: TyreParameters, comment: str = "") -> str:
-    """The content of a .tir file.
+    """Return the content of a .tir file.
 
     Args:
         parameters: The tyre.
-        comment: Lines to stand at the top, without comment signs.
+        comment: Lines for the top of the file, without comment signs.
     """
     lines = [f"! {line}" for line in comment.splitlines()] + _HEADER.splitlines()
     names: dict[str, list[str]] = {"MODEL": [f"TYRESIDE = '{parameters.side}'"]}

@@ -1,7 +1,7 @@
 """Formulas of the tyre, compiled, on plain floats.
 
-Where a kernel has the symbols of its source as arguments, these are theirs (Pacejka, Tire and Vehicle Dynamics, 2012,
-section 4.3.2; SI and radians, ISO-W axes at the contact point):
+Arguments of the kernels with the symbols of their source (Pacejka, Tire and Vehicle Dynamics, 2012, section 4.3.2;
+SI and radians, ISO-W axes at the contact point):
 
     p                   record of the tyre, `record.TYRE_RECORD`
     fz                  load [N], > 0
@@ -10,13 +10,13 @@ section 4.3.2; SI and radians, ISO-W axes at the contact point):
     kappa               longitudinal slip, positive drives
     alpha, tan_alpha    slip angle [rad] and its tangent
     gamma               camber [rad], positive about +x
-    alpha_s, gamma_s    alpha* and gamma*: their tangent and sine where the file asks for it
+    alpha_s, gamma_s    alpha* and gamma*: tangent and sine of the angles, or the angles, as the tyre says
     vx                  speed along the wheel's heading [m/s]
     turn_slip           yaw rate over speed [1/m], positive to the left; MF 6.x only
     d                   rolling direction, 1 forward, -1 backward, between them below walking speed
     mu                  friction of the road relative to that of the file
-    lmux, lmuy, lmu     friction scales, longitudinal and lateral; lmu that of the kernel's own force
-    fx, fy, mx, my, mz  forces [N] and moments [N m]; fx0, fy0 at pure slip, fy_trail what acts through the trail
+    lmux, lmuy, lmu     friction scales, longitudinal and lateral; lmu for the kernel's own force
+    fx, fy, mx, my, mz  forces [N] and moments [N m]; fx0, fy0 at pure slip, fy_trail on the trail
     k_x, k_y            slip stiffness [N], cornering stiffness [N/rad]
     b_y, c_y, dx, dy    stiffness and shape factor of the lateral force, peaks of both forces [N]
     s_hy, s_vy          horizontal and vertical shift of the lateral force [-], [N]

@@ -20,7 +20,7 @@ def _cosine_formula(b: float, c: float, e: float, x: float) -> float:
 
 @compiled
 def longitudinal_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) -> float:
-    """G_xalpha: what the slip angle leaves of the longitudinal force (4.E50 to 4.E57)."""
+    """G_xalpha: factor of the longitudinal force due to the slip angle (4.E50 to 4.E57)."""
     b = (p.RBX1 + p.RBX3 * gamma_s * gamma_s) * math.cos(math.atan(p.RBX2 * kappa)) * p.LXAL
     e = p.REX1 + p.REX2 * dfz
     s_h = p.RHX1
@@ -29,7 +29,7 @@ def longitudinal_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: fl
 
 @compiled
 def lateral_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) -> float:
-    """G_ykappa: what the longitudinal slip leaves of the lateral force (4.E58 to 4.E65)."""
+    """G_ykappa: factor of the lateral force due to the longitudinal slip (4.E58 to 4.E65)."""
     slope = p.RBY1 + p.RBY4 * gamma_s * gamma_s
     b = slope * math.cos(math.atan(p.RBY2 * (alpha_s - p.RBY3))) * p.LYKA
     e = p.REY1 + p.REY2 * dfz
@@ -51,7 +51,7 @@ def friction_ellipse(
     p, fz: float, dfz: float, d: float, kappa: float, alpha_s: float, fx0: float, fy0: float, dx: float, dy: float,
     k_x: float, k_y: float, s_hy: float, s_vy: float, lmux: float,
 ):  # fmt: skip
-    """What combined slip leaves of both pure forces: an ellipse, divided by the ratio of the shifted slips.
+    """Return the factors of both pure forces at combined slip: an ellipse, divided by the ratio of the shifted slips.
 
     Returns:
         Factors of the longitudinal and of the lateral force, 0 to 1.

@@ -1,27 +1,27 @@
 """One wheel on the road: contact kinematics, slip with relaxation, standstill, and the Magic Formula.
 
-Pure functions of the state. The three relaxation states of a tyre are the deflections of its contact patch against the
-rim: `deflection_x_m` along and `deflection_y_m` across the wheel's heading [m], and `deflection_z_rad`, the twist about
-the normal of the road (Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 8.6, the restricted fully non-linear
-model; the twist in the same form over half the contact length a):
+All functions are pure functions of the state. The three relaxation states of a tyre are the deflections of its contact
+patch against the rim: `deflection_x_m` along and `deflection_y_m` across the wheel's heading [m], and
+`deflection_z_rad`, the twist about the normal of the road (Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section
+8.6, the restricted fully non-linear model; the twist in the same form over half the contact length a):
 
     d(u)/dt = -V_sx - |V_x| u / sigma_kappa        kappa' = u / sigma_kappa
     d(v)/dt =  V_sy - |V_x| v / sigma_alpha        tan(alpha') = v / sigma_alpha      (ISO-W sign of alpha)
     d(w)/dt =  psi_dot - |V_x| w / a               phi' = w / a                       (turn slip)
 
-The turn slip enters the formula at low speed only, where steering twists the patch (parking); it fades out with the
-other standstill terms, so that at speed the formula is the usual one without turn slip.
+The turn slip enters the formula at low speed only, where steering twists the patch (parking). It fades out with the
+other standstill terms, so that the usual formula without turn slip applies at speed.
 
-Three additions make them usable from standstill to any speed:
+Three additions make the states usable from standstill to any speed:
 
 * The rates are mean values over the step, exact for slip speeds held within it, and the forces belong to its end.
   Nothing gets stiff when sigma becomes small, and at rest the tyre is a spring, not an amplifier.
-* At low speed the deflection stops growing where the contact patch slides as a whole (the "wind-up" of Pacejka, eq.
-  8.125 ff.): |V_x| is replaced by max(|V_x|, |V_s| / slip_limit), at rest with one |V_s| / slip_limit for both axes, so
-  that a sliding tyre pulls against its sliding. Above `low_speed_mps` the slip limit is that of the tyre file, for each
-  axis by itself, so that the formula's steady state is reached exactly within its range of validity.
-* At low speed a viscous term acts beside the spring (Pacejka, eq. 8.129: k_Vlow), faded out by a cosine. It enters as a
-  slip, so that the friction limit bounds it.
+* At low speed, a contact patch that slides as a whole limits the deflection (the "wind-up" of Pacejka, eq. 8.125 ff.).
+  |V_x| is replaced by max(|V_x|, |V_s| / slip_limit), at rest with one |V_s| / slip_limit for both axes, so that a
+  sliding tyre pulls against its sliding. Above `low_speed_mps` the slip limit is that of the tyre file, separately for
+  each axis, so that the formula's steady state is reached exactly within its range of validity.
+* At low speed a viscous term acts beside the spring (Pacejka, eq. 8.129: k_Vlow) and fades out with a cosine. It enters
+  as a slip, so that the friction limit bounds it.
 """
 
 from __future__ import annotations
@@ -42,26 +42,26 @@ from activesteer.tyre.kernels.vertical import (
 )
 
 _MIN_RELAXATION_LENGTH_M: Final = 0.02
-"""About a tread block: keeps the slip defined when the load vanishes."""
+"""About the length of a tread block; it keeps the slip defined when the load vanishes."""
 _LIFTED_DECAY_PER_S: Final = 20.0
-"""How fast the deflection of a lifted tyre decays [1/s]: a carcass rings down within some tenths of a second."""
+"""Decay rate of the deflection of a lifted tyre [1/s]: a carcass rings down within some tenths of a second."""
 _SLIDING_TO_LINEAR: Final = 3.0
 """Slip of full sliding over slip at which the linear force would reach the friction limit: 3 for a brush model."""
 _SLIDING_TWIST_RAD: Final = 0.12
 """Twist at which the whole patch slides about its middle [rad]: parking torques level off after some 5 to 8 degrees."""
 _NO_TURN_SLIP_1PM: Final = 1e-12
-"""Stands for no turn slip where the formula with turn slip is meant; zero would choose the formula without it."""
+"""Stands for no turn slip in the formula with turn slip; zero would select the formula without it."""
 _SMALLEST_SLIP_LIMIT: Final = 0.01
-"""Slip that a deflection may stand for at least, whatever the range of a tyre file."""
+"""Smallest slip limit of a deflection, whatever the range of a tyre file."""
 _MAX_LOAD_STEPS: Final = 8
 _CAUTIOUS: Final = 0.1
-"""What is left of the load where a step of its search would lift the tyre."""
+"""Fraction of the load that remains if a step of the search would lift the tyre."""
 _LOAD_TOLERANCE: Final = 1e-9
-"""How closely the load has to agree with the horizontal forces that soften the tyre, relative to the load."""
+"""Tolerance of the load, relative to the load, in the search for load and horizontal forces."""
 
 
 class WheelForces(NamedTuple):
-    """Forces of one tyre and what they came from, ISO-W frame at the contact point."""
+    """Forces of one tyre and intermediate quantities, ISO-W frame at the contact point."""
 
     fx_N: float
     fy_N: float
@@ -86,7 +86,7 @@ class WheelForces(NamedTuple):
 
 
 class _Rolling(NamedTuple):
-    """What a tyre does at a given load above zero."""
+    """Forces and rates of a tyre at a given load above zero."""
 
     fx_N: float
     fy_N: float
@@ -104,13 +104,13 @@ class _Rolling(NamedTuple):
 
 @compiled
 def _mean_decay(x):
-    """Mean of exp(-t) over t from 0 to x: what is left, over a step, of the rate at its beginning."""
+    """Return the mean of exp(-t) over t from 0 to x: the average remaining fraction of a rate over a step."""
     return -math.expm1(-x) / x if x > 1e-9 else 1.0
 
 
 @compiled
 def _low_speed_slip_limit(file_limit, sliding_slip, fraction):
-    """Slip at which the deflection stops growing: where the tyre slides at rest, the file's limit when rolling."""
+    """Return the slip that limits the deflection: the sliding slip at rest, the file's limit in motion."""
     return file_limit + (min(sliding_slip, file_limit) - file_limit) * fraction
 
 
@@ -118,7 +118,7 @@ def _low_speed_slip_limit(file_limit, sliding_slip, fraction):
 def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn, gamma, u, v, w
 ):
-    """A tyre at a load above zero.
+    """Evaluate a tyre at a load above zero.
 
     The arguments are those of `tyre_on_road`, with the load [N], the velocities of the contact point along and across
     the heading [m/s], the spin and the yaw rate of the wheel plane [rad/s], the camber [rad] and the relaxation states.
@@ -155,8 +155,8 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
         together = fraction * math.sqrt(sliding_x * sliding_x + sliding_y * sliding_y)
         sliding_x = (1.0 - fraction) * sliding_x + together
         sliding_y = (1.0 - fraction) * sliding_y + together
-        # What a patch that slid at speed has more than one can have that slides at this speed is given back by sliding,
-        # not kept for pushing the car away once it stands.
+        # A patch that slid at higher speed may have more deflection than sliding at this speed allows. Sliding releases
+        # the surplus, so that it does not push the car away at rest.
         held = max(1.0, math.hypot(u / (sigma_x * limit_x), v / (sigma_y * limit_y)))
     rolling = speed + p.SPEED_OFFSET
     carry_x = max(rolling, sliding_x)
@@ -171,17 +171,17 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     kappa = (u + timestep_s * rate_x) / sigma_x + damping_slip_x
     alpha = math.atan((v + timestep_s * rate_y) / sigma_y + damping_slip_y)
 
-    # Where the wind-up limit of a rolling tyre holds the deflection, the slip that it should have is out of range.
+    # If the wind-up limit of a rolling tyre holds the deflection, the slip is outside the valid range.
     limited = 0.0
     beyond = speed >= low_speed_mps and (carry_x > rolling or carry_y > rolling)
     if beyond or limit_flags(p, fz, kappa, alpha, gamma, pressure_Pa) != 0:
         limited = 1.0
-    # Camber works by the path that the tread takes through the patch of a rolling tyre: at rest there is none.
+    # Camber acts by the path of the tread through the patch of a rolling tyre; at rest there is no such path.
     gamma *= 1.0 - fraction
     straight = steady_state(p, fz, kappa, alpha, gamma, pressure_Pa, vx, mu, 0.0)
     fx, fy, mx, my, mz = straight.fx_N, straight.fy_N, straight.mx_Nm, straight.my_Nm, straight.mz_Nm
     if fraction > 0.0:
-        # The formula with turn slip treats camber differently, even without any: the two are blended, never switched.
+        # The formula with turn slip treats camber differently, even at zero turn slip: both are blended, not switched.
         turn_slip = (w + timestep_s * rate_z) / half_length
         if turn_slip == 0.0:
             turn_slip = _NO_TURN_SLIP_1PM
@@ -191,7 +191,7 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
         mx += fraction * (twisted.mx_Nm - mx)
         my += fraction * (twisted.my_Nm - my)
         mz += fraction * (twisted.mz_Nm - mz)
-    # Beyond the range of the file the formula gives the forces of its greatest load.
+    # Beyond the range of the file the formula gives the forces of its largest load.
     load = min(fz, p.FZMAX)
     use = math.hypot(fx / (straight.friction_x * load), fy / (straight.friction_y * load))
     return _Rolling(fx, fy, mx, my, mz, kappa, alpha, rate_x, rate_y, rate_z, limited, use)
@@ -199,10 +199,10 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
 
 @compiled
 def _load(p, deflection, spin, pressure_Pa, damping_N, fx, fy, gamma):
-    """Load [N] under horizontal forces; the damper adds or takes at most what the spring carries."""
+    """Return the load [N] under horizontal forces; the damper adds or removes at most the force of the spring."""
     elastic = vertical_force_loaded(p, deflection, spin, pressure_Pa, fx, fy, gamma)
     elastic += bottoming_force(p, deflection, spin)
-    # So the load is continuous where the tyre touches down or lifts off, and the road never pulls.
+    # The load is continuous when the tyre touches down or lifts off, and the road never pulls.
     return elastic + min(max(damping_N, -elastic), elastic)
 
 
@@ -228,11 +228,11 @@ def tyre_on_road(
     deflection_y_m,
     deflection_z_rad,
 ):
-    """Forces of a tyre on the plane road z = 0 and the rates of its relaxation states.
+    """Return the forces of a tyre on the plane road z = 0 and the rates of its relaxation states.
 
     Args:
-        p: Record of the tyre; it knows the side that the tyre is mounted on.
-        mu: Friction of the road relative to the one of the tyre file [-].
+        p: Record of the tyre, including the side that the tyre is mounted on.
+        mu: Friction of the road relative to that of the tyre file [-].
         pressure_Pa: Inflation pressure [Pa].
         low_speed_mps: Speed below which the standstill terms fade in [m/s].
         low_speed_damping_Nspm: Viscous coefficient of the contact patch at rest [N s/m].
@@ -252,12 +252,11 @@ def tyre_on_road(
         deflection_z_rad: Relaxation state about the normal of the road [rad].
 
     Returns:
-        A `WheelForces`. `heading_x`, `heading_y` is the unit vector of the wheel's heading
-        in the road plane; `arm_..._m` leads from the wheel centre to the contact point, world frame;
-        `limited` is 1.0 where a limit of validity of the tyre file is exceeded; `friction_utilisation` is the
-        fraction of the available friction that the forces take, sqrt((F_x / mu_x F_z)^2 + (F_y / mu_y F_z)^2) with the
-        peak coefficients of the file at this load, camber and pressure on this road. It exceeds 1 by as much as the
-        file's shifts and its weights of combined slip let the forces do so.
+        A `WheelForces`. `heading_x`, `heading_y` is the unit vector of the wheel's heading in the road plane;
+        `arm_..._m` leads from the wheel centre to the contact point, world frame; `limited` is 1.0 if a limit of
+        validity of the tyre file is exceeded; `friction_utilisation` is the used fraction of the available friction,
+        sqrt((F_x / mu_x F_z)^2 + (F_y / mu_y F_z)^2), with the peak coefficients of the file at this load, camber and
+        pressure on this road. It exceeds 1 by as much as the file's shifts and weights of combined slip allow.
     """
     horizontal = math.sqrt(axis_x * axis_x + axis_y * axis_y)
     heading_x = axis_y / horizontal
@@ -270,7 +269,7 @@ def tyre_on_road(
     arm_z = -centre_height_m
 
     spin = spin_x_radps * axis_x + spin_y_radps * axis_y + spin_z_radps * axis_z
-    # What turns the wheel plane, without the spin itself; it moves the contact point across the heading.
+    # Angular velocity of the wheel plane, without the spin; it moves the contact point across the heading.
     turn_x = spin_x_radps - spin * axis_x
     turn_y = spin_y_radps - spin * axis_y
     turn_z = spin_z_radps - spin * axis_z

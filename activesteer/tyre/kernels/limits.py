@@ -1,4 +1,4 @@
-"""Ranges of validity: which inputs of an evaluation lie outside those of the file, as a flag to record."""
+"""Ranges of validity: a flag for the inputs of an evaluation that lie outside those of the file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from activesteer.compilation import compiled
 
 
 class Limit(IntFlag):
-    """What was evaluated at its limit, because the input lies outside the range of the file."""
+    """Input outside the range of the file, evaluated at its limit."""
 
     NONE = 0
     LOAD_LOW = 1
@@ -21,7 +21,7 @@ class Limit(IntFlag):
 
 @compiled
 def limit_flags(p, fz_N: float, kappa: float, alpha_rad: float, gamma_rad: float, pressure_Pa: float) -> int:
-    """Sum of the `Limit` values that apply; a load of zero is a lifted wheel and no violation.
+    """Return the sum of the `Limit` values that apply; a load of zero is a lifted wheel and not a violation.
 
     Args:
         p: Record of the tyre.

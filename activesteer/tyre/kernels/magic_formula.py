@@ -1,17 +1,17 @@
 """The Magic Formula: forces and moments of a tyre in steady state, one compiled kernel for every caller.
 
 Inputs and outputs are in ISO-W axes at the contact point, SI and radians: alpha > 0 gives F_y < 0, kappa > 0 drives,
-gamma > 0 inclines the wheel about +x, M_y < 0 rolls forward. Slip is taken against the speed's absolute value.
+gamma > 0 inclines the wheel about +x, M_y < 0 rolls forward. Slip refers to the absolute value of the speed.
 
 `p` is the record of the tyre (`record.TYRE_RECORD`). Inputs outside the ranges of the file are evaluated at the limit
-(`limits.limit_flags` says which); a load below the smallest valid one scales the forces of that load down to zero.
+(see `limits.limit_flags`). Below the smallest valid load, the forces of that load are scaled down to zero.
 
 Below the speed VXLOW everything that depends on the rolling direction (shifts, trail, rolling resistance) fades with
-a sine through zero at rest, so that the forces are continuous through standstill; the forces due to slip do not fade,
+a sine through zero at rest, so that the forces are continuous through standstill. The forces due to slip do not fade,
 because there slip is the deflection of the contact patch (see `relaxation`).
 
-A division by zero gives inf or nan, as in numpy, and no exception: the kernels run inside the engine's callbacks, where
-nothing could catch one, and the state's guard there finds what is not finite.
+A division by zero gives inf or nan, as in numpy, and no exception. The kernels run inside the engine's callbacks, where
+nothing could catch an exception; the check of the state finds values that are not finite.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ __all__ = [
 
 
 class SteadyState(NamedTuple):
-    """Everything that one evaluation knows, ISO-W axes at the contact point.
+    """Results of one evaluation, ISO-W axes at the contact point.
 
     Attributes:
         fx_N: Longitudinal force [N].
@@ -88,7 +88,7 @@ class SteadyState(NamedTuple):
 
 @compiled
 def rolling_direction(p, vx_mps: float) -> float:
-    """1 rolling forward, -1 backward, a sine between them below VXLOW."""
+    """Return 1 rolling forward, -1 backward, and a sine between them below VXLOW."""
     low = p.VXLOW
     if vx_mps >= low:
         return 1.0
@@ -99,13 +99,13 @@ def rolling_direction(p, vx_mps: float) -> float:
 
 @compiled
 def clamp(x: float, low: float, high: float) -> float:
-    """The value, or the limit that it exceeds."""
+    """Return the value, or the limit that it exceeds."""
     return min(max(x, low), high)
 
 
 @compiled
 def relative_pressure(p, pressure_Pa: float) -> float:
-    """Pressure over the nominal one, less 1."""
+    """Return the pressure over the nominal one, less 1."""
     return clamp(pressure_Pa, p.PRESMIN, p.PRESMAX) / p.NOMPRES - 1.0
 
 
@@ -113,11 +113,7 @@ def relative_pressure(p, pressure_Pa: float) -> float:
 def steady_state(
     p, fz: float, kappa: float, alpha: float, gamma: float, pressure: float, vx: float, mu: float, turn_slip: float
 ):
-    """One evaluation.
-
-    Returns:
-        A `SteadyState`.
-    """
+    """Evaluate the formula once; return a `SteadyState`."""
     if not fz > 0.0:
         return SteadyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     load = clamp(fz, p.FZMIN, p.FZMAX)
@@ -145,8 +141,8 @@ def steady_state(
     if mf52:
         gamma_x, gamma_y, gamma_z = gamma * p.LGAX, gamma_s * p.LGAY, gamma_s * p.LGAZ
 
-    # On a slippery road the pure forces reach their peaks at smaller slips; the weights have to follow, else both peaks
-    # are there at once and the resultant exceeds the friction (similarity method, Pacejka 2012, section 4.2).
+    # On a slippery road the pure forces reach their peaks at smaller slips. The weights must follow, or both peaks
+    # occur together and the resultant exceeds the friction (similarity method, Pacejka 2012, section 4.2).
     similar = max(mu, SMALLEST_FRICTION)
     kappa_m, alpha_m = kappa / similar, alpha_s / similar
     g_y = lateral_weight(p, dfz, kappa_m, alpha_m, gamma_s)
@@ -162,7 +158,7 @@ def steady_state(
         g_x, g_y = friction_ellipse(
             p, fz, dfz, d, kappa, alpha_s, fx0, fy0, mu_x * fz, mu_y * fz, k_x, k_y, s_hy, s_vy, lmux
         )
-        # The moment knows longitudinal slip only by the side force that is left.
+        # Longitudinal slip affects the moment only through the remaining lateral force.
         kappa_z = 0.0
     else:
         g_x = longitudinal_weight(p, dfz, kappa_m, alpha_m, gamma_s)
@@ -191,7 +187,7 @@ def steady_state(
 def magic_formula(
     p, fz_N: float, kappa: float, alpha_rad: float, gamma_rad: float, pressure_Pa: float, vx_mps: float, mu: float
 ):
-    """Forces and moments of the tyre at the contact point in steady state.
+    """Return forces and moments of the tyre at the contact point in steady state.
 
     Args:
         p: Record of the tyre, a `TYRE_RECORD`.
@@ -216,7 +212,7 @@ def magic_formula(
 
 @compiled
 def slip_stiffnesses(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
-    """Slopes of the forces at zero slip, on which the friction of the road has no influence.
+    """Return the slopes of the forces at zero slip; the friction of the road does not affect them.
 
     Args:
         p: Record of the tyre.

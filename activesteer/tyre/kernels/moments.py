@@ -13,7 +13,7 @@ from activesteer.compilation import compiled
 from activesteer.tyre.kernels.pure_slip import EPSILON, MF52
 
 SMALLEST_FRICTION = 1e-6
-"""Friction scale below which slopes that are divided by it stay as they are."""
+"""Friction scale below which slopes divided by it stay constant."""
 
 
 @compiled

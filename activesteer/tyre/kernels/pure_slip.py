@@ -14,7 +14,7 @@ import math
 from activesteer.compilation import compiled
 
 EPSILON = 1e-6
-"""Guard of the denominators; it carries the sign of its neighbour, so that it never cancels it."""
+"""Guard of the denominators; it takes the sign of its neighbour, so that the two never cancel."""
 
 MF52 = 52.0
 

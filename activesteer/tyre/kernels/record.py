@@ -1,7 +1,7 @@
-"""The record of a tyre as the kernels see it: `p.PCX1`, one float64 for each coefficient of the table.
+"""The record of a tyre for the kernels: `p.PCX1`, one float64 for each coefficient of the table.
 
-The same compiled code serves Python, the vectorised call and the native callback, which finds the record in a numeric
-block of the model.
+The same compiled code serves Python, the vectorised call and the native callback. The callback finds the record in a
+numeric block of the model.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ _WORKED_OUT: Final = (
     "Q_RA_GIVEN",  # 1 where the file gives the contact length
     "Q_RB_GIVEN",  # 1 where the file gives the contact width
 )
-"""What stands in no file: `TyreParameters.record` decides it."""
+"""Fields that no file holds; `TyreParameters.record` sets them."""
 
 _FIELDS: Final = (*(coefficient.name for coefficient in COEFFICIENTS), *_WORKED_OUT, *TyreConventions().numbers())
 
 TYRE_RECORD: Final = np.dtype((np.record, [(name, np.float64) for name in _FIELDS]))
-"""Coefficients in the order of their table, what is worked out from the file, and the conventions."""
+"""Coefficients in the order of their table, derived fields, and the conventions."""

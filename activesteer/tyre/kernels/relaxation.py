@@ -14,7 +14,7 @@ from activesteer.tyre.kernels.pure_slip import cornering_stiffness, longitudinal
 
 @compiled
 def carcass_stiffnesses(p, fz_N: float, pressure_Pa: float):
-    """Longitudinal and lateral stiffness of the carcass [N/m] at a load [N] and a pressure [Pa] (equations 17, 18)."""
+    """Return longitudinal and lateral carcass stiffness [N/m] at a load [N] and a pressure [Pa] (equations 17, 18)."""
     dfz = fz_N / (p.LFZO * p.FNOMIN) - 1.0
     dpi = min(max(pressure_Pa, p.PRESMIN), p.PRESMAX) / p.NOMPRES - 1.0
     along = (1.0 + p.PCFX1 * dfz + p.PCFX2 * dfz * dfz) * (1.0 + p.PCFX3 * dpi)
@@ -24,9 +24,9 @@ def carcass_stiffnesses(p, fz_N: float, pressure_Pa: float):
 
 @compiled
 def relaxation_lengths(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
-    """Relaxation lengths of longitudinal and lateral slip [m], >= 0.
+    """Return the relaxation lengths of longitudinal and lateral slip [m], >= 0.
 
-    MF 6.x: slip stiffness over carcass stiffness. MF 5.2: the PTX and PTY coefficients where the file has them.
+    MF 6.x: slip stiffness over carcass stiffness. MF 5.2: the PTX and PTY coefficients if the file has them.
 
     Args:
         p: Record of the tyre.

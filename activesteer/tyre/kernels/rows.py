@@ -1,4 +1,4 @@
-"""The kernels over rows of a table, compiled: what the vectorised call runs."""
+"""The kernels over rows of a table, compiled, for the vectorised call."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def evaluate_rows(tyre, inputs, forces, flags) -> None:
 
 @compiled
 def rolling_rows(tyre, inputs, forces, rolling) -> None:
-    """Relaxation lengths, radii and contact patch for every row.
+    """Compute relaxation lengths, radii and contact patch for every row.
 
     Args:
         tyre: Record of the tyre, shape (1,): a call with an array costs less than one with a record.

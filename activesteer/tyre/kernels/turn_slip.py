@@ -1,4 +1,4 @@
-"""The turn slip factors zeta, compiled, on plain floats: what a curved path, or steering at rest, does to the forces.
+"""The turn slip factors zeta, compiled, on plain floats: effect of a curved path, or of steering at rest.
 
 Turn slip is the yaw rate over the speed [1/m]: the curvature of the path, positive to the left. Defined for MF 6.x.
 
@@ -19,7 +19,7 @@ _MAX_TURN_SLIP = 1e6
 
 @compiled
 def rolling_speed(p, fz: float, kappa: float, pressure: float, vx: float):
-    """Rotational speed [rad/s] and effective radius [m] of a wheel with a given slip, which depend on each other."""
+    """Return rotational speed [rad/s] and effective radius [m] of a wheel at a given slip, solved together."""
     radius = p.UNLOADED_RADIUS
     omega = 0.0
     for _ in range(30):
@@ -37,7 +37,7 @@ def turn_slip_factors(
     p, fz: float, dfz: float, dpi: float, kappa: float, tan_alpha: float, gamma: float, gamma_s: float,
     pressure: float, vx: float, lmuy: float, g_y: float, turn_slip: float,
 ):  # fmt: skip
-    """The factors zeta 0 to 8."""
+    """Return the factors zeta 0 to 8."""
     r0 = p.UNLOADED_RADIUS
     fz0 = p.LFZO * p.FNOMIN
     epsilon_g = min(p.PECP1 * (1.0 + p.PECP2 * dfz), 0.99)

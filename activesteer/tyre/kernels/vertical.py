@@ -13,12 +13,12 @@ from activesteer.compilation import compiled
 
 MF62 = 62.0
 _SOFTEST = 0.1
-"""What horizontal forces leave of the vertical stiffness at least; real tyres stay above 0.8."""
+"""Smallest factor of the vertical stiffness due to horizontal forces; real tyres stay above 0.8."""
 
 
 @compiled
 def stiffness_pressure_factor(p, pressure_Pa: float) -> float:
-    """What the inflation pressure makes of the vertical stiffness (equation 5)."""
+    """Return the factor of the vertical stiffness due to the inflation pressure (equation 5)."""
     pressure = min(max(pressure_Pa, p.PRESMIN), p.PRESMAX)
     return 1.0 + p.PFZ1 * (pressure / p.NOMPRES - 1.0)
 
@@ -51,7 +51,7 @@ def effective_rolling_radius(p, fz_N: float, omega_radps: float, pressure_Pa: fl
 
 @compiled
 def _softening(p, omega: float, fx: float, fy: float) -> float:
-    """What speed and horizontal forces make of the vertical stiffness (equation 2)."""
+    """Return the factor of the vertical stiffness due to speed and horizontal forces (equation 2)."""
     r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
     x, y = p.Q_FCX * fx / fz0, p.Q_FCY * fy / fz0
     return max(1.0 + p.Q_V2 * abs(omega) * r0 / p.LONGVL - x * x - y * y, _SOFTEST)
@@ -89,7 +89,7 @@ def vertical_force_loaded(
             tread = (1.075 - 0.5 * p.ASPECT_RATIO) * p.WIDTH
             shape = (p.Q_CAM1 * loaded + p.Q_CAM2 * loaded * loaded) / denominator
             rho_camber = shape * shape * tread / 8.0 * abs(math.tan(gamma)) - p.Q_CAM3 * rho_free * abs(gamma)
-        # A cambered tyre touches with its shoulder before its middle does.
+        # The shoulder of a cambered tyre touches the road before its middle.
         rho = (deflection_m + rho_camber) / r0
         if rho <= 0.0:
             return 0.0
@@ -146,7 +146,7 @@ def deflection_under_load(
         soft = _softening(p, omega_radps, fx_N, fy_N) * stiffness_pressure_factor(p, pressure_Pa)
         load = fz_N / (fz0 * soft)
         q1 = p.Q_FZ1 + p.Q_FZ3 * gamma_rad * gamma_rad
-        # The root that stays finite where the quadratic term vanishes.
+        # The root that stays finite if the quadratic term vanishes.
         return r0 * 2.0 * load / (q1 + math.sqrt(q1 * q1 + 4.0 * p.Q_FZ2 * load))
     low, high = -0.5 * r0, r0
     for _ in range(100):
@@ -162,9 +162,9 @@ def deflection_under_load(
 
 @compiled
 def contact_patch(p, fz_N: float, pressure_Pa: float):
-    """Length and width of the contact patch [m] (equations 9 and 10).
+    """Return length and width of the contact patch [m] (equations 9 and 10).
 
-    Where the file gives no Q_RA or Q_RB (MF 5.2), the length follows from the vertical stiffness by the estimate of the
+    Without Q_RA or Q_RB in the file (MF 5.2), the length follows from the vertical stiffness by the estimate of the
     MF-Tyre 5.2 manual, and the width is that of the tyre.
     """
     fz = max(fz_N, 0.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from activesteer.conventions import Array
 from activesteer.vehicle.channels.raw_rows import AxialForce, Column, Computed, Signal, Values, signal
-from activesteer.vehicle.guide_model import GUIDE
+from activesteer.vehicle.curve_axle_model import HOLDING_TENDON
 
 
 def link_signals(model: mujoco.MjModel) -> Iterator[Signal]:
@@ -17,7 +17,7 @@ def link_signals(model: mujoco.MjModel) -> Iterator[Signal]:
     for index in range(model.ntendon):
         if model.tendon_stiffness[index] == 0.0 and not model.tendon_stiffnesspoly[index].any():
             continue
-        if model.tendon(index).name.endswith(GUIDE):
+        if model.tendon(index).name.endswith(HOLDING_TENDON):
             # Five springs that stand for all links of a wheel; none of them is a part of the car.
             continue
         # What a damper's tendon has of a spring are the stops at both ends of its travel.

@@ -1,4 +1,4 @@
-"""Puts the axles of curves into a model: tendons that hold the wheels, and the records of the native forces."""
+"""Curve axles in a model: tendons that hold the wheels, and the records of the native forces."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 JOINTS: Final = ("x", "y", "z", "toe", "camber", "caster")
-"""Joints of a guided knuckle in the order of the model: the wheel's steer angle and inclination are `toe` and `camber`
-exactly, since they turn about z first, then about x, then about y."""
-GUIDE: Final = "_guide"
-"""End of the names of the tendons that hold a guided wheel: CORNER_NUMBER_guide."""
+"""Joints of a curve axle's knuckle in the order of the model. The wheel's steer angle and inclination are exactly `toe`
+and `camber`, since the joints turn about z first, then about x, then about y."""
+HOLDING_TENDON: Final = "_guide"
+"""Suffix of the tendons that hold such a wheel: CORNER_NUMBER_guide."""
 _HELD: Final = 0.05
-"""Square of natural frequency times step from which on the engine holds a mode by a tendon: 36 Hz at 1 ms. Each costs
-time, and up to there the native forces beside them, which are explicit, are stable and as accurate."""
+"""Square of natural frequency times step above which a tendon of the engine holds a mode: 36 Hz at 1 ms. Each tendon
+costs time; below it the explicit native forces are stable and as accurate."""
 _INTERVALS: Final = 32
 
 
-def fit_guides(spec: mujoco.MjSpec, curves: Curves) -> None:
-    """Gives each guided wheel its tendons: the fast ones of its knuckle's natural modes on the stiffness of the curves.
+def fit_curve_axles(spec: mujoco.MjSpec, curves: Curves) -> None:
+    """Add tendons to each wheel of a curve axle, for the fast natural modes of its knuckle.
 
     Args:
         spec: The model; changed.
         curves: The curves of its axles.
 
     Raises:
-        ModelError: the model's joints are not those of a guided knuckle.
+        ModelError: the model's joints are not those of a curve axle's knuckle.
     """
     corners = [corner for corner in CORNERS if curves.axle(corner) is not None]
     if not corners:
@@ -47,25 +47,25 @@ def fit_guides(spec: mujoco.MjSpec, curves: Curves) -> None:
         assert axle is not None
         squares, along = _modes(model, corner, axle)
         rows = along @ _strains(model, corner, axle)
-        # How fast it is with all else free to move, the light rack above all.
+        # Frequency with everything else free to move, above all the light rack.
         fast = squares * np.sum((rows @ _mobility(model)) * rows, axis=1) * model.opt.timestep**2
         for number in np.flatnonzero(fast >= _HELD):
-            tendon = spec.add_tendon(name=f"{corner}_{number}{GUIDE}", springlength=[0.0, 0.0])
+            tendon = spec.add_tendon(name=f"{corner}_{number}{HOLDING_TENDON}", springlength=[0.0, 0.0])
             tendon.stiffness = [float(squares[number]), 0.0, 0.0]
             tendon.damping = [_damping(axle, squares[number]), 0.0, 0.0]
             for dof in np.flatnonzero(rows[number]):
                 tendon.wrap_joint(model.joint(int(model.dof_jntid[dof])).name, float(rows[number, dof]))
 
 
-def guide_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDArray[Any]], list[NDArray[np.float64]]]:
-    """The records of all guided wheels, and the tables of their curves.
+def curve_axle_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDArray[Any]], list[NDArray[np.float64]]]:
+    """Return the records of all wheels of curve axles, and the tables of their curves.
 
     Args:
         model: The car with its tendons, compiled.
         curves: The curves of its axles.
 
     Returns:
-        `GUIDE` records, and tables to stand one behind the other; both empty where no axle is guided.
+        `CURVE_AXLE_WHEEL` records and consecutive tables; both empty without curve axles.
     """
     records: list[NDArray[Any]] = []
     tables: list[NDArray[np.float64]] = []
@@ -84,12 +84,12 @@ def guide_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDArray[A
 
 
 def _joints(model: mujoco.MjModel, corner: str) -> tuple[int, int]:
-    """Addresses of a corner's first coordinate and velocity; the others follow."""
+    """Return the addresses of a corner's first coordinate and velocity; the others follow."""
     joints = [find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_{name}") for name in JOINTS]
     qpos, dofs = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     if (np.diff(qpos) != 1).any() or (np.diff(dofs) != 1).any():
         wanted = ", ".join(f"{corner}_{name}" for name in JOINTS)
-        raise ModelError(f"an axle of curves needs the joints {wanted} on its knuckle, in this order, and no other")
+        raise ModelError(f"a curve axle needs the joints {wanted} on its knuckle, in this order, and no other")
     return int(qpos[0]), int(dofs[0])
 
 
@@ -98,25 +98,25 @@ def _side(corner: str) -> float:
 
 
 def _mirror(side: float) -> NDArray[np.float64]:
-    """Signs that make the coordinates of a wheel those of the left one."""
+    """Return the signs that turn the coordinates of a wheel into those of the left one."""
     return np.array([1.0, side, side, 1.0, side])
 
 
 def _spline(points: tuple[float, ...], values: NDArray[np.float64]) -> CubicSpline:
-    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - slow to import, and only axles of curves need it
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - slow to import, and only curve axles need it
 
     return CubicSpline(points, values, axis=1)
 
 
 def _slopes(axle: AxleCurves) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Slopes of the five curves in the design position, over travel and over the rack."""
+    """Return the slopes of the five curves in the design position, over travel and over the rack."""
     by_travel = _spline(axle.travel_m, axle.over_travel())(0.0, 1)[: len(COORDINATES)]
     by_rack = _spline(axle.rack_m, axle.over_rack())(0.0, 1) if axle.is_steered else np.zeros(len(COORDINATES))
     return by_travel, by_rack
 
 
 def _table(points: tuple[float, ...], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A spline through the points on even intervals, as cubics of the place in each interval."""
+    """Lay a spline through the points and return it on even intervals, as cubics of the place in each interval."""
     if not points:
         return np.zeros(0)
     spline = _spline(points, values)
@@ -139,7 +139,7 @@ def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[
         rack, rack_dof = float(model.jnt_qposadr[joint]), float(model.jnt_dofadr[joint])
     held, held_damping, damping = np.zeros((5, 5)), np.zeros((5, 5)), np.zeros((5, 5))
     for number, (square, along) in enumerate(zip(*_modes(model, corner, axle), strict=True)):
-        arms = tendon_arms(model, name := f"{corner}_{number}{GUIDE}")
+        arms = tendon_arms(model, name := f"{corner}_{number}{HOLDING_TENDON}")
         if not arms:
             damping += _damping(axle, square) * np.outer(along, along)
             continue
@@ -148,11 +148,11 @@ def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[
         held += model.tendon_stiffness[tendon] * np.outer(row, row)
         held_damping += model.tendon_damping[tendon] * np.outer(row, row)
     # The engine's step is implicit in its tendons, which is a damping of step times stiffness along them. Where a curve
-    # is no longer as steep as in the design position, the difference would brake the wheel's travel: it is taken along.
+    # is no longer as steep as in the design position, the difference would damp the wheel's travel, so it is included.
     held_damping += model.opt.timestep * held
     by_travel, by_rack = _slopes(axle)
     return fb.filled(
-        fb.GUIDE,
+        fb.CURVE_AXLE_WHEEL,
         qpos=qpos,
         dof=dof,
         side=side,
@@ -172,12 +172,12 @@ def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[
 
 
 def _damping(axle: AxleCurves, square: float) -> float:
-    """Of a mode of unit inertia and the square of its frequency [1/s, 1/s2]."""
+    """Return the damping of a mode of unit inertia with a given square of its frequency [1/s, 1/s2]."""
     return 2.0 * axle.damping_ratio * float(np.sqrt(square))
 
 
 def _mobility(model: mujoco.MjModel) -> NDArray[np.float64]:
-    """Inverse of the inertia of all degrees of freedom in the design position, shape (nv, nv)."""
+    """Return the inverse of the inertia of all degrees of freedom in the design position, shape (nv, nv)."""
     data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     mujoco.mj_forward(model, data)
     mujoco.mj_fullM(model, data, full)
@@ -185,7 +185,7 @@ def _mobility(model: mujoco.MjModel) -> NDArray[np.float64]:
 
 
 def _strains(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> NDArray[np.float64]:
-    """Deflections from the curves, as the left wheel sees them, per degree of freedom, shape (5, nv)."""
+    """Return the deflections from the curves, mirrored to the left wheel, per degree of freedom, shape (5, nv)."""
     rows, side = np.zeros((len(COORDINATES), model.nv)), _side(corner)
     _, first = _joints(model, corner)
     by_travel, by_rack = _slopes(axle)
@@ -197,15 +197,15 @@ def _strains(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> NDArray[np
 
 
 def _modes(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Squares of the frequencies of a knuckle on the stiffness about the curves, and what each mode is of a deflection.
+    """Return the squared frequencies of a knuckle on the stiffness about the curves, and the deflection of each mode.
 
-    The inertia is what a fast motion of the five coordinates meets, the rest free to move. A wheel that turns on its
+    The inertia is that of a fast motion of the five coordinates with the rest free to move. A wheel that turns on its
     bearing takes no part in the rotation of its knuckle in side view.
 
     Returns:
         Squares, shape (5,), rising [1/s2]; one row for each mode, shape (5, 5), the left wheel's.
     """
-    from scipy.linalg import eigh  # noqa: PLC0415 - slow to import, and only axles of curves need it
+    from scipy.linalg import eigh  # noqa: PLC0415 - slow to import, and only curve axles need it
 
     _, first = _joints(model, corner)
     dofs = [first + JOINTS.index(name) for name in COORDINATES]

@@ -1,13 +1,13 @@
-"""The forces of an axle that is guided by curves; see `axle_curves`.
+"""The forces of curve axles; see `axle_curves`.
 
-With e = q - f(z) - g(s), the deflection of the five guided coordinates q from their curves over the travel z and the
-rack s, and t = a . e along each spring that hardens, the energy is U = e'Ke/2 + sum(s t^3/3 + t^4/4) + the integral of
-the load over z. Its slopes are the forces: Q_q = -dU/de, and by the chain rule Q_z = dU/de f'(z), Q_s = dU/de g'(s): no
-work is lost or won, whatever the curves.
+With e = q - f(z) - g(s), the deflection of the five coordinates q from their curves over the travel z and the rack s,
+and t = a . e along each hardening spring, the energy is U = e'Ke/2 + sum(s t^3/3 + t^4/4) + the integral of the load
+over z. Its slopes are the forces: Q_q = -dU/de, and by the chain rule Q_z = dU/de f'(z), Q_s = dU/de g'(s). No work is
+lost or gained, whatever the curves.
 
-The engine is implicit in what tendons carry, and therefore has some in each corner for the stiff part of K, with the
-slopes that the curves have in the design position (`guide_model`). What stands here is the difference: the forces above
-less those of these tendons.
+The engine is implicit in tendons only, so each corner has some tendons for the stiff part of K, with the slopes of the
+curves in the design position (`curve_axle_model`). The forces here are the difference: the forces above less those of
+these tendons.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from activesteer.compilation import inlined
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_memory import records_at
 
-_guides_at: Final = records_at(fb.GUIDE)
+_wheels_at: Final = records_at(fb.CURVE_AXLE_WHEEL)
 _tables_at: Final = records_at(fb.CURVE_TABLE)
 _numbers_at: Final = records_at(np.dtype(np.float64))
 _HEAD: Final = fb.CURVE_TABLE.itemsize // 8
@@ -28,7 +28,7 @@ _HEAD: Final = fb.CURVE_TABLE.itemsize // 8
 
 @inlined
 def _place(table, position):
-    """Interval, place in it from 0 to 1, and how far beyond the ends, in intervals."""
+    """Return the interval, the place in it from 0 to 1, and the distance beyond the ends, in intervals."""
     at = (position - table.start_m) * table.per_m
     count = table.intervals
     inside = min(max(at, 0.0), count)
@@ -38,7 +38,7 @@ def _place(table, position):
 
 @inlined
 def _curve(table, cubics, index, place):
-    """Value of a curve and its slope."""
+    """Return the value of a curve and its slope."""
     interval, t, beyond = place
     start = 4 * (interval * int(table.count) + index)
     a, b, c, d = cubics[start], cubics[start + 1], cubics[start + 2], cubics[start + 3]
@@ -48,9 +48,9 @@ def _curve(table, cubics, index, place):
 
 @inlined
 def _strain(record, travel, tc, rack, rc, index, q, v, moved, on_travel, on_rack):
-    """Deflection of a coordinate of the mirrored, that is left, wheel from its curves, its rate, the curves' slopes.
+    """Return the deflection of a coordinate of the (mirrored) left wheel from its curves, its rate, the curves' slopes.
 
-    Behind them the deflection and the rate that the engine's tendons know, whose curves are straight.
+    Then follow deflection and rate as the engine's tendons have them, with straight curves.
     """
     z, vz, s, vs = moved
     f, slope_z = _curve(travel, tc, index, on_travel)
@@ -76,15 +76,15 @@ def _row(matrix, start, e0, e1, e2, e3, e4):
 
 @inlined
 def _hardened(record, spring, e0, e1, e2, e3, e4):
-    """Force of a hardening spring over its direction a; see `AxleCurves.hardening`."""
+    """Return the force of a hardening spring over its direction a; see `AxleCurves.hardening`."""
     t = _row(record.hardening, 5 * spring, e0, e1, e2, e3, e4)
     return t * t * (record.square[spring] + t)
 
 
 @inlined
-def guides(block, header, qpos, qvel, qfrc):
-    """Adds the forces of all guided wheels."""
-    records = _guides_at(block, header.guides, header.n_guides)
+def add_curve_axle_forces(block, header, qpos, qvel, qfrc):
+    """Add the forces of all wheels of curve axles."""
+    records = _wheels_at(block, header.curve_axle_wheels, header.n_curve_axle_wheels)
     curves = _numbers_at(block, header.curves, header.n_curves)
     for index in range(records.size):
         record = records[index]
