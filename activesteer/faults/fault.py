@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, NamedTuple
 from activesteer.config import Range
 from activesteer.conventions import CORNERS
 from activesteer.errors import ManeuverError, nearest_names
-from activesteer.signals import Measurement
+from activesteer.signals import Measurement, numbers_of
 
 
 class Actuator(NamedTuple):
@@ -51,20 +51,13 @@ class Sensor(NamedTuple):
     unit: str
 
 
-_UNITS: Final = ("radps", "mps2", "mps", "rad", "Pa", "Nm")
-
-
 def _sensors() -> dict[str, Sensor]:
     """Return the signals that a controller gets, except the time."""
     found: dict[str, Sensor] = {}
-    for field in Measurement._fields:
-        name, _, unit = field.rpartition("_")
-        if unit not in _UNITS:
-            continue
-        if "tuple" in str(Measurement.__annotations__[field]):
-            found |= {f"{corner}_{name}_sensor": Sensor(field, place, unit) for place, corner in enumerate(CORNERS)}
-        else:
-            found[f"{name}_sensor"] = Sensor(field, None, unit)
+    for number in numbers_of(Measurement)[1:]:
+        name, _, unit = number.name.rpartition("_")
+        wheel = None if number.name == number.field else CORNERS.index(name[:2])
+        found[f"{name}_sensor"] = Sensor(number.field, wheel, unit)
     return found
 
 
