@@ -20,10 +20,10 @@ ANIMATIONS = {"film_three_systems.webp"}
 
 @pytest.mark.parametrize("name", list_maneuvers())
 def test_every_manoeuvre_has_a_section_with_its_picture(name: str) -> None:
-    page = (DOCS / "manoeuvres.md").read_text(encoding="utf-8")
-    section = re.search(rf"^### {name}\n(.*?)(?=^##|\Z)", page, re.MULTILINE | re.DOTALL)
-    assert section, f"docs/manoeuvres.md has no section {name}"
-    assert f"(pictures/manoeuvre_{name}.png)" in section[1], "python tools/make_doc_pictures.py makes it"
+    pages = "\n".join(page.read_text(encoding="utf-8") for page in sorted((DOCS / "manoeuvres").glob("*.md")))
+    section = re.search(rf"^### {name}\n(.*?)(?=^#|\Z)", pages, re.MULTILINE | re.DOTALL)
+    assert section, f"docs/manoeuvres/ has no section {name}"
+    assert f"(../pictures/manoeuvre_{name}.png)" in section[1], "python tools/make_doc_pictures.py makes it"
     assert (DOCS / "pictures" / f"manoeuvre_{name}.png").is_file()
 
 
