@@ -1,1 +1,1 @@
-"""Measured data: files of other programs as recordings, compared with simulations, driven again, and fitted to."""
+"""Measured data: import as recordings, comparison with simulations, repeated drives, and fits of parameters."""

@@ -1,4 +1,4 @@
-"""The time by which a measured run is later than a simulated one: their clocks were started at different instants."""
+"""Time shift between a measured and a simulated run, whose clocks start at different instants."""
 
 from __future__ import annotations
 
@@ -11,26 +11,22 @@ from activesteer.conventions import Array
 from activesteer.recording import Recording
 
 INPUTS: Final = ("steering_wheel_rad", "rack_m")
-"""What the clocks are compared by where both runs have it: the response of another car may lag, its input may not."""
+"""Channels that align the clocks if both runs have them: the response of another car may lag, its input may not."""
 RESPONSES: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 _STEP_S: Final = 0.01
-"""Step of the search; the result is found between its instants [s]."""
+"""Step of the search [s]; the result is found between its instants."""
 _NEARLY: Final = 0.01
-"""Of shifts that are this near to the best one, as every period of a sine is, the shortest counts."""
+"""Among shifts this close to the best correlation, such as all periods of a sine, the shortest one is taken."""
 
 
 def time_shift(measured: Recording, simulated: Recording) -> float:
-    """How much later the measured run is [s]: measured(t) is simulated(t - shift).
+    """Return the delay of the measured run [s]: measured(t) is simulated(t - shift).
 
-    The greatest of the normalised cross-correlation over all shifts at which the runs overlap by half of the shorter
-    one, then, between the steps of that search, the least mean square of the difference.
-
-    Args:
-        measured: The measured run.
-        simulated: The simulated one.
+    The search maximises the normalised cross-correlation over all shifts at which the runs overlap by half of the
+    shorter run. Between the steps of the search, the mean square of the difference is minimised.
 
     Returns:
-        The shift [s]; nan where nothing moves in both runs that would tell it.
+        The shift [s]; nan if no signal moves in both runs.
     """
     pairs = _pairs(measured, simulated, INPUTS) or _pairs(measured, simulated, RESPONSES)
     if not pairs:
@@ -53,7 +49,7 @@ def time_shift(measured: Recording, simulated: Recording) -> float:
 
 
 def _pairs(measured: Recording, simulated: Recording, names: tuple[str, ...]) -> list[tuple[Array, Array]]:
-    """Signals of both runs, each less the simulation's mean and relative to its range."""
+    """Return signals of both runs, each without the mean of the simulation and relative to its range."""
     pairs = []
     for name in names:
         if name not in measured or name not in simulated:
@@ -66,7 +62,7 @@ def _pairs(measured: Recording, simulated: Recording, names: tuple[str, ...]) ->
 
 
 def _alike(pairs: list[tuple[Array, Array]], least: int) -> Array:
-    """Normalised cross-correlation over all shifts, -1 where fewer than `least` samples overlap."""
+    """Return the normalised cross-correlation over all shifts; -1 where fewer than `least` samples overlap."""
     from scipy.signal import correlate  # noqa: PLC0415 - slow to import
 
     product, first, second = 0.0, 0.0, 0.0
@@ -82,7 +78,7 @@ def _alike(pairs: list[tuple[Array, Array]], least: int) -> Array:
 def _refined(coarse_s: float, own_s: Array, other_s: Array, pairs: list[tuple[Array, Array]]) -> float:
     from scipy.optimize import minimize_scalar  # noqa: PLC0415 - slow to import
 
-    # The same samples at every shift, or the number of them would have a say.
+    # The same samples at every shift, so that their number does not matter.
     kept = (own_s - coarse_s >= other_s[0] + _STEP_S) & (own_s - coarse_s <= other_s[-1] - _STEP_S)
 
     def difference(shift_s: float) -> float:

@@ -1,4 +1,4 @@
-"""A column of a file of measured data, whatever its format."""
+"""Column of a file of measured data, in any format."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ BROKEN: Final = (Exception,)
 
 
 class Column(NamedTuple):
-    """A column or signal of a file.
+    """Column or signal of a file.
 
     Attributes:
-        name: Its name there.
-        unit: Its unit as the file has it; empty where it does not say.
-        read: Its values, shape (n,), and their own times [s]; None where they share a time column of the file.
+        name: Name in the file.
+        unit: Unit in the file; empty if the file states none.
+        read: Function that returns the values, shape (n,), and their own times [s]; None for a shared time column.
     """
 
     name: str
@@ -35,11 +35,7 @@ class Column(NamedTuple):
 
 
 def check_rows(count: int, path: Path) -> None:
-    """Refuse a file by its number of rows, which its metadata tell before the rows are read.
-
-    Raises:
-        RecordingError: there are more than `MAX_ROWS` rows.
-    """
+    """Refuse a file with more than `MAX_ROWS` rows, which its metadata state before the rows are read."""
     if count > MAX_ROWS:
         raise RecordingError(
             f"{shown_path(path)} has {count} rows; at most {MAX_ROWS} are allowed", value=count, allowed=MAX_ROWS
@@ -48,20 +44,20 @@ def check_rows(count: int, path: Path) -> None:
 
 @contextmanager
 def understood(path: Path, what: str) -> Iterator[None]:
-    """Stands around what reads a file: whatever it raises becomes a RecordingError of one line."""
+    """Context that turns any exception of a file reader into a RecordingError of one line."""
     try:
         yield
     except RecordingError:
         raise
     except BROKEN as reason:
-        raise RecordingError(f"{shown_path(path)} is no {what} that can be read: {reason}", value=path) from reason
+        raise RecordingError(f"{shown_path(path)} is no readable {what}: {reason}", value=path) from reason
 
 
 def numbers(values: Any, name: str, path: Path) -> Array:
-    """Values as numbers; instants as seconds since the first one.
+    """Convert values to numbers, and instants to seconds since the first one.
 
     Raises:
-        RecordingError: they are none.
+        RecordingError: the values are no numbers.
     """
     try:
         array = np.asarray(values)

@@ -1,4 +1,4 @@
-"""Columns of a file of measured data, read when they are asked for: CSV, MAT, Parquet, MDF."""
+"""Columns of a file of measured data, read on demand: CSV, MAT, Parquet, MDF."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _PIECE_BYTES: Final = 2**20
 
 
 def read_columns(path: Path) -> list[Column]:
-    """The columns of a file.
+    """Return the columns of a file.
 
     Args:
-        path: A CSV (`.csv`, `.txt`, `.tsv`, `.asc`), `.mat`, `.parquet` or `.mf4` (`.mdf`, `.dat`).
+        path: A CSV (`.csv`, `.txt`, `.tsv`, `.asc`), `.mat`, `.parquet` or `.mf4` (`.mdf`, `.dat`) file.
 
     Raises:
-        RecordingError: it cannot be read, or its ending is none of these.
+        RecordingError: the file cannot be read, or has an unknown ending.
     """
     if not is_file(path):
         raise RecordingError(f"cannot read {shown_path(path)}: it {why_no_file(path)}", value=path)
@@ -45,7 +45,7 @@ def read_columns(path: Path) -> list[Column]:
 
 
 def _numbered(columns: list[Column]) -> list[Column]:
-    """Append a number to a name from its second column on; files such as MDF may repeat names."""
+    """Append a number to the second and further columns of a name; files such as MDF may repeat names."""
     seen: dict[str, int] = {}
     found = []
     for column in columns:
@@ -55,12 +55,12 @@ def _numbered(columns: list[Column]) -> list[Column]:
 
 
 def second_of(name: str) -> str:
-    """Name given to the second column of a name."""
+    """Return the name given to the second column of a name."""
     return f"{name} (2)"
 
 
 def find(columns: list[Column], name: str, path: Path) -> Column:
-    """The column of that name.
+    """Return the column with a name.
 
     Raises:
         RecordingError: there is none.
@@ -161,7 +161,7 @@ def _check_mat_size(path: Path) -> None:
 
 
 def _flat(table: Mapping[str, Any], start: str = "") -> Iterator[tuple[str, Any]]:
-    """Vectors of numbers in structs of structs, by dotted names."""
+    """Yield vectors of numbers in nested structs by dotted names."""
     for name, value in table.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{start}{name}.")
@@ -176,7 +176,7 @@ def _mdf(path: Path) -> list[Column]:
         raise not_installed(RecordingError, "an MDF file", "asammdf", "mdf") from error
     file: Any = None
     problem = ""
-    # Of a broken file asammdf leaves half an object, which complains to the terminal when it is deleted.
+    # asammdf leaves half an object of a broken file, which prints to the terminal when it is deleted.
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         file = MDF(path)
@@ -186,7 +186,7 @@ def _mdf(path: Path) -> list[Column]:
         gc.collect()
         sys.unraisablehook = hook
     if problem:
-        raise RecordingError(f"{shown_path(path)} is no MDF file that can be read: {problem}", value=path)
+        raise RecordingError(f"{shown_path(path)} is no readable MDF file: {problem}", value=path)
     with understood(path, "MDF file"):
         check_rows(max((int(group.channel_group.cycles_nr) for group in file.groups), default=0), path)
         places = [

@@ -1,7 +1,7 @@
-"""Measured runs beside a simulated one: time shift, residuals, tolerance corridors, share inside, verdict.
+"""Comparison of measured runs with a simulated one: time shift, residuals, tolerance corridors, verdict.
 
-ISO 19364 (steady-state circular driving) and ISO 19365 (sine with dwell) put the corridor around the simulation and
-look whether the measurement lies in it: the first in cross plots over the lateral acceleration, the second over time.
+ISO 19364 (steady-state circular driving) and ISO 19365 (sine with dwell) define a corridor around the simulation that
+must contain the measurement. The first uses cross plots over the lateral acceleration, the second plots over time.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ STANDARDS: Final = {
     "iso19365": "ISO 19365: over time",
 }
 SHARE_NEEDED: Final = 0.95
-"""Share of the samples that must lie in the corridor; an assumption: the standards ask for all points of a mean curve,
-and leave open what a single sample of a noisy signal is worth."""
+"""Proportion of the samples that must lie in the corridor. This is an assumption: the standards require all points of
+a mean curve, and do not treat single samples of a noisy signal."""
 _ACROSS: Final = "ay_mps2"
-_QUOTED: Final = "as quoted of ISO 19364 and ISO 19365; the standards' texts were not at hand"
+_QUOTED: Final = "as quoted from ISO 19364 and ISO 19365; the texts of the standards were not available"
 _ASSUMED: Final = "assumption"
 _DEG: Final = math.radians(1.0)
 _CROSS_POINTS: Final = 1500
-"""Most measured and simulated points of a cross plot that are compared with each other."""
+"""Largest number of measured and simulated points of a cross plot."""
 
 
 class Tolerance(NamedTuple):
-    """How far a measured value may be from the simulated one: offset + gain x its size.
+    """Allowed difference from a simulated value: offset + gain x size of the value.
 
     Attributes:
-        offset: SI.
+        offset: Constant part, SI.
         gain: Fraction of the simulated value.
-        source: Where it is from.
+        source: Source of the tolerance.
     """
 
     offset: float
@@ -50,7 +50,7 @@ class Tolerance(NamedTuple):
     source: str
 
     def width(self, values: Array) -> Array:
-        """Half the width of the corridor around values."""
+        """Return half the width of the corridor around values."""
         return self.offset + self.gain * np.abs(values)
 
 
@@ -62,22 +62,22 @@ TOLERANCES: Final = {
     "roll_rad": Tolerance(0.2 * _DEG, 0.1, _ASSUMED),
     "speed_mps": Tolerance(1.0 / 3.6, 0.01, _ASSUMED),
 }
-"""Channels that are compared."""
+"""Channel that is compared -> its tolerance."""
 
 
 class Compared(NamedTuple):
-    """One quantity of measurement and simulation.
+    """Comparison of one channel.
 
     Attributes:
-        channel: Its name.
-        tolerance: What is allowed.
+        channel: Name of the channel.
+        tolerance: Allowed difference.
         x: Instants [s] in the simulation's time or, in a cross plot, measured lateral accelerations [m/s2], shape (n,).
-        measured: Measured values, of several runs their mean, shape (n,).
-        confidence: Half of the 95 % interval of that mean, shape (n,); zero for one run.
-        simulated: What the simulation has there, shape (n,): in a cross plot at its nearest point.
-        low: Lower edge of the corridor at x; in a cross plot that of the simulation's curve.
+        measured: Measured values, the mean of several runs, shape (n,).
+        confidence: Half of the 95 % interval of the mean, shape (n,); zero for one run.
+        simulated: Simulated values, shape (n,); in a cross plot, values of the nearest point.
+        low: Lower edge of the corridor at x; in a cross plot, of the curve of the simulation.
         high: Upper edge.
-        within: Which samples lie in it, shape (n,).
+        within: Which samples lie in the corridor, shape (n,).
     """
 
     channel: str
@@ -92,21 +92,21 @@ class Compared(NamedTuple):
 
     @property
     def residual(self) -> Array:
-        """Measured less simulated."""
+        """Measured minus simulated values."""
         return self.measured - self.simulated
 
     @property
     def share_inside(self) -> float:
-        """Share of the samples in the corridor."""
+        """Proportion of the samples in the corridor."""
         return float(np.mean(self.within))
 
     @property
     def inside(self) -> bool:
-        """Whether as many are inside as are needed."""
+        """Whether enough samples are inside."""
         return self.share_inside >= SHARE_NEEDED
 
     def to_json(self) -> dict[str, Any]:
-        """As in the JSON output, SI."""
+        """Return JSON values, SI."""
         return {
             "channel": self.channel,
             "rms": rms(self.residual),
@@ -120,12 +120,12 @@ class Compared(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What came out.
+    """Result of a comparison.
 
     Attributes:
         standard: Key of `STANDARDS`.
-        shifts_s: How much later each measured run is [s]; nan where nothing told it, and none was made up for.
-        quantities: What both have.
+        shifts_s: Delay of each measured run [s]; nan if unknown, and then not corrected.
+        quantities: Channels that all runs have.
     """
 
     standard: str
@@ -134,11 +134,11 @@ class Comparison(NamedTuple):
 
     @property
     def inside(self) -> bool:
-        """Whether every quantity is inside."""
+        """Whether every channel is inside."""
         return all(quantity.inside for quantity in self.quantities)
 
     def to_json(self) -> dict[str, Any]:
-        """As in the JSON output, SI."""
+        """Return JSON values, SI."""
         return {
             "standard": self.standard,
             "time_shift_s": float(np.mean(self.shifts_s)),
@@ -149,22 +149,22 @@ class Comparison(NamedTuple):
 
 
 def compare(measured: Sequence[Recording], simulated: Recording, standard: str = "iso19365") -> Comparison:
-    """Compare measured runs of one manoeuvre with its simulation.
+    """Compare measured runs of a manoeuvre with its simulation.
 
     Args:
-        measured: At least one.
-        simulated: The simulation.
+        measured: Measured runs, at least one.
+        simulated: Simulated run.
         standard: Key of `STANDARDS`.
 
     Raises:
-        RecordingError: the runs have no channel or no time in common.
+        RecordingError: the runs share no channel or no time.
     """
     names = [name for name in TOLERANCES if all(name in run for run in (*measured, simulated))]
     if standard == "iso19364" and _ACROSS not in names:
         raise RecordingError(f"cross plots need {_ACROSS} in every run", value=_ACROSS)
     if not names:
         raise RecordingError(
-            f"the runs have none of the channels that are compared: {', '.join(TOLERANCES)}", allowed=tuple(TOLERANCES)
+            f"the runs have none of the compared channels: {', '.join(TOLERANCES)}", allowed=tuple(TOLERANCES)
         )
     shifts = tuple(time_shift(run, simulated) for run in measured)
     made_up = [0.0 if math.isnan(shift) else shift for shift in shifts]
@@ -173,7 +173,7 @@ def compare(measured: Sequence[Recording], simulated: Recording, standard: str =
     time_s = measured[0].time_s - made_up[0]
     time_s = time_s[(time_s >= start - 1e-9) & (time_s <= end + 1e-9)]
     if len(time_s) < 10:
-        raise RecordingError(f"the runs have {len(time_s)} samples in common; 10 are needed to compare them")
+        raise RecordingError(f"the runs have {len(time_s)} samples in common; at least 10 are needed")
 
     def mean_of(name: str) -> tuple[Array, Array]:
         values = np.stack(
@@ -196,7 +196,7 @@ def compare(measured: Sequence[Recording], simulated: Recording, standard: str =
 
 
 def _confidence(values: Array) -> Array:
-    """Half of the 95 % interval of the mean (Student), shape (n,)."""
+    """Return half of the 95 % interval of the mean (Student), shape (n,)."""
     from scipy.stats import t  # noqa: PLC0415 - slow to import
 
     count = len(values)
@@ -215,7 +215,7 @@ def _timed(name: str, time_s: Array, measured: Array, confidence: Array, simulat
 def _crossed(
     name: str, across: Array, measured: Array, confidence: Array, sim_across: Array, sim_values: Array
 ) -> Compared:
-    """Inside is a point in the ellipse of both tolerances around some point of the simulated curve."""
+    """Compare in a cross plot: inside is a point in the ellipse of both tolerances around a point of the curve."""
     tolerance = TOLERANCES[name]
     rows = np.unique(np.linspace(0, len(across) - 1, min(len(across), _CROSS_POINTS)).astype(int))
     curve = np.unique(np.linspace(0, len(sim_across) - 1, min(len(sim_across), _CROSS_POINTS)).astype(int))
@@ -231,7 +231,7 @@ def _crossed(
 
 
 def words(found: Compared) -> tuple[str, str, str, str, str]:
-    """Quantity, rms of the residual, tolerance, share inside and verdict, as they are printed."""
+    """Return channel, rms of the residual, tolerance, proportion inside and verdict as texts."""
     shown = quantity_of(found.channel)
     unit, factor = shown.unit.name, shown.factor
     allowed = f"{found.tolerance.offset * factor:.3g} {unit} + {100.0 * found.tolerance.gain:g} %"
@@ -245,12 +245,12 @@ def words(found: Compared) -> tuple[str, str, str, str, str]:
 
 
 def assumptions(found: Comparison) -> list[str]:
-    """What of the verdict is no standard's, one line each."""
+    """Return the parts of the verdict that no standard defines, one line each."""
     assumed = [quantity_of(each.channel).label for each in found.quantities if each.tolerance.source == _ASSUMED]
     lines = [f"Tolerances of steering wheel angle and lateral acceleration {_QUOTED}."]
     if assumed:
         lines.append(f"Tolerances of {', '.join(assumed)} are assumptions.")
-    lines.append(f"A quantity is inside where {100.0 * SHARE_NEEDED:g} % of its samples are; an assumption.")
+    lines.append(f"A quantity is inside if {100.0 * SHARE_NEEDED:g} % of its samples are; this is an assumption.")
     if found.standard == "iso19365":
         lines.append(f"The corridor reaches {1e3 * TIME_TOLERANCE_S:g} ms to either side, as in activesteer validate.")
     return lines

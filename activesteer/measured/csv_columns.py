@@ -1,4 +1,4 @@
-"""Columns of a CSV as other programs write it."""
+"""Columns of a CSV written by another program."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from activesteer.files import read_bytes
 from activesteer.measured.column import MAX_BYTES, Column, check_rows, numbers, understood
 
 _HEAD_LINES: Final = 200
-"""Within so many lines a CSV must begin with its numbers."""
+"""Number of lines within which the numbers of a CSV must begin."""
 _NUMBER: Final = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf)", re.IGNORECASE)
 _COMMA: Final = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _CLOCK: Final = re.compile(r"(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)")
@@ -26,14 +26,14 @@ _DATED: Final = re.compile(r"(\d{4}-\d\d-\d\d[ T])?" + _CLOCK.pattern + "Z?")
 
 
 def csv_columns(path: Path) -> list[Column]:
-    """The columns of a CSV.
+    """Return the columns of a CSV.
 
     Args:
-        path: The file: cells apart by a comma, semicolon, tab, bar or blanks, perhaps in quotes; decimal points or
-            commas; lines above the names, and a line of units below them; UTF-8, UTF-16 or Latin-1.
+        path: The file. Cells are separated by commas, semicolons, tabs, bars or blanks, and may be quoted. Decimal
+            points or commas; lines above the names, and a line of units below them; UTF-8, UTF-16 or Latin-1.
 
     Raises:
-        RecordingError: it cannot be read, or there is no table in it.
+        RecordingError: the file cannot be read, or holds no table.
     """
     import pyarrow as pa  # noqa: PLC0415 - slow to import
     from pyarrow import csv as arrow  # noqa: PLC0415
@@ -93,11 +93,11 @@ def _text(data: bytes) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return data.decode("latin-1")  # what exporters on Windows write: a degree sign is one byte
+        return data.decode("latin-1")  # exporters on Windows: a degree sign is one byte
 
 
 def _clock_s(texts: list[str | None]) -> Array | None:
-    """Times of the day [s], on over midnight; None where a text is none."""
+    """Return times of day [s], increasing over midnight; None if a text is no time of day."""
     found = [_CLOCK.fullmatch((text or "").strip()) for text in texts]
     if not all(found):
         return None
@@ -117,9 +117,9 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _first_numbers(lines: list[str], path: Path) -> tuple[int, str]:
-    """Number of the first line of numbers, and what stands between its cells.
+    """Return the number of the first line of numbers, and the separator of its cells.
 
-    In such a line every other cell may be a word, as the name of a gear, and one a date or a time of the day.
+    In such a line, every other cell may be a word, such as a gear, and one a date or a time of day.
     """
     for number, line in enumerate(lines):
         for separator in ";\t|, ":
@@ -133,14 +133,14 @@ def _first_numbers(lines: list[str], path: Path) -> tuple[int, str]:
                 continue
             return number, separator
     raise RecordingError(
-        f"has no line of numbers in its first {len(lines)} lines; a CSV of measured data has columns apart by a comma, "
+        f"has no line of numbers in its first {len(lines)} lines; the columns of a CSV must be separated by a comma, "
         "semicolon, tab, bar or blanks",
         file=path.name,
     )
 
 
 def _header(head: list[str], separator: str, count: int, path: Path) -> tuple[list[str], list[str]]:
-    """Names and units: the last line before the numbers has the names, or the units of the names before it."""
+    """Return names and units. The last line before the numbers holds the names, or the units of the names before it."""
     rows = [row for line in head if len(row := _cells(line.lstrip("#"), separator)) >= count]
     rows = [row for row in rows if sum(bool(cell) for cell in row) >= 2]
     names = [len(row) for line in head if sum(map(bool, row := _cells(line.lstrip("#"), separator))) >= 2]

@@ -1,4 +1,4 @@
-"""What a fit compares with: channels of recordings, and how noisy each is."""
+"""Data of a fit: channels of recordings, and the noise of each."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from activesteer.recording import Recording
 from activesteer.studies.engine.study_file import StudyFile
 
 _FEWEST: Final = 20
-"""Samples of a channel in a recording that are needed at least."""
+"""Smallest number of samples of a channel in a recording."""
 
 
 class Measured(NamedTuple):
-    """A recording, in the time of the manoeuvre that it became.
+    """Recording in the time of its manoeuvre.
 
     Attributes:
-        name: Of its file.
-        begin_s: Instant of the recording that is zero in the manoeuvre [s].
-        time_s: Instants at which channels are compared [s], shape (n,).
-        channels: What was measured there, SI; not finite where nothing was.
+        name: Name of its file.
+        begin_s: Time of the recording at which the manoeuvre starts [s].
+        time_s: Times at which channels are compared [s], shape (n,).
+        channels: Measured values there, SI; not finite where missing.
     """
 
     name: str
@@ -35,15 +35,15 @@ class Measured(NamedTuple):
 
 
 def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[str, float]:
-    """Channel -> standard deviation of its noise, SI.
+    """Return the standard deviation of the noise of each channel, SI.
 
     Args:
-        study: For error messages.
-        table: Its table [fit].
+        study: The study, for error messages.
+        table: Table [fit] of the study.
         known: Channels of a run.
 
     Raises:
-        StudyError: there is no such channel, or it is given twice.
+        StudyError: a channel does not exist, or is given twice.
     """
     found: dict[str, float] = {}
     for key, value in table.noise.items():
@@ -61,18 +61,18 @@ def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[
 def measured_of(
     recording: Recording, name: str, study: StudyFile, table: FitTable, channels: Collection[str]
 ) -> Measured:
-    """What is compared of a recording.
+    """Return the compared data of a recording.
 
     Args:
         recording: The recording.
-        name: Of its file.
-        study: For error messages, and its step.
-        table: Its table [fit].
-        channels: Which are compared.
+        name: Name of its file.
+        study: The study, for its step and for error messages.
+        table: Table [fit] of the study.
+        channels: Channels to compare.
 
     Raises:
-        StudyError: it lacks a channel.
-        RecordingError: it has too few samples of one.
+        StudyError: the recording lacks a channel.
+        RecordingError: a channel has too few samples.
     """
     for channel in channels:
         if channel not in recording:

@@ -1,4 +1,4 @@
-"""The study file of a fit: recordings in place of manoeuvres, factors that are looked for, and the table [fit]."""
+"""Study file of a fit: recordings as manoeuvres, factors to be found, and the table [fit]."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from activesteer.studies.engine.study_file import StudyFile, read_study
 
 @dataclass(frozen=True)
 class FitTable:
-    """The table [fit] of a study file."""
+    """Table [fit] of a study file."""
 
     noise: dict[str, Annotated[float, Range(1e-12)]]
-    """Channel -> standard deviation of its noise, in the unit of the key, as `yaw_rate_degps`: what a difference of
-    that channel is measured by."""
+    """Channel -> standard deviation of its noise, in the unit of the key, such as `yaw_rate_degps`; the scale of its
+    differences."""
     start: dict[str, float] = field(default_factory=dict)
-    """Factor -> where the search begins; where not given at what the files say, or in the middle of its range."""
+    """Factor -> start of the search; by default the value of the files, or the middle of the range."""
     from_s: float | None = None
-    """Differences before this instant of the recordings do not count; its inputs are driven from its first row."""
+    """Start of the compared part of the recordings [s]; inputs are driven from the first row."""
     until_s: float | None = None
-    """Those behind it neither."""
+    """End of the compared part [s]."""
     intervals: Literal["residuals", "noise"] = "residuals"
-    """What the intervals rest on: what is left in the end, with its autocorrelation, or `noise` as it is stated."""
+    """Basis of the intervals: the final residuals with their autocorrelation, or the stated `noise`."""
 
 
 def read_fit(given: FileOrTable) -> tuple[StudyFile, FitTable]:
@@ -35,21 +35,21 @@ def read_fit(given: FileOrTable) -> tuple[StudyFile, FitTable]:
         given: Name or path of the file, or its table.
 
     Raises:
-        StudyError: it cannot be read, a key or value is wrong, or it is no study that can be fitted.
+        StudyError: the file cannot be read, a key or value is wrong, or the study cannot be fitted.
     """
     study = read_study(given, "fit")
     fail = study.source.fail
     table = build(FitTable, study.fit or {}, study.source, ("fit",))
     if not table.noise:
-        raise fail(("fit", "noise"), "is empty; at least one channel is needed, as yaw_rate_degps = 0.2")
+        raise fail(("fit", "noise"), "is empty; give at least one channel, such as yaw_rate_degps = 0.2")
     if study.case_list is not None or not study.factors:
-        raise fail(("factors",), "a fit needs factors: what is looked for, and in which range")
+        raise fail(("factors",), "a fit needs factors with ranges")
     for key in ("vehicles", "controllers"):
         if len(getattr(study, key)) != 1:
-            raise fail((key,), f"a fit has one of them, not {len(getattr(study, key))}")
+            raise fail((key,), f"a fit needs exactly one, not {len(getattr(study, key))}")
     for maneuver in study.maneuvers:
         if not is_recording(maneuver):
-            raise fail(("maneuvers",), f"{maneuver!r} is no recording (.mcap), whose inputs could be driven", maneuver)
+            raise fail(("maneuvers",), f"{maneuver!r} is no recording (.mcap) with inputs to drive", maneuver)
     for factor in study.factors:
         if factor.kind != "uniform":
             raise fail(("factors", factor.key, factor.kind), "a fit needs a range: uniform = [low, high]")

@@ -1,4 +1,4 @@
-"""What came of a fit: parameters with their intervals, what is left of the differences, and what to think of it."""
+"""Result of a fit: parameters with intervals, residuals, and warnings."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from activesteer.measured.intervals import LEVEL
 from activesteer.quantities import quantity_of
 
 _ALIKE: Final = 0.95
-"""Correlation of two parameters from which on it is said."""
+"""Correlation of two parameters above which a note is given."""
 _MUCH: Final = 1.5
-"""What is left of a channel, relative to its noise, from which on the car does not explain it."""
+"""Residual of a channel relative to its noise above which the car does not explain the channel."""
 _HANGS: Final = 5.0
-"""How many samples may count as one before it is said; noise behind a filter of a test vehicle, some 20 Hz, has 2 at
-100 Hz."""
+"""Number of samples per independent sample above which a note is given. Filtered noise of a test vehicle, about 20 Hz,
+has 2 at 100 Hz."""
 
 
 class Parameter(NamedTuple):
-    """A factor as it was found.
+    """Factor with its fitted value.
 
     Attributes:
-        key: Its key.
-        value: Its value, in the unit of the key; relative where the factor is.
-        half_width: Half of its 95 % interval; nan where it is at an end of its range.
-        start: Where the search began.
-        low: Lower end of its range.
-        high: Upper end.
+        key: Key of the factor.
+        value: Value in the unit of the key; relative if the factor is relative.
+        half_width: Half of the 95 % interval; nan at an end of the range.
+        start: Start of the search.
+        low: Lower end of the range.
+        high: Upper end of the range.
     """
 
     key: str
@@ -40,36 +40,36 @@ class Parameter(NamedTuple):
 
     @property
     def at_end(self) -> bool:
-        """Whether it is at an end of its range, so that it has no interval."""
+        """Whether the value is at an end of its range, and so has no interval."""
         return math.isnan(self.half_width)
 
     @property
     def words(self) -> str:
-        """Value and half width with as many digits as the latter has a meaning for."""
+        """Value and half width, with the significant digits of the latter."""
         if self.at_end or self.half_width <= 0.0:
             return f"{self.value:.5g}"
         digits = max(0, 1 - math.floor(math.log10(self.half_width)))
         return f"{self.value:.{digits}f} +- {self.half_width:.{digits}f}"
 
     def to_json(self) -> dict[str, Any]:
-        """As in the JSON output."""
+        """Return JSON values."""
         low, high = self.value - self.half_width, self.value + self.half_width
         return {"value": self.value, "low": low, "high": high, "start": self.start, "range": [self.low, self.high],
                 "at_end": self.at_end}  # fmt: skip
 
 
 class Compared(NamedTuple):
-    """A channel of a recording beside the runs.
+    """Channel of a recording compared with the runs.
 
     Attributes:
         recording: Name of the recording.
         channel: Name of the channel.
-        noise: Standard deviation of its noise as stated, SI.
-        time_s: Instants of the recording [s], shape (n,).
-        measured: What was measured, SI, shape (n,).
-        before: Simulated less measured where the search began, relative to the noise, shape (n,).
-        after: Likewise where it ended.
-        independent: How many of the n samples count for the intervals.
+        noise: Stated standard deviation of its noise, SI.
+        time_s: Times of the recording [s], shape (n,).
+        measured: Measured values, SI, shape (n,).
+        before: Simulated minus measured values at the start of the search, relative to the noise, shape (n,).
+        after: The same at its end.
+        independent: Number of independent samples.
     """
 
     recording: str
@@ -82,7 +82,7 @@ class Compared(NamedTuple):
     independent: float
 
     def to_json(self) -> dict[str, Any]:
-        """As in the JSON output, SI."""
+        """Return JSON values, SI."""
         return {
             "recording": self.recording,
             "channel": self.channel,
@@ -94,7 +94,7 @@ class Compared(NamedTuple):
         }
 
     def words(self) -> tuple[str, ...]:
-        """Recording, quantity, stated noise, rms before and after, samples and how many count, as they are printed."""
+        """Return recording, channel, noise, rms before and after, numbers of all and of independent samples."""
         shown = quantity_of(self.channel)
         sizes = (self.noise, self.noise * rms(self.before), self.noise * rms(self.after))
         return (
@@ -104,21 +104,21 @@ class Compared(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """What came out.
+    """Result of a fit.
 
     Attributes:
-        parameters: What was looked for.
-        correlations: Of the parameters' errors, shape (p, p); nan for one at an end of its range.
-        compared: Every channel of every recording.
-        basis: What the intervals rest on: `residuals` or `noise`.
+        parameters: Fitted factors.
+        correlations: Correlations of the parameters' errors, shape (p, p); nan at an end of a range.
+        compared: All channels of all recordings.
+        basis: Basis of the intervals: `residuals` or `noise`.
         freedom: Degrees of freedom of the t distribution; infinite with `noise`.
-        misfit: Rms of what is left, relative to the noise; 1 where the car explains all but the noise.
-        rounds: How many sets of parameters were tried, each with its derivatives.
-        runs: How many runs were driven.
-        settled: Whether the search ended because nothing moved any more.
-        overrides: Key -> value with which the car is driven as found, in every recording.
-        own: Recording -> what is besides for that recording alone.
-        notes: What is to be said of it, one sentence each.
+        misfit: Rms of the residuals relative to the noise; 1 if the car explains everything but the noise.
+        rounds: Number of parameter sets tried, each with its derivatives.
+        runs: Number of runs.
+        settled: Whether the search converged.
+        overrides: Key -> value that drives the fitted car in every recording.
+        own: Recording -> additional values for that recording.
+        notes: Warnings, one sentence each.
     """
 
     parameters: tuple[Parameter, ...]
@@ -135,7 +135,7 @@ class Fit(NamedTuple):
     notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """As in the JSON output."""
+        """Return JSON values."""
         return {
             "parameters": {one.key: one.to_json() for one in self.parameters},
             "correlations": self.correlations.tolist(),
@@ -151,7 +151,7 @@ class Fit(NamedTuple):
         }
 
     def pairs(self, least: float) -> list[tuple[str, str, float]]:
-        """Two parameters and the correlation of their errors, where it is at least that large; the largest first."""
+        """Return pairs of parameters with at least this correlation of their errors; the largest first."""
         keys = [one.key for one in self.parameters]
         found = [
             (one, other, float(self.correlations[row, column]))
@@ -163,37 +163,37 @@ class Fit(NamedTuple):
 
 
 def rests_on(found: Fit) -> list[str]:
-    """What the intervals mean, and what they do not, one sentence each."""
+    """Return the meaning and the limits of the intervals, one sentence each."""
     if found.basis == "noise":
-        lines = ["The intervals rest on the noise as stated: white, independent in every channel, normal."]
+        lines = ["The intervals rest on the stated noise: white, normal, and independent in every channel."]
     else:
         lines = [
-            "The intervals rest on what is left of every channel: on its variance, and on as many independent samples "
-            f"as its autocorrelation leaves (t distribution, {found.freedom:.0f} degrees of freedom)."
+            "The intervals rest on the residuals of every channel: their variance, and their number of independent "
+            f"samples by autocorrelation (t distribution, {found.freedom:.0f} degrees of freedom)."
         ]
     return [
         *lines,
-        "They are 95 % intervals of each parameter by itself, from the derivatives where the search ended.",
-        "The inputs are taken as they were recorded: noise and offsets of steering and speed are in no interval, and "
-        "neither is what the model of the car cannot do.",
+        "They are 95 % intervals of single parameters, from the derivatives at the end of the search.",
+        "The inputs are used as recorded: the intervals contain neither noise and offsets of steering and speed, nor "
+        "errors of the model of the car.",
     ]
 
 
 def notes_of(found: Fit) -> tuple[str, ...]:
-    """What looks wrong, one sentence each."""
+    """Return warnings, one sentence each."""
     notes = []
     if not found.settled:
-        notes.append(f"the search did not settle in {found.rounds} rounds; begin it where it ended (fit.start)")
+        notes.append(f"the search did not converge in {found.rounds} rounds; restart it from its end (fit.start)")
     for one in found.parameters:
         if one.at_end:
             notes.append(
-                f"{one.key} is at an end of its range, {one.value:.5g}: it has no interval, and those of the others "
+                f"{one.key} is at an end of its range, {one.value:.5g}: it has no interval, and the other intervals "
                 "hold for this value"
             )
         elif 2.0 * one.half_width > one.high - one.low:
-            notes.append(f"{one.key} is hardly known: its interval is wider than its range")
+            notes.append(f"{one.key} is almost unknown: its interval is wider than its range")
     notes += [
-        f"{one} and {other} are hardly told apart: the correlation of their errors is {value:.3f}"
+        f"{one} and {other} can hardly be separated: the correlation of their errors is {value:.3f}"
         for one, other, value in found.pairs(_ALIKE)
     ]
     for each in found.compared:
@@ -201,14 +201,14 @@ def notes_of(found: Fit) -> tuple[str, ...]:
         where = f"{quantity_of(each.channel).label} in {each.recording}"
         if left > _MUCH:
             notes.append(
-                f"what is left of the {where} is {left:.1f} times its noise: car or inputs are otherwise, and values "
-                "may be wrong by more than their intervals"
+                f"the residual of the {where} is {left:.1f} times its noise: car or inputs differ, and errors may "
+                "exceed the intervals"
             )
         elif left < 1.0 / _MUCH:
-            notes.append(f"what is left of the {where} is {left:.2g} of the stated noise, which is too large")
+            notes.append(f"the residual of the {where} is {left:.2g} of the stated noise, which is too large")
         elif len(each.after) > _HANGS * each.independent:
             notes.append(
-                f"what is left of the {where} is no noise, {len(each.after)} samples count as {each.independent:.0f}: "
-                "car or inputs are otherwise, or the noise is filtered"
+                f"the residual of the {where} is not white: {len(each.after)} samples count as {each.independent:.0f}; "
+                "car or inputs differ, or the noise is filtered"
             )
     return tuple(notes)

@@ -1,4 +1,4 @@
-"""Parameters of a car from recordings: driven again with their inputs, compared, and moved until little is left."""
+"""Fit of car parameters: recordings are driven again with their inputs until the differences are smallest."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ from activesteer.studies.engine.task_queue import TaskQueue
 from activesteer.studies.engine.workers import Workers, workers_for
 
 _SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1ps2": 8.0}
-"""Unless the study says otherwise the recorded speed is held to 0.1 %; a driver's gains leave 0.3 %, which would be
-taken for a property of the car."""
+"""Gains that hold the recorded speed to 0.1 %, unless the study sets them. A driver's gains leave 0.3 %, which the fit
+would attribute to the car."""
 
 
 class FitProgress(NamedTuple):
-    """How far it is; given to whoever watches.
+    """Progress of a fit.
 
     Attributes:
-        round: Number of the set of parameters that is tried, with its derivatives.
-        done: Runs of this round that are made.
+        round: Number of the parameter set that is tried with its derivatives.
+        done: Finished runs of this round.
         total: Runs of this round.
-        misfit: Rms of all differences relative to their noise, of the best set so far; nan before there is one.
+        misfit: Rms of all differences relative to their noise, of the best set so far; nan before the first.
     """
 
     round: int
@@ -59,20 +59,20 @@ def fit(
     scheduler: str | None = None,
     progress: Callable[[FitProgress], None] | None = None,
 ) -> Fit:
-    """Find values of a study's factors with which the car, driven by recorded inputs, comes nearest to recordings.
+    """Find values of factors for which the car, driven by recorded inputs, matches recordings best.
 
     Args:
         study_file: Name or path of a study file with a table [fit], or its table.
-        jobs: Number of processes; that of the processors where not given.
-        scheduler: Address of a Dask scheduler, or its scheduler file, instead.
+        jobs: Number of processes; the number of processors by default.
+        scheduler: Address or file of a Dask scheduler to use instead.
         progress: Called after every run.
 
     Returns:
-        Values, intervals, and what is left of the differences.
+        Values, intervals and residuals.
 
     Raises:
-        StudyError: the file is wrong, a factor changes nothing that was measured or cannot be told from another one, or
-            the car cannot be driven.
+        StudyError: the file is wrong, a factor has no measured effect or cannot be separated from another, or the car
+            cannot be driven.
         ActiveSteerError: a recording, the vehicle, the controller or a key is wrong.
     """
     problem = _Problem(*read_fit(study_file))
@@ -83,7 +83,7 @@ def fit(
 
 
 class _Problem:
-    """Recordings, the runs that answer them, and how far these are from each other."""
+    """Recordings, runs that repeat them, and their differences."""
 
     def __init__(self, study: StudyFile, table: FitTable) -> None:
         recordings = [Recording.open(Path(str(path))) for path in study.maneuvers]
@@ -121,7 +121,7 @@ class _Problem:
     def answers_by(
         self, workers: Workers, progress: Callable[[FitProgress], None]
     ) -> Callable[[list[Array]], list[Answer]]:
-        """What drives sets of parameters: every set in every recording, spread over workers."""
+        """Return a function that drives sets of parameters: each set in each recording, spread over workers."""
         rounds, best = 0, math.nan
 
         def answers(places: list[Array]) -> list[Answer]:
@@ -158,28 +158,28 @@ class _Problem:
         return series
 
     def check(self, slopes: list[Array]) -> None:
-        """Every factor changes something that was measured, and something else than the others do.
+        """Check that every factor has a measured effect that differs from the effects of the others.
 
         Raises:
-            StudyError: one does not.
+            StudyError: a factor has none.
         """
         source, keys = self._study.source, self._study.keys
         for place in without_effect(slopes):
             raise source.fail(
                 ("factors", keys[place]),
-                "changes nothing of these channels in these recordings that their noise would not hide; leave it out",
+                "has no effect above the noise on these channels in these recordings; leave it out",
             )
         if together := told_apart(slopes):
             first, *others = same = [keys[place] for place in together]
             raise source.fail(
                 ("factors", first),
-                f"cannot be told from {' and '.join(others)} by these recordings: together they can be changed so that "
-                "nothing of these channels changes; give all but one of them in [overrides]",
+                f"cannot be separated from {' and '.join(others)} by these recordings: a combined change leaves these "
+                "channels unchanged; set all but one of them in [overrides]",
                 same,
             )
 
     def result(self, found: Found) -> Fit:
-        """What came out."""
+        """Return the result of the search."""
         free: NDArray[np.bool_] = (found.place > AT_END) & (found.place < 1.0 - AT_END)
         self.check(found.slopes)
         known = intervals(found.after, found.slopes, free, stated=self._table.intervals == "noise")
@@ -216,14 +216,14 @@ class _Problem:
 def drive(
     settings: Settings, recording: int, overrides: dict[str, Any], time_s: Array, channels: tuple[str, ...]
 ) -> dict[str, Array] | str:
-    """One run: channels at the instants of a recording, or why there are none.
+    """Drive once; return channels at the times of a recording, or the reason of a failure.
 
     Args:
         settings: What all runs of the study share.
         recording: Number of its manoeuvre.
-        overrides: Of this run.
+        overrides: Overrides of this run.
         time_s: Instants [s], shape (n,).
-        channels: Which are wanted.
+        channels: Names of the channels.
     """
     try:
         scenario = resolve(settings.maneuvers[recording][1], settings.vehicles[0][1], overrides, settings.driver)
@@ -234,7 +234,7 @@ def drive(
 
 
 def _start(factor: Factor, table: FitTable, scenario: Any, study: StudyFile) -> float:
-    """Where a factor is looked for first."""
+    """Return the start of the search for a factor."""
     if factor.key in table.start:
         return table.start[factor.key]
     if factor.nominal:

@@ -1,4 +1,4 @@
-"""Measured data as a recording: columns to channels on a uniform time, and what is unusual in them."""
+"""Import of measured data as a recording: columns become channels on a uniform time, with notes on unusual values."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ _OWN_UNITS: Final = {
 _MOST_REPEATED: Final = 5
 """Number of repeated column names that are listed."""
 _LATEST_S: Final = 1e6
-"""Times beyond are those of a calendar, and begin at zero in a recording."""
+"""Later times are calendar times, and are shifted to zero in a recording [s]."""
 
 
 class Import(NamedTuple):
-    """What came of a file.
+    """Result of an import.
 
     Attributes:
         recording: The recording.
-        taken: Channel, and the column and unit that it was made of.
-        notes: What was done that the file does not say, and what looks wrong.
+        taken: Channel -> column and unit that it comes from.
+        notes: Assumptions that the file does not state, and suspicious values.
     """
 
     recording: Recording
@@ -61,7 +61,7 @@ class Import(NamedTuple):
 
 
 class _Source(NamedTuple):
-    """Where a channel comes from."""
+    """Source of a channel."""
 
     column: Column
     known: Known
@@ -73,14 +73,14 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
 
     Args:
         path: CSV, MAT, Parquet or MDF.
-        map_path: Map file; by the names of the columns where not given.
-        vehicle: The car that stands for the measured one in replay.
+        map_path: Map file; without it, columns are recognised by their names.
+        vehicle: Car that represents the measured one in replay.
 
     Returns:
-        The recording, and what is to be said of it.
+        The recording with notes.
 
     Raises:
-        RecordingError: file or map cannot be read, a column or unit is unknown, or there is a gap.
+        RecordingError: file or map cannot be read, a column or unit is unknown, or samples are missing.
         ActiveSteerError: there is no such vehicle.
     """
     chosen = read_map(map_path)
@@ -108,8 +108,8 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
         if bridged:
             begin, end = bridged[0]
             raise RecordingError(
-                f"has no samples from {begin:.3f} to {end:.3f} s; a map allows it with max_gap_s, or leaves it "
-                "out with start_s and end_s",
+                f"has no samples from {begin:.3f} to {end:.3f} s; allow it with max_gap_s in a map, or cut "
+                "it off with start_s and end_s",
                 file=path.name, key=name, value=(begin, end),
             )  # fmt: skip
         values[name] = resampled(signal, grid_s)
@@ -141,7 +141,7 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
 
 
 def _words(source: _Source) -> str:
-    """Column and unit, which many names say already."""
+    """Return column and unit; many names contain the unit."""
     name, unit = source.column.name, source.known.unit or "-"
     return name if split_unit(name)[1] == unit else f"{name} [{unit}]"
 
@@ -149,12 +149,12 @@ def _words(source: _Source) -> str:
 def _mapped(
     chosen: MeasurementMap, columns: list[Column], table: Mapping[str, Channel], path: Path
 ) -> dict[str, _Source]:
-    """Where the map says that channels come from."""
+    """Return the sources of channels by the map."""
     sources = {}
     for name, given in chosen.channels.items():
         if name not in table and field_in_unit(name, table)[0] is not None:
             raise RecordingError(
-                f"is a channel in another unit; call it {field_in_unit(name, table)[0]} and give `unit`",
+                f"is a channel in another unit; name it {field_in_unit(name, table)[0]} and give `unit`",
                 key=f"channels.{name}",
             )
         column = find(columns, given.column, path)
@@ -164,7 +164,7 @@ def _mapped(
 
 
 def _by_name(columns: list[Column], table: Mapping[str, Channel], path: Path, notes: list[str]) -> dict[str, _Source]:
-    """What the names of columns say."""
+    """Return the sources of channels by the names of columns."""
     names = {column.name for column in columns}
     channels = [*table, "brake_pedal"]
     sources: dict[str, _Source] = {}
@@ -177,19 +177,19 @@ def _by_name(columns: list[Column], table: Mapping[str, Channel], path: Path, no
         if known.channel in sources:
             first = sources[known.channel].column.name
             raise RecordingError(
-                f"{shown(first)} and {shown(column.name)} are both {known.channel}; a map says which",
+                f"{shown(first)} and {shown(column.name)} are both {known.channel}; choose one in a map",
                 file=path.name,
             )
         unit = column.unit or known.unit
         if not unit:
             unit = _si_unit(known.channel, table)
             if unit and not known.sure:
-                notes.append(f"{column.name} has no unit and is taken for {unit} (a map can say another)")
+                notes.append(f"{column.name} has no unit; {unit} is assumed (a map can set another)")
         sources[known.channel] = _Source(column, known._replace(unit=unit), None)
     if not sources:
         some = ", ".join(shown(name) for name in sorted(names)[:8])
         raise RecordingError(
-            f"no column has a name that is known here (it has {some}); a map says what they are: --map", file=path.name
+            f"no column has a known name (there are {some}); describe the columns in a map: --map", file=path.name
         )
     return sources
 
@@ -205,19 +205,19 @@ def _own_time(source: _Source) -> Array | None:
 
 
 def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, needed: bool) -> Array | None:
-    """Times that columns without their own share [s]."""
+    """Return the times that columns without own times share [s]."""
     if not needed:
         if chosen.time:
-            raise RecordingError("every column has its own time here; leave it out", key="time", value=chosen.time)
+            raise RecordingError("every column has its own time; leave this key out", key="time", value=chosen.time)
         return None
     if chosen.time:
         column = find(columns, chosen.time, path)
     else:
         named = [column for column in columns if is_time(column.name)]
         if len(named) != 1:
-            what = "no column is called as a time is" if not named else "several columns are called as times are"
+            what = "no column is named like a time" if not named else "several columns are named like times"
             words = nearest_names("time", [column.name for column in columns])
-            raise RecordingError(f"{what}: {words}; a map says which: time = NAME", file=path.name)
+            raise RecordingError(f"{what}: {words}; name it in a map: time = NAME", file=path.name)
         column = named[0]
     unit = chosen.time_unit or column.unit or known_time_unit(column.name)
     found = si_of(unit)
@@ -227,7 +227,7 @@ def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, n
 
 
 def known_time_unit(name: str) -> str:
-    """Unit in the name of a time column; s where there is none."""
+    """Return the unit in the name of a time column; s by default."""
     ending = name.rstrip("])").replace("[", " ").replace("(", " ").replace("_", " ").split()
     return ending[-1] if len(ending) > 1 and ending[-1] in ("ms", "us", "s") else "s"
 
@@ -235,7 +235,7 @@ def known_time_unit(name: str) -> str:
 def _signal(
     name: str, wanted: str, source: _Source, shared: Array | None, chosen: MeasurementMap, path: Path
 ) -> Samples:
-    """The samples of a channel, SI and signs of ISO 8855."""
+    """Return the samples of a channel, in SI units and with the signs of ISO 8855."""
     column, known, given = source
     found = si_of(known.unit)
     if found is None or found[0] != wanted:
@@ -264,7 +264,7 @@ def _signal(
             early = time_s <= given.zero_until_s
             if not early.any():
                 raise RecordingError(
-                    f"{column.name} begins at {time_s[0]:g} s, after zero_until_s", key=f"channels.{name}.zero_until_s"
+                    f"{column.name} starts at {time_s[0]:g} s, after zero_until_s", key=f"channels.{name}.zero_until_s"
                 )
             values = values - values[early].mean()
     return Samples(time_s, _plausible(values * (known.sign * found[1]), wanted, column.name, path))
@@ -286,19 +286,19 @@ def _plausible(values: Array, unit: str, column: str, path: Path) -> Array:
 
 
 def _bridge_s(chosen: MeasurementMap, signal: Samples) -> float:
-    """A slow signal has no gaps between its samples."""
+    """Return the longest allowed gap; a slow signal has long steps between its samples."""
     return max(chosen.max_gap_s, 1.5 * float(np.median(np.diff(signal.time_s))))
 
 
 def _grid(signals: Mapping[str, Samples], chosen: MeasurementMap, path: Path, notes: list[str]) -> tuple[Array, float]:
-    """Instants at which all signals exist, at the step of the fastest of them; and what is zero in the recording."""
+    """Return times at which all signals exist, with the step of the fastest signal, and the time that becomes zero."""
     start = max(float(signal.time_s[0]) for signal in signals.values())
     end = min(float(signal.time_s[-1]) for signal in signals.values())
     step = chosen.step_s or min(float(np.median(np.diff(signal.time_s))) for signal in signals.values())
     step = round(step, 9)
     if step <= 0.0 or end - start < step:
         raise RecordingError(
-            f"the signals have no time in common: the last begins at {start:g} s, the first ends at {end:g} s",
+            f"the signals have no common time: the last starts at {start:g} s, the first ends at {end:g} s",
             file=path.name,
         )
     count = int((end - start) / step + 1e-6) + 1

@@ -1,4 +1,4 @@
-"""What a fit knows of its parameters: intervals, correlations, and which of them cannot be told from the recordings."""
+"""Uncertainty of a fit: intervals, correlations, and parameters that the recordings cannot separate."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from numpy.typing import NDArray
 from activesteer.conventions import Array
 
 LEVEL: Final = 0.95
-"""Probability with which an interval holds the value."""
+"""Probability that an interval contains the true value."""
 _WINDOW: Final = 5.0
-"""Autocorrelation is summed up to so many times the time that comes out (Sokal, 1997): further out is noise alone."""
+"""The autocorrelation is summed over this multiple of the resulting time (Sokal, 1997); beyond, it is noise."""
 _SAME: Final = 2e-3
-"""Parameters of which a combination changes all differences by no more than this fraction of what they do by themselves
-are the same to the recordings: their correlation is 0.999996, which differences of runs do not tell from 1."""
+"""Parameters are the same to the recordings if a combination of them changes all differences by at most this fraction
+of their single effects. Their correlation is then 0.999996, which differences of runs cannot distinguish from 1."""
 _IN_IT: Final = 0.2
-"""Share from which on a parameter belongs to such a combination."""
+"""Proportion from which a parameter belongs to such a combination."""
 _TOO_LITTLE: Final = 0.5
-"""Effect of a parameter's whole range on all differences together, of the noise, below which nothing is known of it:
-its standard deviation would be twice the range."""
+"""Smallest effect of a parameter's whole range on all differences together, relative to the noise. With less, the
+standard deviation would be twice the range."""
 
 
 class Intervals(NamedTuple):
-    """What is known of the parameters, relative to their ranges.
+    """Uncertainty of the parameters, relative to their ranges.
 
     Attributes:
-        half_widths: Half of each interval, shape (p,); nan for one that is not free.
-        correlations: Of their errors, shape (p, p); nan likewise.
-        independent: How many samples of each series count.
-        freedom: Degrees of freedom of the t distribution; infinite where the noise is what is stated.
+        half_widths: Half of each interval, shape (p,); nan for a parameter at an end of its range.
+        correlations: Correlations of the errors, shape (p, p); nan likewise.
+        independent: Number of independent samples of each series.
+        freedom: Degrees of freedom of the t distribution; infinite for stated noise.
     """
 
     half_widths: Array
@@ -42,10 +42,10 @@ class Intervals(NamedTuple):
 
 
 def autocorrelation_time(values: Array) -> float:
-    """How many neighbouring samples say as much as one that is independent of all others; 1 for white noise.
+    """Return the number of neighbouring samples that are worth one independent sample; 1 for white noise.
 
-    One and twice the sum of the autocorrelations, as far as they are more than their own noise. The mean is not taken
-    off: what stays on one side of zero is no noise.
+    The time is one plus twice the sum of the autocorrelations, as far as these exceed their own noise. The mean is not
+    subtracted: an offset is no noise.
 
     Args:
         values: Differences at equal distances, shape (n,).
@@ -67,16 +67,16 @@ def autocorrelation_time(values: Array) -> float:
 
 
 def intervals(series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np.bool_], *, stated: bool) -> Intervals:
-    """Intervals of the parameters, in the linear neighbourhood of where they were found.
+    """Return intervals of the parameters, in the linear neighbourhood of the solution.
 
-    Least squares weigh each series by its stated noise. Where this noise is not relied upon, each series has the
-    variance of what is left in it, and its n samples count as n/tau, tau its autocorrelation time: exact where the
-    derivatives change slowly against the noise, and too wide where they change as fast.
+    Least squares weights each series by its stated noise. If this noise is not trusted, each series gets the variance
+    of its residual, and its n samples count as n/tau, with tau its autocorrelation time. The result is exact if the
+    derivatives change slowly compared with the noise, and too wide if they change as fast.
 
     Args:
-        series: Differences that are left, relative to the noise, shape (n,) each.
+        series: Residuals relative to the noise, shape (n,) each.
         slopes: Their derivatives, shape (n, p) each.
-        free: Which parameters are free, shape (p,); one at an end of its range is not.
+        free: Which parameters are free, shape (p,); a parameter at an end of its range is not.
         stated: Whether the noise is white and as large as stated.
     """
     from scipy.stats import t  # noqa: PLC0415 - slow to import
@@ -105,12 +105,12 @@ def intervals(series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np
 
 
 def without_effect(slopes: Sequence[Array]) -> list[int]:
-    """Parameters that change nothing, or less than the noise lets see."""
+    """Return the parameters whose effect is zero or below the noise."""
     return [int(place) for place in np.flatnonzero(_effects(slopes) < _TOO_LITTLE)]
 
 
 def told_apart(slopes: Sequence[Array]) -> list[int]:
-    """Parameters of which a combination changes nothing; empty where all of them can be told from each other."""
+    """Return parameters of which a combination has no effect; empty if all can be separated."""
     _, sizes, combinations = np.linalg.svd(np.concatenate(slopes) / _effects(slopes), full_matrices=False)
     if sizes[-1] > _SAME:
         return []

@@ -1,6 +1,6 @@
-"""Bounded least squares: differences of all channels, derivatives from runs that are made at once.
+"""Bounded least squares over runs, whose derivatives come from runs that are made at the same time.
 
-Everything in here is relative: differences to the noise of their channel, parameters to their range, 0 to 1.
+All values are relative: differences to the noise of their channel, parameters to their range, 0 to 1.
 """
 
 from __future__ import annotations
@@ -14,30 +14,30 @@ from activesteer.conventions import Array
 from activesteer.errors import StudyError
 
 STEP: Final = 1e-3
-"""Step of the derivatives, of a parameter's range: far above what a run rounds off, far below its curvature."""
+"""Step of the derivatives, relative to the range: far above rounding, far below the curvature of a run."""
 _SETTLED: Final = 1e-4
-"""The search ends where no parameter moves further, of its range. The steps of Gauss and Newton become shorter with
-their square, so what is left is far less."""
+"""The search ends when no parameter moves further than this fraction of its range. Gauss-Newton steps shrink
+quadratically, so the remaining error is far smaller."""
 _LESS: Final = 1e-8
-"""Or where the sum of squares is less by no more than this fraction."""
+"""The search also ends when the sum of squares decreases by no more than this fraction."""
 _MOST_ROUNDS: Final = 40
 AT_END: Final = 1e-3
-"""A parameter this near to an end of its range is at it."""
+"""A parameter this close to an end of its range is at that end."""
 
 Answer = list[Array] | str
-"""Differences of every channel of every recording with one set of parameters; or why it could not be driven."""
+"""Differences of every channel of every recording for a set of parameters; or the reason why it cannot be driven."""
 
 
 class Found(NamedTuple):
-    """Where the search ended.
+    """End of the search.
 
     Attributes:
-        place: The parameters, shape (p,).
-        before: Differences where it began, a series for each channel of each recording.
-        after: Those where it ended.
-        slopes: Derivatives of these, shape (n, p) each.
-        rounds: How often parameters were tried.
-        settled: Whether it ended because nothing moved any more.
+        place: Parameters, shape (p,).
+        before: Differences at the start, a series per channel and recording.
+        after: Differences at the end.
+        slopes: Derivatives at the end, shape (n, p) each.
+        rounds: Number of parameter sets tried.
+        settled: Whether the search converged.
     """
 
     place: Array
@@ -51,22 +51,22 @@ class Found(NamedTuple):
 def search(
     answers: Callable[[list[Array]], Sequence[Answer]], start: Array, check: Callable[[list[Array]], None]
 ) -> Found:
-    """Make the sum of squares of all differences as small as it becomes (trust region reflective, SciPy).
+    """Minimise the sum of squares of all differences (trust region reflective, SciPy).
 
     Args:
-        answers: Drives several sets of parameters at once.
-        start: Where to begin, shape (p,).
-        check: Called with the derivatives at the start; whatever it raises ends the search.
+        answers: Function that drives several sets of parameters at once.
+        start: Start of the search, shape (p,).
+        check: Called with the derivatives at the start; an exception ends the search.
 
     Raises:
-        StudyError: the first set cannot be driven, or none beside another one.
+        StudyError: the first set, or a set beside a drivable one, cannot be driven.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
     rounds: dict[bytes, tuple[list[Array], list[Array]] | None] = {}
 
     def tried(place: Array) -> tuple[list[Array], list[Array]] | None:
-        """Differences and derivatives at a place; None where it cannot be driven."""
+        """Return differences and derivatives; None if the parameters cannot be driven."""
         name = place.tobytes()
         if name not in rounds:
             rounds[name] = _tried(answers, place, first=not rounds)
@@ -76,7 +76,7 @@ def search(
 
     def differences(place: Array) -> Array:
         found = tried(place)
-        # What is not finite makes the search take a shorter step.
+        # The search shortens its step if a value is not finite.
         return np.full(size, np.nan) if found is None else np.concatenate(found[0])
 
     def slopes(place: Array) -> Array:
@@ -84,12 +84,12 @@ def search(
         assert found is not None
         return np.concatenate(found[1])
 
-    # Not at the very end of a range, where the search could not take a step to either side.
+    # Away from the ends of a range, so that the search can step to both sides.
     start = np.clip(start, STEP, 1.0 - STEP)
     begun = tried(start)
     assert begun is not None
     size = sum(map(len, begun[0]))
-    derivatives, unused = cast(Any, slopes), cast(Any, None)  # their types are guessed from SciPy's defaults
+    derivatives, unused = cast(Any, slopes), cast(Any, None)  # SciPy declares no types for them
     found = least_squares(
         differences, start, derivatives, (0.0, 1.0), xtol=_SETTLED, ftol=_LESS, gtol=unused, max_nfev=_MOST_ROUNDS
     )
@@ -105,12 +105,12 @@ def _tried(
     here, *there = answers([place, *(place + step for step in np.diag(steps))])
     if isinstance(here, str):
         if first:
-            raise StudyError(f"where the search begins, the car cannot be driven: {here}", value=here)
+            raise StudyError(f"the car cannot be driven at the start of the search: {here}", value=here)
         return None
     sides: list[list[Array]] = []
     for beside in there:
         if isinstance(beside, str):
-            raise StudyError(f"beside parameters that could be driven, the car cannot be driven: {beside}")
+            raise StudyError(f"the car cannot be driven beside drivable parameters: {beside}")
         sides.append(beside)
     slopes = [
         np.column_stack([(side[number] - series) / step for side, step in zip(sides, steps, strict=True)])

@@ -1,4 +1,4 @@
-"""Where a measured car was: its path from speed and yaw rate where no position was measured, and its body there."""
+"""Motion of a measured car: path from speed and yaw rate if no position was measured, and poses of the body."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from activesteer.vehicle import Vehicle
 
 
 def with_motion(time_s: Array, channels: Mapping[str, Array]) -> dict[str, Array]:
-    """Channels with what follows from them: speed, yaw angle and path.
+    """Add derived channels: speed, yaw angle and path.
 
-    Without a position the path begins at the origin along x; its direction is yaw plus sideslip angle where that was
-    measured, and yaw alone where it was not.
+    Without a position, the path starts at the origin along x. Its direction is the yaw angle, plus the sideslip angle
+    if measured.
 
     Args:
         time_s: Time, uniform [s], shape (n,).
         channels: Measured values by channel name, SI.
 
     Returns:
-        The same and, where they were missing and follow, `speed_mps`, `yaw_rad`, `x_m`, `y_m`.
+        The channels, with `speed_mps`, `yaw_rad`, `x_m` and `y_m` where they can be derived.
     """
     found = dict(channels)
     if "speed_mps" not in found and "vx_mps" in found:
@@ -37,15 +37,15 @@ def with_motion(time_s: Array, channels: Mapping[str, Array]) -> dict[str, Array
 
 
 def _integral(time_s: Array, values: Array) -> Array:
-    """By trapezoids, zero at the beginning."""
+    """Integrate by trapezoids from zero."""
     return np.append(0.0, np.cumsum(np.diff(time_s) * 0.5 * (values[1:] + values[:-1])))
 
 
 def moved_car(vehicle: Vehicle, time_s: Array, channels: Mapping[str, Array]) -> Poses | None:
-    """A car in its design position, moved as a whole along the path, for replay; None where there is no path.
+    """Return poses of a car in its design position, moved along the path, for replay; None without a path.
 
     Args:
-        vehicle: Whose bodies are shown.
+        vehicle: Vehicle whose bodies are shown.
         time_s: Time [s], shape (n,).
         channels: Values by channel name.
     """
@@ -71,7 +71,7 @@ def moved_car(vehicle: Vehicle, time_s: Array, channels: Mapping[str, Array]) ->
 
 
 def _product(one: Array, other: Array) -> Array:
-    """Product of quaternions w x y z."""
+    """Return the product of quaternions w x y z."""
     w, x, y, z = np.moveaxis(one, -1, 0)
     W, X, Y, Z = np.moveaxis(other, -1, 0)
     return np.stack(

@@ -1,4 +1,4 @@
-"""What columns of other programs are called, in which units, and which of them turn round in the axes of SAE J670."""
+"""Names and units of columns of other programs, and channels with other signs in the axes of SAE J670."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _UNITS: Final = {
     "n": ("N", 1.0), "kn": ("N", 1e3), "nm": ("Nm", 1.0), "n m": ("Nm", 1.0), "pa": ("Pa", 1.0), "bar": ("Pa", 1e5),
     "mpa": ("Pa", 1e6), "%": ("", 0.01), "": ("", 1.0), "-": ("", 1.0), "1": ("", 1.0),
 }  # fmt: skip
-"""Unit as files have it, in lower case -> SI unit and factor. `grad` is the German degree."""
+"""Unit in a file, in lower case -> SI unit and factor. `grad` is the German degree."""
 UNITS: Final = tuple(unit for unit in _UNITS if unit not in ("", "-", "1"))
-"""What a unit may be called."""
+"""Known units."""
 
 TIME_WORDS: Final = frozenset({"time", "times", "t", "zeit", "timestamp", "timestamps", "tstamp", "tstart"})
 
@@ -36,18 +36,18 @@ TURNED_IN_SAE: Final = (
     "az_mps2", "sideslip_rad", "steering_wheel_rad", "steering_wheel_demand_rad", "hand_torque_Nm", "front_steer_rad",
     "rear_steer_rad", "superposition_rad", "rack_m", "front_axle_y_m",
 )  # fmt: skip
-"""Channels that are positive to the left or upwards here, and to the right or downwards with the axes of SAE J670
-(x forward, y right, z down): all of them but what is along x or about it."""
+"""Channels that are positive to the left or upwards here, and to the right or downwards in the axes of SAE J670 (x
+forward, y right, z down): all except those along or about x."""
 
 
 class Known(NamedTuple):
-    """What a column is.
+    """Meaning of a column.
 
     Attributes:
-        channel: Channel that it fills.
-        unit: Its unit where the file does not say.
-        sign: -1 where the exporter has it the other way round than ISO 8855.
-        sure: Whether that is the exporter's unit; else it is taken for SI because nobody said.
+        channel: Channel that the column fills.
+        unit: Unit, if the file states none.
+        sign: -1 if the exporter uses the sign opposite to ISO 8855.
+        sure: Whether the unit is the exporter's; otherwise SI is assumed.
     """
 
     channel: str
@@ -99,17 +99,17 @@ _EXPORTERS: Final[tuple[tuple[str, dict[str, Known]], ...]] = (
         "x": Known("x_m", "m"), "y": Known("y_m", "m"), "psi": Known("yaw_rad", "rad"),
     }),
 )  # fmt: skip
-"""A name that tells an exporter, and the names that it writes."""
+"""Name that identifies an exporter, and the names that it writes."""
 
 
 def si_of(unit: str) -> tuple[str, float] | None:
-    """SI unit of a unit as files have it, and the factor to it; None where it is unknown."""
+    """Return the SI unit of a unit in a file, and the factor to it; None if the unit is unknown."""
     text = unit.strip().strip("[]()").strip()
     return _UNITS.get(text.lower().replace("**", "^"))
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """A name without the unit in brackets behind it, and that unit."""
+    """Split a name and the unit in brackets behind it."""
     found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
     return (found[1], found[2]) if found and si_of(found[2]) else (name, "")
 
@@ -121,20 +121,20 @@ def before_bracket(name: str) -> str:
 
 
 def is_time(name: str) -> bool:
-    """Whether a column is called as times are."""
+    """Return whether a column is named like a time."""
     return name == "time_s" or _word(split_unit(name)[0]) in TIME_WORDS
 
 
 def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> Known | None:
-    """What a column is by its name.
+    """Return the meaning of a column by its name.
 
     Args:
-        name: The name.
-        columns: Those of all columns of the file.
+        name: Name of the column.
+        columns: Names of all columns of the file.
         channels: Channels of a car.
 
     Returns:
-        What it is; None where the name says nothing.
+        The meaning; None if the name is unknown.
     """
     for mark, names in _EXPORTERS:
         if mark in columns and name in names:

@@ -1,4 +1,4 @@
-"""Units and signs that cannot be: speed, yaw rate, lateral acceleration and steering of a car belong together."""
+"""Suspicious units and signs: speed, yaw rate, lateral acceleration and steering of a car are related."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ import numpy as np
 from activesteer.conventions import GRAVITY_MPS2, Array
 
 _ALIKE: Final = 0.7
-"""Correlation from which on two signals belong to the same motion."""
+"""Correlation above which two signals belong to the same motion."""
 _MISTAKES: Final = {
     "yaw_rate_radps": (math.degrees(1.0), "deg/s", "rad/s"),
     "speed_mps": (3.6, "km/h", "m/s"),
     "ay_mps2": (1.0 / GRAVITY_MPS2, "g", "m/s2"),
 }
-"""Channel -> how much too large it is where the first unit was taken for the second."""
+"""Channel -> factor of the error if the first unit was taken for the second."""
 _NEAR: Final = math.log(1.5)
-"""Ratios within it are the same: ay/(v yaw rate) is 1 but for the change of the sideslip."""
+"""Ratios within this range count as equal: ay/(v yaw rate) is 1 except for the change of the sideslip angle."""
 _LONGEST_STEP_S: Final = 1.0
-"""Step from which on nothing of a car's motion is seen [s]."""
+"""Step from which a motion of the car cannot be seen [s]."""
 _STEER_RANGE: Final = (0.001, 0.15)
-"""Yaw rate over speed and steering wheel angle that a car may have [1/m]: 1/(wheelbase x ratio) is 0.02, divided by
-1 + (v/v_ch)^2, and less at the limit; degrees for radians are 57 times beyond."""
+"""Plausible yaw rate over speed and steering wheel angle [1/m]. The value 1/(wheelbase x ratio) is 0.02, divided by 1
++ (v/v_ch)^2, and less at the limit. Degrees taken as radians are off by a factor of 57."""
 _FASTEST_RADPS: Final = 4.0
 """Yaw rate that no car on its wheels reaches [rad/s]."""
 
 
 def suspicions(channels: Mapping[str, Array], step_s: float = 0.01) -> list[str]:
-    """What looks like a wrong unit or sign, one line each.
+    """Return signs of a wrong unit or sign, one line each.
 
     Args:
-        channels: Values by channel name, SI, all of one length.
+        channels: Values by channel name, SI, of equal length.
         step_s: Time between two values [s].
     """
     speed, rate, ay, wheel = (
@@ -80,7 +80,7 @@ def _against_acceleration(product: Array, ay: Array, wheel: Array | None) -> lis
 
 
 def _unit_words(ratio: float) -> list[str]:
-    """What makes the lateral acceleration so many times speed x yaw rate: the fewest units taken for another one."""
+    """Explain the ratio of lateral acceleration to speed x yaw rate by the fewest wrong units."""
     if abs(math.log(ratio)) < _NEAR:
         return []
     guesses = []
@@ -123,6 +123,6 @@ def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:
 
 
 def _alike(one: Array, other: Array) -> float:
-    """Cosine between two signals; 0 where one of them is nothing."""
+    """Return the cosine between two signals; 0 if one of them is zero."""
     size = math.sqrt(float(one @ one) * float(other @ other))
     return float(one @ other) / size if size > 0.0 else 0.0

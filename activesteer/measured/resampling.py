@@ -1,4 +1,4 @@
-"""Samples at any times on a uniform grid, with the pieces that have none."""
+"""Resampling of signals to a uniform grid, and gaps in them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from activesteer.errors import RecordingError
 
 
 class Samples(NamedTuple):
-    """A signal as it was measured.
+    """Signal as measured.
 
     Attributes:
         time_s: Times [s], increasing, shape (n,).
@@ -23,10 +23,10 @@ class Samples(NamedTuple):
 
 
 def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
-    """The samples that are numbers, in the order of their times; of several at one instant the last one counts.
+    """Return the finite samples in the order of their times; the last of several at one instant is kept.
 
     Raises:
-        RecordingError: time and values differ in length, fewer than two are left, or the time goes backwards.
+        RecordingError: time and values differ in length, fewer than two samples are left, or the time goes backwards.
     """
     if time_s.shape != values.shape or time_s.ndim != 1:
         raise RecordingError(
@@ -38,8 +38,8 @@ def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
     if len(time_s) and (steps < 0.0).any():
         row = int(np.argmax(steps < 0.0))
         raise RecordingError(
-            f"the time of {name} goes backwards, from {time_s[row]:g} to {time_s[row + 1]:g} s; several runs in one "
-            "file are cut with start_s and end_s of a map after they are taken apart",
+            f"the time of {name} goes backwards, from {time_s[row]:g} to {time_s[row + 1]:g} s; split several runs "
+            "in one file, or cut them with start_s and end_s of a map",
             file=file,
         )
     last = np.append(steps > 0.0, True) if len(time_s) else known[:0]
@@ -49,21 +49,20 @@ def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
 
 
 def gaps(signal: Samples, longest_s: float, start_s: float, end_s: float) -> list[tuple[float, float]]:
-    """Pieces between samples that are longer than that, from start to end."""
+    """Return gaps between samples that are longer than `longest_s`, from start to end."""
     inside = (signal.time_s[1:] > start_s) & (signal.time_s[:-1] < end_s)
     wide = inside & (np.diff(signal.time_s) > longest_s)
     return [(float(signal.time_s[row]), float(signal.time_s[row + 1])) for row in np.flatnonzero(wide)]
 
 
 def resampled(signal: Samples, grid_s: Array) -> Array:
-    """Values on a uniform grid, straight between samples.
+    """Resample a signal to a uniform grid, with straight lines between samples.
 
-    Where these are closer than the grid, their mean over a step of it, so that what is faster than the grid does not
-    come back as something slow.
+    If the samples are closer than the grid, their mean over a grid step is taken, which prevents aliasing.
 
     Args:
         signal: The samples.
-        grid_s: Instants within their times [s], shape (m,).
+        grid_s: Times within the signal [s], shape (m,).
 
     Returns:
         Values, shape (m,).
@@ -75,13 +74,13 @@ def resampled(signal: Samples, grid_s: Array) -> Array:
     integral = np.append(0.0, np.cumsum(areas))
 
     def until(time_s: Array) -> Array:
-        # The integral of straight pieces is exact at any instant inside of them.
+        # The integral of straight pieces is exact at any instant.
         place = np.clip(np.searchsorted(signal.time_s, time_s) - 1, 0, len(areas) - 1)
         into = time_s - signal.time_s[place]
         here = np.interp(time_s, signal.time_s, signal.values)
         return integral[place] + 0.5 * into * (signal.values[place] + here)
 
-    # Towards the ends the window becomes shorter at both sides: it must not move in time.
+    # Towards the ends, the window shrinks on both sides, so that its centre does not move.
     half = np.minimum(0.5 * step_s, np.minimum(grid_s - signal.time_s[0], signal.time_s[-1] - grid_s))
     wide = half > 1e-3 * step_s
     values = np.interp(grid_s, signal.time_s, signal.values)

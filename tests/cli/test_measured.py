@@ -79,7 +79,7 @@ def test_what_cannot_be_compared_or_imported_is_answered(call, truth, tmp_path):
     (tmp_path / "a.csv").write_text("t,yawrate\n0,0\n1,1\n")
     assert "ends in .mcap" in call("import", "a.csv", "-o", "a.txt").err
     told = call("import", "a.csv")
-    assert "yawrate has no unit and is taken for rad/s" in told.err
+    assert "yawrate has no unit; rad/s is assumed" in told.err
     assert "steering_wheel_rad or rack_m is needed" in call("run", "a.mcap").err
 
 

@@ -283,11 +283,11 @@ def test_a_wrong_unit_or_sign_is_suspected_in_one_line(factors, said):
         ("a.csv", b"time,yaw_rate_radps[bar]\n0,0\n1,1\n", "yaw_rate_radps"),
         ("a.csv", b"time,yawrate,v\n0,00,0,01,72\n0,01,0,02,72\n", "names 3 columns and has 5"),
         ("a.csv", b"time,foo\n0,0\n1,1\n", "'foo'"),
-        ("a.csv", b"u,yaw_rate_radps\n0,0\n1,1\n", "no column is called as a time"),
+        ("a.csv", b"u,yaw_rate_radps\n0,0\n1,1\n", "no column is named like a time"),
         ("a.csv", b"time,yawrate,YawRate\n0,0,0\n1,1,1\n", "are both yaw_rate_radps"),
-        ("a.mat", b"MATLAB 5.0 MAT-file" + bytes(200), "no MATLAB file"),
-        ("a.parquet", b"PAR1" + bytes(50) + b"PAR1", "no Parquet file"),
-        ("a.mf4", b"MDF     4.10    " + bytes(200), "no MDF file"),
+        ("a.mat", b"MATLAB 5.0 MAT-file" + bytes(200), "no readable MATLAB file"),
+        ("a.parquet", b"PAR1" + bytes(50) + b"PAR1", "no readable Parquet file"),
+        ("a.mf4", b"MDF     4.10    " + bytes(200), "no readable MDF file"),
         ("a.xlsx", b"PK", "end in .csv"),
     ],
 )
@@ -304,7 +304,7 @@ def test_a_map_that_names_what_is_not_there_is_an_error(tmp_path):
     for text, said in (
         ('[channels]\nyaw_rate_radps = { column = "P" }\n', "there is no column 'P'; known are: p, t"),
         ('[channels]\nyaw_rate_radps = { column = "p", unit = "bar" }\n', "is in rad/s, and 'p' in 'bar'"),
-        ('[channels]\nyaw_rate_degps = { column = "p" }\n', "call it yaw_rate_radps"),
+        ('[channels]\nyaw_rate_degps = { column = "p" }\n', "name it yaw_rate_radps"),
         ('axis = "sae_j670"\n', "axes"),
     ):
         (tmp_path / "map.toml").write_text(text)
