@@ -1,7 +1,7 @@
-"""A driver or controller of the user's own: by name, from a file, or as a class, an instance or a factory."""
+"""Drivers and controllers of a user: by name, from a file, or as a class, an instance or a factory."""
 
-from activesteer.plugins.file import USER_MODULE
+from activesteer.plugins.file import is_user_module
 from activesteer.plugins.kind import Kind, in_one_line
 from activesteer.plugins.plugin import Plugin, find
 
-__all__ = ["USER_MODULE", "Kind", "Plugin", "find", "in_one_line"]
+__all__ = ["Kind", "Plugin", "find", "in_one_line", "is_user_module"]

@@ -1,4 +1,4 @@
-"""A class or function in a Python file of the user's, named as `my_file.py:MyController?gain=2`."""
+"""A class or function in a user's Python file, named as `my_file.py:MyController?gain=2`."""
 
 from __future__ import annotations
 
@@ -6,46 +6,49 @@ import ast
 import importlib.util
 import re
 import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple, NoReturn
 
 from activesteer.config import parse_value
-from activesteer.errors import ParameterError, nearest_names, shown
+from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
 from activesteer.files import is_file, read_bytes, shown_path, user_path, why_no_file
 from activesteer.plugins.kind import Kind, in_one_line
 
 _FORM: Final = re.compile(r"(?P<path>.+?):(?P<name>[^:?]+)(?:\?(?P<parameters>.*))?", re.DOTALL)
-USER_MODULE: Final = "activesteer_user_"
-"""Beginning of the names of modules loaded from a user's file."""
+_USER_MODULE: Final = "activesteer_user_"
+"""Start of the names of modules loaded from a user's file."""
 _PARAMETER: Final = re.compile(r"([A-Za-z_]\w*)=(.*)", re.DOTALL)
 
 
 class FromFile(NamedTuple):
-    """What a text of this form names.
+    """A class or function from a file.
 
     Attributes:
-        path: The file.
-        content: What stands in it.
-        found: The class or function.
+        origin: The class or function.
         parameters: Name -> value, typed as in TOML.
+        files: Path in the file's folder -> content, of the file and the modules beside it that it imports.
     """
 
-    path: Path
-    content: bytes
-    found: Any
+    origin: Any
     parameters: dict[str, Any]
+    files: dict[str, bytes]
 
 
 def from_file(text: str, kind: Kind) -> FromFile:
-    """Reads the file and looks up what is named.
+    """Load the file and look up the class or function.
+
+    The file can import modules beside it. Every call loads the file and these modules again.
 
     Args:
-        text: `path/to/file.py:Name`, with `?parameter=value&other=value` behind it if need be.
-        kind: What is wanted.
+        text: `path/to/file.py:Name`, optionally followed by `?parameter=value&other=value`.
+        kind: Kind of block that is needed.
 
     Raises:
-        ActiveSteerError: of the kind's type: the text has another form, the file is not there, does not run, or has no
-            such class or function.
+        ActiveSteerError: of the kind's type: the text has another form; or the file does not exist, does not run, or
+            has no such class or function.
     """
 
     def fail(problem: str, value: Any = text, allowed: Any = None) -> Exception:
@@ -55,64 +58,132 @@ def from_file(text: str, kind: Kind) -> FromFile:
     if form is None:
         hint = nearest_names(text, kind.names())
         raise kind.error(
-            f"there is no {kind.word} {shown(text)}; {hint} Your own is given as {kind.example}",
+            f"there is no {kind.word} {shown(text)}; {hint} Give your own as {kind.example}",
             value=text,
             allowed=tuple(kind.names()),
         )
     if not form["name"].isidentifier():
-        raise fail(f"{shown(form['name'])} cannot be the name of a class; your own is given as {kind.example}")
+        raise fail(f"{shown(form['name'])} cannot be the name of a class; give your own as {kind.example}")
     path = user_path(form["path"], kind.error)
     if not is_file(path):
         raise fail(f"there is no file {shown_path(path)}: it {why_no_file(path)}")
-    name = f"{USER_MODULE}{path.stem}"
+    name = f"{_USER_MODULE}{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise fail(f"{shown_path(path)} is no Python file")
+        raise fail(f"{shown_path(path)} is not a Python file")
+    if isinstance(spec.loader, SourceFileLoader):
+        spec.loader = _Uncached(name, str(path))
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    content = read_bytes(path, kind.error)
+    files = _with_neighbours(path, kind.error)
     try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as reason:  # a script may end with exit()
-        raise fail(f"{shown_path(path)} cannot be run: {in_one_line(reason)}") from reason
-    found = getattr(module, form["name"], None)
-    if found is None or not (callable(found) or hasattr(found, "step")):
+        with _Neighbours.first(path.parent, files):
+            spec.loader.exec_module(module)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as reason:  # a script may end with exit()
+        raise fail(f"{shown_path(path)} cannot be run: {in_one_line(reason, files)}") from reason
+    origin = getattr(module, form["name"], None)
+    if origin is None or not (callable(origin) or hasattr(origin, "step")):
         own = [key for key, value in vars(module).items() if getattr(value, "__module__", "") == name]
         raise fail(
             f"{shown_path(path)} has no class {shown(form['name'])}; {nearest_names(form['name'], own)}",
             form["name"],
             own,
         )
-    return FromFile(path, content, found, _parameters(form["parameters"] or "", fail))
+    return FromFile(origin, _parameters(form["parameters"] or "", fail), files)
+
+
+def is_user_module(name: str) -> bool:
+    """Whether a module was loaded from a user's file, or from beside it."""
+    return name.startswith(_USER_MODULE) or _Neighbours.loaded(name)
+
+
+class _Uncached(SourceFileLoader):
+    """Loader without a compiled file, which would hide a change made within the same second."""
+
+    def path_stats(self, path: str) -> NoReturn:  # type: ignore[override]
+        raise OSError("no compiled file")
+
+
+class _Neighbours:
+    """Finder of the modules beside users' files: folder -> names of the modules that are imported from it."""
+
+    folders: ClassVar[dict[str, frozenset[str]]] = {}
+
+    @classmethod
+    def find_spec(cls, name: str, path: Sequence[str] | None = None, _target: object = None) -> ModuleSpec | None:
+        """Find a module; the folder of the file loaded last comes first."""
+        top = name.partition(".")[0]
+        folder = next((folder for folder, names in reversed(cls.folders.items()) if top in names), None)
+        spec = None if folder is None else PathFinder.find_spec(name, [folder] if path is None else path)
+        if spec is not None and isinstance(spec.loader, SourceFileLoader):
+            spec.loader = _Uncached(name, spec.loader.path)
+        return spec
+
+    @classmethod
+    def loaded(cls, name: str) -> bool:
+        """Whether a module in use was found here."""
+        file = getattr(sys.modules.get(name), "__file__", None) or ""
+        top = name.partition(".")[0]
+        return any(top in names and Path(folder) in Path(file).parents for folder, names in cls.folders.items())
+
+    @classmethod
+    @contextmanager
+    def first(cls, folder: Path, files: Iterable[str]) -> Iterator[None]:
+        """Load modules anew, and those of a folder first; afterwards they are found if there is no other."""
+        names = frozenset(Path(file).parts[0].removesuffix(".py") for file in files)
+        for name in [name for name in sys.modules if cls.loaded(name)]:
+            del sys.modules[name]
+        hidden = {name: sys.modules[name] for name in [*sys.modules] if name.partition(".")[0] in names}
+        for name in hidden:
+            del sys.modules[name]
+        cls.folders.pop(str(folder), None)
+        cls.folders[str(folder)] = names
+        sys.meta_path[:] = [cls, *(finder for finder in sys.meta_path if finder is not cls)]
+        importlib.invalidate_caches()
+        try:
+            yield
+        finally:
+            sys.meta_path.remove(cls)
+            sys.meta_path.append(cls)
+            sys.modules.update(hidden)
 
 
 def source_of(text: str) -> dict[str, bytes]:
-    """The file that a text names and the modules beside it that it imports, without running them.
+    """Read the file that a text names, and the modules beside it that it imports, without running them.
 
     Args:
         text: As in `from_file`.
 
     Returns:
-        Path in the file's folder -> content; empty for anything that names no file, as a built-in one.
+        Path in the file's folder -> content; empty for a text that does not name a file, such as a built-in name.
 
     Raises:
         ParameterError: a file cannot be read.
     """
     form = _FORM.fullmatch(text)
-    path = None if form is None else user_path(form["path"], ParameterError)
-    found: dict[str, bytes] = {}
-    waiting = [] if path is None else [path]
+    return {} if form is None else _with_neighbours(user_path(form["path"], ParameterError), ParameterError)
+
+
+def _with_neighbours(path: Path, error: type[ActiveSteerError]) -> dict[str, bytes]:
+    contents: dict[str, bytes] = {}
+    waiting = [path]
     while waiting:
         file = waiting.pop()
-        name = file.relative_to(path.parent).as_posix() if path else file.name
-        if name not in found:
-            found[name] = read_bytes(file, ParameterError)
-            waiting += _imported_from(file.parent, found[name])
-    return found
+        name = file.relative_to(path.parent).as_posix()
+        if name not in contents:
+            contents[name] = read_bytes(file, error)
+            waiting += [
+                module
+                for folder in dict.fromkeys((file.parent, path.parent))
+                for module in _imported_from(folder, contents[name])
+            ]
+    return contents
 
 
 def _imported_from(folder: Path, source: bytes) -> list[Path]:
-    """The modules, and files of the packages, of a folder that a source imports; none where it is no Python."""
+    """Modules, and files of packages, in a folder that a source imports; none if the source is not Python."""
     try:
         nodes = list(ast.walk(ast.parse(source)))
     except (SyntaxError, ValueError, RecursionError):
@@ -121,22 +192,22 @@ def _imported_from(folder: Path, source: bytes) -> list[Path]:
     for node in nodes:
         if isinstance(node, ast.ImportFrom):
             names |= {node.module} if node.module else {alias.name for alias in node.names}
-    found = []
+    files = []
     for name in sorted({name.partition(".")[0] for name in names}):
         if is_file(folder / f"{name}.py"):
-            found.append(folder / f"{name}.py")
+            files.append(folder / f"{name}.py")
         elif is_file(folder / name / "__init__.py"):
-            found += sorted((folder / name).rglob("*.py"))
-    return found
+            files += sorted((folder / name).rglob("*.py"))
+    return files
 
 
 def _parameters(text: str, fail: Any) -> dict[str, Any]:
-    """`gain=2&side="left"`: split where a name follows, so that a value may hold the sign itself."""
+    """Parse `gain=2&side="left"`. The text is split only where a name follows, so that a value can contain `&`."""
     parameters: dict[str, Any] = {}
     for part in re.split(r"&(?=[A-Za-z_]\w*=)", text) if text else ():
         pair = _PARAMETER.fullmatch(part)
         if pair is None:
-            raise fail(f"{shown(part)} is no parameter; name=value is needed, as in ?gain=2&limit_rad=0.05", part)
+            raise fail(f"{shown(part)} is not a parameter; name=value is needed, as in ?gain=2&limit_rad=0.05", part)
         if pair[1] in parameters:
             raise fail(f"the parameter {pair[1]} is given twice", pair[1])
         parameters[pair[1]] = parse_value(pair[2])

@@ -1,10 +1,11 @@
-"""What all controllers, or all drivers, have in common: their names, what they return, and how that is checked."""
+"""A kind of block (controller or driver): its names, its command, and the check of the command."""
 
 from __future__ import annotations
 
 import os
+import sysconfig
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from operator import itemgetter
 from pathlib import Path
@@ -16,23 +17,25 @@ from activesteer.config import Range
 from activesteer.errors import ActiveSteerError, shown
 
 _USUAL: Final = frozenset({float, int, bool, np.float64})
-"""Types of nearly all numbers in a command; others are looked at in full."""
+"""Types of nearly all numbers in a command; numbers of other types take the slow check."""
+_LIBRARIES: Final = tuple({sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")})
+"""Folders of code that no user wrote."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of block that a user can replace by his own.
+    """A kind of block that users can replace by their own.
 
     Attributes:
-        word: What it is called, as in `controller`.
-        example: How one in a file is given, as in `my_file.py:MyController`.
-        inputs: Arguments of its method `step`, as text.
-        built_in: Name -> class of those that come with the package.
-        result: Named tuple that `step` returns.
-        ranges: Field of the result -> what it may be.
-        error: Raised where something is wrong.
-        unchecked: Fields of the result that are no plain numbers.
-        data: Gives the names of those that come with it as data files.
+        word: Name of the kind, such as `controller`.
+        example: Form of a block in a file, such as `my_file.py:MyController`.
+        inputs: Arguments of the method `step`, as text.
+        built_in: Name -> class of the blocks in the package.
+        result: Message that `step` returns.
+        ranges: Field of the result -> its range.
+        error: Error class of this kind.
+        unchecked: Fields of the result that are not plain numbers.
+        data: Function that returns the names of the blocks that are data files of the package.
     """
 
     word: str
@@ -48,65 +51,69 @@ class Kind:
     _numbers: Callable[[Any], tuple[Any, ...]] = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Looks up where the fields stand: they are checked in every step."""
+        """Look up the places of the fields, which are checked in every step."""
         fields = self.result._fields
         object.__setattr__(self, "_places", tuple((fields.index(key), *limits) for key, limits in self.ranges.items()))
         numbers = (place for place, key in enumerate(fields) if key not in self.unchecked)
         object.__setattr__(self, "_numbers", itemgetter(*numbers))
 
     def names(self) -> list[str]:
-        """Names of all that come with the package."""
+        """Names of all blocks in the package."""
         return [*self.built_in, *self.data()]
 
     def is_data(self, given: Any) -> bool:
-        """Whether one is given as data: by the name of such a file, or by its path."""
+        """Whether a block is given as data: by the name of a data file, or by its path."""
         return isinstance(given, (str, os.PathLike)) and (os.fspath(given).endswith(".toml") or given in self.data())
 
     def fail(self, name: str, problem: str, value: Any = None, allowed: Any = None) -> ActiveSteerError:
-        """The error that says what is wrong with a block.
+        """Return the error for a block.
 
         Args:
-            name: How it is called.
-            problem: What is wrong, and what to do.
-            value: What was given or returned.
-            allowed: What may be.
+            name: Name of the block.
+            problem: The problem, and how to solve it.
+            value: Value that was given or returned.
+            allowed: Values that are allowed.
         """
         return self.error(problem, key=f"{self.word} {name}".rstrip(), value=value, allowed=allowed)
 
     def checked(self, command: Any, name: str, setup: Any, said: str = "step returned") -> Any:
-        """A command as it may be carried out.
+        """Check and complete a command.
 
         Args:
-            command: What `step` returned, or what was given in its place.
-            name: Who returned it, for the message.
-            setup: What the block was made from.
-            said: What comes before the command in the message.
+            command: Command that `step` returned, or that was given instead.
+            name: Name of the block, for the message.
+            setup: Argument from which the block was created.
+            said: Words before the command in the message.
 
         Returns:
-            The command.
+            The command, of exactly the class `result`.
 
         Raises:
-            ActiveSteerError: of the type `error`: it is no command, a value is no number, or out of its range.
+            ActiveSteerError: of the type `error`: it is not a command, or a value is not a number or out of its range.
         """
         if not self._is_usual(command):
-            self._check(command, name, said)
+            command = self._check(command, name, said)
         return self.completed(command, name, setup, said)
 
     def completed(self, command: Any, name: str, setup: Any, said: str) -> Any:
-        """A command whose plain numbers are in order, with all else checked and filled in; see `checked`."""
+        """Check and complete the fields other than plain numbers; see `checked`."""
         return command
 
     def _is_usual(self, command: Any) -> bool:
-        if command.__class__ is not self.result or not _USUAL.issuperset(map(type, self._numbers(command))):
+        if (
+            command.__class__ is not self.result
+            or len(command) != len(self.result._fields)
+            or not _USUAL.issuperset(map(type, self._numbers(command)))
+        ):
             return False
-        for index, low, high in self._places:  # noqa: SIM110 - a generator costs more than all else here
+        for index, low, high in self._places:  # noqa: SIM110 - a generator takes longer than the rest of the check
             if not low <= command[index] <= high:
                 return False
         return True
 
-    def _check(self, command: Any, name: str, said: str) -> None:
-        if not isinstance(command, self.result):
-            needed = f"an activesteer.{self.result.__name__} is needed"
+    def _check(self, command: Any, name: str, said: str) -> Any:
+        if not isinstance(command, self.result) or len(command) != len(self.result._fields):
+            needed = f"a complete activesteer.{self.result.__name__} is needed"
             raise self.fail(name, f"{said} {shown(command)}; {needed}", command, self.result)
         for key, value in zip(self.result._fields, command, strict=True):
             limits = self.ranges.get(key)
@@ -123,10 +130,20 @@ class Kind:
             else:
                 needed = f"a number from {limits.low:g} to {limits.high:g} is needed"
             raise self.fail(name, f"{said} {key} = {shown(value)}; {needed}", value, limits)
+        return self.result(*command)
 
 
-def in_one_line(error: BaseException) -> str:
-    """An error of somebody else's code in one line, with the place where it was raised."""
+def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
+    """Describe an error of foreign code in one line, with its place.
+
+    Args:
+        error: The error.
+        files: Names of the user's files. The place is the last line in one of them, else the last line that is not in
+            a library.
+    """
     frames = traceback.extract_tb(error.__traceback__)
-    place = f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
-    return f"{type(error).__name__}: {error}{place}"
+    own = [frame for frame in frames if Path(frame.filename).name in files]
+    outside = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
+    last = (own or outside or frames)[-1:]
+    places = [f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last]
+    return f"{type(error).__name__}: {error}".removesuffix(": ") + "".join(places)

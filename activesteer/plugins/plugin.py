@@ -1,4 +1,4 @@
-"""What was given as a controller or driver: how it is called, made and recorded."""
+"""A given controller or driver: its name, how it is created, and what is recorded of it."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from pathlib import Path
 from typing import Any, Final
 
 from activesteer.errors import nearest_names, shown
-from activesteer.plugins.file import from_file
+from activesteer.plugins.file import from_file, is_user_module
 from activesteer.plugins.kind import Kind, in_one_line
 
 _PLAIN: Final = (bool, int, float, str)
 _SETUP: Final = "setup"
-"""An argument of this name gets what is known of the car."""
+"""Name of the argument that gets the properties of the car."""
 
 
 @dataclass(frozen=True)
 class Plugin:
-    """A controller or driver that can be made, any number of times, for any car.
+    """A controller or driver that can be created any number of times, for any car.
 
     Attributes:
-        kind: Which of the two.
-        name: How it is called in messages and in recordings, as `my_file.py:MyController?gain=2`.
-        label: How it is called in tables and names of files, as `MyController-gain=2`; `+truth` where it uses that.
-        origin: What it is made from: a class, a function, or an object that is copied.
-        parameters: What it is made with, by name.
-        files: The file that it is in, to be kept with the recording.
-        ours: Whether its code is the package's own, which needs no watching.
+        kind: Controllers or drivers.
+        name: Name in messages and recordings, such as `my_file.py:MyController?gain=2`.
+        label: Name in tables and file names, such as `MyController-gain=2`; with `+truth` if it uses the truth.
+        origin: A class, a function, or an object that is copied.
+        parameters: Arguments by name.
+        files: File of the code and the modules beside it that it imports, to be kept with the recording.
+        ours: Whether the code belongs to the package and needs no watching.
     """
 
     kind: Kind
@@ -44,40 +44,49 @@ class Plugin:
     ours: bool = False
 
     def __post_init__(self) -> None:
-        """A block that uses the truth says so in its label, wherever its results are shown."""
+        """Mark a block that uses the truth in its label."""
         if self.uses_truth:
             object.__setattr__(self, "label", f"{self.label}+truth")
 
     @property
     def uses_truth(self) -> bool:
-        """Whether it asks, by an attribute of this name, for what no sensor of a car says."""
+        """Whether the block requests the truth, by an attribute of this name."""
         return bool(getattr(self.origin, "uses_truth", False))
 
     def make(self, setup: Any) -> Any:
-        """Makes the block, always in the state in which it was given: nothing is carried over from one run to the next.
+        """Create the block in its original state: nothing is carried over from one run to the next.
 
         Args:
-            setup: What it may know of the car.
+            setup: Properties of the car that the block may know.
 
         Returns:
-            The block; a user's own inside one that explains what goes wrong in it.
+            The block; a user's block is inside a `Watched`.
 
         Raises:
-            ActiveSteerError: of the kind's type: it cannot be made.
+            ActiveSteerError: of the kind's type: the block cannot be created.
         """
         kind, origin = self.kind, self.origin
         if self.ours:
             return origin.from_vehicle(setup)
         try:
-            made = self._made(setup)
-        except Exception as reason:
+            block = self._created(setup)
+            has_step = callable(getattr(block, "step", None))
+        except KeyboardInterrupt:
+            raise
+        except BaseException as reason:
             what = getattr(origin, "__name__", type(origin).__name__)
-            raise kind.fail(self.name, f"{what} cannot be made: {in_one_line(reason)}") from reason
-        if not callable(getattr(made, "step", None)):
-            raise kind.fail(self.name, f"{type(made).__name__} has no method step({kind.inputs})", made)
-        return Watched(made, kind, self.name, setup)
+            raise kind.fail(self.name, f"{what} cannot be created: {in_one_line(reason, self.files)}") from reason
+        if not has_step:
+            raise kind.fail(self.name, f"{type(block).__name__} has no method step({kind.inputs})", block)
+        return Watched(block, kind, self.name, setup, tuple(self.files))
 
-    def _made(self, setup: Any) -> Any:
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        """Pickle a block of a user's file as its text, so that unpickling loads the file."""
+        if is_user_module(getattr(self.origin, "__module__", "")):
+            return find, (self.name, self.kind)
+        return super().__reduce_ex__(protocol)
+
+    def _created(self, setup: Any) -> Any:
         if is_instance(self.origin):
             return copy.deepcopy(self.origin)
         if hasattr(self.origin, "from_vehicle"):
@@ -87,57 +96,63 @@ class Plugin:
 
 
 class Watched:
-    """A user's block, watched: an error that it raises or a wrong command is reported with its file and class.
+    """A user's block whose errors and wrong commands are reported with file, class and line.
 
     Attributes:
         inner: The user's object.
     """
 
-    def __init__(self, inner: Any, kind: Kind, name: str, setup: Any) -> None:
-        """Wraps it.
+    def __init__(self, inner: Any, kind: Kind, name: str, setup: Any, files: tuple[str, ...] = ()) -> None:
+        """Wrap a block.
 
         Args:
             inner: The user's object.
-            kind: What it is.
-            name: How it is called in messages.
-            setup: What it may know of the car.
+            kind: Controllers or drivers.
+            name: Name in messages.
+            setup: Properties of the car that the block may know.
+            files: Names of the user's files.
         """
         self.inner = inner
-        self._about = kind, name, setup
+        self._about = kind, name, setup, files
 
     def step(self, *inputs: Any) -> Any:
-        """What the user's step returns.
+        """Return the checked command of the user's step.
 
         Raises:
-            ActiveSteerError: of the kind's type: it raised something, or returned no command.
+            ActiveSteerError: of the kind's type: the step raised something, even SystemExit, or returned no command.
         """
-        kind, name, setup = self._about
+        kind, name, setup, files = self._about
         try:
             command = self.inner.step(*inputs)
-        except Exception as reason:
-            raise kind.fail(name, f"step raised {in_one_line(reason)}") from reason
+        except KeyboardInterrupt:
+            raise
+        except BaseException as reason:
+            what = f"{type(self.inner).__name__}.step raised {in_one_line(reason, files)}"
+            raise kind.fail(name, what) from reason
         return kind.checked(command, name, setup)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Watched:
-        kind, name, setup = self._about
+        kind, name, _, files = self._about
         try:
-            return Watched(copy.deepcopy(self.inner, memo), kind, name, setup)
-        except Exception as reason:
-            raise kind.fail(name, f"its state cannot be copied: {in_one_line(reason)}") from reason
+            return Watched(copy.deepcopy(self.inner, memo), *self._about)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as reason:
+            raise kind.fail(name, f"its state cannot be copied: {in_one_line(reason, files)}") from reason
 
 
 def find(given: Any, kind: Kind) -> Plugin:
-    """Finds a controller or driver and checks what can be checked before it is made.
+    """Find a controller or driver, and check what can be checked before it is created.
 
     Args:
-        given: Name of a built-in one; `my_file.py:MyController`, with `?gain=2&limit_rad=0.05` where it takes
-            parameters; a class; an object with a method `step`; or a function that makes one. A class is made by its
-            classmethod `from_vehicle` where it has one. Where an argument is called `setup`, it gets what is known of
-            the car (`ControllerSetup`, `DriverSetup`).
-        kind: Controller or driver.
+        given: A built-in name; `my_file.py:MyController`, with `?gain=2&limit_rad=0.05` for parameters; a class; an
+            object with a method `step`; or a function that returns such an object. If a class has a classmethod
+            `from_vehicle`, it creates the object. An argument named `setup` gets the properties of the car
+            (`ControllerSetup`, `DriverSetup`).
+        kind: Controllers or drivers.
 
     Raises:
-        ActiveSteerError: of the kind's type: there is no such thing, or it has no such parameter.
+        ActiveSteerError: of the kind's type: there is no such block, or it has no such parameter.
     """
     if isinstance(given, Plugin):
         return given
@@ -146,21 +161,20 @@ def find(given: Any, kind: Kind) -> Plugin:
     if isinstance(given, str):
         if given in kind.built_in:
             return Plugin(kind, given, given, kind.built_in[given], {}, {}, ours=True)
-        path, content, origin, parameters = from_file(given, kind)
+        origin, parameters, files = from_file(given, kind)
         _check_parameters(origin, parameters, given, kind)
         label = "-".join([given.partition("?")[0].rpartition(":")[2], *(f"{k}={v}" for k, v in parameters.items())])
-        return Plugin(kind, given, re.sub(r"[^\w=.+-]+", "_", label), origin, parameters, {path.name: content})
+        return Plugin(kind, given, re.sub(r"[^\w=.+-]+", "_", label), origin, parameters, files)
     if not is_instance(given) and not callable(given):
         names = ", ".join(kind.names())
         needed = f"a name ({names}), a file ({kind.example}), a class, an object with the method step({kind.inputs})"
-        raise kind.fail(
-            "", f"is {shown(given)}; {needed}, or a function that makes one is needed", given, tuple(kind.names())
-        )
+        problem = f"is {shown(given)}; {needed}, or a function that returns one is needed"
+        raise kind.fail("", problem, given, tuple(kind.names()))
     return _from_object(given, kind)
 
 
 def is_instance(given: Any) -> bool:
-    """Whether something is a block already, not a class or function that makes one."""
+    """Whether something is a block, not a class or function that creates one."""
     return not isinstance(given, type) and callable(getattr(given, "step", None))
 
 
@@ -185,14 +199,14 @@ def _from_object(given: Any, kind: Kind) -> Plugin:
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """What of it can be recorded."""
+    """Select the values that can be recorded."""
     return {key: value for key, value in values.items() if isinstance(value, _PLAIN) and not key.startswith("_")}
 
 
 def _arguments(maker: Any) -> dict[str, inspect.Parameter]:
     try:
         return dict(inspect.signature(maker).parameters)
-    except (TypeError, ValueError):  # some of what is written in C
+    except (TypeError, ValueError):  # some functions written in C
         return {}
 
 

@@ -9,13 +9,13 @@ import sys
 from typing import Any
 
 from activesteer.errors import ActiveSteerError, ParameterError
-from activesteer.plugins import USER_MODULE, in_one_line
+from activesteer.plugins import in_one_line, is_user_module
 
 
 class _Pickler(pickle.Pickler):
     def reducer_override(self, obj: Any) -> Any:
         # Loading a file again creates new classes under the same names, which pickle would refuse.
-        if isinstance(obj, type) and obj.__module__.startswith(USER_MODULE):
+        if isinstance(obj, type) and is_user_module(obj.__module__):
             return _class, (obj.__module__, obj.__qualname__)
         return NotImplemented
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import os
+import sys
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -195,6 +196,85 @@ def test_file_that_does_not_run_is_answered(tmp_path, text):
     with pytest.raises(ControllerError) as refused:
         find_controller(f"{path}:Mine")
     assert refused.value.value in (path, f"{path}:Mine")
+
+
+@pytest.mark.parametrize(
+    "text", ["exit()", "import sys; sys.exit(0)", "raise GeneratorExit", "raise BaseException('no')"]
+)
+@pytest.mark.parametrize("place", ["file", "__init__", "step"])
+def test_any_exception_of_the_user_s_code_is_answered_with_its_line(write, text, place):
+    step = text if place == "step" else "return ActuatorCommand()"
+    body = f"{text if place == 'file' else ''}\nclass Mine:\n    def __init__(self):\n        "
+    body += f"{text if place == '__init__' else 'pass'}\n    def step(self, command, measurement):\n        {step}\n"
+    given = f"{write(body)}:Mine"
+    with raises(ControllerError, key=f"controller {given}") as refused:
+        simulate("step_steer", given, overrides=SHORT)
+    line = {"file": 3, "__init__": 6, "step": 8}[place]
+    assert f"(mine.py, line {line})" in refused.value.problem
+    assert place == "file" or "Mine" in refused.value.problem
+
+
+@pytest.mark.parametrize("place", ["__init__", "step"])
+def test_ctrl_c_in_the_user_s_code_stays_ctrl_c(place):
+    class Interrupted(Counting):
+        pass
+
+    def interrupt(self: Any, *_: Any) -> None:
+        raise KeyboardInterrupt
+
+    setattr(Interrupted, place, interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        simulate("step_steer", Interrupted, overrides=SHORT)
+
+
+def test_line_of_an_error_is_the_user_s_own(write):
+    given = write(
+        """
+        import json
+
+        class Mine:
+            def step(self, command, measurement):
+                return json.loads("{")
+        """
+    )
+    with raises(ControllerError) as refused:
+        simulate("step_steer", f"{given}:Mine", overrides=SHORT)
+    assert "Mine.step raised JSONDecodeError" in refused.value.problem
+    assert "(mine.py, line 8)" in refused.value.problem
+
+
+IMPORTS = {
+    "module": "from beside import GAIN",
+    "package": "from group.part import GAIN",
+    "within a function": "",
+}
+
+
+@pytest.mark.parametrize("how", IMPORTS)
+def test_a_module_beside_the_file_can_be_imported(write, tmp_path, how):
+    (tmp_path / "beside.py").write_text("GAIN = 2.0\n")
+    (tmp_path / "group").mkdir()
+    (tmp_path / "group" / "__init__.py").write_text("")
+    (tmp_path / "group" / "part.py").write_text("from beside import GAIN\n")
+    body = (
+        f"{IMPORTS[how]}\nclass Mine:\n    def step(self, command, measurement):\n"
+        f"        {IMPORTS[how] or 'from beside import GAIN'}\n        return ActuatorCommand(0.001 * GAIN)\n"
+    )
+    given = f"{write(body)}:Mine"
+    run = simulate("step_steer", given, overrides=SHORT)
+    assert (run["rear_steer_demand_rad"] == 0.002).all()
+    assert {"mine.py", "beside.py"} <= set(run.attachments)
+    # A change counts, even within the same second, and a module of the same name elsewhere does not.
+    (tmp_path / "beside.py").write_text("GAIN = 3.0\n")
+    assert (simulate("step_steer", given, overrides=SHORT)["rear_steer_demand_rad"] == 0.003).all()
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "beside.py").write_text("GAIN = 4.0\n")
+    (other / "mine.py").write_text((tmp_path / "mine.py").read_text())
+    if how != "package":
+        elsewhere = simulate("step_steer", f"{other / 'mine.py'}:Mine", overrides=SHORT)
+        assert (elsewhere["rear_steer_demand_rad"] == 0.004).all()
+    assert str(tmp_path) not in sys.path
 
 
 def test_source_and_parameters_are_recorded():

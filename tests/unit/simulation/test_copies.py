@@ -33,7 +33,7 @@ RUNS = {
     "solver": ("step_steer", "mpc", {}),
 }
 OWN = """
-GAIN = 2.0
+from beside import GAIN
 
 class Mine:
     def __init__(self, setup, gain=1.0):
@@ -105,6 +105,7 @@ def test_a_copy_has_what_was_changed_on_the_way(copied: Copied) -> None:
 @pytest.mark.parametrize("name", ["copy", "deepcopy", "pickle"])
 def test_a_controller_of_the_user_s_own_is_copied_with_its_state(name: str, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(OWN)
+    (tmp_path / "beside.py").write_text("GAIN = 2.0\n")
     given = f"{tmp_path / 'mine.py'}:Mine?gain=1.5"
     original = Simulation("step_steer", given, overrides=KEYS)
     original.advance(400)
