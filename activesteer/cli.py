@@ -48,12 +48,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
-    from activesteer.commands.output import log_to_terminal
+    from contextlib import nullcontext
+
+    from activesteer.commands.output import log_to_terminal, stdout_for_json
     from activesteer.errors import ActiveSteerError
 
     stop.options = options = all_commands().parse(arguments)
     try:
-        with log_to_terminal():
+        with log_to_terminal(), stdout_for_json() if getattr(options, "json", False) else nullcontext():
             return options.action(options)
     except BrokenPipeError:
         raise

@@ -8,7 +8,7 @@ import re
 import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from typing import Any, Final, TextIO
 
 from activesteer.files import json_text
@@ -51,7 +51,36 @@ def print_wrapped(text: str) -> None:
 
 def print_json(value: Any) -> None:
     """Print a value as JSON; see `json_text`."""
-    print(json_text(value))
+    print(json_text(value), file=_for_json[-1] if _for_json else None)
+
+
+_for_json: Final[list[TextIO]] = []
+"""Stream of `print_json`, while it is not standard output."""
+
+
+@contextmanager
+def stdout_for_json() -> Iterator[None]:
+    """Reserve standard output for `print_json`; all other output, such as a user's `print`, goes to standard error."""
+    own = stream = sys.stdout
+    is_process_s = own is not None and own is sys.__stdout__
+    if is_process_s:  # then native code and other processes write there, too
+        own.flush()
+        stream = open(os.dup(1), "w", encoding=own.encoding, errors=own.errors)  # noqa: SIM115 - closed below
+        os.dup2(2, 1)
+    _for_json.append(stream)
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        _for_json.pop()
+        if is_process_s:
+            own.flush()
+            os.dup2(stream.fileno(), 1)
+            try:
+                stream.close()
+            except BrokenPipeError:
+                os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+                raise
 
 
 def in_colour() -> bool:

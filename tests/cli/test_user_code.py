@@ -1,0 +1,65 @@
+"""Code of a user's own on the command line: what it prints, raises and imports."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from activesteer import Recording
+from tests.cli.conftest import Call
+
+ROOT = Path(__file__).resolve().parents[2]
+MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
+SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.2", "--set", "steer.start_s=0.05")
+PRINTS = """
+if self.steps == 1:
+    import os, sys
+    print("said")
+    os.write(1, b"written")
+return ActuatorCommand()
+"""
+
+
+def process(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-c", MAIN, *words],
+        cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("text", ["import sys; sys.exit(0)", "raise SystemExit", "raise BaseException('no')"])
+def test_a_run_that_user_code_ends_has_failed(call: Call, controller: Callable[..., str], text: str) -> None:
+    given = controller(f"if self.steps > 100:\n    {text}\nreturn ActuatorCommand()\n")
+    told = call("run", "step_steer", "-c", given, *SHORT, "-o", "run.mcap")
+    assert told.status == 1
+    assert "Mine.step raised" in told.err
+    assert "(mine.py, line 10)" in told.err
+    assert "100 steps were made; what was recorded until then is in run.mcap" in told.err
+    assert len(Recording.open(Path("run.mcap"))) == 100
+
+
+def test_prints_of_user_code_do_not_disturb_json(call: Call, controller: Callable[..., str], tmp_path: Path) -> None:
+    given = controller(PRINTS)
+    words = "run", "step_steer", "-c", given, *SHORT, "--json"
+    done = process(tmp_path, *words)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["runs"]
+    assert "said" in done.stderr
+    assert "written" in done.stderr
+    controller('print("said")\nreturn ActuatorCommand()\n')
+    told = call(*words)
+    assert told.json["runs"]
+    assert "said" in told.err
+
+
+def test_prints_of_user_code_are_seen_without_json(call: Call, controller: Callable[..., str]) -> None:
+    given: Any = controller('print("said")\nreturn ActuatorCommand()\n')
+    assert "said" in call("run", "step_steer", "-c", given, *SHORT).out
