@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if arguments is None:
             stop.watch()
         status = _called(arguments, stop)
-        if arguments is None:
+        if arguments is None and sys.stdout is not None:
             sys.stdout.flush()
     except BrokenPipeError:  # the reader of the output, such as `head`, has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

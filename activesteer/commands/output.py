@@ -61,9 +61,9 @@ _for_json: Final[list[TextIO]] = []
 @contextmanager
 def stdout_for_json() -> Iterator[None]:
     """Reserve standard output for `print_json`; all other output, such as a user's `print`, goes to standard error."""
-    own = stream = sys.stdout
-    is_process_s = own is not None and own is sys.__stdout__
-    if is_process_s:  # then native code and other processes write there, too
+    stream = sys.stdout
+    own = stream if stream is sys.__stdout__ else None
+    if own is not None:  # native code and other processes write to it, too
         own.flush()
         stream = open(os.dup(1), "w", encoding=own.encoding, errors=own.errors)  # noqa: SIM115 - closed below
         os.dup2(2, 1)
@@ -73,7 +73,7 @@ def stdout_for_json() -> Iterator[None]:
             yield
     finally:
         _for_json.pop()
-        if is_process_s:
+        if own is not None:
             own.flush()
             os.dup2(stream.fileno(), 1)
             try:
