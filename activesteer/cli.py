@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if arguments is None and sys.stdout is not None:
             sys.stdout.flush()
     except BrokenPipeError:  # the reader of the output, such as `head`, has ended
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         status = 1
     except BaseException as error:
         # An interrupted import or an ended worker may turn the signal into any other exception.
