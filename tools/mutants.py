@@ -85,8 +85,8 @@ ROOMS: Final = {
     ),
     "vehicle/native": Room(
         "vehicle/native_*.py",
-        "unit/vehicle physics/test_step_steer.py",
-        "physics/test_signs.py physics/test_toe_link_screw.py physics/test_braking.py",
+        "unit/vehicle/test_native_*.py unit/vehicle physics/test_toe_link_screw.py physics/test_step_steer.py",
+        "physics/test_signs.py physics/test_braking.py physics/test_superposition_actuator.py",
     ),
     "analysis/claims": Room(
         "analysis/claims/*.py",
@@ -99,6 +99,9 @@ ROOMS: Final = {
         "unit/studies/engine/test_study.py unit/studies/engine/test_tuning.py",
     ),
 }
+
+OTHER_NAMES: Final = {"native_guide": "axle_of_curves", "native_screws": "toe_link_screw", "advance": "filter_parts"}
+"""Files whose tests are called otherwise."""
 
 _ARITHMETIC: Final = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Mod_Mul", "FloorDiv_Mul", "Sub_Mul")
 _COMPARISONS: Final = (
@@ -215,7 +218,7 @@ def copy_tree(tree: Path) -> None:
 
 def commands(mutant: Mutant, *, wide: bool) -> list[str]:
     """The pytest commands for a mutant."""
-    stem, room = Path(mutant.file).stem.removeprefix("native_"), ROOMS[mutant.room]
+    stem, room = OTHER_NAMES.get(stem := Path(mutant.file).stem, stem), ROOMS[mutant.room]
     pytest = f"{sys.executable} -m pytest -x -q -p no:cacheprovider -m 'not slow'"
     plain = f"env NUMBA_DISABLE_JIT=1 {pytest} -W ignore::RuntimeWarning"
     own = f"**/test_{stem}.py **/test_{stem}_*.py {room.near}"
