@@ -1,7 +1,6 @@
-"""Where files and folders are opened and made: what the system refuses becomes an error of ours.
+"""Opening and creation of files and folders, with one-line errors of the class that the caller names.
 
-Every error raised here is of the class that the caller names, and is one line: what could not be done, to which path,
-and why.
+Every message states the operation, the path and the reason.
 """
 
 from __future__ import annotations
@@ -21,44 +20,44 @@ from typing import Any, Final, NamedTuple
 from activesteer.errors import ActiveSteerError, shown
 
 MAX_TEXT_BYTES: Final = 2_000_000
-"""Longest text file that is read as an input, unless said otherwise; those of the package have some 20 kB."""
+"""Default limit of a text file; files of the package have about 20 kB."""
 MAX_CSV_BYTES: Final = 10_000_000
-"""Longest CSV; an hour of samples every 10 ms has 8 MB."""
+"""Limit of a CSV; an hour of samples every 10 ms has 8 MB."""
 MAX_NUMBER: Final = 1e12
-"""Largest absolute value of a number in a file, in any unit. A larger number describes nothing of a car, and overflows
-in what is computed with it."""
+"""Largest absolute value of a number in a file, in any unit. A larger number is meaningless for a car and may
+overflow."""
 _passing: Final[set[Path]] = set()
 _DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def shown_path(path: str | os.PathLike[str]) -> str:
-    """A path as a message shows it: cut to 200 characters, and none of them moves a cursor or cannot be printed."""
+    """Return a path for a message: at most 200 characters, control characters escaped."""
     return shown(Path(os.fsdecode(path)))
 
 
 def writing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> AbstractContextManager[None]:
-    """Stands around what writes a file: an OSError of the body becomes an error of class `error`."""
+    """Context that turns an OSError of writing into an error of class `error`."""
     return _refused("write", path, error)
 
 
 def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> AbstractContextManager[None]:
-    """Stands around what reads a file: an OSError of the body becomes an error of class `error`."""
+    """Context that turns an OSError of reading into an error of class `error`."""
     return _refused("read", path, error)
 
 
 @contextmanager
 def replacing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[Path]:
-    """Give a new file beside `path` to write to, which takes the place of `path` in the end.
+    """Yield a new file beside `path` that replaces `path` at the end.
 
-    So no one reads half a file: where the body fails, the new file is deleted and what was there before stays. A device
-    is written to as it is.
+    No one can read half a file: if the body fails, the new file is deleted and the old one stays. A device is written
+    directly.
 
     Args:
         path: The file.
-        error: Class of the error that an OSError becomes.
+        error: Class of the errors.
 
     Yields:
-        What to write to; it has the ending of `path`.
+        Path to write to, with the ending of `path`.
 
     Raises:
         ActiveSteerError: the body raised an OSError, or `path` may not be replaced; of class `error`.
@@ -66,7 +65,7 @@ def replacing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> It
     with _refused("write", path, error):
         target = Path(os.path.realpath(path))
         if target.exists():
-            target.open("ab").close()  # the folder's permissions alone would allow to replace a read-only file
+            target.open("ab").close()  # the permissions of the folder would allow replacing a read-only file
         if target.exists() and not target.is_file():
             yield target
             return
@@ -80,7 +79,7 @@ def replacing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> It
 
 @contextmanager
 def passing(part: Path) -> Iterator[None]:
-    """Stands around what writes a file that is moved to its place in the end: where it still is then, it is deleted.
+    """Context around the writing of a temporary file; deletes the file if it still exists at the end.
 
     Args:
         part: The file; `delete_passing` deletes it too.
@@ -94,25 +93,17 @@ def passing(part: Path) -> Iterator[None]:
 
 
 def delete_passing() -> None:
-    """Delete the files of `passing` that are being written, for an end of the process that does not unwind it."""
+    """Delete all temporary files of `passing`, before the process ends without unwinding."""
     for part in tuple(_passing):
         with suppress(OSError):
             part.unlink(missing_ok=True)
 
 
 def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerError]) -> Path:
-    """Write a text file, in UTF-8; one that exists is replaced as a whole.
-
-    Args:
-        path: The file.
-        text: What it shall hold.
-        error: Class of the error where it cannot be written.
-
-    Returns:
-        The path.
+    """Write a text file in UTF-8, and return its path; an existing file is replaced as a whole.
 
     Raises:
-        ActiveSteerError: it cannot be written; of class `error`.
+        ActiveSteerError: the file cannot be written; of class `error`.
     """
     with replacing(path, error) as part:
         part.write_text(text, encoding="utf-8")
@@ -120,12 +111,12 @@ def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerE
 
 
 def json_text(value: Any) -> str:
-    """A value as indented JSON that any reader takes: JSON has no nan, so a number that is not finite becomes null."""
+    """Return a value as indented JSON; a number that is not finite becomes null."""
     return json.dumps(finite(value), indent=2, allow_nan=False)
 
 
 def finite(value: Any) -> Any:
-    """JSON values in which None stands for every number that is not finite."""
+    """Return JSON values with None for every number that is not finite."""
     if isinstance(value, Mapping):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -134,19 +125,12 @@ def finite(value: Any) -> Any:
 
 
 def file_word(text: str) -> str:
-    """A text as part of a file's name: what is no letter, digit, dot, hyphen or underscore becomes an underscore."""
+    """Return a text as part of a file name: only letters, digits, dots, hyphens and underscores."""
     return "".join(letter if letter.isalnum() or letter in "._-" else "_" for letter in text)
 
 
 def user_path(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:
-    """A path as a user writes it, `~` replaced by the home folder.
-
-    Args:
-        path: The path.
-        error: Class of the error where there is no such home folder.
-
-    Returns:
-        The path.
+    """Return a path with `~` replaced by the home folder.
 
     Raises:
         ActiveSteerError: there is no such home folder; of class `error`.
@@ -158,7 +142,7 @@ def user_path(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Pa
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
-    """Whether there is a regular file; a name that no file can have is none."""
+    """Return whether a path is a regular file; also for names that no file can have."""
     try:
         return stat.S_ISREG(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -166,7 +150,7 @@ def is_file(path: str | os.PathLike[str]) -> bool:
 
 
 def is_folder(path: str | os.PathLike[str]) -> bool:
-    """Whether there is a folder; a name that no folder can have is none."""
+    """Return whether a path is a folder; also for names that no folder can have."""
     try:
         return stat.S_ISDIR(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -174,7 +158,7 @@ def is_folder(path: str | os.PathLike[str]) -> bool:
 
 
 def why_no_file(path: str | os.PathLike[str]) -> str:
-    """What is at a path where a file was expected, for an error message."""
+    """Return why a path is no file, for an error message."""
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError):
@@ -185,19 +169,11 @@ def why_no_file(path: str | os.PathLike[str]) -> str:
 def read_bytes(path: str | os.PathLike[str], error: type[ActiveSteerError], max_bytes: int = MAX_TEXT_BYTES) -> bytes:
     """Read a regular file of limited size.
 
-    Args:
-        path: The file.
-        error: Class of the error where it cannot be read.
-        max_bytes: Longest file that is read [bytes].
-
-    Returns:
-        What it holds.
-
     Raises:
-        ActiveSteerError: it cannot be read, is a folder, pipe or device, or is too long; of class `error`.
+        ActiveSteerError: the file cannot be read, is a folder, pipe or device, or is too long; of class `error`.
     """
     with reading(path, error):
-        # Without O_NONBLOCK, opening a pipe would wait for someone who writes to it.
+        # Without O_NONBLOCK, opening a pipe would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             os.close(descriptor)
@@ -216,22 +192,22 @@ def read_text(
     error: type[ActiveSteerError],
     max_bytes: int = MAX_TEXT_BYTES,
 ) -> str:
-    """Read a text file in UTF-8; see `read_bytes`. Line ends become those of Python, a byte order mark is left out."""
+    """Read a text file in UTF-8; see `read_bytes`. Line ends are normalised, and a byte order mark is removed."""
     try:
         text = read_bytes(path, error, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError as reason:
         raise error(
-            f"cannot read {shown_path(path)}: it is no text in UTF-8 (byte {reason.start})", value=path
+            f"cannot read {shown_path(path)}: it is no UTF-8 text (byte {reason.start})", value=path
         ) from reason
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 class CsvRow(NamedTuple):
-    """A row of a CSV.
+    """Row of a CSV.
 
     Attributes:
         line: Line in the file, from 1.
-        cells: Its cells without blanks around them.
+        cells: Cells without surrounding blanks.
     """
 
     line: int
@@ -241,20 +217,20 @@ class CsvRow(NamedTuple):
 def read_csv(
     path: str | os.PathLike[str], error: type[ActiveSteerError], *, empty_cells_count: bool = False
 ) -> list[CsvRow]:
-    """Read the rows of a CSV, whose cells are apart by commas, semicolons or tabs; the first line with any decides.
+    """Read the rows of a CSV with cells separated by commas, semicolons or tabs; the first line with any decides.
 
-    What is behind a `#` is a comment. Where cells are apart by semicolons or tabs, 1,5 is the number 1.5.
+    Text after `#` is a comment. With semicolons or tabs, 1,5 is the number 1.5.
 
     Args:
         path: The file.
-        error: Class of the error where it cannot be read.
-        empty_cells_count: Whether a row of nothing but empty cells, as spreadsheets leave them at the end, is a row.
+        error: Class of the errors.
+        empty_cells_count: Whether to keep rows with empty cells only, as spreadsheets leave them at the end.
 
     Returns:
         Rows that are not empty.
 
     Raises:
-        ActiveSteerError: it cannot be read, or is no CSV; of class `error`.
+        ActiveSteerError: the file cannot be read, or is no CSV; of class `error`.
     """
     lines = [line.partition("#")[0] for line in read_text(path, error, MAX_CSV_BYTES).split("\n")]
     separator = next((sign for line in lines for sign in ";\t," if sign in line), ",")
@@ -300,17 +276,10 @@ def csv_number(cell: str, error: type[ActiveSteerError], file: str, line: int, c
 
 
 def make_folder(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:
-    """Make a folder and those above it, where they do not exist.
-
-    Args:
-        path: The folder.
-        error: Class of the error where it cannot be made.
-
-    Returns:
-        The path.
+    """Create a folder with its parents if needed, and return its path.
 
     Raises:
-        ActiveSteerError: it cannot be made, or is a file; of class `error`.
+        ActiveSteerError: the folder cannot be created, or is a file; of class `error`.
     """
     folder = Path(path)
     with _refused("make the folder", folder, error):

@@ -1,6 +1,6 @@
-"""Find the models, manoeuvres and studies, in a checkout, in an editable install and in an installed wheel.
+"""Models, manoeuvres and studies of the package, in a checkout, an editable install and an installed wheel.
 
-In a wheel they travel inside the package, in `_data/`; in a checkout they lie beside the package, at the top.
+In a wheel they are inside the package, in `_data/`; in a checkout they are beside the package.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from activesteer.files import is_file, is_folder, user_path, why_no_file
 _PACKAGE = Path(__file__).resolve().parent
 
 DEFAULT_DRIVER: Final = "typical"
-"""Who drives where nobody is named."""
+"""Default driver."""
 
 
 def _data_dir(name: str, error: type[ActiveSteerError]) -> Path:
@@ -41,10 +41,7 @@ def _data_dir(name: str, error: type[ActiveSteerError]) -> Path:
 
 
 def models_dir() -> Path:
-    """The directory with `mjcf/`, `vehicles/`, `tyres/`, `drivers/` and `controllers/`.
-
-    Returns:
-        Absolute path of an existing directory.
+    """Return the folder with `mjcf/`, `vehicles/`, `tyres/`, `drivers/` and `controllers/`.
 
     Raises:
         ModelError: the installation is incomplete.
@@ -53,10 +50,7 @@ def models_dir() -> Path:
 
 
 def maneuvers_dir() -> Path:
-    """The directory with the manoeuvre files.
-
-    Returns:
-        Absolute path of an existing directory.
+    """Return the folder of the manoeuvre files.
 
     Raises:
         ManeuverError: the installation is incomplete.
@@ -65,10 +59,7 @@ def maneuvers_dir() -> Path:
 
 
 def studies_dir() -> Path:
-    """The directory with the study files.
-
-    Returns:
-        Absolute path of an existing directory.
+    """Return the folder of the study files.
 
     Raises:
         StudyError: the installation is incomplete.
@@ -77,88 +68,76 @@ def studies_dir() -> Path:
 
 
 def list_maneuvers() -> list[str]:
-    """Names of the manoeuvres that come with the package, sorted."""
+    """Return the names of the manoeuvres of the package, sorted."""
     return _names(maneuvers_dir())
 
 
 def list_vehicles() -> list[str]:
-    """Names of the vehicles that come with the package, sorted."""
+    """Return the names of the vehicles of the package, sorted."""
     return _names(models_dir() / "vehicles")
 
 
 def list_studies() -> list[str]:
-    """Names of the studies that come with the package, sorted."""
+    """Return the names of the studies of the package, sorted."""
     return _names(studies_dir())
 
 
 def list_drivers() -> list[str]:
-    """Names of the drivers that come with the package, sorted."""
+    """Return the names of the drivers of the package, sorted."""
     return _names(models_dir() / "drivers")
 
 
 def list_controller_variants() -> list[str]:
-    """Names of the controller variants that come with the package, sorted."""
+    """Return the names of the controller variants of the package, sorted."""
     return _names(models_dir() / "controllers")
 
 
 def find_driver_file(name_or_path: str | os.PathLike[str]) -> Path:
-    """The file of a driver.
+    """Return the file of a driver.
 
     Args:
-        name_or_path: A name from `list_drivers`, or the path of a .toml file; see `find_maneuver`.
-
-    Returns:
-        Path of an existing file.
+        name_or_path: A name of the package, or the path of a .toml file; see `find_maneuver`.
 
     Raises:
-        DriverError: there is no such driver or file; the message names the nearest ones.
+        DriverError: there is no such driver or file; the message names similar ones.
     """
     return _find(name_or_path, models_dir() / "drivers", "driver", DriverError)
 
 
 def find_controller_variant(name_or_path: str | os.PathLike[str]) -> Path:
-    """The file of a controller variant.
+    """Return the file of a controller variant.
 
     Args:
-        name_or_path: A name from `list_controller_variants`, or the path of a .toml file; see `find_maneuver`.
-
-    Returns:
-        Path of an existing file.
+        name_or_path: A name of the package, or the path of a .toml file; see `find_maneuver`.
 
     Raises:
-        ControllerError: there is no such variant or file; the message names the nearest ones.
+        ControllerError: there is no such controller variant or file; the message names similar ones.
     """
     return _find(name_or_path, models_dir() / "controllers", "controller", ControllerError)
 
 
 def find_maneuver(name_or_path: str | os.PathLike[str]) -> Path:
-    """The file of a manoeuvre.
+    """Return the file of a manoeuvre.
 
     Args:
-        name_or_path: A name from `list_maneuvers`, or the path of a .toml file. A string is a path if it contains a
-            separator or ends in `.toml`.
-
-    Returns:
-        Path of an existing file.
+        name_or_path: A name of the package, or the path of a .toml file. A text is a path if it contains a separator or
+            ends in `.toml`.
 
     Raises:
-        ManeuverError: there is no such manoeuvre or file; the message names the nearest ones.
+        ManeuverError: there is no such manoeuvre or file; the message names similar ones.
     """
     return _find(name_or_path, maneuvers_dir(), "manoeuvre", ManeuverError)
 
 
 def find_vehicle(name_or_path: str | os.PathLike[str]) -> Path:
-    """The parameter file of a vehicle.
+    """Return the parameter file of a vehicle.
 
     Args:
-        name_or_path: A name from `list_vehicles`, or the path of a .toml file or of the folder that it is in. A string
-            is a path if it contains a separator or ends in `.toml`, or is no vehicle's name and a folder has it.
-
-    Returns:
-        Path of an existing file.
+        name_or_path: A name of the package, or the path of a .toml file or of its folder. A text is a path if it
+            contains a separator, ends in `.toml`, or is a folder and no name of the package.
 
     Raises:
-        ParameterError: there is no such vehicle or file; the message names the nearest ones.
+        ParameterError: there is no such vehicle or file; the message names similar ones.
     """
     if name_or_path not in list_vehicles() and is_folder(folder := user_path(name_or_path, ParameterError)):
         name_or_path = _vehicle_in(folder)
@@ -166,42 +145,36 @@ def find_vehicle(name_or_path: str | os.PathLike[str]) -> Path:
 
 
 def _vehicle_in(folder: Path) -> Path:
-    """The vehicle file of a folder: that of the folder's name, or the only one there is."""
-    names = [name for name in _names(folder) if name != "table"]  # what `vehicle new` keeps of its input
+    """Return the vehicle file of a folder: the file with the name of the folder, or the only one."""
+    names = [name for name in _names(folder) if name != "table"]  # the input of `vehicle new`
     name = folder.resolve().name
     if name in names:
         return folder / f"{name}.toml"
     if len(names) == 1:
         return folder / f"{names[0]}.toml"
     raise ParameterError(
-        f"which vehicle file of {folder} is meant? There are: {', '.join(names) or 'none'}", value=folder, allowed=names
+        f"the folder {folder} needs one vehicle file; it has: {', '.join(names) or 'none'}", value=folder, allowed=names
     )
 
 
 def check_own(file: Path) -> None:
-    """Refuse to change a file that belongs to an installed package.
-
-    Args:
-        file: The file.
+    """Refuse to change a file of an installed package.
 
     Raises:
-        ParameterError: it does.
+        ParameterError: the file belongs to one.
     """
     if file.resolve().is_relative_to(_PACKAGE) or {"site-packages", "dist-packages"} & set(file.resolve().parts):
-        raise ParameterError(f"{file} belongs to an installed package; copy it to a place of your own", value=file)
+        raise ParameterError(f"{file} belongs to an installed package; copy it first", value=file)
 
 
 def find_study(name_or_path: str | os.PathLike[str]) -> Path:
-    """The file of a study.
+    """Return the file of a study.
 
     Args:
-        name_or_path: Name of a study that comes with the package, or the path of a .toml file; see `find_maneuver`.
-
-    Returns:
-        Path of an existing file.
+        name_or_path: A name of the package, or the path of a .toml file; see `find_maneuver`.
 
     Raises:
-        StudyError: there is no such study or file; the message names the nearest ones.
+        StudyError: there is no such study or file; the message names similar ones.
     """
     return _find(name_or_path, studies_dir(), "study", StudyError)
 
@@ -209,7 +182,7 @@ def find_study(name_or_path: str | os.PathLike[str]) -> Path:
 def _names(directory: Path) -> list[str]:
     try:
         return sorted(file.stem for file in directory.iterdir() if file.suffix == ".toml")
-    except (OSError, ValueError):  # no folder, or none that may be looked into
+    except (OSError, ValueError):  # no folder, or no permission
         return []
 
 

@@ -1,13 +1,13 @@
-"""TOML tables into frozen dataclasses: every key known, every value of the right type and within its range.
+"""TOML tables to frozen dataclasses: every key is known, every value has the right type and range.
 
-A field's type is its check: `float`, `int`, `bool`, `str`, a `Literal` of some words, tuples of floats, a nested
-dataclass, a dict or a tuple of nested dataclasses, or one of these `| None`. An element of a tuple has its number for a
+The type of a field defines its check: `float`, `int`, `bool`, `str`, a `Literal` of words, a tuple of floats, a nested
+dataclass, a dict or a tuple of nested dataclasses, or one of these `| None`. An element of a tuple has its number as a
 key: `road.patches.0.mu` is the `mu` of the first [[road.patches]]. A range is written
-`Annotated[float, Range(low, high)]`. Inside, everything is SI and radians; in a file a key may carry an edge unit
-instead: `speed_kmh` fills `speed_mps`, `angle_deg` fills `angle_rad`.
+`Annotated[float, Range(low, high)]`. Values are SI and radians. A key in a file may have a display unit instead:
+`speed_kmh` fills `speed_mps`, `angle_deg` fills `angle_rad`.
 
-A class may name, in `KEY_HINTS`, keys that people look for in vain, and what to say to them; and in `OVERRULED`, keys
-that have no effect where other keys have certain values: key -> {other key: its value, None for any}.
+A class may define `KEY_HINTS`: keys that users expect but that do not exist -> help. It may define `OVERRULED`: keys
+without effect while other keys have certain values: key -> {other key: its value, None for any}.
 """
 
 from __future__ import annotations

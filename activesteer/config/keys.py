@@ -1,4 +1,4 @@
-"""The keys that a dataclass has in a file: fields in SI or in a unit of the edge, in tables below tables."""
+"""Keys of a dataclass in a file: fields in SI or in a display unit, in nested tables."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ _EDGE_UNITS: Final = {
     "_kmh": ("_mps", 1.0 / 3.6),
     "_g": ("_mps2", GRAVITY_MPS2),
 }
-"""Suffix of a key in a file -> suffix of the field it fills, and the factor."""
+"""Suffix of a key in a file -> suffix of the field that it fills, and factor."""
 
 
 def spellings(name: str) -> list[str]:
-    """The keys that fill a field: its own name, and the one in a unit of the edge."""
+    """Return the keys that fill a field: its name, and the name in a display unit."""
     edges = [name[: -len(si)] + edge for edge, (si, _) in _EDGE_UNITS.items() if name.endswith(si)]
     return [name, *edges]
 
 
 def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, float]:
-    """The field that a key of a file fills.
+    """Return the field that a key of a file fills.
 
     Args:
-        key: The key, perhaps in a unit of the edge.
+        key: The key, possibly in a display unit.
         fields: Names of the fields, in SI.
 
     Returns:
-        Name of the field, None where there is none, and the factor from the key's unit to SI.
+        Name of the field, or None, and the factor from the unit of the key to SI.
     """
     if not isinstance(key, str):
         return None, 1.0
@@ -50,17 +50,17 @@ def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, flo
 
 @functools.cache
 def hints_of(cls: type, *, include_extras: bool = False) -> dict[str, Any]:
-    """Types of a dataclass's fields: what `typing.get_type_hints` says, which reads their texts anew at every call."""
+    """Return the types of the fields of a dataclass, cached: `typing.get_type_hints` parses them at every call."""
     return typing.get_type_hints(cls, include_extras=include_extras)
 
 
 def fields_of(cls: type) -> dict[str, dataclasses.Field[Any]]:
-    """The fields of a dataclass by their names."""
+    """Return the fields of a dataclass by name."""
     return {field.name: field for field in dataclasses.fields(cls)}
 
 
 def dataclass_in(hint: Any) -> type | None:
-    """The dataclass of a table that a field holds, also of one that may be left out; None for other fields."""
+    """Return the dataclass of a table that a field holds, possibly an optional one; None for other fields."""
     for candidate in (hint, *typing.get_args(hint)):
         if isinstance(candidate, type) and dataclasses.is_dataclass(candidate):
             return candidate if typing.get_origin(hint) not in (dict, tuple) else None
@@ -68,13 +68,13 @@ def dataclass_in(hint: Any) -> type | None:
 
 
 def element_of(hint: Any) -> type | None:
-    """The dataclass that the elements of a tuple are made of, or None."""
+    """Return the dataclass of the elements of a tuple, or None."""
     item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
     return item if isinstance(item, type) and dataclasses.is_dataclass(item) else None
 
 
 def key_paths(cls: type, prefix: str = "") -> list[str]:
-    """All dotted keys that a table for `cls` may have, for messages about keys that do not exist."""
+    """Return all dotted keys that a table for `cls` may have, for error messages."""
     paths: list[str] = []
     hints = hints_of(cls)
     for field in dataclasses.fields(cls):
@@ -87,7 +87,7 @@ def key_paths(cls: type, prefix: str = "") -> list[str]:
 
 
 def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:
-    """Keys with the names of the fields in place of other units: `speed_kmh` becomes `speed_mps`."""
+    """Return keys with the names of the fields: `speed_kmh` becomes `speed_mps`."""
     if not path:
         return ()
     name, _ = field_in_unit(path[0], fields_of(cls))
@@ -102,7 +102,7 @@ def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:
 
 
 def leaf_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
-    """The keys of all values of a table, each as the names that lead to it."""
+    """Yield the keys of all values of a table, each as the path of names to it."""
     for key, value in table.items():
         if isinstance(value, Mapping):
             yield from ((str(key), *below) for below in leaf_keys(value))
@@ -111,14 +111,14 @@ def leaf_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
 
 
 def key_hint(cls: type, key: str) -> str | None:
-    """What a class, or that of a table in it, says to those who look for a dotted key that it does not have."""
+    """Return the help that a class, or the class of an inner table, gives for a dotted key that does not exist."""
     first, _, rest = key.partition(".")
     inner = dataclass_in(hints_of(cls).get(first)) if rest else None
     return getattr(cls, "KEY_HINTS", {}).get(key) if inner is None else key_hint(inner, rest)
 
 
 def no_such_key(cls: type, source: Source, path: Sequence[str]) -> ActiveSteerError:
-    """The error for a key that a class does not have; see `Source.fail`."""
+    """Return the error for a key that a class does not have; see `Source.fail`."""
     names = [spelling for name in fields_of(cls) for spelling in spellings(name)]
     help_ = key_hint(cls, path[-1]) or nearest_names(path[-1], names)
     return source.fail(path, f"there is no such key; {help_}", allowed=names)

@@ -1,4 +1,4 @@
-"""Keys replaced from outside, and keys without effect beside others."""
+"""Overrides of keys, and keys without effect beside others."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from activesteer.errors import nearest_names, shown
 def merged(
     cls: type, table: Mapping[str, Any], path: Sequence[str], value: object, source: Source, above: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """The table with one key replaced, whatever unit it is written in.
+    """Return a table with one key replaced, in any of its units.
 
     Args:
-        cls: Dataclass that the table will become.
+        cls: Dataclass of the table.
         table: The table.
-        path: Keys that lead to the one to replace.
-        value: What to put there.
-        source: For error messages.
-        above: Keys that lead to the table.
+        path: Path of names to the replaced key.
+        value: New value.
+        source: Source of the table, for error messages.
+        above: Path of names to the table.
 
     Returns:
         A new table.
 
     Raises:
-        ActiveSteerError: there is no such key, or one above it is no table.
+        ActiveSteerError: there is no such key, or a key above it is no table.
     """
     where = (*above, path[0])
     if not isinstance(table, Mapping):
@@ -69,7 +69,7 @@ def merged(
 def _merged_list(
     element: type, given: Any, rest: Sequence[str], value: object, source: Source, where: Sequence[str]
 ) -> list[Any]:
-    """A list of tables with one of them, or a key of it, replaced."""
+    """Return a list of tables with one table, or a key of it, replaced."""
     if not isinstance(given, (list, tuple)):
         raise source.fail(where, f"is {shown(given)}, which is no list", given)
     elements = list(given)
@@ -86,16 +86,16 @@ def _merged_list(
 
 
 def check_overruled(cls: type, table: Mapping[str, Any], source: Source, given: Iterable[Sequence[str]]) -> None:
-    """No key may be given that others make ineffective; see `OVERRULED`.
+    """Refuse keys that other keys make ineffective; see `OVERRULED`.
 
     Args:
-        cls: Dataclass that the table will become.
+        cls: Dataclass of the table.
         table: The table.
-        source: For error messages.
-        given: Keys that were given, each as the names that lead to it.
+        source: Source of the table, for error messages.
+        given: Given keys, each as a path of names.
 
     Raises:
-        ActiveSteerError: there is such a key; the message names both.
+        ActiveSteerError: a key has no effect; the message names both keys.
     """
     for path in given:
         owner, within = cls, table

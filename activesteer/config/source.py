@@ -1,4 +1,4 @@
-"""Where a value stands, and within what it must lie: what an error message says of it."""
+"""Place and range of a value, for error messages."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from activesteer.files import MAX_NUMBER
 
 
 class Range(NamedTuple):
-    """Allowed range of a number, both ends included."""
+    """Allowed range of a number, including both ends."""
 
     low: float = -MAX_NUMBER
     high: float = MAX_NUMBER
 
     def __str__(self) -> str:
-        """As it is said in an error message; an end that was not given is not named, in whatever unit."""
+        """Describe the range for an error message, without an end that is not set."""
         if self.high > 0.1 * MAX_NUMBER:
             return f"at least {self.low:g}"
         if self.low < -0.1 * MAX_NUMBER:
@@ -28,13 +28,13 @@ class Range(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """Where a table came from, for error messages.
+    """Origin of a table, for error messages.
 
     Attributes:
-        name: File name, or what to call a table that has no file.
-        text: The file's text, to find lines in.
-        error: Class of the errors to raise.
-        overridden: Dotted keys whose values came from overrides, not from here.
+        name: Name of the file, or of a table without a file.
+        text: Text of the file, to find lines in.
+        error: Class of the errors.
+        overridden: Dotted keys whose values came from overrides.
     """
 
     name: str
@@ -43,40 +43,34 @@ class Source:
     overridden: frozenset[str] = frozenset()
 
     def fail(self, path: Sequence[str], problem: str, value: object = None, allowed: Any = None) -> ActiveSteerError:
-        """An error that says where and what.
+        """Return an error with file, line and key.
 
         Args:
-            path: Keys that lead to what is wrong.
-            problem: What is wrong with it, in words.
-            value: What was given.
-            allowed: What may be given: a range, or names.
-
-        Returns:
-            The error, to be raised.
+            path: Path of names to the wrong key.
+            problem: Description of the problem.
+            value: Given value.
+            allowed: Allowed values: a range, or names.
         """
         key = ".".join(path)
         overridden = any(key == other or key.startswith(other + ".") for other in self.overridden)
-        # What stands in an inline table or a list has no line of its own.
+        # A key in an inline table or a list has no line of its own.
         line = next((found for end in range(len(path), 0, -1) if (found := self._line_of(path[:end]))), None)
         return self.error(
             problem, file=self.name, line=line, key=key or None, value=value, allowed=allowed, overridden=overridden
         )
 
     def placed(self, path: Sequence[str], reason: ActiveSteerError) -> ActiveSteerError:
-        """The same error with the place that a check, which knows no file, could not know.
+        """Return the error of a check with the place in the file, which the check does not know.
 
         Args:
-            path: Keys that lead to the table that was checked.
-            reason: The error of the check; its key is one inside that table.
-
-        Returns:
-            The error, to be raised.
+            path: Path of names to the checked table.
+            reason: Error of the check; its key is relative to the table.
         """
         inner = reason.key.split(".") if reason.key else ()
         return self.fail((*path, *inner), reason.problem, reason.value, reason.allowed)
 
     def _line_of(self, path: Sequence[str]) -> int | None:
-        """Line of a key, found in the text: tomllib does not keep it."""
+        """Return the line of a key in the text; tomllib does not keep it."""
         wanted = ".".join(path)
         table = ""
         elements: dict[str, int] = {}
@@ -98,7 +92,7 @@ class Source:
 
 
 def _numbered(name: str, elements: Mapping[str, int]) -> str:
-    """A dotted key with the number of the present element behind the name of every list."""
+    """Return a dotted key with the number of the current element behind the name of every list."""
     key = ""
     for part in name.strip().split("."):
         key = f"{key}.{part}" if key else part

@@ -1,4 +1,4 @@
-"""TOML as text: read with limits on what a hostile file may cost, and written."""
+"""TOML texts: reading with limits for hostile files, and writing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from activesteer.files import read_text
 
 _MAX_DEPTH: Final = 32
 _DEEP_KEY: Final = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){{{_MAX_DEPTH}}}""")
-"""A dotted key of more than so many parts; the time that tomllib takes grows with the square of their number."""
+"""Dotted key with too many parts; the time of tomllib grows with the square of their number."""
 
 
 def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tuple[dict[str, Any], Source]:
@@ -23,7 +23,7 @@ def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tup
 
     Args:
         path: The file.
-        error: Class of the error to raise.
+        error: Class of the errors.
 
     Returns:
         The table and its source.
@@ -39,10 +39,10 @@ def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tup
 
 
 def _parsed(text: str) -> dict[str, Any]:
-    """A TOML text's table.
+    """Parse a TOML text.
 
     Raises:
-        ValueError: it is no TOML, has a number of too many digits, or is nested too deeply.
+        ValueError: the text is no TOML, is nested too deeply, or has a number with too many digits.
     """
     if _DEEP_KEY.search(text):
         raise ValueError(f"a key is nested more than {_MAX_DEPTH} deep")
@@ -53,10 +53,10 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def parse_value(text: str) -> Any:
-    """A value as TOML writes it; what is no TOML value is a text.
+    """Return a value written as in TOML; any other text is returned as it is.
 
     Raises:
-        ParameterError: it is nested too deeply, or has a number of too many digits.
+        ParameterError: the value is nested too deeply, or has a number with too many digits.
     """
     try:
         table = _parsed(f"value = {text}")
@@ -68,7 +68,7 @@ def parse_value(text: str) -> Any:
 
 
 def toml_value(value: Any) -> str:
-    """A value as TOML writes it; JSON's texts, numbers and lists are TOML's too."""
+    """Return a value as TOML; texts, numbers and lists of JSON are valid TOML."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{json.dumps(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
     if isinstance(value, (list, tuple)):
@@ -77,14 +77,14 @@ def toml_value(value: Any) -> str:
 
 
 def toml_text(table: Mapping[str, Any], remarks: Mapping[str, str] | None = None) -> str:
-    """A table as the text of a file, the tables in it each below its header.
+    """Return a table as the text of a file, each inner table below its header.
 
     Args:
-        table: Keys that need no quotes, and their values; a list of tables stands in one line.
-        remarks: What to say above a header, by the table's dotted name; a line of it becomes a line of comment.
+        table: Keys without quotes, and values; a list of tables is written in one line.
+        remarks: Dotted name of a table -> comment above its header.
 
     Returns:
-        The text; `read_toml` makes the same table of it.
+        The text; `read_toml` restores the table.
     """
     return "\n".join(_lines(table, remarks or {}, "")).lstrip("\n") + "\n"
 

@@ -1,4 +1,4 @@
-"""Tables into dataclasses, each value checked against its field's type, and back."""
+"""Conversion of tables to dataclasses, with a check of each value against the type of its field, and back."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _MAX_TEXT: Final = 1000
 
 
 def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence[str] = (), base: Any = None) -> T:
-    """Make a dataclass from a table.
+    """Build a dataclass from a table.
 
     Args:
-        cls: Dataclass to make.
-        table: Keys and values; edge units are converted.
-        source: For error messages.
-        path: Keys that lead to this table.
+        cls: Dataclass to build.
+        table: Keys and values; display units are converted.
+        source: Source of the table, for error messages.
+        path: Path of names to this table.
         base: Object whose values fill the keys that are missing and have no default in the class.
 
     Returns:
@@ -45,7 +45,7 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
             raise no_such_key(cls, source, where)
         if name in values:
             first = next(other for other in table if field_in_unit(other, fields)[0] == name)
-            raise source.fail(where, f"{first} and {key} are the same in two units; give one of them")
+            raise source.fail(where, f"{first} and {key} are the same key in two units; give one of them")
         values[name] = _convert(hints[name], raw, factor, source, where, _default_of(fields[name]))
     for name, field in fields.items():
         if name in values or field.default is not dataclasses.MISSING:
@@ -58,7 +58,7 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
         raise source.fail((*path, name), f"the key {' or '.join(spellings(name))} is missing")
     try:
         return cls(**values)
-    except ActiveSteerError as reason:  # from the class's own checks, which know no file
+    except ActiveSteerError as reason:  # from checks of the class, which do not know the file
         raise source.placed(path, reason) from reason
 
 
@@ -70,7 +70,7 @@ def _default_of(field: dataclasses.Field[Any]) -> Any:
 
 
 def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[str], base: Any = None) -> Any:
-    """One value, checked against its type hint; `base` as in `build`, for a table."""
+    """Check a value against its type hint and convert it."""
     limits = Range()
     if typing.get_origin(hint) is typing.Annotated:
         hint, *notes = typing.get_args(hint)
@@ -98,7 +98,7 @@ def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[
 def _elements(
     hint: Any, raw: Any, factor: float, limits: Range, source: Source, path: Sequence[str]
 ) -> tuple[Any, ...]:
-    """A list of numbers, or of tables."""
+    """Convert a list of numbers or of tables."""
     element = element_of(hint)
     if not isinstance(raw, (list, tuple)):
         wanted = "no list of numbers" if element is None else f"no list; tables [[{'.'.join(path)}]] are needed"
@@ -124,14 +124,14 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
     if not good or (isinstance(raw, bool) and hint is not bool):
         raise source.fail(path, f"{shown(raw)} is not {wanted}", raw, hint)
     if isinstance(raw, str) and (len(raw) > _MAX_TEXT or not raw.isprintable()):
-        raise source.fail(path, f"{shown(raw)} is not {_MAX_TEXT} characters, at most, that can be printed", raw)
+        raise source.fail(path, f"{shown(raw)} is not a text of at most {_MAX_TEXT} printable characters", raw)
     if hint in (bool, str):
         return raw
     number: Any = raw
     try:
         value = number * factor if factor != 1.0 else hint(number)
         finite = math.isfinite(value)
-    except OverflowError:  # a whole number too large for a float
+    except OverflowError:  # an integer too large for a float
         value, finite = math.inf, False
     if not finite:
         raise source.fail(path, f"{shown(raw)} is not finite", raw, limits)
@@ -144,28 +144,28 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
 
 
 def checked_number(key: str, value: object, limits: Range) -> float:
-    """An argument of a Python function, checked as a number of a file is.
+    """Check an argument of a Python function like a number in a file.
 
     Args:
         key: Name of the argument.
-        value: What was given.
+        value: Value of the argument.
         limits: Allowed range.
 
     Returns:
         The number.
 
     Raises:
-        ParameterError: it is no number, or out of range.
+        ParameterError: the value is no number, or out of range.
     """
     return _scalar(float, value, 1.0, limits, Source(""), (key,))
 
 
 def to_table(value: Any, *, defaults: bool = True) -> Any:
-    """A dataclass as plain tables, ready for JSON; `build` takes it back.
+    """Return a dataclass as plain tables for JSON; `build` restores it.
 
     Args:
-        value: A dataclass, or what stands in one.
-        defaults: Whether to keep fields that have their default; those that are None are left out in any case.
+        value: A dataclass, or a value in one.
+        defaults: Whether to keep fields with default values; fields that are None are always left out.
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         values = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
