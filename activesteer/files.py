@@ -251,13 +251,6 @@ def read_csv(
 def csv_number(cell: str, error: type[ActiveSteerError], file: str, line: int, column: str) -> float:
     """Return the number in a cell of a CSV.
 
-    Args:
-        cell: Text of the cell.
-        error: Class of the error to raise.
-        file: Name of the file.
-        line: Line of the cell, from 1.
-        column: Name of its column.
-
     Raises:
         ActiveSteerError: the cell holds no finite number, or one above `MAX_NUMBER`; of class `error`.
     """

@@ -41,29 +41,17 @@ def _data_dir(name: str, error: type[ActiveSteerError]) -> Path:
 
 
 def models_dir() -> Path:
-    """Return the folder with `mjcf/`, `vehicles/`, `tyres/`, `drivers/` and `controllers/`.
-
-    Raises:
-        ModelError: the installation is incomplete.
-    """
+    """Return the folder with `mjcf/`, `vehicles/`, `tyres/`, `drivers/` and `controllers/`."""
     return _data_dir("models", ModelError)
 
 
 def maneuvers_dir() -> Path:
-    """Return the folder of the manoeuvre files.
-
-    Raises:
-        ManeuverError: the installation is incomplete.
-    """
+    """Return the folder of the manoeuvre files."""
     return _data_dir("maneuvers", ManeuverError)
 
 
 def studies_dir() -> Path:
-    """Return the folder of the study files.
-
-    Raises:
-        StudyError: the installation is incomplete.
-    """
+    """Return the folder of the study files."""
     return _data_dir("studies", StudyError)
 
 
@@ -93,26 +81,12 @@ def list_controller_variants() -> list[str]:
 
 
 def find_driver_file(name_or_path: str | os.PathLike[str]) -> Path:
-    """Return the file of a driver.
-
-    Args:
-        name_or_path: A name of the package, or the path of a .toml file; see `find_maneuver`.
-
-    Raises:
-        DriverError: there is no such driver or file; the message names similar ones.
-    """
+    """Return the file of a driver by its name or path; see `find_maneuver`."""
     return _find(name_or_path, models_dir() / "drivers", "driver", DriverError)
 
 
 def find_controller_variant(name_or_path: str | os.PathLike[str]) -> Path:
-    """Return the file of a controller variant.
-
-    Args:
-        name_or_path: A name of the package, or the path of a .toml file; see `find_maneuver`.
-
-    Raises:
-        ControllerError: there is no such controller variant or file; the message names similar ones.
-    """
+    """Return the file of a controller variant by its name or path; see `find_maneuver`."""
     return _find(name_or_path, models_dir() / "controllers", "controller", ControllerError)
 
 
@@ -124,7 +98,8 @@ def find_maneuver(name_or_path: str | os.PathLike[str]) -> Path:
             ends in `.toml`.
 
     Raises:
-        ManeuverError: there is no such manoeuvre or file; the message names similar ones.
+        ManeuverError: there is no such manoeuvre or file (another class for the other kinds); the message names similar
+            ones.
     """
     return _find(name_or_path, maneuvers_dir(), "manoeuvre", ManeuverError)
 
@@ -168,14 +143,7 @@ def check_own(file: Path) -> None:
 
 
 def find_study(name_or_path: str | os.PathLike[str]) -> Path:
-    """Return the file of a study.
-
-    Args:
-        name_or_path: A name of the package, or the path of a .toml file; see `find_maneuver`.
-
-    Raises:
-        StudyError: there is no such study or file; the message names similar ones.
-    """
+    """Return the file of a study by its name or path; see `find_maneuver`."""
     return _find(name_or_path, studies_dir(), "study", StudyError)
 
 

@@ -56,15 +56,12 @@ def _figures(options: argparse.Namespace) -> int:
 
 
 def draw_all(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle: str) -> list[Path]:
-    """Draw all figures that these runs allow, and the figure of the suspension.
+    """Draw all figures that these runs allow, and the figure of the suspension: PNG, SVG and PDF.
 
     Args:
         recordings: Scenario -> system -> recording.
         folder: Folder for the figures.
         vehicle: Name or path of the vehicle, for the rig and the linear models.
-
-    Returns:
-        Files of the figures: PNG, SVG and PDF.
 
     Raises:
         ActiveSteerError: matplotlib is not installed, a file cannot be written, or the rig fails.

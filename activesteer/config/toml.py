@@ -19,14 +19,7 @@ _DEEP_KEY: Final = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){{{_MAX_DE
 
 
 def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tuple[dict[str, Any], Source]:
-    """Read a TOML file.
-
-    Args:
-        path: The file.
-        error: Class of the errors.
-
-    Returns:
-        The table and its source.
+    """Return the table of a TOML file, and its source.
 
     Raises:
         ActiveSteerError: the file cannot be read or is no TOML; of class `error`.

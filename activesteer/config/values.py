@@ -20,17 +20,14 @@ _MAX_TEXT: Final = 1000
 
 
 def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence[str] = (), base: Any = None) -> T:
-    """Build a dataclass from a table.
+    """Build a dataclass from a table, and convert display units.
 
     Args:
         cls: Dataclass to build.
-        table: Keys and values; display units are converted.
+        table: Keys and values.
         source: Source of the table, for error messages.
         path: Path of names to this table.
         base: Object whose values fill the keys that are missing and have no default in the class.
-
-    Returns:
-        The dataclass.
 
     Raises:
         ActiveSteerError: a key is unknown, missing or given twice, or a value is wrong.
@@ -144,15 +141,7 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
 
 
 def checked_number(key: str, value: object, limits: Range) -> float:
-    """Check an argument of a Python function like a number in a file.
-
-    Args:
-        key: Name of the argument.
-        value: Value of the argument.
-        limits: Allowed range.
-
-    Returns:
-        The number.
+    """Check the argument `key` of a Python function like a number in a file, and return it.
 
     Raises:
         ParameterError: the value is no number, or out of range.

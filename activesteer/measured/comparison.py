@@ -149,12 +149,7 @@ class Comparison(NamedTuple):
 
 
 def compare(measured: Sequence[Recording], simulated: Recording, standard: str = "iso19365") -> Comparison:
-    """Compare measured runs of a manoeuvre with its simulation.
-
-    Args:
-        measured: Measured runs, at least one.
-        simulated: Simulated run.
-        standard: Key of `STANDARDS`.
+    """Compare measured runs of a manoeuvre with its simulation, by a key of `STANDARDS`.
 
     Raises:
         RecordingError: the runs share no channel or no time.

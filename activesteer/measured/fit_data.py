@@ -35,15 +35,10 @@ class Measured(NamedTuple):
 
 
 def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[str, float]:
-    """Return the standard deviation of the noise of each channel, SI.
-
-    Args:
-        study: The study, for error messages.
-        table: Table [fit] of the study.
-        known: Channels of a run.
+    """Return the standard deviation of the noise of each channel of the table [fit], SI.
 
     Raises:
-        StudyError: a channel does not exist, or is given twice.
+        StudyError: a channel is not among the `known` ones, or is given twice.
     """
     found: dict[str, float] = {}
     for key, value in table.noise.items():
@@ -61,14 +56,7 @@ def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[
 def measured_of(
     recording: Recording, name: str, study: StudyFile, table: FitTable, channels: Collection[str]
 ) -> Measured:
-    """Return the compared data of a recording.
-
-    Args:
-        recording: The recording.
-        name: Name of its file.
-        study: The study, for its step and for error messages.
-        table: Table [fit] of the study.
-        channels: Channels to compare.
+    """Return the data of a recording that are compared.
 
     Raises:
         StudyError: the recording lacks a channel.

@@ -126,16 +126,7 @@ def is_time(name: str) -> bool:
 
 
 def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> Known | None:
-    """Return the meaning of a column by its name.
-
-    Args:
-        name: Name of the column.
-        columns: Names of all columns of the file.
-        channels: Channels of a car.
-
-    Returns:
-        The meaning; None if the name is unknown.
-    """
+    """Return the meaning of a column by its name, the names of all columns and the channels of a car, or None."""
     for mark, names in _EXPORTERS:
         if mark in columns and name in names:
             return names[name]

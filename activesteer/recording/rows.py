@@ -213,11 +213,11 @@ class FileRows:
 
     def channel(self, column: int) -> NDArray[np.float64]:
         """Return the values of a channel, shape (n,)."""
-        found = _cache.get(self._token, column)
-        if found is None:
-            columns = self._neighbours(column)
-            found = self._load(columns)[columns.index(column)]
-        return found.astype(np.float64)
+        if (self._token, column) in _cached:
+            _cached.move_to_end((self._token, column))
+            return _cached[self._token, column].astype(np.float64)
+        columns = self._neighbours(column)
+        return self._load(columns)[columns.index(column)].astype(np.float64)
 
     def at(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
         """Return the values of all channels in ascending rows, shape (len(rows), number of channels)."""
@@ -253,38 +253,22 @@ class FileRows:
                 array[done:stop] = block.columns[column]
             done = stop
         for column, array in zip(columns, arrays, strict=True):
-            _cache.put(self._token, column, array)
+            _keep(self._token, column, array)
         return arrays
 
 
-class _Cache:
-    """Cache of channels of open files; the least recently used ones are dropped first."""
-
-    def __init__(self) -> None:
-        self._arrays: OrderedDict[tuple[int, int], NDArray] = OrderedDict()
-        self._size = 0
-
-    def get(self, token: int, column: int) -> NDArray | None:
-        if (token, column) in self._arrays:
-            self._arrays.move_to_end((token, column))
-        return self._arrays.get((token, column))
-
-    def put(self, token: int, column: int, array: NDArray) -> None:
-        if (token, column) not in self._arrays:
-            self._size += array.nbytes
-        self._arrays[token, column] = array
-        while self._size > MAX_CACHED_BYTES and self._arrays:
-            self._size -= self._arrays.popitem(last=False)[1].nbytes
-
-    def drop(self, token: int) -> None:
-        for key in [key for key in self._arrays if key[0] == token]:
-            self._size -= self._arrays.pop(key).nbytes
-
-
-_cache = _Cache()
+_cached: Final[OrderedDict[tuple[int, int], NDArray]] = OrderedDict()
+"""Token of an open file and column -> channel, the least recently used one first."""
 _tokens = count()
+
+
+def _keep(token: int, column: int, array: NDArray) -> None:
+    _cached[token, column] = array
+    while sum(each.nbytes for each in _cached.values()) > MAX_CACHED_BYTES:
+        _cached.popitem(last=False)
 
 
 def _release(descriptor: int, token: int) -> None:
     os.close(descriptor)
-    _cache.drop(token)
+    for key in [key for key in _cached if key[0] == token]:
+        del _cached[key]

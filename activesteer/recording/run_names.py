@@ -10,15 +10,7 @@ from activesteer.recording.recording import Recording
 
 
 def run_names(sources: Sequence[str | Path], recordings: Iterable[Recording]) -> list[str]:
-    """Return a name for each run: its controller if all differ, else its file, with the folder if needed.
-
-    Args:
-        sources: File or other name of each run.
-        recordings: The runs.
-
-    Returns:
-        The names, in the same order.
-    """
+    """Return a name for each run: its controller if all differ, else its file, with the folder if needed."""
     # A user's controller is named by file and class; the class is enough.
     controllers = [
         str(run.metadata.get("controller", "run")).rpartition(":")[2]

@@ -124,18 +124,11 @@ def state_schema(group: str, channels: Iterable[Channel]) -> bytes:
 
 
 def state_fields(schema: bytes, schema_name: str) -> tuple[list[str], FixedMessage]:
-    """Read a schema of `state_schema`.
-
-    Args:
-        schema: Serialised `FileDescriptorSet`.
-        schema_name: Full name of the message in it.
-
-    Returns:
-        Field names in their order, and the layout of the messages.
+    """Return the field names of a schema of `state_schema` in their order, and the layout of the messages.
 
     Raises:
         RecordingError: the schema does not describe a group of channels.
-        google.protobuf.message.DecodeError: it is no schema at all.
+        google.protobuf.message.DecodeError: the data are no schema.
     """
     for file in FileDescriptorSet.FromString(schema).file:
         for message in file.message_type:

@@ -16,11 +16,7 @@ _START_BYTES: Final = 64
 
 
 def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Check that a recording can be written, without changing anything.
-
-    Args:
-        path: The file.
-        overwrite: Whether an existing recording may be replaced; any other file never is.
+    """Check that a recording can be written, without changing anything; only a recording may be replaced.
 
     Raises:
         RecordingError: the folder does not exist or is not writeable, or an existing file may not be replaced.
