@@ -18,23 +18,11 @@ from typing import Any, Final
 
 import griffe
 
+from activesteer.maneuver.kinds import KINDS
+
 ROOT: Final = Path(__file__).resolve().parents[1]
 FOLDER: Final = ROOT / "docs" / "reference"
 NOTE: Final = "<!-- Written by tools/make_reference.py from the docstrings; do not edit. -->\n"
-MANEUVER_KINDS: Final = (
-    "step_steer",
-    "sine_with_dwell",
-    "lane_change",
-    "slalom",
-    "follow_path",
-    "slowly_increasing_steer",
-    "constant_radius",
-    "sine_sweep",
-    "random_steer",
-    "brake_in_turn",
-    "straight_braking",
-    "open_loop",
-)
 METRICS: Final = (
     "step_response",
     "sine_with_dwell",
@@ -113,7 +101,7 @@ PAGES: Final[dict[str, Page]] = {
         (
             Section("All manoeuvres", "activesteer.maneuver.base", ("Maneuver",)),
             Section("Road", "activesteer.road.road", ("Road", "RoadPatch")),
-            *(Section(kind, f"activesteer.maneuver.{kind}") for kind in MANEUVER_KINDS),
+            *(Section(kind, f"activesteer.maneuver.{kind}") for kind in KINDS),
             Section(
                 "",
                 "activesteer.maneuver.open_loop_tables",

@@ -67,12 +67,12 @@ class AxleKind:
     @property
     def arms(self) -> dict[str, tuple[tuple[str, ...], str]]:
         """Swinging parts: name -> inner points (one or two) and outer point."""
-        found = {}
+        arms = {}
         for name, inner in self.carriers.items():
             if inner:
                 outer = next(link.outer for link in self.links if link.inner == inner[0])
-                found[name] = (inner, outer)
-        return found
+                arms[name] = (inner, outer)
+        return arms
 
 
 def _link(name: str, stiffness: float, hardening: float, damping: float, reason: str, outer: str = "") -> LinkKind:

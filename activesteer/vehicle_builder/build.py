@@ -113,19 +113,19 @@ def new_vehicle(
     check_origin(car, raw)
     # All files are written in a temporary folder: a car that cannot stand leaves no files.
     with tempfile.TemporaryDirectory() as scratch:
-        made = Path(scratch)
+        files = Path(scratch)
         for _, _, own in tyres.values():
             if own is not None:
-                shutil.copyfile(own, made / own.name)
-        trimmed = trim(car, lambda found: _write(made, car, found), log)
-        _write(made, car, trimmed, final=True)
-        text, keyframes = keyframe_xml(made / f"{name}.toml")
+                shutil.copyfile(own, files / own.name)
+        trimmed = trim(car, lambda trimmed: _write(files, car, trimmed), log)
+        _write(files, car, trimmed, final=True)
+        text, keyframes = keyframe_xml(files / f"{name}.toml")
         keyframes.write_text(text, encoding="utf-8")
-        shutil.copyfile(table_path, made / f"table{table_path.suffix.lower()}")
+        shutil.copyfile(table_path, files / f"table{table_path.suffix.lower()}")
         readme = readme_text(car, trimmed, f"table{table_path.suffix.lower()}")
-        (made / "README.md").write_text(readme, encoding="utf-8")
+        (files / "README.md").write_text(readme, encoding="utf-8")
         with writing(target, ParameterError):
-            shutil.copytree(made, target, dirs_exist_ok=True)
+            shutil.copytree(files, target, dirs_exist_ok=True)
     return NewVehicle(target, target / f"{name}.toml", tuple(car.assumptions), trimmed, car.questions)
 
 

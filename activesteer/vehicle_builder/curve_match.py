@@ -25,22 +25,22 @@ NEAR_ENOUGH: Final = 5e-6
 _CASTER: Final = 0.02
 
 
-def match_travel(axles: tuple[Axle, ...], found: dict[str, TrimmedAxle], held: HeldCar) -> float:
+def match_travel(axles: tuple[Axle, ...], trimmed: dict[str, TrimmedAxle], held: HeldCar) -> float:
     """Correct the curves over travel of all guided axles, and return the largest correction [m, rad].
 
     Args:
         axles: The guided axles.
-        found: Their curves; changed.
+        trimmed: Their curves; changed.
         held: The car on the rig.
     """
-    heights = np.zeros((len(_asked(axles[0]).travel_m), 4))
+    heights = np.zeros((len(_measured_curves(axles[0]).travel_m), 4))
     for axle in axles:
-        heights[:, _wheels(axle)] = np.array(_asked(axle).travel_m)[:, None]
+        heights[:, _wheels(axle)] = np.array(_measured_curves(axle).travel_m)[:, None]
     cases = [Case(height_m=row) for row in heights]
     poses, loads, standing, standing_loads = _swept(held, cases, heights[:, _wheels(axles[0])][:, 0])
     greatest = 0.0
     for axle in axles:
-        asked, curves = _asked(axle), found[axle.name].curves
+        measured, curves = _measured_curves(axle), trimmed[axle.name].curves
         assert curves is not None
         assert axle.measured is not None
         wheels = _wheels(axle)
@@ -49,28 +49,28 @@ def match_travel(axles: tuple[Axle, ...], found: dict[str, TrimmedAxle], held: H
         now[:, [0, 1, 3]] -= at_rest[[0, 1, 3]]
         changes = {}
         for column, name in enumerate(OVER_TRAVEL):
-            missing = np.array(getattr(asked, name)) - now[:, column]
+            missing = np.array(getattr(measured, name)) - now[:, column]
             greatest = max(greatest, _size(name, missing))
             changes[name] = _corrected(curves, name, missing)
         if axle.measured.wheel_load_N is not None:
             rise = (loads[:, wheels] - standing_loads[wheels]).mean(axis=1)
             changes["load_N"] = _corrected(curves, "load_N", np.array(axle.measured.wheel_load_N) - rise)
-        found[axle.name].curves = dataclasses.replace(curves, **changes)
+        trimmed[axle.name].curves = dataclasses.replace(curves, **changes)
     return greatest
 
 
-def match_steering(axle: Axle, found: TrimmedAxle, held: HeldCar, pinion_m: float) -> float:
+def match_steering(axle: Axle, trimmed: TrimmedAxle, held: HeldCar, pinion_m: float) -> float:
     """Correct the curves over the rack, and return the largest correction [m, rad].
 
     Args:
         axle: The front axle, guided.
-        found: Its curves; changed.
+        trimmed: Its curves; changed.
         held: The car on the rig.
         pinion_m: Rack travel per steering wheel angle [m/rad].
     """
-    asked, curves = _asked(axle), found.curves
+    measured, curves = _measured_curves(axle), trimmed.curves
     assert curves is not None
-    rack = np.array(asked.rack_m)
+    rack = np.array(measured.rack_m)
     cases = [Case("contact", steering_wheel_rad=float(at / pinion_m)) for at in rack]
     there = np.empty(len(rack))
     poses, _, standing, _ = _swept(held, cases, rack, there)
@@ -80,20 +80,20 @@ def match_steering(axle: Axle, found: TrimmedAxle, held: HeldCar, pinion_m: floa
     both = np.stack([_left(poses[:, 0], 0), _left(poses[::-1, 1], 1)])
     rest = np.stack([_left(standing[None, 0], 0), _left(standing[None, 1], 1)])
     now = (both - rest).mean(axis=0)
-    lifted, travel = now[:, 5], np.array(asked.travel_m)
+    lifted, travel = now[:, 5], np.array(measured.travel_m)
     greatest, changes = 0.0, {}
     for column, (name, by_travel) in enumerate(zip(OVER_RACK, OVER_TRAVEL, strict=True)):
-        over = np.array(getattr(asked, by_travel))
+        over = np.array(getattr(measured, by_travel))
         change = now[:, column] - np.interp(lifted, travel, over) + np.interp(0.0, travel, over)
-        wanted = CubicSpline(rack, getattr(asked, name))(there)
-        missing = np.interp(rack, there, wanted - (-change if name == "rack_steer_rad" else change))
+        target = CubicSpline(rack, getattr(measured, name))(there)
+        missing = np.interp(rack, there, target - (-change if name == "rack_steer_rad" else change))
         greatest = max(greatest, _size(name, missing))
         changes[name] = _corrected(curves, name, missing)
-    found.curves = dataclasses.replace(curves, **changes)
+    trimmed.curves = dataclasses.replace(curves, **changes)
     return greatest
 
 
-def _asked(axle: Axle) -> AxleCurves:
+def _measured_curves(axle: Axle) -> AxleCurves:
     assert axle.measured is not None
     return axle.measured.curves
 

@@ -52,15 +52,15 @@ def hardware_tables(part: Hardware) -> dict[str, Any]:
 
 def in_degrees(table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the table with angles in degrees, rounded for readers."""
-    found = {}
+    result = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
-            found[key] = in_degrees(value)
+            result[key] = in_degrees(value)
         elif key.endswith("_rad"):
-            found[key.removesuffix("_rad") + "_deg"] = _each(value, math.degrees)
+            result[key.removesuffix("_rad") + "_deg"] = _each(value, math.degrees)
         else:
-            found[key] = _each(value, lambda one: one)
-    return found
+            result[key] = _each(value, lambda one: one)
+    return result
 
 
 def _each(value: Any, change: Callable[[float], float]) -> Any:

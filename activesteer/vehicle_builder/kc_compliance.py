@@ -94,11 +94,11 @@ def fitted(loads: list[Load]) -> Elasticity:
         return ((deflections(forces, *parts(numbers)) - wanted) / _SCALE * weight)[known]
 
     def refined(start: Array) -> Array:
-        found = least_squares(
+        solution = least_squares(
             lambda numbers: np.concatenate([missing(numbers), _PULL * (numbers - start)]), start, x_scale="jac",
             ftol=1e-4, max_nfev=30,
         )  # fmt: skip
-        return np.asarray(found.x, dtype=np.float64)
+        return np.asarray(solution.x, dtype=np.float64)
 
     numbers = root if not loads else refined(root)
     hardens = bool(loads) and float(np.sum(missing(numbers) ** 2)) > len(loads)
@@ -134,9 +134,9 @@ def _start(forces: Array, wanted: Array, weight: Array) -> Array:
         right.append(wanted[known, index] * weight[known, 0] / _SCALE[index])
     rows.append(_PULL * np.eye(len(places)))
     right.append(_PULL * np.eye(5)[_LOWER])
-    found = np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=None)[0]
+    solution = np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=None)[0]
     matrix = np.zeros((5, 5))
-    matrix[_LOWER] = found
+    matrix[_LOWER] = solution
     values, vectors = np.linalg.eigh(matrix + np.tril(matrix, -1).T)
     held = vectors * np.sqrt(np.maximum(values, 1e-6))
     # The triangle of a product: QR of its other factor.

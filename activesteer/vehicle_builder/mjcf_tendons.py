@@ -139,12 +139,12 @@ def spring_classes(car: Car, trimmed: Trimmed) -> str:
     """Return the default classes of the springs."""
     lines = []
     for axle in car.axles:
-        found = trimmed.axle(axle.name)
-        squeezed = found.spring_force_N / found.spring_rate_Npm
+        trim = trimmed.axle(axle.name)
+        squeezed = trim.spring_force_N / trim.spring_rate_Npm
         length = axle.spring.length_m + squeezed
         hidden = ' group="3"' if axle.spring.start_m is not None and axle.spring.lever != 1.0 else ""
         lines.append(
-            f'      <default class="{axle.name}_spring"><tendon stiffness="{sig(found.spring_rate_Npm)}" '
+            f'      <default class="{axle.name}_spring"><tendon stiffness="{sig(trim.spring_rate_Npm)}" '
             f'springlength="{num(length)}"{hidden}/></default>'
         )
     return "\n".join(lines) + "\n"
@@ -154,9 +154,9 @@ def damper_classes(car: Car, trimmed: Trimmed) -> str:
     """Return the default classes of the dampers."""
     lines = []
     for axle in car.axles:
-        found, length = trimmed.axle(axle.name), axle.damper.length_m
-        ends = f"{num(length - found.bump_stop_m)} {num(length + found.rebound_stop_m)}"
-        stiffness = " ".join(sig(value) for value in found.stop_stiffness)
+        trim, length = trimmed.axle(axle.name), axle.damper.length_m
+        ends = f"{num(length - trim.bump_stop_m)} {num(length + trim.rebound_stop_m)}"
+        stiffness = " ".join(sig(value) for value in trim.stop_stiffness)
         hidden = ' group="3"' if axle.damper.start_m is not None and axle.damper.lever != 1.0 else ""
         lines.append(
             f'      <default class="{axle.name}_damper"><tendon springlength="{ends}" stiffness="{stiffness}"{hidden}/>'

@@ -64,11 +64,11 @@ def _open(rows: list[str]) -> str:
 
 
 def _trim_row(trimmed: Trimmed, name: str) -> str:
-    found = trimmed.axle(name)
-    speeds, forces = found.damper_velocity_mps, found.damper_force_N
+    trim = trimmed.axle(name)
+    speeds, forces = trim.damper_velocity_mps, trim.damper_force_N
     at = next(index for index, speed in enumerate(speeds) if speed >= 0.0)
     first, last = max(at - 1, 0), min(at + 1, len(speeds) - 1)
     damping = (forces[last] - forces[first]) / (speeds[last] - speeds[first])
-    stops = f"{num(1e3 * found.bump_stop_m, 1)} bump, {num(1e3 * found.rebound_stop_m, 1)} rebound"
-    spring = f"{num(1e-3 * found.spring_rate_Npm, 2)} | {num(found.spring_force_N, 0)}"
+    stops = f"{num(1e3 * trim.bump_stop_m, 1)} bump, {num(1e3 * trim.rebound_stop_m, 1)} rebound"
+    spring = f"{num(1e-3 * trim.spring_rate_Npm, 2)} | {num(trim.spring_force_N, 0)}"
     return f"| {name} | {spring} | {sig(damping, 3)} | {stops} |"

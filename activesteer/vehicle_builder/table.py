@@ -271,8 +271,8 @@ def chosen_kinds(table: CarTable, front: str | None = None, rear: str | None = N
     Raises:
         ParameterError: there is no such kind.
     """
-    asked = {"front": front, "rear": rear}
-    return {axle: kind_of(axle, asked[axle] or table.axle(axle).type or DEFAULTS[axle]) for axle in ("front", "rear")}
+    chosen = {"front": front, "rear": rear}
+    return {axle: kind_of(axle, chosen[axle] or table.axle(axle).type or DEFAULTS[axle]) for axle in ("front", "rear")}
 
 
 def in_vehicle_axes(table: CarTable) -> CarTable:

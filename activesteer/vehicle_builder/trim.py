@@ -25,10 +25,10 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.mass_properties import mass_properties
 from activesteer.vehicle.parameters import Friction
+from activesteer.vehicle_builder.corner_motion import corner_motion
 from activesteer.vehicle_builder.curve_match import NEAR_ENOUGH, match_steering, match_travel
 from activesteer.vehicle_builder.design import Axle, Car, Log
 from activesteer.vehicle_builder.masses import chassis_of
-from activesteer.vehicle_builder.motion import corner_motion
 from activesteer.vehicle_builder.steering_geometry import rack_per_steer_m
 from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
 
@@ -112,7 +112,7 @@ def trim(car: Car, write: Write, log: Log) -> Trimmed:
                 )
         unsprung = float(model.body_subtreemass[model.body(f"{axle.corner}_knuckle").id])
         sprung[axle.name] = loads[axle.name] / GRAVITY_MPS2 - unsprung
-        rates[axle.name] = _wanted_rate(axle, loads[axle.name], sprung[axle.name])
+        rates[axle.name] = _target_rate(axle, loads[axle.name], sprung[axle.name])
         _first_guess(axle, trimmed.axle(axle.name), ratios[axle.name], rates[axle.name], sprung[axle.name], log)
     wheel_rates = _let_stand(car, trimmed, write, ratios, rates)
     if guided:
@@ -142,7 +142,7 @@ def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
     return float((more - less) / 2e-4)
 
 
-def _wanted_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
+def _target_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
     """Return the wheel rate of the table, given or from the ride frequency; None if it gives the spring rate."""
     if axle.measured is not None and axle.measured.wheel_load_N is not None:
         return None
@@ -161,36 +161,36 @@ def _wanted_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
 
 
 def _first_guess(
-    axle: Axle, found: TrimmedAxle, ratios: tuple[float, float], rate: float | None, sprung_kg: float, log: Log
+    axle: Axle, axle_trim: TrimmedAxle, ratios: tuple[float, float], rate: float | None, sprung_kg: float, log: Log
 ) -> None:
     spring, damper = ratios
     measured = None if axle.measured is None else axle.measured.wheel_rate_Npm
-    found.spring_rate_Npm = axle.table.spring_rate_Npm or (measured or rate or 24000.0) / spring**2
-    found.spring_force_N = sprung_kg * GRAVITY_MPS2 / spring
-    if found.curves is None:
-        found.wheel_x_rad, found.wheel_z_rad = -axle.camber_rad, -axle.toe_rad
+    axle_trim.spring_rate_Npm = axle.table.spring_rate_Npm or (measured or rate or 24000.0) / spring**2
+    axle_trim.spring_force_N = sprung_kg * GRAVITY_MPS2 / spring
+    if axle_trim.curves is None:
+        axle_trim.wheel_x_rad, axle_trim.wheel_z_rad = -axle.camber_rad, -axle.toe_rad
     if axle.kind.strut and axle.table.anti_roll_bar_Nmprad is not None:
         # The bar acts along the strut, whose travel is smaller than that of the wheel.
         axle.anti_roll_bar_Npm /= damper**2
     bump, rebound = axle.table.bump_stop_m, axle.table.rebound_stop_m
-    found.bump_stop_m = log.take(f"{axle.name}.bump_stop_m", bump, _STOPS_M[0] * damper, "35 mm at the wheel", "m")
-    found.rebound_stop_m = log.take(
+    axle_trim.bump_stop_m = log.take(f"{axle.name}.bump_stop_m", bump, _STOPS_M[0] * damper, "35 mm at the wheel", "m")
+    axle_trim.rebound_stop_m = log.take(
         f"{axle.name}.rebound_stop_m", rebound, _STOPS_M[1] * damper, "65 mm at the wheel", "m"
     )
     if measured is not None and axle.table.stop_stiffness is None:
         # The measured wheel load includes them.
-        found.stop_stiffness = (0.0, 0.0, 0.0)
+        axle_trim.stop_stiffness = (0.0, 0.0, 0.0)
     elif axle.table.stop_stiffness is None:
         # The force at the wheel is r F(r z): for the stop force of the compact at the wheel, divide by r2, r3, r4.
-        found.stop_stiffness = tuple(
+        axle_trim.stop_stiffness = tuple(
             float(f"{value / damper ** (power + 2):.3g}") for power, value in enumerate(_STOP_AT_WHEEL)
         )
-        words = ", ".join(f"{value:g}" for value in found.stop_stiffness)
+        words = ", ".join(f"{value:g}" for value in axle_trim.stop_stiffness)
         log.note(f"{axle.name}.stop_stiffness", words, "cellular rubber, at the wheel as the compact's")
     else:
-        found.stop_stiffness = axle.table.stop_stiffness
+        axle_trim.stop_stiffness = axle.table.stop_stiffness
     friction = axle.table.damper_friction_N
-    found.friction_N = log.take(
+    axle_trim.friction_N = log.take(
         f"{axle.name}.damper_friction_N", friction, round(30.0 / damper), "30 N at the wheel", "N"
     )
 
@@ -228,7 +228,7 @@ def wheel_rates_Npm(held: HeldCar) -> dict[str, float]:
 
 
 def _let_stand(
-    car: Car, trimmed: Trimmed, write: Write, ratios: dict[str, tuple[float, float]], wanted: dict[str, float | None]
+    car: Car, trimmed: Trimmed, write: Write, ratios: dict[str, tuple[float, float]], targets: dict[str, float | None]
 ) -> dict[str, float]:
     """Let the car stand by Newton's method for each axle, and return the wheel rates."""
     left_m = np.zeros(4)
@@ -237,23 +237,23 @@ def _let_stand(
         rates = wheel_rates_Npm(stand.held)
         left_m, done = stand.travel_m, True
         for index, axle in ((0, car.front), (2, car.rear)):
-            found, ratio, rate = trimmed.axle(axle.name), ratios[axle.name][0], wanted[axle.name]
+            axle_trim, ratio, rate = trimmed.axle(axle.name), ratios[axle.name][0], targets[axle.name]
             travel = float(stand.travel_m[index : index + 2].mean())
             toe = float(stand.toe_rad[index : index + 2].mean()) - axle.toe_rad
             camber = float(stand.camber_rad[index : index + 2].mean()) - axle.camber_rad
             off = 0.0 if rate is None else rates[axle.name] / rate - 1.0
-            if found.curves is not None:
+            if axle_trim.curves is not None:
                 # The curves are matched as a whole.
                 toe = camber = 0.0
             done &= abs(travel) < _TRAVEL_M and max(abs(toe), abs(camber)) < _ANGLE_RAD and abs(off) < _RATE_FRACTION
-            stiffness = max(rates[axle.name], 0.3 * found.spring_rate_Npm * ratio**2)
-            found.spring_force_N += travel * stiffness / ratio
-            found.wheel_x_rad += camber
-            found.wheel_z_rad += toe
+            stiffness = max(rates[axle.name], 0.3 * axle_trim.spring_rate_Npm * ratio**2)
+            axle_trim.spring_force_N += travel * stiffness / ratio
+            axle_trim.wheel_x_rad += camber
+            axle_trim.wheel_z_rad += toe
             # Only near the design position: beyond it stops and progressive links act too.
             if rate is not None and abs(travel) < 0.01:
-                found.spring_rate_Npm -= off * rate / ratio**2
-                if found.spring_rate_Npm <= 0.0:
+                axle_trim.spring_rate_Npm -= off * rate / ratio**2
+                if axle_trim.spring_rate_Npm <= 0.0:
                     raise ModelError(
                         f"the links alone give a wheel rate above the desired {rate:.0f} N/m", key=axle.name
                     )
@@ -284,16 +284,16 @@ def _match_curves(car: Car, guided: tuple[Axle, ...], trimmed: Trimmed, write: W
 
 def _fit_steering(car: Car, trimmed: Trimmed, write: Write, log: Log) -> None:
     """Find the pinion for the ratio, or the ratio of the pinion."""
-    wanted = car.table.steering.ratio
-    if wanted is None and car.table.steering.pinion_radius_m is None:
-        wanted = _RATIO
+    target = car.table.steering.ratio
+    if target is None and car.table.steering.pinion_radius_m is None:
+        target = _RATIO
         log.note("steering.ratio", f"{_RATIO:g}", "passenger car, 14 to 18")
     for _ in range(4):
         trimmed.ratio = _ratio(_stand(write(trimmed)).held)
-        if wanted is None or abs(trimmed.ratio / wanted - 1.0) < 1e-4:
+        if target is None or abs(trimmed.ratio / target - 1.0) < 1e-4:
             return
-        trimmed.pinion_radius_m *= trimmed.ratio / wanted
-        trimmed.ratio = wanted
+        trimmed.pinion_radius_m *= trimmed.ratio / target
+        trimmed.ratio = target
 
 
 def _ratio(held: HeldCar) -> float:
@@ -307,13 +307,13 @@ def _ratio(held: HeldCar) -> float:
     return 1.0 / float(np.polyfit(_STEER_RAD, steer, 1)[0])
 
 
-def _fit_damper(axle: Axle, found: TrimmedAxle, ratio: float, ride_Npm: float, sprung_kg: float) -> None:
+def _fit_damper(axle: Axle, axle_trim: TrimmedAxle, ratio: float, ride_Npm: float, sprung_kg: float) -> None:
     table = axle.table
     if table.damper_velocity_mps is not None and table.damper_force_N is not None:
-        found.damper_velocity_mps, found.damper_force_N = table.damper_velocity_mps, table.damper_force_N
+        axle_trim.damper_velocity_mps, axle_trim.damper_force_N = table.damper_velocity_mps, table.damper_force_N
         return
     damping = table.damper_Nspm
     if damping is None:
         damping = 2.0 * (axle.damping_ratio or 0.28) * math.sqrt(ride_Npm * sprung_kg) / ratio**2
-    found.damper_velocity_mps = _CURVE_MPS
-    found.damper_force_N = tuple(round(force * damping / _CURVE_NSPM, 1) for force in _CURVE_N)
+    axle_trim.damper_velocity_mps = _CURVE_MPS
+    axle_trim.damper_force_N = tuple(round(force * damping / _CURVE_NSPM, 1) for force in _CURVE_N)

@@ -164,8 +164,8 @@ def _named(linear: _Linear) -> dict[str, Mode]:
     size = linear.free.size
     lower = -np.linalg.solve(linear.mass, np.hstack([linear.stiffness, linear.damping]))
     upper = np.hstack([np.zeros((size, size)), np.eye(size)])
-    found = np.linalg.eig(np.vstack([upper, lower]))
-    roots, vectors = (np.asarray(part, dtype=np.complex128) for part in found)
+    solution = np.linalg.eig(np.vstack([upper, lower]))
+    roots, vectors = (np.asarray(part, dtype=np.complex128) for part in solution)
     keep = (roots.imag > 1e-3) & (np.abs(roots) < 2.0 * math.pi * _FASTEST_HZ)
     roots, shapes = roots[keep], vectors[size:, keep]
     energy = np.einsum("im,ij,jm->m", shapes.conj(), linear.mass, shapes).real

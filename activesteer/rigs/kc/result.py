@@ -101,8 +101,8 @@ class KcResult:
             lines.append(
                 f"{entry.name:31} {entry.axle:5} {_number(entry.value):>7} {entry.unit:9} {band:>14} {verdict}".rstrip()
             )
-        asked = [entry for entry in self.metrics if entry.inside is not None]
-        lines += ["", f"{sum(entry.inside is True for entry in asked)} of {len(asked)} target bands met"]
+        targeted = [entry for entry in self.metrics if entry.inside is not None]
+        lines += ["", f"{sum(entry.inside is True for entry in targeted)} of {len(targeted)} target bands met"]
         for entry in self.outside:
             remark = f": {entry.remark}" if entry.remark else ""
             lines += textwrap.wrap(f"outside: {entry.axle} {entry.name}{remark}", 80, subsequent_indent="  ")

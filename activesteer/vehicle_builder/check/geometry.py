@@ -12,7 +12,7 @@ import numpy as np
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.vehicle_builder.check.findings import Finding, Level, Usual, judged
-from activesteer.vehicle_builder.motion import corner_motion
+from activesteer.vehicle_builder.corner_motion import corner_motion
 
 _MIRROR_M: Final = 1e-6
 _TOUCH_M: Final = 0.005
