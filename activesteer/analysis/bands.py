@@ -1,4 +1,4 @@
-"""Where the curves of a population lie: 10 to 90 % of its runs, to be drawn behind the nominal curve."""
+"""Bands of a population's curves: from 10 to 90 % of its runs, drawn behind the nominal curve."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from activesteer.files import reading
 from activesteer.resources import DEFAULT_DRIVER, studies_dir
 
 QUANTILES: Final = (0.1, 0.9)
-"""Which part of the runs lies below the lower and below the upper edge."""
+"""Fractions of the runs below the lower and below the upper edge."""
 TRACK: Final = ("front_axle_x_m", "front_axle_y_m")
-"""Channels whose band is across the course: y over x."""
+"""Channels of the band across the course, y over x."""
 TRACK_STEP_M: Final = 0.5
 FILE: Final = "bands.parquet"
 _MANTISSA_BITS: Final = 11
-"""What is kept of an edge: 0.02 % of it, less than a line is wide."""
+"""Bits that are kept of an edge: an error of 0.02 %, less than the width of a line."""
 
 
 class Band(NamedTuple):
     """A band of one channel.
 
     Attributes:
-        at: Time [s], or x of the front axle centre [m] for its y, shape (n,).
+        at: Time [s], or x of the front axle centre [m], shape (n,).
         low: Lower edge, shape (n,).
         high: Upper edge, shape (n,).
     """
@@ -42,10 +42,10 @@ class Band(NamedTuple):
 
 
 def band_over_time(curves: Sequence[Array], step_s: float) -> Band:
-    """The band of a channel.
+    """Return the band of a channel over time.
 
     Args:
-        curves: The channel in every run, every `step_s`; runs of different length are compared as far as all go.
+        curves: The channel in every run, every `step_s`; the shortest run ends the band.
         step_s: Time between two values [s].
     """
     length = min(map(len, curves))
@@ -54,7 +54,7 @@ def band_over_time(curves: Sequence[Array], step_s: float) -> Band:
 
 
 def band_of_tracks(tracks: Sequence[tuple[Array, Array]]) -> Band:
-    """The band of tracks across the course, as far along it as half of the runs come.
+    """Return the band of tracks across the course, to the place that half of the runs reach.
 
     Args:
         tracks: x and y of the front axle centre in every run [m].
@@ -62,14 +62,14 @@ def band_of_tracks(tracks: Sequence[tuple[Array, Array]]) -> Band:
     furthest = [np.maximum.accumulate(x) for x, _ in tracks]
     begin, end = max(float(x[0]) for x in furthest), float(np.median([x[-1] for x in furthest]))
     at = np.arange(begin, end, TRACK_STEP_M)
-    # A car that turns round is looked at until then.
+    # A car that turns round counts until it does so.
     across = [np.interp(at, x, y, right=np.nan) for x, (_, y) in zip(furthest, tracks, strict=True)]
     low, high = np.nanquantile(np.stack(across), QUANTILES, axis=0)
     return Band(at, low, high)
 
 
 def table_of(bands: Mapping[tuple[str, str, str], Band]) -> pa.Table:
-    """Bands as they are stored, with the precision of a picture.
+    """Return bands as a table, with the precision of a picture.
 
     Args:
         bands: (manoeuvre, controller, channel) -> band.
@@ -95,14 +95,14 @@ def _rounded(values: Array) -> np.ndarray:
 
 
 def bands_of(recording: RecordingLike) -> Mapping[str, Band]:
-    """The bands that belong to a run.
+    """Return the population's bands for a run.
 
     Args:
         recording: The run.
 
     Returns:
-        Channel -> band; nothing where the run is none of the paper's as it stands, by the driver that the population
-        varies, or no population of its car is stored.
+        Channel -> band. Empty if the run differs from the paper's, if the population varies another driver, or if no
+        population of the car is stored.
 
     Raises:
         StudyError: the stored file cannot be read.

@@ -1,6 +1,6 @@
-"""Metrics of braking in a turn by ISO 7975: what the car does in the first second, against the circle it was on.
+"""Metrics of braking in a turn by ISO 7975: the car in the first second, compared with its circle before the brake.
 
-The reference is the circle of the steady state before the brake: its radius is speed over yaw rate, its middle lies
+The reference is the circle of the steady state before the brake. Its radius is speed over yaw rate. Its centre lies
 across the track of the centre of gravity at the beginning of braking.
 
 Source: ISO 7975, Passenger cars - Braking in a turn - Open-loop test method.
@@ -22,9 +22,9 @@ BEFORE_S: Final = 0.5
 AFTER_S: Final = 1.0
 """Time after the beginning of braking at which the car is compared with its circle [s]."""
 STANDSTILL_MPS: Final = 1.0
-"""Speed at which braking counts as ended [m/s]."""
+"""Speed at which braking ends [m/s]."""
 MIN_YAW_RATE_RADPS: Final = math.radians(0.5)
-"""Below this yaw rate before the brake the car goes straight on [rad/s]."""
+"""Smallest yaw rate before the brake of a car that turns [rad/s]."""
 
 KEY_METRICS: Final = (
     KeyMetric("yaw_rate_deviation_after_1000ms_radps", 1e-3),
@@ -42,16 +42,19 @@ KEY_METRICS: Final = (
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
-    """Metrics of braking in a turn.
+    """Return the metrics of braking in a turn.
 
     Returns:
-        `braking_begin_time_s`; steady state before: `speed_begin_mps`, `ay_begin_mps2`, `yaw_rate_begin_radps`,
-        `radius_begin_m`. `mean_deceleration_mps2`: from the beginning of braking to its end (standstill, pedal
-        released, or end of the run). 1 s after the beginning: `yaw_rate_after_1000ms_radps`, and
-        `yaw_rate_deviation_after_1000ms_radps`, by how much it is above the one that keeps the car on the circle at
-        its speed then, in the direction of the turn (above 0 the car turns in); `path_deviation_after_1000ms_m`, by
-        how far the centre of gravity is outside the circle (below 0 inside). `yaw_rate_peak_abs_radps`,
-        `sideslip_peak_abs_rad`: from the beginning of braking on. nan where the run ends before.
+        - `braking_begin_time_s`; the steady state before it: `speed_begin_mps`, `ay_begin_mps2`,
+          `yaw_rate_begin_radps`, `radius_begin_m`.
+        - `mean_deceleration_mps2`: until standstill, release of the pedal, or the end of the run.
+        - `yaw_rate_after_1000ms_radps`: 1 s after the beginning of braking.
+        - `yaw_rate_deviation_after_1000ms_radps`: the same less the yaw rate that keeps the car on the circle at its
+          present speed, in the direction of the turn; above 0 the car turns in.
+        - `path_deviation_after_1000ms_m`: distance of the centre of gravity from the circle, outwards positive.
+        - `yaw_rate_peak_abs_radps`, `sideslip_peak_abs_rad`: from the beginning of braking on.
+
+        A value is nan if the run ends before it.
 
     Raises:
         RecordingError: a channel is missing, the brake is not pressed, or the car does not turn before.

@@ -1,4 +1,4 @@
-"""What of a course a picture shows."""
+"""The part of a course that a picture shows."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from activesteer.road.course import Course
 
 BEFORE_M: Final = 20.0
 AFTER_M: Final = 50.0
-"""How much of the road is shown before the first gate and after the last [m]."""
+"""Length of the road before the first gate and after the last gate [m]."""
 BESIDE_M: Final = 2.0
-"""How much of it beside the course [m]; a car that goes further off is out of the picture."""
+"""Width of the road beside the course [m]; a car further off is outside the picture."""
 
 
 class CourseView(NamedTuple):
@@ -22,8 +22,8 @@ class CourseView(NamedTuple):
     Attributes:
         x_m: Limits of x [m].
         y_m: Limits of y [m].
-        path_x_m: World x of the path, straight on beyond its end as far as the picture goes [m], shape (n,).
-        path_y_m: World y of it [m], shape (n,).
+        path_x_m: World x of the path, extended straight to the ends of the picture [m], shape (n,).
+        path_y_m: World y of the path [m], shape (n,).
     """
 
     x_m: tuple[float, float]
@@ -33,7 +33,7 @@ class CourseView(NamedTuple):
 
 
 def view_of(course: Course) -> CourseView:
-    """From before the first gate to behind the last; all of the path where there are no gates."""
+    """Return the view from before the first gate to behind the last gate, or of the whole path without gates."""
     path = course.path
     sides = [y for lane in course.lanes for y in (lane.right_y_m, lane.left_y_m)]
     every_y = np.concatenate([path.y_m, course.cones_m[:, 1], sides])

@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from activesteer.errors import RecordingError
 
 _ORDER: Final = 6
-"""Order of one pass; forwards and backwards together have the twelve poles of the standards."""
+"""Order of one pass; both passes together have the twelve poles of the standards."""
 _ENDS_PERIODS: Final = 6.0
-"""Periods of the cut-off frequency that the filter needs to die away."""
+"""Time in which the filter dies away, in periods of the cut-off frequency."""
 
 
 def low_pass(values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float) -> NDArray[np.float64]:
-    """A Butterworth filter of twelve poles without phase: six forwards, the same six backwards.
+    """Apply a Butterworth filter of twelve poles without phase: six poles forwards, the same six backwards.
 
-    Both passes have the cut-off frequency given; together they take a sine of this frequency down to half.
+    Both passes have the given cut-off frequency; together they halve a sine of this frequency.
 
     Args:
         values: Samples at equal distances, shape (n,).
-        timestep_s: Distance of the samples [s].
+        timestep_s: Interval between the samples [s].
         cut_off_Hz: Cut-off frequency [Hz], below half the sampling frequency.
 
     Returns:
@@ -42,7 +42,7 @@ def low_pass(values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float)
             value=timestep_s,
             allowed=0.5 / cut_off_Hz,
         )
-    # The signal is continued at both ends, mirrored through its end points, until a pass has died away.
+    # The signal is mirrored at both end points, for as long as a pass needs to die away.
     ends = min(len(values) - 1, round(_ENDS_PERIODS / (cut_off_Hz * timestep_s)))
     if ends * timestep_s * cut_off_Hz < 1.0:
         raise RecordingError(

@@ -1,8 +1,8 @@
 """Frequency response of a recorded run to its steering, and its metrics, by ISO 7401 (continuous sinusoidal input).
 
-The run begins and ends with the car going straight on, so that the discrete Fourier transform of the whole run has no
+The run begins and ends with the car going straight, so that the discrete Fourier transform of the whole run has no
 leakage. The response at a frequency is the cross spectrum over the spectrum of the input, both summed over the
-neighbouring lines; the coherence says how much of the output follows from the input by a linear system.
+neighbouring lines. The coherence is the share of the output that follows from the input by a linear system.
 
 Source: ISO 7401, Road vehicles - Lateral transient response test methods; J. S. Bendat and A. G. Piersol, Random Data
 (2010), chapter 6 (the estimate H1 and the coherence).
@@ -22,16 +22,16 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
 
 INPUT: Final = "steering_wheel_demand_rad"
-"""What the driver asks for: the steering wheel follows it within a millisecond."""
+"""The driver's demand; the steering wheel follows it within a millisecond."""
 OUTPUTS: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 """Channels whose response is evaluated."""
 HALF_BAND_LINES: Final = 2
-"""Lines to either side that are summed into one value."""
+"""Number of lines to either side that are summed into one value."""
 MIN_SPECTRUM: Final = 1e-3
-"""Fraction of its largest amplitude that the input must have at a frequency for a response there to mean something."""
+"""Least amplitude of the input for a response, as a fraction of the largest amplitude of the input."""
 LOWEST_Hz: Final = 0.2
 HIGHEST_Hz: Final = 4.0
-"""Range that metrics are evaluated in [Hz]."""
+"""Range of the metrics [Hz]."""
 
 KEY_METRICS: Final = (
     KeyMetric("yaw_rate_gain_1ps", 0.005),
@@ -54,7 +54,7 @@ class FrequencyResponse(NamedTuple):
     Attributes:
         frequency_Hz: Frequencies [Hz], shape (n,).
         response: Output over input, complex, shape (n,).
-        coherence: 0 to 1, shape (n,).
+        coherence: Coherence, 0 to 1, shape (n,).
     """
 
     frequency_Hz: NDArray[np.float64]
@@ -68,13 +68,13 @@ def frequency_response(
     frequency_Hz: NDArray[np.float64],
     input_channel: str = INPUT,
 ) -> FrequencyResponse:
-    """Response of a channel to the steering.
+    """Return the response of a channel to the steering.
 
     Args:
-        recording: A run that begins and ends going straight on, with all frequencies in its steering.
+        recording: A run that begins and ends straight, with all frequencies in its steering.
         output: Channel.
-        frequency_Hz: Where it is wanted [Hz]; the nearest lines of the spectrum are returned.
-        input_channel: Channel that the response is referred to.
+        frequency_Hz: Frequencies [Hz]; the nearest lines of the spectrum are returned.
+        input_channel: Input of the response.
 
     Returns:
         Response and coherence at these lines.
@@ -110,14 +110,14 @@ def response_of(
     input_channel: str,
     largest: float,
 ) -> FrequencyResponse:
-    """The estimate H1 and the coherence.
+    """Return the estimate H1 and the coherence.
 
     Args:
         frequency_Hz: Frequencies [Hz], shape (n,).
         power_u: Power of the input there, shape (n,).
         power_y: Power of the output, in the same measure, shape (n,).
         cross: Cross spectrum, the conjugate input times the output, shape (n,).
-        input_channel: What the input is called.
+        input_channel: Name of the input, for the error.
         largest: Largest power of the input at any frequency.
 
     Raises:
@@ -132,18 +132,18 @@ def response_of(
         )
     with np.errstate(invalid="ignore"):
         coherence = np.abs(cross) ** 2 / (power_u * power_y)
-    # Without any output the response is zero and nothing contradicts it.
+    # Without any output the response is zero, and the coherence is perfect.
     return FrequencyResponse(frequency_Hz, cross / power_u, np.where(power_y > 0.0, coherence, 1.0))
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
-    """Metrics of a sine sweep, from 0.2 to 4 Hz.
+    """Return the metrics of a sine sweep, from 0.2 to 4 Hz.
 
     Returns:
-        For yaw rate, lateral acceleration (`ay`) and roll: `<name>_gain_...` at 0.2 Hz per steering wheel angle,
-        `<name>_phase_at_1Hz_rad`. For the yaw rate also the largest gain over the one at 0.2 Hz with its frequency, the
-        frequency at which the phase passes -45 deg, and the bandwidth (gain at 0.7 of the one at 0.2 Hz); nan where
-        they are not reached. `coherence_min` is the least of all three up to 2 Hz.
+        For yaw rate, lateral acceleration (`ay`) and roll `<name>_gain_...` at 0.2 Hz per steering wheel angle and
+        `<name>_phase_at_1Hz_rad`. For the yaw rate also the peak gain over the gain at 0.2 Hz and its frequency, the
+        frequency at which the phase passes -45 deg, and the bandwidth, at 0.7 of the gain at 0.2 Hz; nan if the run
+        does not reach them. `coherence_min` is the least coherence of the three outputs up to 2 Hz.
 
     Raises:
         RecordingError: a channel is missing, or the run is no sweep over this range.
@@ -172,7 +172,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _falls_to(x: NDArray[np.float64], y: NDArray[np.float64], level: float) -> float:
-    """Where y first falls to a level, interpolated; nan where it never does."""
+    """Return the first abscissa at which y falls to a level, interpolated; nan if it never does."""
     below = np.flatnonzero((y[1:] <= level) & (y[:-1] > level))
     if below.size == 0:
         return math.nan

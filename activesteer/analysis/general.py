@@ -1,4 +1,4 @@
-"""Metrics that make sense for every manoeuvre: peaks, root mean squares, and the friction that the tyres used."""
+"""Metrics for every manoeuvre: peaks, root mean squares, and the friction that the tyres use."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SIGNALS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("
 """Channels that are evaluated: name and unit suffix."""
 
 MIN_LOAD_N: Final = 100.0
-"""Vertical load below which a tyre carries nothing that matters and its force ratio is not looked at [N]."""
+"""Vertical load below which the force ratio of a tyre does not count [N]."""
 
 KEY_METRICS: Final = (
     KeyMetric("yaw_rate_peak_abs_radps", 1e-3),
@@ -34,12 +34,12 @@ KEY_METRICS: Final = (
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
-    """Peaks and root mean squares of a run.
+    """Return peaks and root mean squares of a run.
 
     Returns:
-        `<name>_peak_abs_<unit>` and `<name>_rms_<unit>` of yaw rate, lateral acceleration, sideslip and roll, the
-        largest steering wheel angle, `friction_used_max` (largest ratio of horizontal to vertical tyre force, of all
-        corners) and `speed_end_mps`.
+        `<name>_peak_abs_<unit>` and `<name>_rms_<unit>` of yaw rate, lateral acceleration, sideslip and roll; the
+        largest steering wheel angle; `friction_used_max`, the largest ratio of horizontal to vertical force of any
+        tyre; and `speed_end_mps`.
 
     Raises:
         RecordingError: a channel is missing.
@@ -54,7 +54,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def measured_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Those of `metrics` whose channels were measured; a car on a proving ground has no sensors of tyre forces."""
+    """Return the metrics whose channels were measured; a car on a proving ground has no sensors of tyre forces."""
     values: dict[str, float] = {}
     for name, unit in SIGNALS:
         with suppress(RecordingError):

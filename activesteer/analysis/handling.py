@@ -1,13 +1,13 @@
 """Steady-state handling from a slow ramp at constant speed or on a constant radius, by ISO 4138.
 
 The understeer gradient is the gradient of the steer angle (steering wheel over overall ratio) over lateral
-acceleration, less that of the Ackermann angle l/R; with the measured curvature yaw rate over speed it is one and the
-same line in both tests:
+acceleration, less the gradient of the Ackermann angle l/R. With the measured curvature, yaw rate over speed, both tests
+give the same line:
 
     steering wheel / ratio - l * yaw rate / speed = offset + EG * lateral acceleration
 
-Gradients are fitted over `FIT_MPS2`, where tyres and suspension are linear. The offset is the little by which the car
-lags behind the ramp.
+Gradients are fitted over `FIT_MPS2`, where tyres and suspension are linear. The offset is the small lag of the car
+behind the ramp.
 
 Source: ISO 4138, Passenger cars - Steady-state circular driving behaviour; v_ch = sqrt(l/EG) is the speed at which the
 yaw rate per steer angle is largest.
@@ -31,11 +31,11 @@ from activesteer.theory.single_track import characteristic_speed
 FIT_MPS2: Final = (0.5, 2.0)
 """Range of lateral acceleration over which gradients are fitted [m/s2]."""
 DEPARTURE: Final = 0.05
-"""Fraction by which the steer angle departs from the line where the linear range ends."""
+"""Relative departure of the steer angle from the line at the end of the linear range."""
 SMOOTHING_S: Final = 0.5
-"""Window of the moving average that limits are read from [s]."""
+"""Window of the moving average for the limits [s]."""
 MIN_SPEED_MPS: Final = 1.0
-"""Slower than this, curvature is not evaluated [m/s]."""
+"""Least speed at which curvature is evaluated [m/s]."""
 
 KEY_METRICS: Final = (
     KeyMetric("understeer_gradient_radpmps2", 1e-5),
@@ -53,7 +53,7 @@ KEY_METRICS: Final = (
 
 
 class CarGeometry(NamedTuple):
-    """What the evaluation must know of the car.
+    """Geometry of the car that the evaluation needs.
 
     Attributes:
         cg_to_front_m: Distance of the centre of gravity to the front axle, l_V [m].
@@ -72,7 +72,7 @@ class CarGeometry(NamedTuple):
 
 
 class Handling(NamedTuple):
-    """Steady-state handling in one test. Gradients are over lateral acceleration; nan where a test does not define one.
+    """Steady-state handling in one test. Gradients are over lateral acceleration; nan if the test does not define them.
 
     Attributes:
         understeer_gradient_radpmps2: EG, at the road wheel [rad/(m/s2)].
@@ -83,7 +83,7 @@ class Handling(NamedTuple):
         roll_gradient_radpmps2: Roll angle, outwards positive [rad/(m/s2)].
         sideslip_gradient_radpmps2: Sideslip angle at the centre of gravity, in a left turn [rad/(m/s2)].
         front_slip_gradient_radpmps2: Effective slip angle of the front axle, steering and roll steer included.
-        rear_slip_gradient_radpmps2: The same of the rear axle.
+        rear_slip_gradient_radpmps2: Effective slip angle of the rear axle.
         yaw_rate_gain_1ps: Yaw rate per steering wheel angle [1/s]; at constant speed.
         steering_wheel_gain_mps2prad: Lateral acceleration per steering wheel angle [(m/s2)/rad]; at constant speed.
         limit_acceleration_mps2: Largest lateral acceleration [m/s2].
@@ -104,10 +104,10 @@ class Handling(NamedTuple):
 
 
 def car_of(recording: RecordingLike) -> CarGeometry:
-    """The car of a recording, from its metadata.
+    """Read the geometry of the car from the metadata of a recording.
 
     Raises:
-        RecordingError: the metadata do not say.
+        RecordingError: the metadata do not hold it.
     """
     vehicle: Any = recording.metadata.get("vehicle")
     try:
@@ -124,18 +124,18 @@ def car_of(recording: RecordingLike) -> CarGeometry:
 
 
 def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> Handling:
-    """Steady-state handling from a test.
+    """Return the steady-state handling from a test.
 
     Args:
         recording: A slow ramp to either side, from straight ahead: of the steering wheel at constant speed, or of the
             speed on a circle.
-        car: The car; from the recording's metadata where not given.
+        car: Geometry of the car; by default from the recording's metadata.
 
     Returns:
         Gradients and limits.
 
     Raises:
-        RecordingError: a channel is missing, or the run does not cover the range that gradients are fitted over.
+        RecordingError: a channel is missing, or the run does not cover the range of the fit.
     """
     car = car or car_of(recording)
 
@@ -148,7 +148,7 @@ def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> Handli
     speed = channel("vx_mps")
     step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))
     smoothed = _moving_average(ay, step_s)
-    # Only what comes before the limit: behind it the same acceleration is passed again.
+    # Only samples before the limit: beyond it the same acceleration occurs again.
     top = int(smoothed.argmax())
     first = int(np.argmax(smoothed > FIT_MPS2[0]))
     rising = np.zeros(len(ay), dtype=bool)
@@ -192,19 +192,19 @@ def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> Handli
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
-    """The values of `evaluate`, and the speed at the end."""
+    """Return the values of `evaluate`, and the speed at the end."""
     return {**evaluate(recording)._asdict(), "speed_end_mps": float(recording["speed_mps"][-1])}
 
 
 def _line(x: Array, y: Array) -> tuple[float, float]:
-    """Slope and offset of the line through points, by least squares."""
+    """Return slope and offset of the least-squares line through points."""
     spread = x - x.mean()
     slope = float(spread @ (y - y.mean()) / (spread @ spread))
     return slope, float(y.mean() - slope * x.mean())
 
 
 def _moving_average(values: Array, step_s: float) -> Array:
-    """Mean over a window around every sample; towards the ends over as much of it as there is."""
+    """Return the mean over a window around every sample, which is cut at the ends of the signal."""
     half = max(1, round(0.5 * SMOOTHING_S / step_s))
     total = np.concatenate(([0.0], np.cumsum(values)))
     index = np.arange(len(values))

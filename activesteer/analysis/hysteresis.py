@@ -1,4 +1,4 @@
-"""A loop of one signal over another, as an on-centre weave test draws it: gradient and dead bands.
+"""A loop of one signal over another, as in an on-centre weave test: gradient and dead bands.
 
 Source: ISO 13674-1, Road vehicles - Test method for the quantification of on-centre handling - Weave test.
 """
@@ -14,16 +14,16 @@ from activesteer.analysis.series import Array
 from activesteer.errors import RecordingError
 
 AROUND: Final = 0.2
-"""Fraction of the largest abscissa around zero over which a gradient is taken."""
+"""Range of the gradient around zero, as a fraction of the largest abscissa."""
 
 
 class Loop(NamedTuple):
-    """A loop, as its branches pass through zero; means of all periods.
+    """Properties of a loop at its passages through zero, means of all periods.
 
     Attributes:
-        gradient: Slope of the ordinate over the abscissa around abscissa zero, of both branches.
-        ordinate_dead_band: Height of the loop at abscissa zero; positive where the ordinate comes after the abscissa.
-        abscissa_dead_band: Width of the loop at ordinate zero, likewise.
+        gradient: Slope of the ordinate over the abscissa around abscissa zero, mean of both branches.
+        ordinate_dead_band: Height of the loop at abscissa zero; positive if the ordinate lags behind the abscissa.
+        abscissa_dead_band: Width of the loop at ordinate zero, with the same sign.
     """
 
     gradient: float
@@ -32,17 +32,17 @@ class Loop(NamedTuple):
 
 
 def loop(x: Array, y: Array) -> Loop:
-    """Evaluates a loop.
+    """Evaluate a loop.
 
     Args:
-        x: Abscissa, that oscillates about zero, shape (n,).
+        x: Abscissa, which oscillates about zero, shape (n,).
         y: Ordinate, shape (n,).
 
     Returns:
         Gradient and dead bands.
 
     Raises:
-        RecordingError: one of the two does not pass through zero both upwards and downwards.
+        RecordingError: a signal does not pass through zero both upwards and downwards.
     """
     up, down = (crossings(x, y, rising=rising) for rising in (True, False))
     right, left = (crossings(y, x, rising=rising) for rising in (True, False))
@@ -60,18 +60,18 @@ def loop(x: Array, y: Array) -> Loop:
 
 
 def crossings(x: Array, y: Array, *, rising: bool) -> Array:
-    """Values of a signal where another passes through zero, interpolated.
+    """Return the interpolated values of one signal where another signal passes through zero.
 
     Args:
         x: The other signal, shape (n,).
         y: The signal, shape (n,).
-        rising: Whether it passes upwards.
+        rising: Whether the other signal passes upwards.
 
     Returns:
         A value for each passage.
 
     Raises:
-        RecordingError: there is none.
+        RecordingError: the other signal never does.
     """
     sign = 1.0 if rising else -1.0
     places = np.flatnonzero((sign * x[:-1] < 0.0) & (sign * x[1:] >= 0.0))
@@ -82,12 +82,12 @@ def crossings(x: Array, y: Array, *, rising: bool) -> Array:
 
 
 def slope_at_zero(x: Array, y: Array, within: float) -> float:
-    """Slope of a line through the points near abscissa zero; nan where there are fewer than three.
+    """Return the slope of the line through the points near abscissa zero; nan for fewer than three points.
 
     Args:
         x: Abscissa, shape (n,).
         y: Ordinate, shape (n,).
-        within: Largest magnitude of the abscissa that counts.
+        within: Largest magnitude of the abscissa.
     """
     near = np.abs(x) <= within
     return float(np.polynomial.Polynomial.fit(x[near], y[near], 1).convert().coef[1]) if near.sum() > 2 else math.nan

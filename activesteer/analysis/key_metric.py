@@ -9,7 +9,7 @@ RELATIVE_TOLERANCE: Final = 0.01
 
 
 class KeyMetric(NamedTuple):
-    """One of the metrics that tell most about a manoeuvre.
+    """A key metric of a manoeuvre.
 
     Attributes:
         name: Name of the metric, ending in its unit.

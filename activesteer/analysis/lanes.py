@@ -1,4 +1,4 @@
-"""Whether a car keeps within lanes, and how it passes cones: both by the outline of its body.
+"""Lanes and cones: distances of the outline of the car's body from them.
 
 The body is a rectangle of the car's width with a usual overhang beyond the axles (`Footprint`).
 """
@@ -20,9 +20,9 @@ from activesteer.road.footprint import Footprint
 
 
 def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> float:
-    """How far the body gets beyond the side of a lane at most.
+    """Return the largest distance of the body beyond the side of a lane.
 
-    A corner of the body counts while it is between the two ends of a lane. An end of a side counts throughout, since a
+    A corner of the body counts while it is between the two ends of a lane. The end of a side always counts, since a
     body that turns there covers it while its corners are elsewhere.
 
     Args:
@@ -31,8 +31,7 @@ def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> f
         car: Its car.
 
     Returns:
-        Largest distance beyond a side [m]; below 0 it is the smallest distance to one. nan where no corner is ever
-        inside a lane.
+        Distance [m]; below 0, the smallest distance from a side. nan if no corner is ever inside a lane.
     """
     oversteps = [math.nan]
     for x, y in corners(recording, car):
@@ -47,9 +46,9 @@ def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> f
 
 
 def stays_in_lanes(recording: RecordingLike, course: Course, car: Footprint) -> bool:
-    """Whether the whole body goes through every lane to its end and never gets beyond a side.
+    """Return whether the whole body passes every lane to its end and never crosses a side.
 
-    A car that turns round before the last lane oversteps nothing there, but it has not kept to the lanes.
+    A car that turns round before the last lane crosses no side there, but it does not keep to the lanes.
     """
     for x, _ in corners(recording, car):
         for lane in course.lanes:
@@ -59,20 +58,20 @@ def stays_in_lanes(recording: RecordingLike, course: Course, car: Footprint) -> 
 
 
 def cone_distances(recording: RecordingLike, course: Course, car: Footprint) -> Array:
-    """Smallest distance between the side of each cone and the body of the car.
+    """Return the smallest distance between each cone and the body of the car.
 
-    A cone is a disc of `CONE_RADIUS_M` around its point; one on the side of a lane is the point itself, since a lane's
-    width is measured between the sides of its cones.
+    A cone is a disc of `CONE_RADIUS_M` around its point. A cone on the side of a lane is the point itself, since the
+    width of a lane is measured between the sides of its cones.
 
     Returns:
-        Distance [m], shape (number of cones,); 0 or less where the cone is hit, by how far the body covers it.
+        Distance [m], shape (number of cones,); 0 or less for a cone that is hit, by the depth that the body covers.
     """
     radius_m = np.where(course.on_lane_side(), 0.0, CONE_RADIUS_M)
     return _distances(recording, course.cones_m, car) - radius_m
 
 
 def _distances(recording: RecordingLike, points_m: Array, car: Footprint) -> Array:
-    """Smallest distance of each point from the body over the run [m], below 0 inside; points of shape (n, 2)."""
+    """Return the smallest distance of each point from the body over the run [m], below 0 inside; points are (n, 2)."""
     front_x, front_y, cos, sin = _pose(recording)
     middle_m = 0.5 * (car.front_m + car.rear_m)
     half_length_m = car.front_m - middle_m
@@ -88,9 +87,9 @@ def _distances(recording: RecordingLike, points_m: Array, car: Footprint) -> Arr
 
 
 def struck_cones(recordings: Iterable[RecordingLike], course: Course) -> NDArray[np.bool_]:
-    """Which cones of a course any of some cars hits; shape (number of cones,).
+    """Return which cones of a course at least one of the cars hits, shape (number of cones,).
 
-    A run that does not tell where its car was, or how large it is, hits none.
+    A run without the place or the size of its car hits none.
     """
     struck = np.zeros(len(course.cones_m), dtype=bool)
     for recording in recordings:
@@ -100,7 +99,7 @@ def struck_cones(recordings: Iterable[RecordingLike], course: Course) -> NDArray
 
 
 def corners(recording: RecordingLike, car: Footprint) -> list[tuple[Array, Array]]:
-    """World x and y of the four corners of the body over time [m]: front left and right, rear left and right."""
+    """Return world x and y of the corners of the body over time [m]: front left and right, rear left and right."""
     front_x, front_y, cos, sin = _pose(recording)
     return [
         (front_x + ahead * cos - left * sin, front_y + ahead * sin + left * cos)
@@ -110,7 +109,7 @@ def corners(recording: RecordingLike, car: Footprint) -> list[tuple[Array, Array
 
 
 def _pose(recording: RecordingLike) -> tuple[Array, Array, Array, Array]:
-    """World x and y of the front axle centre [m], cosine and sine of the yaw angle; over time."""
+    """Return world x and y of the front axle centre [m], cosine and sine of the yaw angle, over time."""
     x, y, yaw = (
         np.asarray(recording[name], dtype=np.float64) for name in ("front_axle_x_m", "front_axle_y_m", "yaw_rad")
     )

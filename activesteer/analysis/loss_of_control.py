@@ -1,4 +1,4 @@
-"""Whether a car was lost: it spun, or left the course; and the same in words."""
+"""Loss of control: the car spins, or leaves the course; as a verdict and in words."""
 
 from __future__ import annotations
 
@@ -9,26 +9,23 @@ from activesteer.analysis.claims.sine_with_dwell import LOST_SIDESLIP_RAD
 from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP, SIDESLIP_PEAKS, STAYS_IN_LANES
 
 Metrics = Mapping[str, float | None]
-"""Metrics of a run; a value that does not exist is None or nan."""
+"""Metrics of a run; a value that is not defined is None or nan."""
 
 
 def has_spun(metrics: Metrics) -> bool:
-    """Whether the sideslip went beyond `LOST_SIDESLIP_RAD`, or the run ended before that could be said."""
+    """Return whether the sideslip exceeded `LOST_SIDESLIP_RAD`, or whether the run ended too early to tell."""
     peaks = [abs(_number(metrics, name)) for name in SIDESLIP_PEAKS if metrics.get(name) is not None]
     return not peaks or not peaks[0] <= LOST_SIDESLIP_RAD
 
 
 def is_lost(metrics: Metrics) -> bool:
-    """Whether a car was lost.
+    """Return whether the car was lost.
 
-    It is where it has spun, where it does not keep to the lanes of its course, and where it passes a cone of a slalom
-    on the wrong side or not at all. A cone that is touched makes no loss.
+    A car is lost if it spins, if it does not keep to the lanes of its course, or if it passes a cone of a slalom on the
+    wrong side or not at all. A cone that is touched does not count.
 
     Args:
-        metrics: Metrics of the run. One that the manoeuvre does not have is no key of them.
-
-    Returns:
-        Whether it was.
+        metrics: Metrics of the run; those that the manoeuvre does not have are no keys.
     """
     if has_spun(metrics) or (STAYS_IN_LANES in metrics and _number(metrics, STAYS_IN_LANES) != 1.0):
         return True
@@ -36,7 +33,7 @@ def is_lost(metrics: Metrics) -> bool:
 
 
 def losses(metrics: Mapping[str, float]) -> Iterator[str]:
-    """What went wrong in a run with these metrics, in words."""
+    """Describe the failures of a run with these metrics."""
     peak = next((abs(metrics[name]) for name in SIDESLIP_PEAKS if name in metrics), None)
     if peak is not None and has_spun(metrics):
         yield f"lost at {math.degrees(peak):.0f} deg of sideslip" if math.isfinite(peak) else "lost"
@@ -50,7 +47,7 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
 
 
 def kept(metrics: Mapping[str, float]) -> Iterator[str]:
-    """What a run with these metrics kept to, in words; nothing where there is nothing to keep to."""
+    """Describe the requirements that a run with these metrics met; empty if the manoeuvre has none."""
     if metrics.get(STAYS_IN_LANES) == 1.0:
         yield "stays in the lanes"
     if metrics.get(CONES_MISSED) == 0.0 and not metrics.get(CONES_HIT):

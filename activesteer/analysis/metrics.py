@@ -23,7 +23,7 @@ from activesteer.metric_table import metric
 
 
 class Evaluation(NamedTuple):
-    """How the runs of one kind of manoeuvre are evaluated.
+    """Evaluation of the runs of one kind of manoeuvre.
 
     Attributes:
         metrics: Function from a run to its metrics.

@@ -1,8 +1,8 @@
-"""Metrics of a run along a path: lane change, slalom, a path of one's own.
+"""Metrics of a run along a path: lane change, slalom, or a path of the user.
 
-"The gates" is from where the front axle centre reaches the first lane (the first cone, where there are no lanes) to
-where it reaches the end of the last gate; "after the gates" is the 3 s from then on. A car that never gets to the last
-gate, or a recording that ends within the 3 s, has no values for it.
+"The gates" begin where the front axle centre reaches the first lane, or the first cone of a course without lanes. They
+end where it reaches the end of the last gate. "After the gates" is the 3 s from then on. These metrics are nan for a
+car that never reaches the last gate, or a recording that ends within the 3 s.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from activesteer.conventions import CORNERS
 from activesteer.road.course import Course
 
 AFTER_S: Final = 3.0
-"""Time after the last gate in which the car should come to rest [s]."""
+"""Time after the last gate in which the car should settle [s]."""
 LONGEST_LAG_S: Final = 0.6
-"""Longest lag looked for [s]: a quarter of the period of a slalom of 36 m at 100 km/h."""
+"""Longest lag [s]: a quarter of the period of a slalom of 36 m at 100 km/h."""
 
 SIGNALS: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2"), ("roll", "rad"))
 """Channels that are evaluated: name and unit suffix."""
 OSCILLATING: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2"), ("steering_wheel", "rad"))
-"""Channels of which the root mean square within and after the gates is given."""
+"""Channels whose root mean squares within and after the gates are metrics."""
 
 PATH_KEY_METRICS: Final = (
     KeyMetric("track_deviation_max_m", 0.01),
@@ -78,7 +78,7 @@ class PathFollowing(NamedTuple):
 
     Attributes:
         values: Metric name, ending in its unit, to value.
-        notes: Why values are nan, one sentence each.
+        notes: Reasons for values that are nan, one sentence each.
     """
 
     values: dict[str, float]
@@ -92,7 +92,7 @@ class Windows(NamedTuple):
         approach: From the beginning of the run to the last gate.
         gates: From the first gate to the last.
         after: The 3 s after the last gate.
-        notes: Why one of them is empty.
+        notes: Reasons for an empty window, one sentence each.
     """
 
     approach: slice
@@ -102,21 +102,21 @@ class Windows(NamedTuple):
 
 
 def evaluate(recording: RecordingLike) -> PathFollowing:
-    """Metrics of a run along a path, with the reasons for what could not be evaluated.
+    """Return the metrics of a run along a path, with the reasons for those that could not be evaluated.
 
-    For each of yaw rate, sideslip, lateral acceleration (`ay`) and roll `<name>_peak_abs_<unit>` and
-    `<name>_rms_<unit>` of the whole run; for all but roll and for the steering wheel `<name>_gates_rms_<unit>` and
-    `<name>_after_gates_rms_<unit>`. `yaw_rate_lag_s`, `ay_lag_s`: by how much they come after the steering wheel, up to
-    the last gate. Steering effort: `steering_wheel_peak_abs_rad`, `steering_wheel_rms_rad`, and the same of its rate.
-    Track: `track_deviation_max_m`, `track_deviation_rms_m`, distance of the front axle centre from the path over the
-    whole run. Lanes: `lane_overstep_m`, by how much the body gets beyond a lane at most (below 0: smallest distance to
-    a side), `stays_in_lanes` (1 or 0); `cones_hit`, `cone_distance_min_m`. Tyres: `tyre_use_max`, `tyre_use_mean`,
-    fraction of the available friction that is used, over all wheels and the whole run. `speed_loss_mps`: speed at the
-    beginning less the lowest; `speed_end_mps`.
-
-    A slalom also has `track_amplitude_m` (half of the distance between the leftmost and the rightmost place of the
-    front axle centre between first and last cone), `cone_distance_mean_m`, and `cones_missed`, the number of cones
-    passed on another side than the path passes them, or not at all.
+    - Sizes: `<name>_peak_abs_<unit>`, `<name>_rms_<unit>` of yaw rate, sideslip, lateral acceleration (`ay`) and roll
+      over the whole run. `<name>_gates_rms_<unit>` and `<name>_after_gates_rms_<unit>` of the steering wheel and of all
+      these but roll.
+    - Lag behind the steering wheel up to the last gate: `yaw_rate_lag_s`, `ay_lag_s`.
+    - Steering effort: `steering_wheel_peak_abs_rad`, `steering_wheel_rms_rad`, and the same of its rate.
+    - Distance of the front axle centre from the path: `track_deviation_max_m`, `track_deviation_rms_m`.
+    - Lanes: `lane_overstep_m`, the largest distance of the body beyond a lane (below 0: smallest distance from a side),
+      `stays_in_lanes` (1 or 0), `cones_hit`, `cone_distance_min_m`.
+    - Tyres: `tyre_use_max`, `tyre_use_mean`, the fraction of the available friction that all wheels use.
+    - Speed: `speed_loss_mps`, initial less lowest speed; `speed_end_mps`.
+    - Slalom: `track_amplitude_m` (half the distance between the leftmost and the rightmost place of the front axle
+      centre between first and last cone), `cone_distance_mean_m`, and `cones_missed` (cones that the car does not reach
+      or passes on another side than the path does).
 
     Args:
         recording: A run along a path.
@@ -157,14 +157,14 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
-    """The values of `evaluate` alone."""
+    """Return the values of `evaluate` alone."""
     return evaluate(recording).values
 
 
 def find_windows(recording: RecordingLike, course: Course) -> Windows:
-    """Which samples belong to the gates and to the time after them.
+    """Return the samples of the gates and of the time after them.
 
-    A path without gates counts as approach as a whole.
+    A path without gates is all approach.
     """
     nothing = slice(0, 0)
     if course.last_gate_x_m is None:
@@ -194,7 +194,7 @@ def _steering_effort(wheel: Array, step_s: float) -> dict[str, float]:
 
 
 def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
-    """Where the car is, against path, lanes and cones."""
+    """Return the metrics of the car's distances from path, lanes and cones."""
     deviation = track.path_distance(*track.front_axle(recording), course.path.x_m, course.path.y_m)
     values = {"track_deviation_max_m": float(np.abs(deviation).max()), "track_deviation_rms_m": rms(deviation)}
     if not course.lanes and not len(course.cones_m):
@@ -222,6 +222,6 @@ def _slalom(recording: RecordingLike, course: Course) -> dict[str, float]:
     return {
         "track_amplitude_m": 0.5 * float(y.max() - y.min()),
         "cone_distance_mean_m": float(distances.mean()),
-        # A cone that is not reached has side nan, which is no side either.
+        # A cone that is not reached has side nan, which equals no side.
         "cones_missed": float(np.count_nonzero(sides != asked)),
     }

@@ -1,4 +1,4 @@
-"""Frequency response to random steering by ISO 7401: several runs, averaged spectra, coherence, and the error left.
+"""Frequency response to random steering by ISO 7401: averaged spectra of several runs, coherence, and remaining error.
 
 Source: P. D. Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967) 70-73 (averaged spectra of overlapping
 segments); J. S. Bendat and A. G. Piersol, Random Data (2010), chapters 6 and 9 (the estimate H1, its random error).
@@ -20,17 +20,17 @@ from activesteer.errors import RecordingError
 SEGMENT_S: Final = 20.0
 """Length of a segment [s]: the spectra have a line every 0.05 Hz."""
 _HANN_OVERLAP: Final = 1.0 + 2.0 / 36.0
-"""Segments with Hann windows that overlap by half count for one over this as many independent ones (Welch, 1967)."""
+"""Segments with Hann windows that overlap by half, for each independent segment (Welch, 1967)."""
 
 
 class RandomResponse(NamedTuple):
-    """A response that was averaged.
+    """An averaged frequency response.
 
     Attributes:
         response: The response, and its coherence.
-        gain_error: Standard error of the gain by the coherence and the number of averages, relative, shape (n,); that
-            of the phase is the same in radians.
-        averages: How many independent segments are in it.
+        gain_error: Relative standard error of the gain by coherence and number of averages, shape (n,); it is also the
+            standard error of the phase [rad].
+        averages: Number of independent segments.
     """
 
     response: FrequencyResponse
@@ -41,17 +41,17 @@ class RandomResponse(NamedTuple):
 def random_response(
     recordings: Sequence[RecordingLike], output: str, lowest_Hz: float, highest_Hz: float, input_channel: str = INPUT
 ) -> RandomResponse:
-    """Response of a channel to random steering, at all lines of a range.
+    """Return the response of a channel to random steering, at all lines of a range.
 
-    The segments are finite, and what a car does after the end of one is lost: the gain comes out low by some per mille
-    where the response dies away within a second. The error is that of small deviations: coherence above some 0.3.
+    The segments are finite, and the response to the end of a segment is lost. The gain is therefore low by some per
+    mille if the response dies away within a second. The error holds for small deviations: coherence above some 0.3.
 
     Args:
         recordings: Runs with different random steering, of at least `SEGMENT_S` each, all with one time step.
         output: Channel.
         lowest_Hz: Least frequency [Hz].
         highest_Hz: Greatest frequency [Hz].
-        input_channel: Channel that the response is referred to.
+        input_channel: Input of the response.
 
     Returns:
         The response.

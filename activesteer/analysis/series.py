@@ -17,14 +17,14 @@ SMOOTHING_S: Final = 0.04
 and takes white noise at 1 kHz down to a quarter."""
 
 RATE_SPAN_S: Final = 0.01
-"""Time over which a rate of change is taken [s]."""
+"""Interval over which a rate of change is taken [s]."""
 
 PEAK_MARGIN: Final = 0.005
-"""A maximum less than this fraction above the steady-state value is no peak."""
+"""Fraction above the steady-state value below which a maximum is no peak."""
 
 
 class StepResponse(NamedTuple):
-    """How a signal follows a step. Times count from the step; nan where a value does not exist.
+    """Response of a signal to a step. Times count from the step; undefined values are nan.
 
     Attributes:
         steady_state: Value at the end.
@@ -32,7 +32,7 @@ class StepResponse(NamedTuple):
         peak: Largest value in the direction of the steady-state value.
         peak_time_s: Time of the peak [s].
         overshoot: (peak - steady state)/steady state.
-        notes: Why a value is nan, one sentence each.
+        notes: Reasons for values that are nan, one sentence each.
     """
 
     steady_state: float
@@ -44,14 +44,14 @@ class StepResponse(NamedTuple):
 
 
 def smooth(values: Array, timestep_s: float) -> Array:
-    """Smoothing without delay: a cubic fitted around every sample (Savitzky and Golay, 1964).
+    """Smooth a signal without delay, by a cubic fitted around every sample (Savitzky and Golay, 1964).
 
     Args:
         values: Samples at equal distances, shape (n,).
-        timestep_s: Distance of the samples [s].
+        timestep_s: Interval between the samples [s].
 
     Returns:
-        Smoothed samples, shape (n,); the samples themselves where the window holds fewer than five.
+        Smoothed samples, shape (n,); the samples themselves if the window holds fewer than five.
     """
     half = round(SMOOTHING_S / timestep_s / 2.0)
     window = 2 * half + 1
@@ -66,7 +66,7 @@ def smooth(values: Array, timestep_s: float) -> Array:
 
 
 def crossing_time(time_s: Array, values: Array, level: float) -> float:
-    """First time at which a signal rises through a level, interpolated between samples.
+    """Return the first time at which a signal rises through a level, interpolated between samples.
 
     Args:
         time_s: Time of the samples [s], ascending, shape (n,).
@@ -85,11 +85,13 @@ def crossing_time(time_s: Array, values: Array, level: float) -> float:
 
 
 def largest_rate(values: Array, timestep_s: float) -> float:
-    """Largest rate of change, taken over `RATE_SPAN_S`: unlike the slope of a smoothed signal it does not overshoot.
+    """Return the largest rate of change over `RATE_SPAN_S`.
+
+    Unlike the slope of a smoothed signal it does not overshoot.
 
     Args:
         values: Samples at equal distances, shape (n,).
-        timestep_s: Distance of the samples [s].
+        timestep_s: Interval between the samples [s].
 
     Returns:
         Magnitude of the rate, in the unit of `values` per second; nan if the signal is shorter than the span.
@@ -101,11 +103,11 @@ def largest_rate(values: Array, timestep_s: float) -> float:
 
 
 def rate_rms(values: Array, timestep_s: float) -> float:
-    """Root mean square of the rate of change, taken over `RATE_SPAN_S`.
+    """Return the root mean square of the rate of change over `RATE_SPAN_S`.
 
     Args:
         values: Samples at equal distances, shape (n,).
-        timestep_s: Distance of the samples [s].
+        timestep_s: Interval between the samples [s].
 
     Returns:
         Root mean square, in the unit of `values` per second; nan if the signal is shorter than the span.
@@ -115,22 +117,22 @@ def rate_rms(values: Array, timestep_s: float) -> float:
 
 
 def rms(values: Array) -> float:
-    """Root mean square, in the unit of the values; nan where there are none."""
+    """Return the root mean square, in the unit of the values; nan for no values."""
     return float(np.sqrt(np.mean(np.square(values, dtype=np.float64)))) if len(values) else math.nan
 
 
 def lag(leader: Array, follower: Array, timestep_s: float, longest_s: float) -> float:
-    """By how much a signal comes after another: the shift at which the two look most alike.
+    """Return the lag of a signal behind another signal: the shift at which the two are most alike.
 
     Args:
         leader: Samples at equal distances, shape (n,).
         follower: Samples of the other signal, shape (n,).
-        timestep_s: Distance of the samples [s].
-        longest_s: Longest lag looked for [s].
+        timestep_s: Interval between the samples [s].
+        longest_s: Longest possible lag [s].
 
     Returns:
-        Lag [s], by the maximum of the normalised cross-correlation, with a parabola between samples; nan where the
-        maximum lies at an end of the range (the follower leads, or lags longer), or a signal is zero.
+        Lag [s], by the maximum of the normalised cross-correlation, with a parabola between samples; nan if the maximum
+        is at an end of the range (the follower leads, or lags longer), or if a signal is zero.
     """
     lead, follow = (np.asarray(values, dtype=np.float64) for values in (leader, follower))
     count, maximum = len(lead), round(longest_s / timestep_s)
@@ -149,7 +151,7 @@ def lag(leader: Array, follower: Array, timestep_s: float, longest_s: float) -> 
 
 
 def timestep(time_s: Array) -> float:
-    """Distance of equidistant samples [s].
+    """Return the interval between equidistant samples [s].
 
     Raises:
         RecordingError: fewer than two samples, or they are not equidistant within 1 % of a step.
@@ -170,19 +172,20 @@ def timestep(time_s: Array) -> float:
 def step_response(time_s: Array, values: Array, step_time_s: float, window_s: float, minimum: float) -> StepResponse:
     """Evaluate the response of one signal to a step.
 
-    The signal is at zero before the step; it may move either way. Noise is reduced by `smooth` before crossings and
-    maxima are looked for; the steady-state value is the mean of the samples themselves.
+    The signal is at zero before the step and may move either way. `smooth` reduces its noise for crossings and maxima;
+    the steady-state value is the mean of the samples themselves.
 
     Args:
         time_s: Time [s], equidistant, shape (n,).
         values: Signal, shape (n,).
         step_time_s: Time of the step [s].
         window_s: Length of the window at the end whose mean is the steady-state value [s].
-        minimum: Smallest steady-state value to which times and overshoot are referred, in the unit of the signal.
+        minimum: Smallest steady-state value for times and overshoot, in the unit of the signal.
 
     Returns:
-        The response. Its response time is nan if 90 % is never passed, its peak time if the largest value lies in the
-        window at the end or exceeds the steady-state value by less than `PEAK_MARGIN`: such a response only settles.
+        The response. Its response time is nan if the signal never passes 90 %. Its peak time is nan if the signal only
+        settles: its largest value lies in the window at the end, or exceeds the steady-state value by less than
+        `PEAK_MARGIN`.
 
     Source: ISO 7401, step input: response time, peak response time, overshoot.
     """

@@ -1,14 +1,14 @@
 """Metrics of a sine with dwell by FMVSS 126 and UN Regulation 140.
 
-The two yaw rate ratios count from the *completion* of steer, the end of the sine; the lateral displacement counts from
-its *beginning*. Steering wheel angle and yaw rate are filtered as the standards say (10 and 6 Hz, twelve poles, no
-phase); the filter rounds the corner at the end of the sine, which puts the completion some 0.015 s off, here as in a
-measured test. Three differences to a measured test, all because a simulation needs less:
+The two yaw rate ratios count from the *completion* of steer, the end of the sine. The lateral displacement counts from
+the *beginning* of steer. Steering wheel angle and yaw rate are filtered as in the standards (10 and 6 Hz, twelve poles,
+no phase). The filter rounds the corner at the end of the sine, which shifts the completion by some 0.015 s, here as in
+a measured test. The evaluation differs from that of a measured test in three points:
 
 - Nothing is zeroed: simulated signals have no offset.
 - The displacement comes from the recorded position, which is exact. The standards integrate the lateral acceleration
   twice, since a test car has no position.
-- Sideslip is recorded; peaks of it are taken unfiltered.
+- Sideslip is recorded, and its peaks are unfiltered.
 
 Source: 49 CFR 571.126 (FMVSS 126), S5.2 and S7.11; UN Regulation 140.
 """
@@ -30,23 +30,23 @@ from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 
 STEERING_CUT_OFF_Hz: Final = 10.0
-"""Filter of the steering wheel angle [Hz]."""
+"""Cut-off frequency for the steering wheel angle [Hz]."""
 MOTION_CUT_OFF_Hz: Final = 6.0
-"""Filter of yaw rate and lateral acceleration [Hz]."""
+"""Cut-off frequency for yaw rate and lateral acceleration [Hz]."""
 LONGEST_CREEP_S: Final = 0.1
-"""A wheel that takes longer than this from the threshold to the centre creeps; its line is then drawn on [s]."""
+"""Longest time from the threshold to the centre [s]; a slower wheel creeps, and its line is extrapolated."""
 PEAK_PROMINENCE: Final = 0.02
-"""A local maximum of the yaw rate counts as a peak when it stands out by this fraction of the largest one."""
+"""Least prominence of a peak of the yaw rate, as a fraction of the largest one."""
 INSTANTS_S: Final = (1.0, 1.75)
 """Times after the completion of steer at which the yaw rate is compared with its peak [s]."""
 DISPLACEMENT_TIME_S: Final = 1.07
-"""Time after the beginning of steer at which the lateral displacement is taken [s]; FMVSS 126 asks for 1.83 m there,
-of a car up to 3500 kg and from 5 A on."""
+"""Time after the beginning of steer at which the lateral displacement is taken [s]; FMVSS 126 requires 1.83 m from a
+car up to 3500 kg, from 5 A on."""
 RATIO_LIMITS: Final = (0.35, 0.20)
-"""Largest ratios allowed at `INSTANTS_S`."""
+"""Largest allowed ratios at `INSTANTS_S`."""
 
 PEAKS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("roll", "rad"), ("steering_wheel", "rad"))
-"""Channels whose largest magnitude is given: name and unit suffix."""
+"""Channels whose largest magnitude is a metric: name and unit suffix."""
 
 KEY_METRICS: Final = (
     KeyMetric("yaw_rate_after_1000ms_share", 0.01),
@@ -64,14 +64,14 @@ KEY_METRICS: Final = (
 
 
 class Steering(NamedTuple):
-    """The times of a sine with dwell, and its side.
+    """Times and side of a sine with dwell.
 
     Attributes:
-        side: 1 where it begins to the left, -1 to the right.
-        begin_s: The wheel first passes 5 deg.
-        reversal_s: It passes the centre between the two halves.
-        completion_s: It is back at the centre after the second half.
-        straight: Samples before it in which every signal shall be zero.
+        side: 1 for a sine that begins to the left, -1 to the right.
+        begin_s: Time at which the wheel first passes 5 deg [s].
+        reversal_s: Time at which it passes the centre between the two halves [s].
+        completion_s: Time at which it is back at the centre after the second half [s].
+        straight: Samples before the sine in which every signal shall be zero.
     """
 
     side: float
@@ -82,7 +82,7 @@ class Steering(NamedTuple):
 
 
 def steering(recording: RecordingLike) -> Steering:
-    """When a sine with dwell begins, reverses and is completed, interpolated between samples.
+    """Return beginning, reversal and completion of a sine with dwell, interpolated between samples.
 
     Raises:
         RecordingError: the run holds no sine with dwell: the wheel does not turn to both sides and come back.
@@ -116,17 +116,19 @@ def steering(recording: RecordingLike) -> Steering:
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
-    """Metrics of a sine with dwell.
+    """Return the metrics of a sine with dwell.
 
     Returns:
-        `steer_begin_time_s`, `steer_reversal_time_s` and `steer_completion_time_s` from the beginning of the run [s].
-        `yaw_rate_reversal_peak_radps`: the first peak of the yaw rate that the reversal causes, with its sign [rad/s],
-        and its time. `yaw_rate_after_1000ms_share` and `yaw_rate_after_1750ms_share`: yaw rate so long after the
-        completion of steer over this peak [-]; below zero where the car turns the other way by then.
-        `lateral_displacement_m`: of the centre of gravity, across the heading at the beginning of steer, 1.07 s after
-        it; positive to the side that is steered to first [m]. `lateral_displacement_by_ay_m`: the same from the
-        lateral acceleration, as the standards take it [m]. `<name>_peak_abs_<unit>` over the whole run. nan where
-        the run ends before a value is reached.
+        - `steer_begin_time_s`, `steer_reversal_time_s`, `steer_completion_time_s`: from the beginning of the run.
+        - `yaw_rate_reversal_peak_radps`: first peak of the yaw rate after the reversal, with its sign; and its time.
+        - `yaw_rate_after_1000ms_share`, `yaw_rate_after_1750ms_share`: yaw rate so long after the completion of steer,
+          as a fraction of this peak; below zero if the car turns the other way by then.
+        - `lateral_displacement_m`: displacement of the centre of gravity 1.07 s after the beginning of steer, across
+          the heading at that beginning, positive to the side of the first half.
+        - `lateral_displacement_by_ay_m`: the same from the lateral acceleration, as in the standards.
+        - `<name>_peak_abs_<unit>`: over the whole run.
+
+        A value is nan if the run ends before it.
 
     Raises:
         RecordingError: a channel is missing, or the run holds no sine with dwell.
@@ -158,17 +160,17 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _crossing_before(time_s: Array, values: Array, index: int) -> float:
-    """Last time before a sample at which a signal rises through zero."""
+    """Return the last time before a sample at which a signal rises through zero."""
     rising = np.flatnonzero((values[:index] < 0.0) & (values[1 : index + 1] >= 0.0))
     i = int(rising[-1])
     return float(time_s[i] - values[i] * (time_s[i + 1] - time_s[i]) / (values[i + 1] - values[i]))
 
 
 def _completion(time_s: Array, angle: Array, start: int) -> float:
-    """When the second half, here positive, has come back to the centre.
+    """Return the time at which the second half, here positive, is back at the centre.
 
-    A steering system that gives may let the wheel creep over the last degrees or stop short of the centre. The line
-    through 10 and 5 deg is then drawn on to it: a creeping wheel does not put the completion off.
+    With an elastic steering system the wheel may creep over the last degrees or stop short of the centre. The line
+    through 10 and 5 deg is then extrapolated to the centre, so that creep does not delay the completion.
     """
     below = np.flatnonzero(angle[start:] < THRESHOLD_RAD)
     if below.size == 0:
@@ -193,7 +195,7 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
 
 
 def _first_peak(time_s: Array, values: Array, begin_s: float) -> tuple[float, float]:
-    """First local maximum after a time that stands out; the largest value where there is none (time, value)."""
+    """Return time and value of the first prominent maximum after a time; of the largest value if there is none."""
     from scipy.signal import find_peaks  # noqa: PLC0415 - takes half a second to import
 
     after = np.flatnonzero(time_s >= begin_s)
@@ -213,7 +215,7 @@ def _displacement(recording: RecordingLike, times: Steering) -> float:
 
 
 def integrated_displacement(time_s: NDArray[np.floating], ay_mps2: NDArray[np.floating], begin_s: float) -> float:
-    """Lateral displacement 1.07 s after the beginning of steer, both integrals counted from there.
+    """Return the lateral displacement 1.07 s after the beginning of steer, integrated twice from there.
 
     Args:
         time_s: Time of the samples [s], equidistant, shape (n,).
@@ -221,18 +223,18 @@ def integrated_displacement(time_s: NDArray[np.floating], ay_mps2: NDArray[np.fl
         begin_s: Beginning of steer [s].
 
     Returns:
-        Displacement [m], left positive; nan where the run ends before.
+        Displacement [m], left positive; nan if the run ends before.
 
     Source: FMVSS 126, S7.11.9.
     """
     end_s = begin_s + DISPLACEMENT_TIME_S
     if end_s > time_s[-1]:
         return math.nan
-    # An acceleration goes into the displacement with the time that is left to it: one integral in place of two.
+    # Each acceleration is weighted with the remaining time: one integral replaces two.
     instants_s = np.linspace(begin_s, end_s, 1 + round(DISPLACEMENT_TIME_S / timestep(time_s)))
     return float(np.trapezoid((end_s - instants_s) * np.interp(instants_s, time_s, ay_mps2), instants_s))
 
 
 def _at(time_s: Array, values: NDArray[np.floating], instant_s: float) -> float:
-    """Value at a time, interpolated; nan after the end of the run."""
+    """Return the value at a time, interpolated; nan after the end of the run."""
     return float(np.interp(instant_s, time_s, values)) if instant_s <= time_s[-1] else math.nan

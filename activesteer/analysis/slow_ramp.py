@@ -19,9 +19,9 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import GRAVITY_MPS2
 
 REFERENCE_MPS2: Final = 0.3 * GRAVITY_MPS2
-"""Lateral acceleration that A belongs to [m/s2]."""
+"""Lateral acceleration at which the angle is A [m/s2]."""
 FIT: Final = (1.0 / 3.0, 1.25)
-"""Range of the line in fractions of the acceleration looked for: 0.1 to 0.375 g for 0.3 g."""
+"""Range of the line, in fractions of the wanted acceleration: 0.1 to 0.375 g for 0.3 g."""
 
 KEY_METRICS: Final = (
     KeyMetric("steering_wheel_at_0_3g_rad", 2e-4),
@@ -39,14 +39,14 @@ KEY_METRICS: Final = (
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
-    """Metrics of a slow ramp.
+    """Return the metrics of a slow ramp.
 
     Returns:
-        Those of `handling`, and `steering_wheel_at_0_3g_rad`: the steering wheel angle at 0.3 g, by the line through
-        the filtered signals, with its sign; nan where the run does not reach 0.375 g [rad].
+        The metrics of `handling`, and `steering_wheel_at_0_3g_rad`: the steering wheel angle at 0.3 g with its sign, by
+        the line through the filtered signals [rad]; nan if the run does not reach 0.375 g.
 
     Raises:
-        RecordingError: as `handling.metrics`.
+        RecordingError: as for `handling.metrics`.
     """
     values = handling.metrics(recording)
     step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))
@@ -59,12 +59,12 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def angle_at(steering_rad: Array, ay_mps2: Array, wanted_mps2: float) -> float:
-    """Steering wheel angle at a lateral acceleration, by the line through the range of `FIT` around it.
+    """Return the steering wheel angle at a lateral acceleration, by the line through the range of `FIT`.
 
     Args:
         steering_rad: Steering wheel angle of a slow ramp to the left [rad], shape (n,).
-        ay_mps2: Lateral acceleration, which must pass the range [m/s2], shape (n,).
-        wanted_mps2: Acceleration looked for [m/s2].
+        ay_mps2: Lateral acceleration, which must cover the range [m/s2], shape (n,).
+        wanted_mps2: Wanted lateral acceleration [m/s2].
 
     Returns:
         Angle [rad].

@@ -1,4 +1,4 @@
-"""What the analysis needs of a recording: arrays by channel name, their time, and the metadata."""
+"""Interface of a recording for the analysis: arrays by channel name, their time, and the metadata."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ class RecordingLike(Protocol):
 
     @property
     def metadata(self) -> Mapping[str, Any]:
-        """What was run, with `maneuver.kind`."""
+        """Description of the run, with `maneuver.kind`."""
         ...
 
     def __getitem__(self, name: str, /) -> NDArray[Any]:
-        """One channel over `time_s`, shape (n,)."""
+        """Return a channel over `time_s`, shape (n,)."""
         ...
 
 
 class Evaluable:
-    """A recorded run whose channels are fit for formulas: each that is asked for is finite, in two rows or more."""
+    """A recorded run whose channels are fit for formulas: finite, with two rows or more."""
 
     def __init__(self, recording: RecordingLike) -> None:
-        """Refuses a run that is too short.
+        """Refuse a run that is too short.
 
         Raises:
-            RecordingError: it has less than two rows.
+            RecordingError: it has fewer than two rows.
         """
         if len(recording.time_s) < 2:
             raise RecordingError(f"a run of {len(recording.time_s)} rows cannot be evaluated, at least 2 are needed")
@@ -49,7 +49,7 @@ class Evaluable:
         """Return a channel over time, shape (n,).
 
         Raises:
-            RecordingError: there is none of that name, or it is not finite.
+            RecordingError: no channel has this name, or the channel is not finite.
         """
         values = self._recording[name]
         usable = np.abs(values) <= _MAX_VALUE
@@ -63,14 +63,14 @@ class Evaluable:
 
 
 _MAX_VALUE: Final = 1e30
-"""What no channel of a car that drives comes near to, and whose square is still finite."""
+"""Bound that no channel of a car comes near, and whose square is still finite."""
 
 
 def maneuver_kind(recording: RecordingLike) -> str:
-    """Kind of the manoeuvre that was driven (`step_steer` ...).
+    """Return the kind of the manoeuvre (`step_steer` ...).
 
     Raises:
-        RecordingError: the metadata does not say.
+        RecordingError: the metadata do not name it.
     """
     maneuver = recording.metadata.get("maneuver")
     kind = maneuver.get("kind") if isinstance(maneuver, Mapping) else None
@@ -85,10 +85,10 @@ def maneuver_kind(recording: RecordingLike) -> str:
 
 
 def read_course(recording: RecordingLike) -> Course:
-    """The course of a run.
+    """Return the course of a run.
 
     Raises:
-        RecordingError: the metadata hold none, or a wrong one.
+        RecordingError: the metadata hold no course, or a wrong one.
     """
     course = course_of(recording.metadata)
     if course is None:
@@ -97,10 +97,10 @@ def read_course(recording: RecordingLike) -> Course:
 
 
 def read_footprint(recording: RecordingLike) -> Footprint:
-    """Sizes of the car of a run.
+    """Return the sizes of the car of a run.
 
     Raises:
-        RecordingError: the metadata do not give them, or wrong ones.
+        RecordingError: the metadata hold no sizes, or wrong ones.
     """
     footprint = footprint_of(recording.metadata)
     if footprint is None:

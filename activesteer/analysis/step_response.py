@@ -1,6 +1,6 @@
 """Metrics of a step steer by ISO 7401.
 
-The car runs straight ahead before the step, so every value is counted from zero. t = 0 is where the steering wheel
+The car runs straight before the step, so every value counts from zero. t = 0 is the instant at which the steering wheel
 passes half of its final angle, interpolated between samples. A steady-state value is the mean over the last second.
 
 Source: ISO 7401, Road vehicles - Lateral transient response test methods, step input.
@@ -40,13 +40,12 @@ KEY_METRICS: Final = (
 
 
 class Signal(NamedTuple):
-    """A signal that is evaluated.
+    """A signal and its metrics.
 
     Attributes:
         name: First part of the names of its metrics.
         unit: Unit suffix.
-        minimum: Smallest steady-state value to which times and overshoot are referred; below it the run says nothing
-            about them.
+        minimum: Smallest steady-state value for times and overshoot; below it the run says nothing about them.
     """
 
     name: str
@@ -75,7 +74,7 @@ class StepSteer(NamedTuple):
 
     Attributes:
         values: Metric name, ending in its unit, to value.
-        notes: Name of the signal to the reasons why some of its values are nan.
+        notes: Name of the signal -> reasons for its values that are nan.
     """
 
     values: dict[str, float]
@@ -83,18 +82,18 @@ class StepSteer(NamedTuple):
 
 
 def evaluate(recording: RecordingLike) -> StepSteer:
-    """Metrics of a step steer, with the reasons for what could not be evaluated.
+    """Return the metrics of a step steer, with the reasons for those that could not be evaluated.
 
-    For each of yaw rate, lateral acceleration (`ay`), roll and sideslip: `<name>_steady_state_<unit>`,
-    `<name>_response_time_s` (90 %), `<name>_peak_<unit>`, `<name>_peak_time_s`, `<name>_overshoot`. Peaks are taken in
-    the direction of the steady-state value. `tb_srad` is the peak response time of the yaw rate times the magnitude of
-    the steady-state sideslip. Then the steering: `step_time_s`, its largest rate, settled angles; `speed_end_mps`.
+    For yaw rate, lateral acceleration (`ay`), roll and sideslip: `<name>_steady_state_<unit>`, `<name>_response_time_s`
+    (90 %), `<name>_peak_<unit>` and `<name>_peak_time_s` in the direction of the steady-state value, and
+    `<name>_overshoot`. `tb_srad` is the peak response time of the yaw rate times the magnitude of the steady-state
+    sideslip. For the steering: `step_time_s`, the largest rate, and steady-state angles. Also `speed_end_mps`.
 
     Args:
         recording: A run with one step of the steering wheel, to either side, and at least two seconds after it.
 
     Returns:
-        Values and notes. Times are from t = 0 [s], except `step_time_s`, which is from the beginning of the run.
+        Values and notes. Times count from t = 0 [s], but `step_time_s` from the beginning of the run.
 
     Raises:
         RecordingError: there is no step, it has no beginning, the run ends too early after it, or a channel is missing.
@@ -126,7 +125,7 @@ def evaluate(recording: RecordingLike) -> StepSteer:
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
-    """The values of `evaluate` alone."""
+    """Return the values of `evaluate` alone."""
     return evaluate(recording).values
 
 

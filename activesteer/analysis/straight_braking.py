@@ -1,4 +1,4 @@
-"""Metrics of braking straight ahead (ISO 21994, ISO 14512): distance, deceleration, what of the friction was used."""
+"""Metrics of braking straight ahead (ISO 21994, ISO 14512): distance, deceleration, use of the friction."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import RecordingError
 
 STANDSTILL_MPS: Final = 0.1
-"""Below this the car stands [m/s]."""
+"""Speed below which the car stands [m/s]."""
 FROM_FRACTION, TO_FRACTION = 0.8, 0.1
-"""Fractions of the initial speed of a fully developed deceleration (UN R13-H): 80 and 10 of 100 km/h."""
+"""Fractions of the initial speed for the mean fully developed deceleration (UN R13-H): 80 and 10 of 100 km/h."""
 SLIPS_FROM_MPS: Final = 15.0 / 3.6
-"""Speed above which no wheel shall lock [m/s]; UN R13-H, annex 6 asks the same."""
+"""Speed above which no wheel shall lock [m/s]; UN R13-H, annex 6 has the same speed."""
 
 KEY_METRICS: Final = (
     KeyMetric("stopping_distance_m", 0.01),
@@ -35,16 +35,20 @@ KEY_METRICS: Final = (
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
-    """Metrics of braking straight ahead.
+    """Return the metrics of braking straight ahead.
 
     Returns:
-        `braking_begin_time_s`, `speed_begin_mps`: where the brake begins to be pressed. `stopping_distance_m`: from
-        there to standstill. `mean_deceleration_mps2`: mean fully developed deceleration, over the distance between 80
-        and 10 % of the initial speed (UN R13-H). `braking_efficiency`: this over what the tyres' peak friction at their
-        loads allowed on the same way, g sum(mu F_z) / sum(F_z); drag counts as braking. `wheel_slip_max`: largest share
-        of the car's speed by which a wheel was slower, above 15 km/h; 1 is locked. `brake_pressure_peak_Pa`;
-        `yaw_rate_peak_abs_radps`, `lateral_deviation_max_m` from the straight line, `steering_wheel_peak_abs_rad`, all
-        until standstill. nan where the car does not come so far.
+        - `braking_begin_time_s`, `speed_begin_mps`: at the first pressure on the brake pedal.
+        - `stopping_distance_m`: from there to standstill.
+        - `mean_deceleration_mps2`: mean fully developed deceleration, over the distance between 80 and 10 % of the
+          initial speed (UN R13-H).
+        - `braking_efficiency`: this deceleration over the one that the tyres' peak friction allows at their loads on
+          the same distance, g sum(mu F_z) / sum(F_z); drag counts as braking.
+        - `wheel_slip_max`: largest slip of a wheel as a fraction of the car's speed, above 15 km/h; 1 is locked.
+        - `brake_pressure_peak_Pa`, and until standstill `yaw_rate_peak_abs_radps`, `lateral_deviation_max_m` from the
+          straight line, `steering_wheel_peak_abs_rad`.
+
+        A value is nan if the car does not get so far.
 
     Raises:
         RecordingError: a channel is missing, or the brake is not pressed.
@@ -88,9 +92,9 @@ def _below(speed: Array, begin: int, level_mps: float) -> int | None:
 
 
 def _allowed(recording: RecordingLike, way: Array, first: int, last: int) -> float:
-    """Mean over the way of the deceleration that the tyres' peak friction allows [m/s2].
+    """Return the mean over the distance of the deceleration that the tyres' peak friction allows [m/s2].
 
-    A tyre's peak force is the one that it gives over the fraction of its friction that it uses for it.
+    The peak force of a tyre is its force over the fraction of its friction that it uses.
     """
     part = slice(first, last + 1)
     peaks, loads = np.zeros(last + 1 - first), np.zeros(last + 1 - first)
@@ -106,9 +110,9 @@ def _allowed(recording: RecordingLike, way: Array, first: int, last: int) -> flo
 
 
 def _largest_slip(recording: RecordingLike, speed: Array, braked: slice) -> float:
-    """Largest share by which the circumference of a wheel is slower than the car, above `SLIPS_FROM_MPS`.
+    """Return the largest relative slip of a wheel above `SLIPS_FROM_MPS`.
 
-    The rolling radius is that of each wheel before the brake.
+    The rolling radius of each wheel is its radius before the brake.
     """
     fast = speed[braked] > SLIPS_FROM_MPS
     if not fast.any():

@@ -7,19 +7,19 @@ from collections.abc import Callable, Mapping
 from activesteer.metric_table import recorded_metric
 
 Paint = Callable[[str, float, float, str], str]
-"""Of a metric: its name, its value in a run, that in the first run, its text -> the text as it is shown."""
+"""Function from the name of a metric, its value in a run and in the first run, and its text to the text as shown."""
 
 
 def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = None) -> str:
-    """A table with a row per metric and a column per run.
+    """Return a table with a row per metric and a column per run.
 
     Args:
-        runs: Metrics by label of the run; metrics that only some runs have leave a blank in the others.
-        paint: Gives the values of all runs but the first their colours; without it they have none.
+        runs: Metrics by label of the run; a metric that a run lacks leaves a blank.
+        paint: Colours the values of all runs but the first; None for no colours.
 
     Returns:
-        Lines of equal form, without a newline at the end: name, unit, then the values. A value that the run does not
-        define (nan) is shown as `-`.
+        Lines without a newline at the end: name, unit, then the values. A value that the run does not define (nan) is
+        shown as `-`.
     """
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows = [["", "", *runs]]

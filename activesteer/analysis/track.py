@@ -1,4 +1,4 @@
-"""Where the front axle centre goes: distance from a path, and from other tracks."""
+"""The track of the front axle centre: distance from a path, and from other tracks."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from activesteer.conventions import Array
 
 
 def front_axle(recording: RecordingLike) -> tuple[Array, Array]:
-    """World x and y of the front axle centre over time [m], shape (n,) each."""
+    """Return world x and y of the front axle centre over time [m], shape (n,) each."""
     x, y = (np.asarray(recording[f"front_axle_{axis}_m"], dtype=np.float64) for axis in "xy")
     return x, y
 
 
 def first_at(recording: RecordingLike, x_m: float) -> int | None:
-    """Index of the first sample at which the front axle centre has reached an x; None where it never does."""
+    """Return the index of the first sample at which the front axle centre has reached an x; None if it never does."""
     reached = np.flatnonzero(front_axle(recording)[0] >= x_m)
     return int(reached[0]) if reached.size else None
 
 
 def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> Array:
-    """Distance of points from a path of straight pieces, which goes on straight beyond both of its ends.
+    """Return the distance of points from a path of straight pieces, which continues straight beyond both of its ends.
 
-    The nearest point of the path is looked for on the pieces at both sides of the nearest corner point.
+    The nearest point of the path lies on a piece beside the nearest corner point.
 
     Args:
         x_m: World x of the points [m], shape (n,).
@@ -34,13 +34,13 @@ def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> A
         path_y_m: World y of the path [m], shape (m,).
 
     Returns:
-        Distance [m], shape (n,), positive where the point is to the left of the path; nan where there is no distance.
+        Distance [m], shape (n,), positive for a point to the left of the path; nan for a point that is not finite.
     """
     from scipy.spatial import KDTree  # noqa: PLC0415 - takes a while to import
 
     points = np.column_stack([x_m, y_m])
     corners = np.column_stack([path_x_m, path_y_m])
-    # Of a point that is not finite, or whose distance is not, the tree finds a corner that does not exist.
+    # For a point that is not finite, or whose distance is not, the tree returns a corner that does not exist.
     nearest = np.minimum(KDTree(corners).query(np.nan_to_num(points))[1], len(corners) - 1)
     pieces = np.diff(corners, axis=0)
     lengths = np.linalg.norm(pieces, axis=1)
@@ -62,29 +62,29 @@ def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> A
 
 
 def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
-    """World y of the front axle centre where it first gets to each x, interpolated.
+    """Return world y of the front axle centre at its first passage of each x, interpolated.
 
     Args:
         recording: The run.
         x_m: World x, ascending [m], shape (n,).
 
     Returns:
-        World y [m], shape (n,); nan where the run never gets there.
+        World y [m], shape (n,); nan if the run never gets there.
     """
     x, y = front_axle(recording)
-    # A car that spins may go back: only what is ahead of all before it counts.
+    # A car that spins may go back: only samples ahead of all earlier ones count.
     ahead = np.concatenate([[True], x[1:] > np.maximum.accumulate(x)[:-1]])
     return np.interp(x_m, x[ahead], y[ahead], left=math.nan, right=math.nan)
 
 
 def largest_difference(first: RecordingLike, second: RecordingLike, from_x_m: float, to_x_m: float) -> float:
-    """Largest lateral distance of two tracks at the same x [m]; nan where one of them does not reach from end to end.
+    """Return the largest lateral distance between two tracks at the same x [m]; nan if one does not cover the range.
 
     Args:
         first: A run.
-        second: Another.
-        from_x_m: Where the comparison begins, world x [m].
-        to_x_m: Where it ends [m].
+        second: Another run.
+        from_x_m: Beginning of the range, world x [m].
+        to_x_m: End of the range [m].
     """
     x = np.linspace(from_x_m, to_x_m, max(2, math.ceil((to_x_m - from_x_m) / 0.1) + 1))
     return float(np.abs(track_over_x(first, x) - track_over_x(second, x)).max())

@@ -1,4 +1,4 @@
-"""What came out of runs in a few words, for where there is no room for a report."""
+"""The outcome of runs in a few words, where there is no room for a report."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from activesteer.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.recording import Recording
 
 _ALSO: Final = ("yaw_rate_steady_state_radps", "stopping_distance_m", "steering_wheel_rms_rad")
-"""Metrics that are named where a manoeuvre has them."""
+"""Metrics that the outcome names if a manoeuvre has them."""
 
 
 def outcome(recording: Recording) -> str:
-    """What went wrong in a run and what it kept to, in the words of the report, and its key figures.
+    """Describe failures, met requirements and key figures of a run, in the words of the report.
 
     Args:
         recording: The run.
@@ -34,7 +34,7 @@ def outcome(recording: Recording) -> str:
 
 
 def verdict(recordings: Mapping[str, Recording]) -> list[str]:
-    """A line for each run, then one for each claim of the paper about them.
+    """Return a line for each run, then a line for each claim of the paper about them.
 
     Args:
         recordings: By name of the run.

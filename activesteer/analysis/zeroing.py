@@ -1,4 +1,4 @@
-"""What a signal reads while the car still goes straight on, and is therefore taken off it, by FMVSS 126.
+"""Offsets of signals, from the time in which the car still goes straight, by FMVSS 126.
 
 Source: 49 CFR 571.126 (FMVSS 126), S7.11.4 and S7.11.5; UN Regulation 140, 9.11.
 """
@@ -13,11 +13,11 @@ import numpy as np
 from activesteer.analysis.series import Array, timestep
 
 FAST_RADPS: Final = math.radians(75.0)
-"""Rate of the steering wheel that ends the range [rad/s]."""
+"""Rate of the steering wheel at the end of the range [rad/s]."""
 FAST_FOR_S: Final = 0.2
-"""How long the wheel must go on turning so fast [s]."""
+"""Least duration of this rate [s]."""
 THRESHOLD_RAD: Final = math.radians(5.0)
-"""Steering wheel angle whose first passing is the beginning of steer [rad]; the range ends before."""
+"""Steering wheel angle whose first passing is the beginning of steer [rad]; the range ends before it."""
 RANGE_S: Final = 1.0
 """Length of the range [s]."""
 _AVERAGED_S: Final = 0.1
@@ -25,14 +25,14 @@ _AVERAGED_S: Final = 0.1
 
 
 def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
-    """The second before the steering wheel turns fast.
+    """Return the second before the steering wheel turns fast.
 
     Args:
         time_s: Time of the samples [s], equidistant, shape (n,).
         steering_rad: Filtered steering wheel angle [rad], shape (n,).
 
     Returns:
-        Its samples, as many as there are; none where the wheel does not begin to turn at more than 75 deg/s for 200 ms.
+        Samples of the range, as far as the run has them; none if the wheel never turns faster than 75 deg/s for 200 ms.
     """
     step_s = timestep(time_s)
     width = max(1, round(_AVERAGED_S / step_s))
@@ -48,8 +48,8 @@ def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
 
 
 def offset(values: Array, samples: slice) -> float:
-    """Mean of a signal over some samples; 0 where there are none.
+    """Return the mean of a signal over some samples; 0 for no samples.
 
-    Of the signal as it is recorded: a filter without phase rings before the steering wheel turns.
+    The signal must be unfiltered: a filter without phase rings before the steering wheel turns.
     """
     return float(np.mean(values[samples], dtype=np.float64)) if samples.stop > samples.start else 0.0

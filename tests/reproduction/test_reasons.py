@@ -68,7 +68,7 @@ def test_tracks_of_the_lane_change_look_alike_once_front_superposition_acts(over
 @pytest.mark.parametrize("factor", [0.85, 1.15])
 def test_it_does_not_act_where_the_yaw_gain_is_the_one_it_believes(factor: float) -> None:
     found = claims("double_lane_change", {"factors.tyre_cornering_stiffness": factor})
-    assert "afs never asks" in found["L1"].obstacle
+    assert "afs never demands" in found["L1"].obstacle
 
 
 def test_a_corrector_that_believes_in_a_lighter_car_gives_the_sideslip_back() -> None:

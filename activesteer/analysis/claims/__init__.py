@@ -1,8 +1,8 @@
-"""What the paper says about the three systems, as checks on recordings; one file for each manoeuvre.
+"""The paper's statements about the three systems, as checks on recordings; one file for each manoeuvre.
 
 Every criterion comes from the paper's words and from what a driver or a sensor can notice, and was written down before
 anything was tuned. Each statement names the fakes that it must reject. `not_reproduced.toml` lists the claims that are
-known not to come out, with the reason; `scorecard` puts the two together.
+known not to be reproduced, with the reason. `scorecard` combines verdicts and reasons.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from activesteer.analysis.claims.scorecard import Scorecard, Verdict, not_reprod
 from activesteer.analysis.source import RecordingLike
 
 _NO_SETTING: Final = frozenset({"vehicle", "duration_s", "settle_s", "title"})
-"""Keys of a manoeuvre's file that may be another than the paper's, and the whole of the car."""
+"""Keys that may differ from the paper's: these keys of the manoeuvre, and the whole car."""
 
 
 def claims_for(recording: RecordingLike) -> Claims | None:
-    """The claims that the paper makes about the manoeuvre of a run.
+    """Return the paper's claims about the manoeuvre of a run.
 
     Args:
-        recording: The run. The name of its manoeuvre counts, and, for the two open-loop ones, its kind: a step steer of
-            one's own is a step steer. One driven with other settings of the manoeuvre is none that the paper speaks of.
+        recording: The run. The name of its manoeuvre counts, and for the two open-loop manoeuvres also its kind: a
+            user's step steer is a step steer. The paper has no claims about a manoeuvre with other settings.
 
     Returns:
-        What checks them; None where the paper says nothing about the manoeuvre.
+        Function that checks them; None if the paper has no claims about the manoeuvre.
     """
     maneuver = recording.metadata.get("maneuver")
     if not isinstance(maneuver, Mapping):
@@ -43,7 +43,7 @@ def claims_for(recording: RecordingLike) -> Claims | None:
 
 
 def _is_of_maneuver(key: str, vehicle: object) -> bool:
-    """Whether an override changes what is driven; a car of one's own is judged like any other, and any length."""
+    """Return whether an override changes the manoeuvre; any car and any duration are judged."""
     part = key.removeprefix("maneuver.").partition(".")[0]
     return part not in _NO_SETTING and not (isinstance(vehicle, Mapping) and part in vehicle)
 

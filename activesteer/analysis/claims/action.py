@@ -1,7 +1,7 @@
-"""What a system does for the car, apart from what the noise and the offsets of its sensors make it do.
+"""Actions of a system, apart from its responses to noise and offsets of its sensors.
 
-A controller answers to noise too. Noise of an instant moves no car, and the offset of a sensor acts straight ahead as
-it does in the manoeuvre: both can be told from what the system does about the manoeuvre, in the recording itself.
+A controller responds to noise too. Noise of an instant moves no car, and the offset of a sensor acts the same straight
+ahead and in the manoeuvre. The recording itself therefore separates both from the response to the manoeuvre.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from activesteer.analysis.series import Array, timestep
 from activesteer.analysis.source import RecordingLike
 
 MEAN_S: Final = 0.2
-"""An angle counts as its mean over this time [s], in which a car begins to answer: the compact's lateral acceleration
-is at 90 % of its steady state 0.24 s after a step of the steering wheel. What the controllers of the paper make of
-the noise of a production yaw rate sensor, 0.1 deg/s in samples of 10 ms times 0.42 s at most, is 0.04 deg rms in an
-instant, and 0.01 deg in this mean."""
+"""Time over which an angle is averaged [s]. A car begins to respond in this time: the compact's lateral acceleration is
+at 90 % of its steady state 0.24 s after a step of the steering wheel. The noise of a production yaw rate sensor, 0.1
+deg/s in samples of 10 ms, times the largest gain of the paper's controllers, 0.42 s, is 0.04 deg rms in an instant and
+0.01 deg in this mean."""
 AHEAD_RAD: Final = math.radians(1.0)
-"""A car goes straight ahead until its steering wheel first passes this angle [rad]."""
+"""Steering wheel angle whose first passing ends the part straight ahead [rad]."""
 
 
 def straight_ahead(recording: RecordingLike) -> slice:
-    """The rows before the steering wheel is first turned; none where it is turned from the beginning."""
+    """Return the rows before the steering wheel is first turned; none if it is turned from the beginning."""
     turned = np.abs(recording["steering_wheel_rad"]) > AHEAD_RAD
     return slice(0, int(np.argmax(turned)) if turned.any() else len(turned))
 
 
 def means(values: Array, timestep_s: float) -> Array:
-    """A signal as its mean over `MEAN_S` around every sample, or over all of it where it is shorter; shape (n,)."""
+    """Return the mean of a signal over `MEAN_S` around every sample, or over a shorter signal, shape (n,)."""
     width = min(len(values), max(1, round(MEAN_S / timestep_s)))
     if not width:
         return values
@@ -38,14 +38,14 @@ def means(values: Array, timestep_s: float) -> Array:
 
 
 def largest_action(recording: RecordingLike, demand: str) -> float:
-    """By how much more a system turns wheels in a manoeuvre than straight ahead before it.
+    """Return by how much more a system turns wheels in a manoeuvre than straight ahead before it.
 
     Args:
         recording: The run.
-        demand: Channel of the angle that it demands [rad].
+        demand: Channel of the demanded angle [rad].
 
     Returns:
-        Largest magnitude of the angle's mean over `MEAN_S`, less the largest straight ahead [rad].
+        Largest magnitude of the angle's mean over `MEAN_S`, less its largest magnitude straight ahead [rad].
     """
     step_s, values = timestep(recording.time_s), recording[demand]
     ahead = np.abs(means(values[straight_ahead(recording)], step_s))
@@ -53,6 +53,6 @@ def largest_action(recording: RecordingLike, demand: str) -> float:
 
 
 def mean_straight_ahead(recording: RecordingLike, channel: str) -> float:
-    """What a channel reads straight ahead, in its unit; 0 where no part of the run is."""
+    """Return the mean of a channel straight ahead, in its unit; 0 if no part of the run is straight ahead."""
     ahead = recording[channel][straight_ahead(recording)]
     return float(np.mean(ahead)) if len(ahead) else 0.0

@@ -1,7 +1,7 @@
-"""A claim of the paper: what is stated, what must hold for it, and what became of it in three runs.
+"""A claim of the paper: its statement, its criterion, and its verdict in three runs.
 
-The sizes of a statement come from what its words mean and from what a driver or a
-sensor can notice (`metric_table`), and it names the fakes that it must not be taken in by.
+The limits of a criterion come from the words of the statement and from what a driver or a sensor can notice
+(`metric_table`). A statement names the fakes that it must reject.
 """
 
 from __future__ import annotations
@@ -14,47 +14,47 @@ from typing import Final
 from activesteer.errors import ParameterError
 
 SYSTEMS: Final = ("none", "ars", "afs")
-"""The runs that are compared: no control, active rear steering, active front superposition."""
+"""Names of the compared runs: no control, active rear steering, active front superposition."""
 SYSTEMS_WITH_CONTROL: Final = SYSTEMS[1:]
 
 
 class Kind(StrEnum):
-    """What a statement is about."""
+    """Subject of a statement."""
 
     SYSTEMS = "property of the systems"
-    """The steering wheel follows a table: car, road and system decide."""
+    """The steering wheel follows a table; car, road and system determine the result."""
     DRIVER = "depends on the driver"
-    """A driver closes the loop: what he sees and how he acts decide too."""
+    """A driver closes the loop and influences the result too."""
 
 
 class Fake(StrEnum):
-    """Runs that look like those that a statement is about, and are not."""
+    """Runs that look like the runs of a statement, and are not."""
 
     NONE_AS_BOTH = "the run without control given as both systems"
     NO_EFFECT = "both systems turn their wheels and the car moves as without control"
     EXCHANGED = "the two systems exchanged"
-    REVERSED = "both systems with their signs turned round"
-    ONE_REVERSED = "one of the systems with its sign turned round"
+    REVERSED = "both systems with their signs reversed"
+    ONE_REVERSED = "one of the systems with its sign reversed"
     NO_GAIN = "both systems with gains at zero"
-    NOISE = "both systems answer to the noise of their sensors and to nothing else"
+    NOISE = "both systems respond to the noise of their sensors and to nothing else"
     CUT_SHORT = "runs that end too early"
 
 
 _NO_PROOF: Final = frozenset({Fake.NONE_AS_BOTH, Fake.EXCHANGED, Fake.NO_GAIN, Fake.NOISE, Fake.CUT_SHORT})
-"""What every statement rejects: no claim passes but on whole runs in which each system acts as what it is,
-and on the manoeuvre."""
+"""Fakes that every statement rejects: a claim passes only on whole runs in which each system acts as itself and
+responds to the manoeuvre."""
 
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """One statement of the paper, and its criterion.
+    """A statement of the paper, and its criterion.
 
     Attributes:
         id: Its number.
-        text: What is claimed.
-        criterion: What must hold for it to pass, besides what all of them need (`Trio.obstacle`).
-        kind: What it is about.
-        rejects: Fakes that it must not pass on.
+        text: Its words.
+        criterion: Condition for it to pass, besides the conditions of all statements (`SystemRuns.obstacle`).
+        kind: Its subject.
+        rejects: Fakes on which it must not pass.
     """
 
     id: str
@@ -65,19 +65,19 @@ class Statement:
 
     @classmethod
     def about(cls, kind: Kind, number: str, text: str, criterion: str, *rejects: Fake) -> Statement:
-        """A statement; the fakes are those that it rejects besides the ones that all do."""
+        """Return a statement that rejects these fakes besides those that every statement rejects."""
         return cls(number, text, criterion, kind, _NO_PROOF | frozenset(rejects))
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A statement, checked.
+    """A checked statement.
 
     Attributes:
-        statement: What was checked.
+        statement: The statement.
         passed: Whether it holds.
-        values: The numbers it was decided on, named `<system>_<metric>`.
-        obstacle: Why it cannot hold whatever the numbers say; empty where nothing stands against it.
+        values: The numbers that decide, named `<system>_<metric>`.
+        obstacle: Why it cannot pass whatever the numbers are; empty if nothing prevents it.
     """
 
     statement: Statement
@@ -92,17 +92,17 @@ class Claim:
 
     @property
     def text(self) -> str:
-        """What is claimed."""
+        """Words of the statement."""
         return self.statement.text
 
     @property
     def criterion(self) -> str:
-        """What must hold for it to pass."""
+        """Condition for it to pass."""
         return self.statement.criterion
 
 
 def check_systems(runs: Mapping[str, object], what: str) -> None:
-    """All three runs must be there; more are no matter.
+    """Check that the three runs are given; further runs are ignored.
 
     Raises:
         ParameterError: one is missing.

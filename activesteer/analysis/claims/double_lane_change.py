@@ -1,4 +1,4 @@
-"""What the paper says about the double lane change on a dry road, as checks on three recordings.
+"""The paper's statements about the double lane change on a dry road, as checks on three recordings.
 
 Source: V. Dorsch, Mecatronics-REM 2012, section on the double lane change.
 """
@@ -23,14 +23,14 @@ from activesteer.analysis.claims.path_following import (
     held,
     held_statement,
 )
-from activesteer.analysis.claims.trio import Trio
+from activesteer.analysis.claims.system_runs import SystemRuns
 from activesteer.analysis.source import RecordingLike, read_course
 from activesteer.metric_table import CONES_HIT, SIDESLIP_RAD, YAW_RATE_RADPS
 
 ALIKE_M: Final = 0.5
-"""Tracks look alike when they are nowhere further apart than this [m], a seventh of the way to the side lane."""
+"""Largest distance between tracks that look alike [m]: a seventh of the distance to the side lane."""
 PEAK_FRACTION: Final = 0.9
-"""A system lowers a peak when it brings it down to this fraction."""
+"""Largest fraction of a peak that is left when a system lowers it."""
 YAW_RATE_PEAK: Final = "yaw_rate_peak_abs_radps"
 AFTER_DRIVER: Final = ("ay_after_gates_rms_mps2", "steering_wheel_after_gates_rms_rad")
 
@@ -39,15 +39,16 @@ L1: Final = Statement.about(
     "L1",
     "The three tracks look alike.",
     "From the first gate to the last, the tracks of the front axle centre of any two runs are at most "
-    f"{ALIKE_M:g} m apart at the same x. How many cones each body hits is said, and does not decide.",
+    f"{ALIKE_M:g} m apart at the same x. The number of cones that each body hits is given, and does not decide.",
 )
 L2: Final = Statement.about(
     Kind.DRIVER,
     "L2",
     "Without control the car goes on oscillating after the last gate; each system stops that.",
     f"The root mean square of the yaw rate of none after the last gate is above "
-    f"{math.degrees(SETTLED_YAW_RATE_RADPS):g} deg/s. Those of yaw rate and sideslip {CALMED_WORDS}; those of lateral "
-    f"acceleration and steering wheel angle are at most {100.0 * CALMED:.0f} % of those of none too.",
+    f"{math.degrees(SETTLED_YAW_RATE_RADPS):g} deg/s. The root mean squares of yaw rate and sideslip {CALMED_WORDS}. "
+    "The root mean squares of lateral acceleration and steering wheel angle are also at most "
+    f"{100.0 * CALMED:.0f} % of the values of none.",
     Fake.NO_EFFECT,
     Fake.REVERSED,
 )
@@ -56,8 +57,8 @@ L3: Final = Statement.about(
     "L3",
     "Each system lowers the peaks of yaw rate and sideslip.",
     "The largest magnitudes of yaw rate and of sideslip of ars and of afs are at most "
-    f"{100.0 * PEAK_FRACTION:.0f} % of those of none, and {math.degrees(YAW_RATE_RADPS):g} deg/s and "
-    f"{math.degrees(SIDESLIP_RAD):g} deg less at least.",
+    f"{100.0 * PEAK_FRACTION:.0f} % of the values of none, and smaller by at least {math.degrees(YAW_RATE_RADPS):g} "
+    f"deg/s and {math.degrees(SIDESLIP_RAD):g} deg.",
     Fake.NO_EFFECT,
     Fake.REVERSED,
 )
@@ -69,41 +70,41 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
     """Check claims L1 to L4.
 
     Args:
-        recordings: Double lane changes through the same course, by system; the three of `SYSTEMS` are needed.
+        recordings: Double lane changes through the same course, by system; all of `SYSTEMS`.
 
     Returns:
-        Four claims, in order. A value that does not exist (nan) lets its claim fail.
+        Four claims, in order. An undefined value (nan) fails its claim.
 
     Raises:
         ParameterError: one of the three runs is missing.
         RecordingError: a run has no course, or a channel is missing.
     """
-    trio = Trio(recordings, path_following.metrics, "double lane change")
-    oscillates = trio.metrics["none"][AFTER_YAW_RATE] > SETTLED_YAW_RATE_RADPS
-    others = all(trio.both_lower(name, CALMED, 0.0) for name in AFTER_DRIVER)
-    lowered = trio.both_lower(YAW_RATE_PEAK, PEAK_FRACTION, YAW_RATE_RADPS)
+    runs = SystemRuns(recordings, path_following.metrics, "double lane change")
+    oscillates = runs.metrics["none"][AFTER_YAW_RATE] > SETTLED_YAW_RATE_RADPS
+    others = all(runs.both_lower(name, CALMED, 0.0) for name in AFTER_DRIVER)
+    lowered = runs.both_lower(YAW_RATE_PEAK, PEAK_FRACTION, YAW_RATE_RADPS)
     return [
-        _alike(trio),
-        trio.judge(
-            L2, oscillates and others and calmed(trio), trio.pick(AFTER_YAW_RATE, AFTER_SIDESLIP, *AFTER_DRIVER)
+        _alike(runs),
+        runs.judge(
+            L2, oscillates and others and calmed(runs), runs.pick(AFTER_YAW_RATE, AFTER_SIDESLIP, *AFTER_DRIVER)
         ),
-        trio.judge(
+        runs.judge(
             L3,
-            lowered and trio.both_lower(SIDESLIP_PEAK, PEAK_FRACTION, SIDESLIP_RAD),
-            trio.pick(YAW_RATE_PEAK, SIDESLIP_PEAK),
+            lowered and runs.both_lower(SIDESLIP_PEAK, PEAK_FRACTION, SIDESLIP_RAD),
+            runs.pick(YAW_RATE_PEAK, SIDESLIP_PEAK),
         ),
-        held(trio, L4),
+        held(runs, L4),
     ]
 
 
-def _alike(trio: Trio) -> Claim:
-    course = read_course(trio.recordings["none"])
+def _alike(runs: SystemRuns) -> Claim:
+    course = read_course(runs.recordings["none"])
     first_m, last_m = course.first_gate_x_m, course.last_gate_x_m
     differences = {
         f"track_difference_{one}_{other}_m": math.nan
-        if last_m is None or not trio.whole
-        else track.largest_difference(trio.recordings[one], trio.recordings[other], first_m, last_m)
+        if last_m is None or not runs.whole
+        else track.largest_difference(runs.recordings[one], runs.recordings[other], first_m, last_m)
         for one, other in combinations(SYSTEMS, 2)
     }
-    cones = {f"{system}_{CONES_HIT}": trio.metrics[system].get(CONES_HIT, math.nan) for system in SYSTEMS}
-    return trio.judge(L1, all(value <= ALIKE_M for value in differences.values()), differences | cones)
+    cones = {f"{system}_{CONES_HIT}": runs.metrics[system].get(CONES_HIT, math.nan) for system in SYSTEMS}
+    return runs.judge(L1, all(value <= ALIKE_M for value in differences.values()), differences | cones)

@@ -1,4 +1,4 @@
-"""How often the claims hold in a population of cars, roads and drivers, and what the systems do there.
+"""Shares of a population of cars, roads and drivers in which the claims hold, and effects of the systems in it.
 
 `studies.paper.population` drives it. The result of the package's own population is stored with it, so that a nominal
 verdict can be read beside its share.
@@ -20,24 +20,25 @@ from activesteer.resources import studies_dir
 from activesteer.theory.shares import ShareVerdict, share_verdict
 
 NONE: Final = "none"
-"""In place of a factor where none is significant."""
+"""Name in place of a factor if no factor is significant."""
 
 
 @dataclass(frozen=True)
 class ClaimShare:
-    """How often a claim holds.
+    """Share of a population in which a claim holds.
 
     Attributes:
-        id: Its number.
-        passed: Whether it holds with the nominal car, road and driver.
-        number: Samples in which it could be judged.
-        share: Of these, in which it holds; nan where there are none.
+        id: Number of the claim.
+        passed: Whether the claim holds with the nominal car, road and driver.
+        number: Number of samples in which the claim could be judged.
+        share: Share of these samples in which it holds; nan for no samples.
         low: Lower end of the 95 % interval.
         high: Upper end.
-        depends_on: Key of the factor that it depends on most; `none` where no factor is significant.
+        depends_on: Key of the factor with the largest influence; `none` if no factor is significant.
         explained: Share of the variance that this factor explains.
-        direction: 1 where the claim holds more often with more of it, -1 with less, 0 in the middle or at the ends.
-        at: Factor and value, as `sensors.preset = ideal` -> share of the samples with it, of factors that are a choice.
+        direction: 1 if the claim holds more often with more of the factor, -1 with less, 0 in the middle or at the
+            ends.
+        at: Value of a factor that is a choice, as `sensors.preset = ideal` -> share of the samples with this value.
     """
 
     id: str
@@ -53,16 +54,16 @@ class ClaimShare:
 
     @property
     def verdict(self) -> ShareVerdict:
-        """What the interval says of the claim."""
+        """Verdict of the interval."""
         return share_verdict(self.low, self.high)
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return JSON values."""
         return {**asdict(self), "verdict": self.verdict.value}
 
     @property
     def words(self) -> str:
-        """The factor in words; empty where there is none."""
+        """The factor in words; empty without a factor."""
         if self.depends_on == NONE:
             return ""
         choices = {name: share for name, share in self.at.items() if name.startswith(f"{self.depends_on} = ")}
@@ -73,14 +74,14 @@ class ClaimShare:
 
 @dataclass(frozen=True)
 class Change:
-    """By how much a system changes the magnitude of a metric, against the same sample without control.
+    """Change of the magnitude of a metric by a system, relative to the same sample without control.
 
     Attributes:
         metric: The metric.
-        number: Samples in which both runs have it.
-        low: 5 % of them are below.
-        median: Half of them are.
-        high: 95 % of them are.
+        number: Number of samples in which both runs have the metric.
+        low: 5 % quantile of the changes.
+        median: Median of the changes.
+        high: 95 % quantile of the changes.
     """
 
     metric: str
@@ -92,18 +93,18 @@ class Change:
 
 @dataclass(frozen=True)
 class SystemEffect:
-    """What a system does in a scenario.
+    """Effects of a system in a scenario.
 
     Attributes:
         controller: The system.
         scenario: The manoeuvre.
-        lost_without: Samples in which the car without control is lost; see `loss.is_lost`.
-        saved: Of these, in which the car with the system is not.
-        fine_without: Samples in which the car without control is not lost.
-        spoiled: Of these, in which the car with the system is.
-        spun_without: Samples in which the car without control spins; the rest of the lost ones leaves the course.
-        spun: In which the car with the system does.
-        changes: Peak of the sideslip, oscillation that is left, steering effort, as far as the manoeuvre has them.
+        lost_without: Number of samples in which the car without control is lost; see `loss_of_control.is_lost`.
+        saved: Number of these samples in which the car with the system is not lost.
+        fine_without: Number of samples in which the car without control is not lost.
+        spoiled: Number of these samples in which the car with the system is lost.
+        spun_without: Number of samples in which the car without control spins; the other lost cars leave the course.
+        spun: Number of samples in which the car with the system spins.
+        changes: Peak of the sideslip, remaining oscillation, steering effort, if the manoeuvre has them.
     """
 
     controller: str
@@ -119,13 +120,13 @@ class SystemEffect:
 
 @dataclass(frozen=True)
 class Population:
-    """What came of a population.
+    """Result of a population.
 
     Attributes:
         samples: Number of samples.
-        seed: Of the sample.
+        seed: Seed of the samples.
         vehicle: The car that the samples are variations of.
-        versions: What it was driven with.
+        versions: Versions of the program and its libraries.
         claims: In the order of the paper.
         systems: Scenario by scenario.
     """
@@ -138,19 +139,19 @@ class Population:
     systems: tuple[SystemEffect, ...]
 
     def of(self, claim: str) -> ClaimShare | None:
-        """The share of a claim; None where there is none."""
+        """Return the share of a claim; None for an unknown claim."""
         return next((share for share in self.claims if share.id == claim), None)
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return JSON values."""
         return {**asdict(self), "claims": [claim.to_json() for claim in self.claims]}
 
     @classmethod
     def from_json(cls, table: Mapping[str, Any]) -> Population:
-        """The population that `to_json` was made of.
+        """Return the population that `to_json` described.
 
         Raises:
-            StudyError: it was not.
+            StudyError: the table is damaged.
         """
         try:
             claims = [ClaimShare(**{key: claim[key] for key in claim if key != "verdict"}) for claim in table["claims"]]
@@ -163,7 +164,7 @@ class Population:
             raise StudyError(f"the stored population is damaged: {reason}") from reason
 
     def to_text(self) -> str:
-        """Shares and effects for a terminal, in degrees."""
+        """Return shares and effects for a terminal, in degrees."""
         return "\n".join(
             [f"{self.samples} samples of {self.vehicle}, seed {self.seed}", "", *self._claim_lines(), "",
              *self._system_lines()]
@@ -196,7 +197,7 @@ class Population:
 
 
 def percent(share: float) -> str:
-    """A share in whole percent; within one percent of 0 or 100 with the digit that tells it from them."""
+    """Write a share in whole percent; within one percent of 0 or 100 with the digit that differs from them."""
     value = 100.0 * share
     beyond = float(f"{min(value, 100.0 - value):.1g}")
     decimals = max(0, -math.floor(math.log10(beyond))) if beyond > 0.0 else 0
@@ -205,13 +206,13 @@ def percent(share: float) -> str:
 
 @functools.cache
 def stored_population(vehicle: str) -> Population | None:
-    """The population that belongs to the package.
+    """Return the population that belongs to the package.
 
     Args:
         vehicle: Name of a car.
 
     Returns:
-        What came of it; None where none of this car is stored.
+        Its result; None if no population of this car is stored.
 
     Raises:
         StudyError: the file cannot be read.

@@ -1,4 +1,4 @@
-"""Which claims belong to which manoeuvre."""
+"""Claims by manoeuvre."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from activesteer.analysis.claims.claim import Claim, Statement
 from activesteer.analysis.source import RecordingLike
 
 Claims = Callable[[Mapping[str, RecordingLike]], list[Claim]]
-"""Recordings by system -> claims."""
+"""Function from recordings by system to claims."""
 
 _ROOMS: Final = {
     "step_steer": step_steer,
@@ -27,4 +27,4 @@ STATEMENTS: Final[dict[str, Statement]] = {
 }
 """Number -> statement, in the same order."""
 SCENARIO_OF: Final = {statement.id: name for name, room in _ROOMS.items() for statement in room.STATEMENTS}
-"""Number of a statement -> name of the manoeuvre that it is about."""
+"""Number of a statement -> name of its manoeuvre."""

@@ -1,4 +1,4 @@
-"""All claims together: what passed, what failed, and what was known beforehand not to come out."""
+"""All claims with their verdicts: passed, failed, or known not to be reproduced."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ FILE: Final = "not_reproduced.toml"
 
 
 class Verdict(StrEnum):
-    """What became of a claim."""
+    """Verdict of a claim."""
 
     PASSED = "passed"
     FAILED = "failed"
     NOT_REPRODUCED = "not reproduced"
-    """It fails, and is listed as known to."""
+    """The claim fails, and is listed as not reproduced."""
     UNEXPECTED = "passed, though listed as not reproduced"
-    """The list is to be cleaned."""
+    """The claim passes and must leave the list."""
 
 
 class Judged(NamedTuple):
@@ -37,9 +37,9 @@ class Judged(NamedTuple):
 
     Attributes:
         claim: The claim.
-        verdict: What became of it.
-        reason: Why it is known not to come out; empty where it is not listed.
-        share: How often it holds in the stored population; None where there is none.
+        verdict: Its verdict.
+        reason: Why it is not reproduced; empty for a claim that is not listed.
+        share: Share of the stored population in which it holds; None without a population.
     """
 
     claim: Claim
@@ -54,7 +54,7 @@ class Scorecard:
 
     Attributes:
         judged: All of them, in the order given.
-        population: The stored population of the car; None where there is none.
+        population: The stored population of the car; None without one.
     """
 
     judged: tuple[Judged, ...]
@@ -62,11 +62,11 @@ class Scorecard:
 
     @property
     def exit_status(self) -> int:
-        """1 where a claim fails that is not known to, else 0."""
+        """1 if a claim fails that is not listed, else 0."""
         return int(any(item.verdict is Verdict.FAILED for item in self.judged))
 
     def to_json(self) -> dict[str, Any]:
-        """The scorecard as JSON values; a number that does not exist (nan) is None."""
+        """Return the scorecard as JSON values; an undefined number (nan) is None."""
         return {
             "claims": [
                 {
@@ -90,7 +90,7 @@ class Scorecard:
         }
 
     def to_text(self) -> str:
-        """The scorecard for a terminal: number, verdict, text, then the numbers, in degrees and km/h."""
+        """Return the scorecard for a terminal: number, verdict, text, then the values, in degrees and km/h."""
         beside = any(item.share is not None for item in self.judged)
         lines = [f"    {'nominal':<14}  population"] if beside else []
         for claim, verdict, reason, share in self.judged:
@@ -101,7 +101,7 @@ class Scorecard:
             if claim.obstacle:
                 lines.append(f"{'':20}nothing is proved: {claim.obstacle}")
             if verdict is Verdict.UNEXPECTED:
-                lines.append(f"{'':20}listed in {FILE}, from where it can be taken out")
+                lines.append(f"{'':20}listed in {FILE}; remove it from there")
             elif reason:
                 lines.append(f"{'':20}because: {reason}")
         counts = [f"{self._count(verdict)} {verdict.value}" for verdict in Verdict if self._count(verdict)]
@@ -112,7 +112,7 @@ class Scorecard:
         return "\n".join(lines)
 
     def by_share(self) -> dict[ShareVerdict, str]:
-        """What the population says of the claims: verdict -> their numbers, with what each depends on most."""
+        """Return the numbers of the claims by verdict of the population, with the factor of the largest influence."""
         shares = [item.share for item in self.judged if item.share is not None]
         return {
             verdict: ", ".join(
@@ -135,20 +135,19 @@ def scorecard(
     known: Mapping[str, str] | None = None,
     population: Population | None = None,
 ) -> Scorecard:
-    """Put claims and what is known of them together.
+    """Judge claims with the list of claims that are not reproduced.
 
     Args:
         claims: Checked claims.
-        vehicle: Name of the vehicle; what is known not to come out with it is looked up, see `not_reproduced`, and how
-            often the claims hold in its population.
-        known: In place of that, number -> reason of the claims known not to come out.
-        population: In place of the stored one.
+        vehicle: Name of the vehicle, for its list (see `not_reproduced`) and its stored population.
+        known: Number -> reason of the claims that are not reproduced, in place of the list.
+        population: Population in place of the stored one.
 
     Returns:
         The scorecard.
 
     Raises:
-        ParameterError: the list of what is known is wrong.
+        ParameterError: the list is wrong.
     """
     reasons = not_reproduced(vehicle) if known is None else known
     stored = population or stored_population(vehicle)
@@ -160,7 +159,7 @@ def scorecard(
 
 
 def not_reproduced(vehicle: str, text: str | None = None) -> dict[str, str]:
-    """Which claims are known not to come out with a vehicle.
+    """Return the claims that are not reproduced with a vehicle.
 
     Args:
         vehicle: Name of the vehicle.
@@ -203,7 +202,7 @@ def _verdict(claim: Claim, known: Mapping[str, str]) -> Verdict:
 
 
 def number_lines(values: Mapping[str, float]) -> list[str]:
-    """The numbers of a claim, in degrees and km/h: a line for each metric, the systems beside each other."""
+    """Return the values of a claim, in degrees and km/h: a line for each metric, the systems beside each other."""
     by_metric: dict[str, list[tuple[str, float]]] = {}
     for name, value in values.items():
         system, _, metric = name.partition("_")

@@ -1,8 +1,8 @@
-"""What the paper says about the sine with dwell, as checks on three recordings.
+"""The paper's statements about the sine with dwell, as checks on three recordings.
 
-Ratios are those of FMVSS 126, from the completion of steer. Where a system must keep the car, their magnitude counts: a
-car that swings back fails too, which is stricter than the standard. Where the control-free car must be lost, they count
-with their sign, as there.
+The ratios are those of FMVSS 126, from the completion of steer. For a system that must keep the car, their magnitude
+counts: a car that swings back fails too, which is stricter than the standard. For the car without control, which must
+be lost, they count with their sign, as in the standard.
 
 Source: V. Dorsch, Mecatronics-REM 2012, section on the single sine with dwell; 49 CFR 571.126; A. van Zanten et al.,
 VDC, the vehicle dynamics control system of Bosch, SAE 950759 (1995), for the sideslip at which steering has no effect.
@@ -18,22 +18,22 @@ import numpy as np
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.trio import Trio
+from activesteer.analysis.claims.system_runs import SystemRuns
 from activesteer.analysis.sine_with_dwell import INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import Array
 from activesteer.metric_table import SIDESLIP_RAD
 
 LOST_SIDESLIP_RAD: Final = math.radians(20.0)
-"""Beyond this sideslip angle a car is lost [rad]."""
+"""Largest sideslip angle of a car that is not lost [rad]."""
 KEPT_SIDESLIP_RAD: Final = math.radians(12.0)
-"""Up to this one the steering still turns the car on a dry road [rad]."""
+"""Largest sideslip angle at which the steering still turns the car on a dry road [rad]."""
 MIN_ANGLE_RAD: Final = math.radians(0.1)
-"""Two added angles are compared where both are larger than this [rad]."""
+"""Least size of two added angles that are compared [rad]."""
 OPPOSITE_FRACTION: Final = 0.9
-"""Fraction of this time in which they must be opposite."""
+"""Least fraction of the time of comparison in which they are opposite."""
 MIN_COMMON_S: Final = 0.1
-"""Time for which both must be that large at all [s]."""
+"""Least time of comparison [s]."""
 
 RATIOS: Final = ("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share")
 SIDESLIP: Final = "sideslip_peak_abs_rad"
@@ -47,9 +47,9 @@ def _kept_statement(number: str, system: str, text: str) -> Statement:
         Kind.SYSTEMS,
         number,
         text,
-        f"The magnitude of the yaw rate of {system} is at most {_LIMITS} after the completion of steer, of its first "
+        f"The yaw rate of {system} is in magnitude at most {_LIMITS} after the completion of steer, of its first "
         f"peak after the steering reversal (FMVSS 126), and its sideslip stays within "
-        f"{math.degrees(KEPT_SIDESLIP_RAD):.0f} deg; none does not keep these limits, and the peak of its sideslip is "
+        f"{math.degrees(KEPT_SIDESLIP_RAD):.0f} deg; none breaks these limits, and the peak of its sideslip is "
         f"at least {math.degrees(SIDESLIP_RAD):g} deg larger.",
         Fake.NO_EFFECT,
         Fake.REVERSED,
@@ -61,7 +61,7 @@ D1: Final = Statement.about(
     "D1",
     "Without control the car is lost.",
     f"The yaw rate of none is above at least one of the limits of FMVSS 126 ({_LIMITS} after the completion of steer), "
-    f"and its sideslip goes beyond {math.degrees(LOST_SIDESLIP_RAD):.0f} deg and beyond twice that of ars and of afs.",
+    f"and its sideslip exceeds {math.degrees(LOST_SIDESLIP_RAD):.0f} deg and twice the sideslip of ars and of afs.",
     Fake.NO_EFFECT,
     Fake.REVERSED,
 )
@@ -81,7 +81,7 @@ D5: Final = Statement.about(
     Kind.SYSTEMS,
     "D5",
     "Rear steering is somewhat more effective than front superposition.",
-    f"The peak of the sideslip of ars is at least {math.degrees(SIDESLIP_RAD):g} deg below that of afs, and the "
+    f"The peak of the sideslip of ars is at least {math.degrees(SIDESLIP_RAD):g} deg below the peak of afs, and the "
     "magnitude of its yaw rate ratio 1.00 s after the completion of steer is not larger; ars keeps the limits of D2.",
     Fake.NO_EFFECT,
     Fake.REVERSED,
@@ -93,51 +93,51 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
     """Check claims D1 to D5.
 
     Args:
-        recordings: Sines with dwell with the same steering input, by system; the three of `SYSTEMS` are needed.
+        recordings: Sines with dwell with the same steering input, by system; all of `SYSTEMS`.
 
     Returns:
-        Five claims, in order. A value that does not exist (nan) lets its claim fail.
+        Five claims, in order. An undefined value (nan) fails its claim.
 
     Raises:
         ParameterError: one of the three runs is missing.
         RecordingError: a run is no sine with dwell.
     """
-    trio = Trio(recordings, sine_with_dwell.metrics, "sine with dwell")
-    return [_lost(trio), _kept(trio, D2, "ars"), _kept(trio, D3, "afs"), _opposite(trio), _effective(trio)]
+    runs = SystemRuns(recordings, sine_with_dwell.metrics, "sine with dwell")
+    return [_lost(runs), _kept(runs, D2, "ars"), _kept(runs, D3, "afs"), _opposite(runs), _effective(runs)]
 
 
-def _lost(trio: Trio) -> Claim:
-    none = trio.metrics["none"]
+def _lost(runs: SystemRuns) -> Claim:
+    none = runs.metrics["none"]
     failed = any(none[ratio] > limit for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True))
     lost = none[SIDESLIP] > LOST_SIDESLIP_RAD
-    alone = all(none[SIDESLIP] > 2.0 * trio.metrics[system][SIDESLIP] for system in SYSTEMS_WITH_CONTROL)
+    alone = all(none[SIDESLIP] > 2.0 * runs.metrics[system][SIDESLIP] for system in SYSTEMS_WITH_CONTROL)
     values = {f"none_{ratio}": none[ratio] for ratio in RATIOS}
-    return trio.judge(D1, failed and lost and alone, values | trio.pick(SIDESLIP))
+    return runs.judge(D1, failed and lost and alone, values | runs.pick(SIDESLIP))
 
 
-def _kept(trio: Trio, statement: Statement, system: str) -> Claim:
+def _kept(runs: SystemRuns, statement: Statement, system: str) -> Claim:
     values = {
-        f"{run}_{metric}": trio.metrics[run][metric] for metric in (*RATIOS, SIDESLIP) for run in ("none", system)
+        f"{run}_{metric}": runs.metrics[run][metric] for metric in (*RATIOS, SIDESLIP) for run in ("none", system)
     }
-    kept = _keeps(trio, system) and not _keeps(trio, "none")
-    return trio.judge(statement, kept and trio.lowers(system, SIDESLIP, 1.0, SIDESLIP_RAD), values)
+    kept = _keeps(runs, system) and not _keeps(runs, "none")
+    return runs.judge(statement, kept and runs.lowers(system, SIDESLIP, 1.0, SIDESLIP_RAD), values)
 
 
-def _keeps(trio: Trio, system: str) -> bool:
-    within = all(trio.size(system, ratio) <= limit for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True))
-    return within and trio.metrics[system][SIDESLIP] <= KEPT_SIDESLIP_RAD
+def _keeps(runs: SystemRuns, system: str) -> bool:
+    within = all(runs.size(system, ratio) <= limit for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True))
+    return within and runs.metrics[system][SIDESLIP] <= KEPT_SIDESLIP_RAD
 
 
-def _opposite(trio: Trio) -> Claim:
-    """D4, from the angles that the controllers demand: what the hinges give under load is nothing that they add."""
+def _opposite(runs: SystemRuns) -> Claim:
+    """Check D4 with the angles that the controllers demand, without the give of the hinges under load."""
     nothing = np.empty(0), np.empty(0), 0.0
-    rear, front, step_s = _added_angles(trio.recordings["ars"], trio.recordings["afs"]) if trio.whole else nothing
+    rear, front, step_s = _added_angles(runs.recordings["ars"], runs.recordings["afs"]) if runs.whole else nothing
     both = (np.abs(rear) > MIN_ANGLE_RAD) & (np.abs(front) > MIN_ANGLE_RAD)
     common_s = float(np.count_nonzero(both)) * step_s
     fraction = float(np.mean(rear[both] * front[both] < 0.0)) if both.any() else math.nan
     scale = float(np.sqrt(np.sum(rear**2) * np.sum(front**2)))
     correlation = float(np.sum(rear * front)) / scale if scale > 0.0 else math.nan
-    return trio.judge(
+    return runs.judge(
         D4,
         correlation < 0.0 and common_s >= MIN_COMMON_S and fraction >= OPPOSITE_FRACTION,
         {
@@ -149,7 +149,7 @@ def _opposite(trio: Trio) -> Claim:
 
 
 def _added_angles(ars: RecordingLike, afs: RecordingLike) -> tuple[Array, Array, float]:
-    """Demanded rear and superposed angle over the time since the beginning of steer, and its step [s]."""
+    """Return demanded rear and superposed angle over the time since the beginning of steer, and its step [s]."""
     times = sine_with_dwell.steering(ars)
     later_s = sine_with_dwell.steering(afs).begin_s - times.begin_s
     time_s = np.asarray(ars.time_s, dtype=np.float64)
@@ -159,10 +159,10 @@ def _added_angles(ars: RecordingLike, afs: RecordingLike) -> tuple[Array, Array,
     return rear, front, float(time_s[1] - time_s[0])
 
 
-def _effective(trio: Trio) -> Claim:
-    less = trio.metrics["afs"][SIDESLIP] - trio.metrics["ars"][SIDESLIP] >= SIDESLIP_RAD
-    return trio.judge(
+def _effective(runs: SystemRuns) -> Claim:
+    less = runs.metrics["afs"][SIDESLIP] - runs.metrics["ars"][SIDESLIP] >= SIDESLIP_RAD
+    return runs.judge(
         D5,
-        _keeps(trio, "ars") and less and trio.size("ars", RATIOS[0]) <= trio.size("afs", RATIOS[0]),
-        {f"{run}_{metric}": trio.metrics[run][metric] for metric in (SIDESLIP, RATIOS[0]) for run in ("ars", "afs")},
+        _keeps(runs, "ars") and less and runs.size("ars", RATIOS[0]) <= runs.size("afs", RATIOS[0]),
+        {f"{run}_{metric}": runs.metrics[run][metric] for metric in (SIDESLIP, RATIOS[0]) for run in ("ars", "afs")},
     )

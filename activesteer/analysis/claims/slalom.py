@@ -1,6 +1,6 @@
-"""What the paper says about the slalom, as checks on three recordings.
+"""The paper's statements about the slalom, as checks on three recordings.
 
-"Between the cones" is from where the front axle centre reaches the first gate to where it reaches the end of the last.
+"Between the cones": from the first gate to the end of the last gate, by the front axle centre.
 
 Source: V. Dorsch, Mecatronics-REM 2012, section on the slalom.
 """
@@ -22,7 +22,7 @@ from activesteer.analysis.claims.path_following import (
     held,
     held_statement,
 )
-from activesteer.analysis.claims.trio import Trio
+from activesteer.analysis.claims.system_runs import SystemRuns
 from activesteer.analysis.source import RecordingLike
 from activesteer.metric_table import (
     CONES_HIT,
@@ -34,7 +34,7 @@ from activesteer.metric_table import (
 )
 
 NOT_REDUCED: Final = 0.95
-"""An amplitude is not reduced when it stays above this fraction of the one without control."""
+"""Least fraction of the amplitude without control that is left when a system does not reduce it."""
 TRACK: Final = "track_amplitude_m"
 YAW_RATE: Final = "yaw_rate_gates_rms_radps"
 SIDESLIP: Final = "sideslip_gates_rms_rad"
@@ -46,8 +46,8 @@ Z1: Final = Statement.about(
     "Z1",
     "Without control the track swings wider.",
     "The amplitude of the front axle centre's track between first and last cone (half the distance of its leftmost "
-    f"and rightmost place) is at least {TRACK_M:g} m larger for none than for ars and for afs. How many cones each "
-    "body hits is said, and does not decide.",
+    f"and rightmost place) is at least {TRACK_M:g} m larger for none than for ars and for afs. The number of "
+    "cones that each body hits is given, and does not decide.",
     Fake.NO_EFFECT,
     Fake.REVERSED,
 )
@@ -64,9 +64,9 @@ Z3: Final = Statement.about(
     "Z3",
     "Front superposition does not reduce the amplitudes, and needs large angles of the driver.",
     "Between the cones, the root mean squares of yaw rate and of sideslip of afs are not more than "
-    f"{100.0 * (1.0 - NOT_REDUCED):.0f} % below those of none; that of its steering wheel angle is the largest of the "
-    f"three by at least {math.degrees(STEERING_WHEEL_RAD):g} deg, and that angle goes beyond "
-    f"{math.degrees(LARGE_STEERING_WHEEL_RAD):.0f} deg; and afs passes every cone on the right side.",
+    f"{100.0 * (1.0 - NOT_REDUCED):.0f} % below the values of none. The root mean square of its steering wheel angle "
+    f"is the largest of the three by at least {math.degrees(STEERING_WHEEL_RAD):g} deg, and the angle exceeds "
+    f"{math.degrees(LARGE_STEERING_WHEEL_RAD):.0f} deg. afs passes every cone on the right side.",
     Fake.NO_EFFECT,
     Fake.REVERSED,
 )
@@ -74,8 +74,8 @@ Z4: Final = Statement.about(
     Kind.DRIVER,
     "Z4",
     "Rear steering has the smallest amplitudes of yaw rate and sideslip.",
-    "Between the cones, the root mean squares of yaw rate and of sideslip of ars are below those of none and afs, by "
-    f"at least {math.degrees(YAW_RATE_RADPS):g} deg/s and {math.degrees(SIDESLIP_RAD):g} deg.",
+    "Between the cones, the root mean squares of yaw rate and of sideslip of ars are below the values of none and "
+    f"afs by at least {math.degrees(YAW_RATE_RADPS):g} deg/s and {math.degrees(SIDESLIP_RAD):g} deg.",
     Fake.NO_EFFECT,
     Fake.REVERSED,
 )
@@ -87,31 +87,31 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
     """Check claims Z1 to Z5.
 
     Args:
-        recordings: Slaloms around the same cones, by system; the three of `SYSTEMS` are needed.
+        recordings: Slaloms around the same cones, by system; all of `SYSTEMS`.
 
     Returns:
-        Five claims, in order. A value that does not exist (nan) lets its claim fail.
+        Five claims, in order. An undefined value (nan) fails its claim.
 
     Raises:
         ParameterError: one of the three runs is missing.
         RecordingError: a run has no course, or a channel is missing.
     """
-    trio = Trio(recordings, path_following.metrics, "slalom")
-    wider = all(trio.metrics["none"][TRACK] - trio.metrics[system][TRACK] >= TRACK_M for system in SYSTEMS_WITH_CONTROL)
+    runs = SystemRuns(recordings, path_following.metrics, "slalom")
+    wider = all(runs.metrics["none"][TRACK] - runs.metrics[system][TRACK] >= TRACK_M for system in SYSTEMS_WITH_CONTROL)
     kept = all(
-        trio.metrics["afs"][metric] >= NOT_REDUCED * trio.metrics["none"][metric] for metric in (YAW_RATE, SIDESLIP)
+        runs.metrics["afs"][metric] >= NOT_REDUCED * runs.metrics["none"][metric] for metric in (YAW_RATE, SIDESLIP)
     )
-    large = trio.metrics["afs"][STEERING_PEAK] > LARGE_STEERING_WHEEL_RAD
-    passes = trio.metrics["afs"][CONES_MISSED] == 0.0
-    calmest = trio.is_smallest("ars", YAW_RATE, YAW_RATE_RADPS) and trio.is_smallest("ars", SIDESLIP, SIDESLIP_RAD)
+    large = runs.metrics["afs"][STEERING_PEAK] > LARGE_STEERING_WHEEL_RAD
+    passes = runs.metrics["afs"][CONES_MISSED] == 0.0
+    calmest = runs.is_smallest("ars", YAW_RATE, YAW_RATE_RADPS) and runs.is_smallest("ars", SIDESLIP, SIDESLIP_RAD)
     return [
-        trio.judge(Z1, wider, trio.pick(TRACK, CONES_HIT)),
-        trio.judge(Z2, calmed(trio), trio.pick(AFTER_YAW_RATE, AFTER_SIDESLIP)),
-        trio.judge(
+        runs.judge(Z1, wider, runs.pick(TRACK, CONES_HIT)),
+        runs.judge(Z2, calmed(runs), runs.pick(AFTER_YAW_RATE, AFTER_SIDESLIP)),
+        runs.judge(
             Z3,
-            kept and large and passes and trio.is_largest("afs", STEERING, STEERING_WHEEL_RAD),
-            trio.pick(YAW_RATE, SIDESLIP, STEERING, STEERING_PEAK),
+            kept and large and passes and runs.is_largest("afs", STEERING, STEERING_WHEEL_RAD),
+            runs.pick(YAW_RATE, SIDESLIP, STEERING, STEERING_PEAK),
         ),
-        trio.judge(Z4, calmest, trio.pick(YAW_RATE, SIDESLIP)),
-        held(trio, Z5),
+        runs.judge(Z4, calmest, runs.pick(YAW_RATE, SIDESLIP)),
+        held(runs, Z5),
     ]

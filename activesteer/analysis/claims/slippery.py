@@ -1,4 +1,4 @@
-"""What the paper says about the double lane change on a slippery road, as checks on three recordings.
+"""The paper's statements about the double lane change on a slippery road, as checks on three recordings.
 
 Source: V. Dorsch, Mecatronics-REM 2012, section on the double lane change with low friction.
 """
@@ -12,19 +12,19 @@ from typing import Final
 from activesteer.analysis import path_following
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
 from activesteer.analysis.claims.path_following import LARGE_STEERING_WHEEL_RAD, held, held_statement
-from activesteer.analysis.claims.trio import Trio
+from activesteer.analysis.claims.system_runs import SystemRuns
 from activesteer.analysis.series import rms
 from activesteer.analysis.source import RecordingLike
 from activesteer.metric_table import CONES_HIT, LANE_OVERSTEP, STAYS_IN_LANES, TRACK_M
 
 LARGER: Final = 1.5
-"""The driver without control needs this many times the angle that the others need."""
+"""Least ratio of the driver's angle without control to the angles with control."""
 LARGE_YAW_RATE_RADPS: Final = math.radians(5.0)
-"""A car that goes on straight has a smaller yaw rate at the end [rad/s]."""
+"""Yaw rate at the end that no car has which continues straight [rad/s]."""
 LARGE_SIDESLIP_RAD: Final = math.radians(5.0)
-"""A car that goes on straight has a smaller sideslip at the end [rad]."""
+"""Sideslip angle at the end that no car has which continues straight [rad]."""
 END_S: Final = 3.0
-"""The end of the run, which the paper's figures show [s]."""
+"""Length of the end of the run, which the paper's figures show [s]."""
 WHEEL: Final = "steering_wheel_peak_abs_rad"
 YAW_RATE_END: Final = "yaw_rate_end_rms_radps"
 SIDESLIP_END: Final = "sideslip_end_rms_rad"
@@ -35,8 +35,8 @@ def _stays_statement(number: str, system: str, text: str) -> Statement:
         Kind.DRIVER,
         number,
         text,
-        f"The whole body of {system} goes through every lane and never gets beyond a side; that of none does "
-        f"not, and gets at least {TRACK_M:g} m further out.",
+        f"The whole body of {system} goes through every lane and never crosses a side; the body of none "
+        f"does not, and gets at least {TRACK_M:g} m further out.",
         Fake.NO_EFFECT,
         Fake.REVERSED,
     )
@@ -47,8 +47,8 @@ W1: Final = Statement.about(
     "W1",
     "Without control the driver leaves the track, with large steering angles, and the car ends with large yaw rate "
     "and sideslip.",
-    "The body of none does not keep to the lanes; its steering wheel angle goes beyond "
-    f"{math.degrees(LARGE_STEERING_WHEEL_RAD):.0f} deg and beyond {LARGER:g} times that of ars and of afs; in the last "
+    "The body of none does not keep to the lanes; its steering wheel angle exceeds "
+    f"{math.degrees(LARGE_STEERING_WHEEL_RAD):.0f} deg and {LARGER:g} times the angles of ars and of afs; in the last "
     f"{END_S:g} s of the run the root mean squares of its yaw rate and sideslip are above "
     f"{math.degrees(LARGE_YAW_RATE_RADPS):.0f} deg/s and {math.degrees(LARGE_SIDESLIP_RAD):.0f} deg.",
     Fake.NO_EFFECT,
@@ -64,17 +64,17 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
     """Check claims W1 to W4.
 
     Args:
-        recordings: Double lane changes on a slippery road, by system; the three of `SYSTEMS` are needed.
+        recordings: Double lane changes on a slippery road, by system; all of `SYSTEMS`.
 
     Returns:
-        Four claims, in order. A value that does not exist (nan) lets its claim fail.
+        Four claims, in order. An undefined value (nan) fails its claim.
 
     Raises:
         ParameterError: one of the three runs is missing.
         RecordingError: a run has no course, or a channel is missing.
     """
-    trio = Trio(recordings, _metrics, "slippery double lane change")
-    return [_leaves(trio), _stays(trio, W2, "ars"), _stays(trio, W3, "afs"), held(trio, W4)]
+    runs = SystemRuns(recordings, _metrics, "slippery double lane change")
+    return [_leaves(runs), _stays(runs, W2, "ars"), _stays(runs, W3, "afs"), held(runs, W4)]
 
 
 def _metrics(recording: RecordingLike) -> dict[str, float]:
@@ -85,23 +85,23 @@ def _metrics(recording: RecordingLike) -> dict[str, float]:
     return without | path_following.metrics(recording) | end
 
 
-def _leaves(trio: Trio) -> Claim:
-    none = trio.metrics["none"]
+def _leaves(runs: SystemRuns) -> Claim:
+    none = runs.metrics["none"]
     steers = none[WHEEL] > LARGE_STEERING_WHEEL_RAD and all(
-        none[WHEEL] > LARGER * trio.metrics[system][WHEEL] for system in SYSTEMS_WITH_CONTROL
+        none[WHEEL] > LARGER * runs.metrics[system][WHEEL] for system in SYSTEMS_WITH_CONTROL
     )
     lost = none[YAW_RATE_END] > LARGE_YAW_RATE_RADPS and none[SIDESLIP_END] > LARGE_SIDESLIP_RAD
     names = (LANE_OVERSTEP, STAYS_IN_LANES, CONES_HIT, YAW_RATE_END, SIDESLIP_END)
     values = {f"none_{name}": none[name] for name in names}
-    return trio.judge(W1, none[STAYS_IN_LANES] == 0.0 and steers and lost, values | trio.pick(WHEEL))
+    return runs.judge(W1, none[STAYS_IN_LANES] == 0.0 and steers and lost, values | runs.pick(WHEEL))
 
 
-def _stays(trio: Trio, statement: Statement, system: str) -> Claim:
+def _stays(runs: SystemRuns, statement: Statement, system: str) -> Claim:
     names = (LANE_OVERSTEP, STAYS_IN_LANES, CONES_HIT)
-    none, kept = trio.metrics["none"], trio.metrics[system]
+    none, kept = runs.metrics["none"], runs.metrics[system]
     further_m = none[LANE_OVERSTEP] - kept[LANE_OVERSTEP]
-    return trio.judge(
+    return runs.judge(
         statement,
         kept[STAYS_IN_LANES] == 1.0 and none[STAYS_IN_LANES] == 0.0 and further_m >= TRACK_M,
-        {f"{run}_{name}": trio.metrics[run][name] for name in names for run in ("none", system)},
+        {f"{run}_{name}": runs.metrics[run][name] for name in names for run in ("none", system)},
     )

@@ -1,7 +1,8 @@
-"""The paper's figures again, from recordings: same numbers, same curves 1, 2, 3, units at every axis.
+"""The paper's figures from recordings: the same numbers, the same curves 1, 2, 3, and units at every axis.
 
-`draw_all` makes the figures of whole reproductions, `figure_for` the one that suits a manoeuvre. matplotlib is an extra
-of the package and imported when a picture is made. Figures 1, 2 and 3 need more than recordings and are made elsewhere.
+`draw_all` makes the figures of whole reproductions, `figure_for` makes one figure of a manoeuvre. matplotlib is an
+extra of the package and imported when a picture is made. Figures 1, 2 and 3 need more than recordings and are made
+elsewhere.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Draw = Callable[[Mapping[str, RecordingLike]], "Figure"]
-"""Recordings by system -> figure."""
+"""Function from recordings by system to a figure."""
 
 FORMATS: Final = (".png", ".svg", ".pdf")
 
@@ -50,13 +51,13 @@ BY_SCENARIO: Final[dict[str, dict[str, Draw]]] = {
         "figure_24_slippery_sideslip": time_histories.figure_24,
     },
 }
-"""Scenario -> file name without its ending -> what draws the figure."""
+"""Scenario -> file name without its ending -> function that draws the figure."""
 
 OF_ANY_RUN: Final = {
     "figure_07_predicted_rear_angle": theory.figure_7,
     "figure_09_tolerance_function": theory.figure_9,
 }
-"""Figures that show parameters: the same from every run with a vehicle."""
+"""Figures of parameters, which are the same for every run of a vehicle."""
 
 BY_KIND: Final[dict[str, Draw]] = {
     "step_steer": figure_11,
@@ -65,15 +66,15 @@ BY_KIND: Final[dict[str, Draw]] = {
     "slalom": tracks.overview,
     "follow_path": tracks.overview,
 }
-"""Kind of manoeuvre -> what shows it at a glance; every other kind gets `time_histories.general`."""
+"""Kind of manoeuvre -> function that draws it at a glance; other kinds are drawn by `time_histories.general`."""
 
 
 def draw_all(recordings: Mapping[str, Mapping[str, RecordingLike]], folder: str | os.PathLike[str]) -> list[Path]:
-    """Draw the paper's figures of all scenarios that there are runs of, as PNG, SVG and PDF.
+    """Draw the paper's figures of all driven scenarios, as PNG, SVG and PDF.
 
     Args:
-        recordings: Scenario -> system -> run. Scenarios that the paper does not have are left out.
-        folder: Where the files go; made where it does not exist.
+        recordings: Scenario -> system -> run. Scenarios that are not in the paper are ignored.
+        folder: Folder for the files; it is created if it does not exist.
 
     Returns:
         The files written, in the order of their numbers.
@@ -99,13 +100,13 @@ def draw_all(recordings: Mapping[str, Mapping[str, RecordingLike]], folder: str 
 
 
 def figure_for(kind: str) -> Callable[[Mapping[str, RecordingLike], str | os.PathLike[str]], Path]:
-    """The figure that shows a kind of manoeuvre at a glance.
+    """Return the function that draws a kind of manoeuvre at a glance.
 
     Args:
         kind: Kind of the manoeuvre.
 
     Returns:
-        What draws runs of it, by system, and saves them under a path; it raises as `step_steer_figure` does.
+        Function that draws its runs, by system, and saves the figure; it raises the errors of `step_steer_figure`.
     """
     draw = BY_KIND.get(kind, time_histories.general)
 

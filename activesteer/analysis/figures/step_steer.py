@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from activesteer.analysis.figures import style, time_panels
-from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, Curve
+from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, DrawnRun
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS, RUN_DASHES, Array, RunLook
 from activesteer.errors import RecordingError
@@ -25,11 +25,10 @@ FRONT = quantity_of("front_steer_rad")._replace(short="steering angles")
 
 
 def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
-    """Response to a step steer.
+    """Draw the response to a step steer.
 
-    From the top: yaw rate (dotted: desired, of the runs with a controller), steering angles (front wheels thin, added
-    angles thick: those of the rear wheels, or the superposition at the front ones), lateral acceleration, sideslip and
-    roll, over one time axis.
+    From the top, over one time axis: yaw rate (dotted: desired by the controller), steering angles (front wheels thin,
+    added angles of rear wheels or front superposition thick), lateral acceleration, sideslip and roll.
 
     Args:
         recordings: Runs by label; `none`, `ars` and `afs` get the paper's names and numbers, others keep their own.
@@ -63,8 +62,8 @@ def step_steer_figure(recordings: Mapping[str, RecordingLike], path: str | os.Pa
     """Draw `figure_11` and save it.
 
     Args:
-        recordings: As there.
-        path: File to write; its ending says the format (.png, .pdf, .svg).
+        recordings: Runs by label; see `figure_11`.
+        path: File to write; its ending gives the format (.png, .pdf, .svg).
 
     Returns:
         The path written.
@@ -85,9 +84,9 @@ def figure_2(
 
     Args:
         recording: A step steer.
-        path: File to write; its ending says the format (.png, .pdf, .svg).
-        models: Label -> channel -> values over the time of the recording, to stand beside it: the single-track model
-            (`identification.single_track_response`), which has no roll, the linear car
+        path: File to write; its ending gives the format (.png, .pdf, .svg).
+        models: Label -> channel -> values over the time of the recording, drawn beside it: the single-track model
+            (`identification.single_track_response`), which has no roll, and the linear car
             (`linearisation.linear_response`).
 
     Returns:
@@ -101,7 +100,7 @@ def figure_2(
     """
     figure = new_figure(width_in=style.COLUMN_IN, height_in=3.6)
     axes: list[Axes] = list(figure.subplots(2, 1, sharex=True))
-    car = Curve(recording, RunLook("multibody car", 0, ()))
+    car = DrawnRun(recording, RunLook("multibody car", 0, ()))
     for axis, panel in zip(axes, (YAW_RATE, ROLL), strict=True):
         style.draw(axis, car, panel, label=car.look.label, width=2.0)
         for place, (label, channels) in enumerate((models or {}).items(), start=1):

@@ -1,6 +1,6 @@
 """One style for all figures: colours, dashes and numbers of the systems, curves and legends. Degrees, as in the paper.
 
-Made to be printed at the width that they have, in grey too: text of 8 pt, lines that their dashes tell apart.
+The figures can be printed at their own width and in grey: text of 8 pt, and lines with different dashes.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LineStyle = Literal["-"] | tuple[float, tuple[float, ...]]
-"""A full line, or dashes, as matplotlib takes them."""
+"""A full line, or dashes in the notation of matplotlib."""
 COLUMN_IN: Final = 3.5
 """Width of a column of a two-column journal [in]."""
 PAGE_IN: Final = 7.2
-"""Width of both [in]."""
+"""Width of both columns [in]."""
 TEXT_PT: Final = 8.0
 LINE_PT: Final = 1.3
 DOTTED: Final[LineStyle] = (0.0, (1.0, 1.6))
-"""Style of what stands beside a run's own line."""
+"""Style of a further line of a run."""
 BAND_ALPHA: Final = 0.16
 BAND_LABEL: Final = "80 % of the population"
-"""From 10 to 90 %."""
+"""The band lies between 10 and 90 %."""
 MAX_POINTS: Final = 5000
-"""A curve with more samples than this is drawn with fewer: a picture cannot show them, and its file would hold them."""
+"""Most samples of a curve: a picture cannot show more, and its file would be large."""
 
 
 YAW_RATE: Final = quantity_of("yaw_rate_radps")
@@ -49,17 +49,17 @@ SIDESLIP: Final = quantity_of("sideslip_rad")
 ROLL: Final = quantity_of("roll_rad")
 SPEED: Final = quantity_of("speed_mps")
 ADDED: Final = quantity_of("rear_steer_rad")._replace(channel="", short="added angle")
-"""The angles that the systems add: not one channel, but `ADDED_CHANNELS` of those that ask for any."""
+"""The angles that the systems add: not one channel, but the demanded ones of `ADDED_CHANNELS`."""
 ADDED_CHANNELS: Final = ("rear_steer_rad", "superposition_rad")
 
 
-class Curve(NamedTuple):
+class DrawnRun(NamedTuple):
     """A run as it is drawn.
 
     Attributes:
         recording: The run.
         look: Label, colour and dashes.
-        bands: Where the curves of the population lie, by channel; empty where the run belongs to none.
+        bands: Bands of the population, by channel; empty if no population belongs to the run.
     """
 
     recording: RecordingLike
@@ -68,35 +68,37 @@ class Curve(NamedTuple):
 
     @property
     def linestyle(self) -> LineStyle:
-        """Its dashes, as matplotlib takes them."""
+        """Its dashes in the notation of matplotlib."""
         return (0.0, self.look.dashes) if self.look.dashes else "-"
 
     @property
     def lost(self) -> bool:
-        """Whether the car has spun."""
+        """Whether the car spins."""
         return bool(np.abs(self.recording["sideslip_rad"]).max() > LOST_SIDESLIP_RAD)
 
 
-def curves(recordings: Mapping[str, RecordingLike]) -> list[Curve]:
-    """The runs in the paper's order, the three systems always in the same colours.
+def curves(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
+    """Return the runs in the paper's order; the three systems always have the same colours.
 
     Raises:
         ParameterError: there is no run to draw.
     """
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
-    return [Curve(recordings[name], look, bands_of(recordings[name])) for name, look in run_looks(recordings).items()]
+    return [
+        DrawnRun(recordings[name], look, bands_of(recordings[name])) for name, look in run_looks(recordings).items()
+    ]
 
 
 def draw(
     axis: Axes,
-    curve: Curve,
+    curve: DrawnRun,
     panel: Quantity,
     label: str = "",
     width: float = LINE_PT,
     style: LineStyle | None = None,
 ) -> None:
-    """One channel of one run over time; without a label it stays out of the legend, without a style it has its own."""
+    """Draw a channel of a run over time: without a label outside the legend, by default in the run's own style."""
     draw_band(axis, curve, panel.channel, panel.factor)
     values = thinned(curve.recording[panel.channel]) * panel.factor
     # A leading underscore keeps a line out of the legend.
@@ -106,8 +108,8 @@ def draw(
     )  # fmt: skip
 
 
-def draw_band(axis: Axes, curve: Curve, channel: str, factor: float = 1.0) -> None:
-    """Where a channel lies in the population, behind all curves."""
+def draw_band(axis: Axes, curve: DrawnRun, channel: str, factor: float = 1.0) -> None:
+    """Draw the band of a channel in the population, behind all curves."""
     band = curve.bands.get(channel)
     if band is not None:
         edges = band.low * factor, band.high * factor
@@ -122,29 +124,29 @@ def draw_band(axis: Axes, curve: Curve, channel: str, factor: float = 1.0) -> No
         )
 
 
-def added_channels(curve: Curve) -> list[str]:
-    """Which angles a system adds: what no controller asks for is the give of a hinge, not an added angle."""
+def added_channels(curve: DrawnRun) -> list[str]:
+    """Return the angles that a system adds; an angle that no controller demands is the give of a hinge."""
     return [name for name in ADDED_CHANNELS if np.any(curve.recording[name.replace("_rad", "_demand_rad")])]
 
 
-def draw_added(axis: Axes, curve: Curve, width: float = LINE_PT) -> None:
-    """The angles that a system adds."""
+def draw_added(axis: Axes, curve: DrawnRun, width: float = LINE_PT) -> None:
+    """Draw the angles that a system adds."""
     for channel in added_channels(curve):
         draw(axis, curve, ADDED._replace(channel=channel), width=width)
 
 
-def present(panels: Sequence[Quantity], drawn: Sequence[Curve]) -> list[Quantity]:
-    """The panels without that of the added angles where no run has any."""
+def present(panels: Sequence[Quantity], drawn: Sequence[DrawnRun]) -> list[Quantity]:
+    """Return the panels, without the added angles if no run has any."""
     return [panel for panel in panels if panel is not ADDED or any(added_channels(curve) for curve in drawn)]
 
 
 def thinned(values: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Every n-th sample, n so that a picture has enough of them and not many more."""
+    """Return every n-th sample, with n for at most `MAX_POINTS` samples."""
     return np.asarray(values[:: -(-len(values) // MAX_POINTS) or 1], dtype=np.float64)
 
 
 def plain(axis: Axes, title: str = "") -> None:
-    """Grid, spines and size of text of every axis here."""
+    """Set grid, spines and size of text of an axis."""
     if title:
         axis.set_ylabel(title)
     plain_axis(axis)
@@ -155,7 +157,7 @@ def plain(axis: Axes, title: str = "") -> None:
 
 
 def name_curves(figure: Figure, axis: Axes, lines: Sequence[tuple[str, float, LineStyle]] = ()) -> None:
-    """The legend of the runs, above all axes, and what other kinds of line mean: text, width, style."""
+    """Draw the legend of the runs above all axes, with further kinds of line by text, width and style."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - an extra, and slow to import
     from matplotlib.patches import Patch  # noqa: PLC0415
 

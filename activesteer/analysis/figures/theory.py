@@ -1,4 +1,4 @@
-"""Figures of the control law itself, from the parameters that a recording holds: 7 and 9."""
+"""Figures 7 and 9: the control law, from the parameters in a recording."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TOP_SPEED_MPS: Final = 200.0 / 3.6
-"""Up to where the predicted angle is drawn [m/s]."""
+"""Greatest speed of the predicted angle [m/s]."""
 
 
 def figure_7(recording: RecordingLike) -> Figure:
-    """Predicted rear angle over speed, and the part of it that the rear system uses.
+    """Draw the predicted rear angle over speed, and the part of it that the rear system uses.
 
     Raises:
         ParameterError: matplotlib is not installed.
@@ -41,7 +41,7 @@ def figure_7(recording: RecordingLike) -> Figure:
     axis.axhline(0.0, color="#999999", linewidth=0.8)
     axis.plot(3.6 * speed_mps, ratio, color=RUN_COLOURS[1], linewidth=1.6, label="keeps sideslip at zero (eq. 5)")
     if gain != 1.0:
-        label = f"of it used: {100.0 * gain:.3g} %"
+        label = f"used part: {100.0 * gain:.3g} %"
         axis.plot(3.6 * speed_mps, gain * ratio, "--", color=RUN_COLOURS[1], linewidth=1.4, label=label)
     zero = np.flatnonzero((ratio[:-1] < 0.0) & (ratio[1:] >= 0.0))
     if zero.size:
@@ -64,7 +64,7 @@ def figure_7(recording: RecordingLike) -> Figure:
 
 
 def figure_9(recording: RecordingLike) -> Figure:
-    """Tolerance function of the correctors, with c_off and c_in.
+    """Draw the tolerance function of the correctors, with c_off and c_in.
 
     Raises:
         ParameterError: matplotlib is not installed.

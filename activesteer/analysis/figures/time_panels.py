@@ -1,4 +1,4 @@
-"""Panels over one time axis, which shows the transient; where a car spins, the others keep the scale."""
+"""Panels over one time axis that shows the transient; the cars that do not spin set the scale."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from activesteer.analysis.figures.style import (
     SPEED,
     TEXT_PT,
     YAW_RATE,
-    Curve,
+    DrawnRun,
     curves,
     draw,
     draw_added,
@@ -34,25 +34,25 @@ if TYPE_CHECKING:
 PANEL_IN: Final = 1.05
 """Height of a panel over time [in]."""
 _INSET_FROM: Final = 2.0
-"""By how much a lost car must exceed the others for an inset."""
+"""Least ratio of the curve of a lost car to the others for an inset."""
 _INSET_WIDTH: Final = 0.34
 _INSET_HEIGHT: Final = 0.48
 _INSET_CAPTION: Final = 0.16
-"""Parts of the axis."""
+"""Sizes of the inset, as fractions of the axis."""
 _SETTLED: Final = 0.05
-"""A signal has settled when it stays this near to its end, of its range."""
+"""Distance from the last value within which a signal has settled, as a fraction of its range."""
 _BEFORE: Final = 0.08
 _AFTER: Final = 0.2
-"""What is shown before and after the transient, of its duration."""
+"""Time shown before and after the transient, as fractions of its duration."""
 
 
-def fill_panels(axes: Sequence[Axes], drawn: Sequence[Curve], panels: Sequence[Quantity]) -> None:
-    """Draws panels over one time axis, which shows the transient.
+def fill_panels(axes: Sequence[Axes], drawn: Sequence[DrawnRun], panels: Sequence[Quantity]) -> None:
+    """Draw panels over one time axis that shows the transient.
 
     Args:
-        axes: As many as panels, from the top.
+        axes: One for each panel, from the top.
         drawn: The runs.
-        panels: What each axis shows; the first one's curves carry the labels.
+        panels: Quantity of each axis; the curves of the first axis carry the labels.
     """
     for row, (axis, panel) in enumerate(zip(axes, panels, strict=True)):
         for curve in drawn:
@@ -67,16 +67,16 @@ def fill_panels(axes: Sequence[Axes], drawn: Sequence[Curve], panels: Sequence[Q
         show_lost_beside(axis, drawn, panel)
 
 
-def finish_time(axes: Sequence[Axes], drawn: Sequence[Curve]) -> None:
-    """The time axis below all panels, over the transient."""
+def finish_time(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
+    """Set the time axis below all panels to the transient."""
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(*transient(drawn))
 
 
-def transient(drawn: Sequence[Curve]) -> tuple[float, float]:
-    """From before the first run moves to after the last has settled [s]; those that spin do not settle, nor count.
+def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
+    """Return the time from before the first motion to after the last run has settled [s]; runs that spin do not count.
 
-    The whole time where there is nothing to settle to.
+    If no run settles, this is the whole time.
     """
     start, end = 0.0, max(float(curve.recording.time_s[-1]) for curve in drawn)
     begins, ends = [], []
@@ -95,10 +95,10 @@ def transient(drawn: Sequence[Curve]) -> tuple[float, float]:
     return max(start, min(begins) - _BEFORE * lasts), min(end, max(ends) + _AFTER * lasts)
 
 
-def show_lost_beside(axis: Axes, drawn: Sequence[Curve], panel: Quantity) -> None:
-    """Where a car that spins would set the scale: that of the others, and all of them in an inset, over the whole time.
+def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Quantity) -> None:
+    """Keep the scale of the cars that do not spin, and draw all cars over the whole time in an inset.
 
-    The curves of the others fill the axis; the inset stands in the corner that they leave free.
+    The inset stands in the corner that the curves leave free.
     """
     kept = [curve for curve in drawn if not curve.lost]
     if len(kept) in (0, len(drawn)) or panel is ADDED:
@@ -117,7 +117,7 @@ def show_lost_beside(axis: Axes, drawn: Sequence[Curve], panel: Quantity) -> Non
         return
     margin = 0.08 * max(high - low, panel.min_span)
     low, high = low - margin, high + margin
-    # Above or below, where it takes less to keep the inset clear of the others.
+    # Above or below, wherever the axis grows less to keep the inset clear of the curves.
     top = max(high, low + (corner_high + margin - low) / (1.0 - _INSET_HEIGHT - _INSET_CAPTION))
     bottom = min(low, high - (high - corner_low + margin) / (1.0 - _INSET_HEIGHT - _INSET_CAPTION))
     above = top - low <= high - bottom
@@ -127,7 +127,7 @@ def show_lost_beside(axis: Axes, drawn: Sequence[Curve], panel: Quantity) -> Non
     for curve in drawn:
         draw(inset, curve, panel, width=0.8)
     start, end = inset.get_xlim()
-    # Its numbers stand inside, before the curves begin.
+    # The numbers of the inset stand inside, before the curves begin.
     inset.set_xlim(start - 0.35 * (end - start), end)
     inset.tick_params(labelsize=TEXT_PT, length=0.0, labelbottom=False)
     inset.tick_params(axis="y", pad=-3.0)
@@ -143,7 +143,7 @@ def show_lost_beside(axis: Axes, drawn: Sequence[Curve], panel: Quantity) -> Non
 
 
 def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Quantity]) -> Figure:
-    """A figure of panels over one time axis, as wide as a column.
+    """Draw panels over one time axis, as wide as a column.
 
     Raises:
         ParameterError: matplotlib is not installed, or there is no run to draw.

@@ -12,7 +12,7 @@ from activesteer.analysis import lanes, track
 from activesteer.analysis.bands import TRACK
 from activesteer.analysis.course_view import CourseView, view_of
 from activesteer.analysis.figures import style, time_panels
-from activesteer.analysis.figures.style import Curve
+from activesteer.analysis.figures.style import DrawnRun
 from activesteer.analysis.source import RecordingLike, read_course, read_footprint
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure
@@ -28,14 +28,14 @@ CONE_COLOUR: Final = "#e69f00"
 STRUCK_COLOUR: Final = "#b3261e"
 WIDTH_IN: Final = style.PAGE_IN
 CARS: Final = 12
-"""How many outlines of a car stand along the course, at most."""
+"""Most outlines of a car along the course."""
 COURSE_ASPECT: Final = 0.2
 TRACK_ASPECT: Final = 0.35
-"""Height over width of the axes of courses and of tracks, about."""
+"""Approximate height over width of the axes of courses and of tracks."""
 
 
 def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
-    """The course: path, lanes with their sizes, cones. It says by how much lateral positions are stretched."""
+    """Draw the course: path, lanes with their sizes, cones. The axis names the factor that stretches y."""
     course = read_course(style.curves(recordings)[0].recording)
     figure = new_figure(width_in=WIDTH_IN, height_in=0.65 + _axis_height_in(course, COURSE_ASPECT))
     axis: Axes = figure.subplots()
@@ -51,7 +51,7 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
 
 
 def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
-    """Tracks of the front axle centre along the course. It says by how much lateral positions are stretched."""
+    """Draw tracks of the front axle centre along the course. The axis names the factor that stretches y."""
     course = read_course(style.curves(recordings)[0].recording)
     figure = new_figure(width_in=WIDTH_IN, height_in=0.95 + _axis_height_in(course, TRACK_ASPECT))
     axis: Axes = figure.subplots()
@@ -61,7 +61,7 @@ def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
 
 
 def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
-    """Tracks, and below them what driver, car and systems do over time."""
+    """Draw tracks, and below them the actions of driver, car and systems over time."""
     drawn = style.curves(recordings)
     wanted = (style.STEERING_WHEEL, style.YAW_RATE, style.ADDED, style.LATERAL, style.SIDESLIP)
     panels = style.present(wanted, drawn)
@@ -80,7 +80,7 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
 
 
 def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
-    """Draws the course, and the track of the front axle centre of every run."""
+    """Draw the course, and the track of the front axle centre of every run."""
     drawn = style.curves(recordings)
     for curve in drawn:
         style.draw_band(axis, curve, TRACK[1])
@@ -95,8 +95,8 @@ def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
         _draw_cars(axis, curve)
 
 
-def _draw_cars(axis: Axes, curve: Curve) -> None:
-    """The outline of the car, in its size, at places along the course."""
+def _draw_cars(axis: Axes, curve: DrawnRun) -> None:
+    """Draw the outline of the car in its size at places along the course."""
     from matplotlib.patches import Polygon  # noqa: PLC0415 - an extra, and slow to import
 
     try:
@@ -113,7 +113,7 @@ def _draw_cars(axis: Axes, curve: Curve) -> None:
 
 
 def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.bool_] | None = None) -> None:
-    """Lanes, path and cones, with a legend of their own, and the limits of the axis."""
+    """Draw lanes, path and cones with their own legend, and set the limits of the axis."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - an extra, and slow to import
     from matplotlib.patches import Ellipse, Rectangle  # noqa: PLC0415
 
@@ -129,10 +129,10 @@ def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.b
         course.cone_centres_m(), struck if struck is not None else [False] * len(course.cones_m), strict=True
     ):
         colour = STRUCK_COLOUR if hit else CONE_COLOUR
-        # In its size; the edge keeps it from vanishing.
+        # The cone has its size; its edge keeps it visible.
         size = 2.0 * CONE_RADIUS_M
         axis.add_patch(Ellipse((x, y), size, size, facecolor=colour, edgecolor=colour, linewidth=1.6, zorder=3))
-    names = [*(["lane"] if course.lanes else []), "path asked for"]
+    names = [*(["lane"] if course.lanes else []), "path"]
     if len(course.cones_m):
         shown.append(Line2D([], [], linestyle="", marker="o", markersize=3.0, color=CONE_COLOUR))
         names.append("cone")
@@ -155,7 +155,7 @@ def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.b
 
 
 def _stretch(view: CourseView, aspect: float) -> int:
-    """By how much lateral positions are stretched for an axis about `aspect` times as high as it is wide."""
+    """Return the factor that stretches lateral positions for an axis about `aspect` times as high as wide."""
     (left, right), (low, high) = view.x_m, view.y_m
     return max(1, round(aspect * (right - left) / (high - low)))
 

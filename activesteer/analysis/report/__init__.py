@@ -1,6 +1,6 @@
 """The report of runs: one HTML page with scorecard, plots to zoom into, metrics, parameters; it works offline.
 
-The plots are drawn in the browser by uPlot (https://github.com/leeoniya/uPlot, MIT), of which a copy is in
+uPlot (https://github.com/leeoniya/uPlot, MIT) draws the plots in the browser; a copy of it is in
 `activesteer/pages/templates`.
 """
 

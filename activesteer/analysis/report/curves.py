@@ -1,4 +1,4 @@
-"""What the plots of a report show: the signals of runs over one time axis, thinned, in the units of `quantities`."""
+"""Data of the plots of a report: signals of runs over one time axis, thinned, in their units for display."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M, Course
 
 RATE_HZ: Final = 200.0
-"""Most samples of a signal in a second; the car's own motion ends below 20 Hz."""
+"""Most samples of a signal per second; the car's own motion ends below 20 Hz."""
 MAX_SAMPLES: Final = 4000
-"""Most samples of a signal in all: twice what the widest screen shows, until one zooms in."""
+"""Most samples of a signal: twice the pixels of the widest screen, before zooming in."""
 MAX_STEP_S: Final = 0.02
-"""Most from one sample to the next as long as samples can stand for the signal [s]: 25 Hz are seen at this rate."""
+"""Longest interval between samples that still represent the signal [s]: they show up to 25 Hz."""
 OFF_COURSE_M: Final = 6.0
-"""How far beside the course a car that leaves it stays in the picture [m]."""
+"""Distance beside the course to which the picture shows a car that leaves it [m]."""
 DIGITS: Final = 4
-"""Digits after the first of a signal's range; more cannot be seen."""
+"""Digits after the first digit of a signal's range; more cannot be seen."""
 
 
 class TimePlot(NamedTuple):
     """A plot over time.
 
     Attributes:
-        title: What it shows.
-        quantity: In which unit, and how small its axis may be.
-        signals: From a recording to what is drawn of it, SI; the first is the run's own line, others are dotted. One
-            that a recording does not have raises `RecordingError`, one that says nothing is None.
-        note: What a dotted line is.
+        title: Its title.
+        quantity: Quantity that gives its unit and the least height of its axis.
+        signals: Functions from a recording to a signal, SI. The first is the run's own line, the others are dotted. A
+            signal that the recording lacks raises `RecordingError`; a signal without meaning is None.
+        note: Meaning of a dotted line.
     """
 
     title: str
@@ -62,14 +62,14 @@ def _desired(recording: Recording) -> Array | None:
 
 def _added(name: str) -> Callable[[Recording], Array | None]:
     def values(recording: Recording) -> Array | None:
-        # What no controller asks for is the give of a hinge, not an added angle.
+        # An angle that no controller demands is the give of a hinge, not an added angle.
         return recording[f"{name}_rad"] if np.any(recording[f"{name}_demand_rad"]) else None
 
     return values
 
 
 def _beside_truth(word: str, channel: str) -> TimePlot:
-    """What a sensor says or a controller estimates, and the truth where that was recorded beside it."""
+    """Return the plot of a measured or an estimated channel, with the true one if it was recorded."""
 
     def truth(recording: Recording) -> Array | None:
         return recording[channel] if f"{word}_{channel}" in recording else None
@@ -108,14 +108,14 @@ PANELS: Final = (
     TimePlot("Friction utilisation, highest of four wheels", quantity_of(_USE), (_over_corners(_USE, np.maximum),)),
     TimePlot("Wheel load, lowest of four wheels", _LOAD, (_over_corners("tyre_fz_N", np.minimum),)),
 )  # fmt: skip
-"""In pairs, as they stand beside each other."""
+"""Plots in pairs, as they stand beside each other."""
 
 
 def plots(group: Group) -> dict[str, Any]:
-    """The plots of a group, as JSON values.
+    """Return the plots of a group as JSON values.
 
     Returns:
-        Time step and number of samples, runs, panels, marks, and the track where positions were recorded.
+        Time step and number of samples, runs, plots, marks, and the track if positions were recorded.
     """
     grid = time_grid([run.recording.time_s for run in group.runs])
     panels = [shown for panel in PANELS if (shown := _panel(panel, group.runs, grid))["series"]]
@@ -135,12 +135,12 @@ def plots(group: Group) -> dict[str, Any]:
 
 
 def time_grid(times_s: Sequence[Array]) -> Array:
-    """Instants that all runs are shown at: samples of the first, thinned, as far as the longest goes [s]."""
+    """Return the instants of all plots: thinned samples of the first run, to the end of the longest run [s]."""
     first = times_s[0]
     start = min(float(time_s[0]) for time_s in times_s)
     end = max(float(time_s[-1]) for time_s in times_s)
     step = float(np.median(np.diff(first))) if len(first) > 1 else 1.0 / RATE_HZ
-    # A hair less than a whole number is rounding.
+    # A value slightly below a whole number is due to rounding.
     every = max(
         1, math.ceil(1.0 / (RATE_HZ * step) - 1e-6), math.ceil((end - start) / (step * (MAX_SAMPLES - 1)) - 1e-6)
     )
@@ -157,11 +157,11 @@ def _panel(panel: TimePlot, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
             try:
                 values = signal(run.recording)
             except RecordingError:
-                # A run of an older version, or of another program, may lack it; the others are shown.
+                # A run of an older version or of another program may lack the signal.
                 continue
             if values is not None:
                 sampled = _reduced(run.recording.time_s, values * panel.quantity.factor, grid)
-                # What a run has alone is its own line; dotted is what stands beside it.
+                # The only signal of a run is its own line; further signals are dotted.
                 series.append({"run": number, "dotted": not alone, "values": _rounded(sampled)})
                 alone = False
     note = panel.note if any(item["dotted"] for item in series) else ""
@@ -170,14 +170,14 @@ def _panel(panel: TimePlot, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
 
 
 def _sampled(time_s: Array, values: Array, grid: Array) -> Array:
-    """Values at the instants of the grid; nan before and after the run."""
+    """Return the values at the instants of the grid; nan before and after the run."""
     return np.interp(grid, time_s, values, left=math.nan, right=math.nan)
 
 
 def _reduced(time_s: Array, values: Array, grid: Array) -> Array:
-    """Values for a curve; of a run too long for all of its motion, the extremes, so that no peak is lost.
+    """Return the values of a curve; for a run too long for samples, the extremes, so that no peak is lost.
 
-    Two instants of the grid take the least and the greatest value between the first of them and the next pair.
+    Each pair of instants takes the least and the greatest value up to the next pair.
     """
     if len(grid) < 2 or grid[1] - grid[0] <= MAX_STEP_S:
         return _sampled(time_s, values, grid)
@@ -193,13 +193,13 @@ def _reduced(time_s: Array, values: Array, grid: Array) -> Array:
 
 
 def _rounded(values: Array, decimals: int | None = None) -> list[float | None]:
-    """Numbers for JSON, which has no nan, with as many digits as can be seen."""
+    """Return numbers for JSON, which has no nan, with as many digits as can be seen."""
     finite = np.isfinite(values)
     if decimals is None:
         known = values[finite]
         span = float(np.ptp(known)) if known.size else 0.0
         span = span or float(np.abs(known).max(initial=0.0))
-        # A signal that is constant but for rounding must not become a staircase of it, hence the upper limit.
+        # The upper limit keeps the rounding of a constant signal from becoming a staircase.
         decimals = min(9, max(0, DIGITS - math.floor(math.log10(span)))) if span > 0.0 else 0
     numbers = np.round(np.where(finite, values, 0.0), decimals) + 0.0  # no -0.0
     listed = [int(number) if number == int(number) else number for number in numbers.tolist()]
@@ -207,7 +207,7 @@ def _rounded(values: Array, decimals: int | None = None) -> list[float | None]:
 
 
 def _marks(group: Group) -> list[dict[str, Any]]:
-    """Instants that a standard judges by."""
+    """Return the instants of a standard's criterion."""
     recording = group.runs[0].recording
     if (
         not isinstance(maneuver := recording.metadata.get("maneuver"), dict)
@@ -217,14 +217,14 @@ def _marks(group: Group) -> list[dict[str, Any]]:
     try:
         completion_s = sine_with_dwell.steering(recording).completion_s
     except RecordingError:
-        # A run that was cut short can still be looked at.
+        # An incomplete run has no such instants, but it can be shown.
         return []
     later = [{"time_s": completion_s + s, "text": f"+{s:.2f} s"} for s in sine_with_dwell.INSTANTS_S]
     return [{"time_s": completion_s, "text": "end of steer"}, *later]
 
 
 def _track(group: Group, grid: Array) -> dict[str, Any] | None:
-    """Course, tracks of the front axle centre [m], heading [rad] and sizes of the cars [m]."""
+    """Return course, tracks of the front axle centre [m], heading [rad] and sizes of the cars [m]."""
     tracks = []
     for number, run in enumerate(group.runs):
         try:
@@ -249,7 +249,7 @@ def _courses(group: Group) -> Iterator[Course]:
         try:
             yield read_course(run.recording)
         except RecordingError:
-            # An open-loop manoeuvre has none.
+            # An open-loop manoeuvre has no course.
             continue
 
 

@@ -1,4 +1,4 @@
-"""The runs of a report: opened, named, and put together by the manoeuvre that they drive."""
+"""The runs of a report: opened, named, and grouped by manoeuvre."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from activesteer.recording import Recording
 from activesteer.recording.run_names import run_names
 
 MAX_RUNS: Final = 60
-"""More runs than this make a page that nobody can read, and that a browser is slow to open."""
+"""Most runs of a report; with more runs, nobody can read the page and a browser is slow to open it."""
 
 
 class Run(NamedTuple):
-    """A recording as it is shown.
+    """A recording in a report.
 
     Attributes:
-        source: Where it comes from, such as the name of its file.
+        source: Its origin, such as the name of its file.
         recording: The recording.
-        name: What its column is called, short (`ars`).
+        name: Short name of its column (`ars`).
         look: Label, colour and dashes of its curves.
     """
 
@@ -34,7 +34,7 @@ class Run(NamedTuple):
 
     @property
     def problem(self) -> str:
-        """Why the run did not end properly; empty where it did."""
+        """Reason why the run is incomplete; empty for a complete run."""
         metadata = self.recording.metadata
         return "" if metadata.get("complete", True) else str(metadata.get("error", "the run did not end properly"))
 
@@ -44,8 +44,8 @@ class Group(NamedTuple):
 
     Attributes:
         name: Name of the manoeuvre.
-        title: The same in words.
-        runs: At least one.
+        title: Its name in words.
+        runs: The runs, at least one.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Group(NamedTuple):
     runs: tuple[Run, ...]
 
     def by_name(self) -> dict[str, Recording]:
-        """Recordings by name of the run."""
+        """Return the recordings by name of the run."""
         return {run.name: run.recording for run in self.runs}
 
 
 def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
-    """Recordings by path; of a file that was cut short or damaged, what can be read.
+    """Open recordings, by path; of an incomplete or damaged file, the readable part.
 
     Raises:
         ParameterError: a file is named twice.
@@ -73,13 +73,13 @@ def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
 
 
 def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
-    """The runs by manoeuvre: those of the paper in its order, then the others as they come.
+    """Return the runs by manoeuvre: first the paper's manoeuvres in its order, then the others.
 
     Args:
-        recordings: By where they come from.
+        recordings: Recordings by their origin.
 
     Raises:
-        ParameterError: there is none, or there are more than `MAX_RUNS`.
+        ParameterError: there is no recording, or there are more than `MAX_RUNS`.
         RecordingError: a recording has no rows.
     """
     if not 1 <= len(recordings) <= MAX_RUNS:
@@ -95,7 +95,7 @@ def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
 
 
 def entry(recording: Recording, table: str, key: str) -> str:
-    """An entry of a table of the metadata as text; empty where it does not exist."""
+    """Return an entry of a table of the metadata as text; empty if it does not exist."""
     values: Any = recording.metadata.get(table)
     return str(values.get(key, "")) if isinstance(values, Mapping) else ""
 

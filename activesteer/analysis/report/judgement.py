@@ -1,4 +1,4 @@
-"""What the paper claims about the runs of a group, or why that cannot be said."""
+"""The paper's claims about the runs of a group, or the reason why they cannot be judged."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class Judgement(NamedTuple):
     """The claims about a group of runs.
 
     Attributes:
-        scorecard: Claims with their verdicts; without any where the paper claims nothing, or nothing can be said.
-        obstacle: Why nothing can be said; empty where something is, or where the paper claims nothing.
+        scorecard: Claims with their verdicts; empty if there are no claims, or if they cannot be judged.
+        obstacle: Why the claims cannot be judged; empty if they are, or if there are none.
     """
 
     scorecard: Scorecard
@@ -23,9 +23,9 @@ class Judgement(NamedTuple):
 
 
 def judge(group: Group) -> Judgement:
-    """Checks the paper's claims, where the runs are those that they speak of.
+    """Check the paper's claims about the runs of a group.
 
-    The three systems are needed, complete, driven by the same manoeuvre with the same car.
+    The group must hold a complete run of each of the three systems, in the same manoeuvre with the same car.
     """
     nothing = scorecard([], known={})
     recordings = group.by_name()

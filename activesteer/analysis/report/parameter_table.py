@@ -1,4 +1,4 @@
-"""Parameters of runs side by side: the tables of their metadata, flat, as text."""
+"""Parameters of runs side by side: the flattened tables of their metadata, as text."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class Row(NamedTuple):
     """A parameter.
 
     Attributes:
-        key: Its name, with the tables that it stands in.
-        values: Its value in each run; a single one where it is the same in all.
+        key: Its name, with the names of its tables.
+        values: Its value in each run; a single value if all runs have the same.
     """
 
     key: str
@@ -23,16 +23,16 @@ class Row(NamedTuple):
 
     @property
     def differs(self) -> bool:
-        """Whether runs differ in it."""
+        """Whether the runs differ in this parameter."""
         return len(self.values) > 1
 
 
 def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
-    """The entries of tables of the metadata, in the order of the first run, those that only later ones have after it.
+    """Return the entries of tables of the metadata: those of the first run in its order, then those of later runs.
 
     Args:
         recordings: The runs.
-        tables: Keys of the metadata: tables, or single values. The entries of a single one are given without its name.
+        tables: Keys of the metadata: tables, or single values. The entries of a single table come without its name.
     """
     flat = [dict(_flat(_chosen(run.metadata, tables))) for run in recordings]
     found = []

@@ -1,4 +1,4 @@
-"""What came out of runs, for the top of a report: what went wrong, and the key figures beside each other."""
+"""Results of runs for the top of a report: failures, and key figures beside each other."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from activesteer.analysis.report.tables import difference_text, number
 from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP, SIDESLIP_PEAKS, Better, recorded_metric
 
 MAX_FIGURES: Final = 6
-"""More key figures than this are no longer read at a glance."""
+"""Most key figures that can be read at a glance."""
 
 
 class KeyFigure(NamedTuple):
-    """What a run is first looked at for.
+    """A key figure of runs.
 
     Attributes:
         title: Its name.
-        metrics: Names of metrics; the first that a run has is it.
+        metrics: Names of metrics; the first one that a run has is shown.
     """
 
     title: str
@@ -33,8 +33,8 @@ class Figure(NamedTuple):
 
     Attributes:
         text: Its value.
-        difference: To the first run; empty for that one itself and where there is none.
-        change: What the difference is worth.
+        difference: Difference from the first run; empty for the first run and without a difference.
+        change: Significance of the difference.
     """
 
     text: str
@@ -43,12 +43,12 @@ class Figure(NamedTuple):
 
 
 class Result(NamedTuple):
-    """What came out of a run.
+    """Result of a run.
 
     Attributes:
         run: The run.
-        losses: What went wrong, in words; empty where nothing did.
-        kept: What went right, in words; empty where nothing was to be kept.
+        losses: Its failures, in words.
+        kept: The requirements that it met, in words.
         figures: Its key figures.
     """
 
@@ -74,15 +74,15 @@ KEY_FIGURES: Final = (
     KeyFigure("Off the path", ("track_deviation_max_m",)),
     KeyFigure("Steering effort, rms rate", ("steering_wheel_rate_rms_radps",)),
 )
-"""In the order of their columns; a manoeuvre has some of them."""
+"""Key figures in the order of their columns; a manoeuvre has some of them."""
 
 
 HEADLINE: Final = "Peak sideslip [deg]"
-"""Title of the one that stands for all where there is room for one."""
+"""Title of the key figure that is shown where there is room for only one."""
 
 
 def key_titles(group: Group) -> list[str]:
-    """Titles of the columns of key figures, with their units."""
+    """Return the titles of the columns of key figures, with their units."""
     return [
         f"{figure.title} [{unit}]" if (unit := recorded_metric(name).unit_name) else figure.title
         for figure, name in _chosen(group)
@@ -90,7 +90,7 @@ def key_titles(group: Group) -> list[str]:
 
 
 def results(group: Group) -> list[Result]:
-    """What came out of each run of a group, beside the first of them."""
+    """Return the result of each run of a group, compared with the first run."""
     chosen = list(_chosen(group))
     first = group.runs[0].recording.metrics
     lost = [(*(["incomplete"] if run.problem else []), *losses(run.recording.metrics)) for run in group.runs]
@@ -104,7 +104,7 @@ def results(group: Group) -> list[Result]:
 
 
 def _chosen(group: Group) -> Iterator[tuple[KeyFigure, str]]:
-    """The key figures that any run has, with the metric that tells it."""
+    """Yield the key figures that any run has, with their metrics."""
     names = {name for run in group.runs for name in run.recording.metrics}
     having = (
         (figure, name) for figure in KEY_FIGURES if (name := next(filter(names.__contains__, figure.metrics), ""))

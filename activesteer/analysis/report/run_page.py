@@ -1,4 +1,4 @@
-"""Puts a report together: one HTML page with everything in it, which needs nothing else and no network."""
+"""The report of runs as one HTML page that needs no other file and no network."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ _CHANGE_MARK: Final = {
     Change.SAME: "\N{ALMOST EQUAL TO}",
     Change.OTHER: "",
 }
-"""Colour alone would not do."""
+"""Marks beside the colours, for readers who cannot see these."""
 
 
 class _Section(NamedTuple):
-    """What the page says of one manoeuvre; the names are those of the template."""
+    """Content of one manoeuvre; the template uses these names."""
 
     anchor: str
     group: Group
@@ -68,14 +68,11 @@ class _Section(NamedTuple):
 
 
 def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[str]) -> Path:
-    """Writes the report of runs; a file that exists is replaced.
+    """Write the report of runs and return its path; an existing file is replaced.
 
     Args:
-        recordings: By where they come from, such as the names of their files.
+        recordings: Recordings by their origin, such as the names of their files.
         path: The HTML file.
-
-    Returns:
-        The path.
 
     Raises:
         ParameterError: there is no recording, or the file cannot be written.
@@ -85,11 +82,11 @@ def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[st
 
 
 def report_page(recordings: Mapping[str, Recording], made: date | None = None) -> str:
-    """The report of runs, HTML: the same recordings and date give the same page.
+    """Return the report of runs as HTML; the same recordings and date give the same page.
 
     Args:
-        recordings: By where they come from.
-        made: The date that it bears; today's where there is none.
+        recordings: Recordings by their origin.
+        made: Date of the report; by default today.
 
     Raises:
         ParameterError: there is no recording.
@@ -149,7 +146,7 @@ def _section(group: Group, anchor: str) -> _Section:
 
 
 def _facts(groups: Sequence[Group], made: date) -> list[str]:
-    """Date, car, driver, program."""
+    """Return date, car, driver and versions of the program."""
     recordings = [run.recording for group in groups for run in group.runs]
 
     def every(table: str, key: str) -> str:

@@ -1,4 +1,4 @@
-"""What stands in the tables of a report, as text."""
+"""Content of the tables of a report, as text."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from activesteer.quantities import parameter_label, typeset
 
 
 class Cell(NamedTuple):
-    """A number, or a difference with what it is of the first run's value where that means something."""
+    """A number, or a difference with its percentage of the first run's value, if that has a meaning."""
 
     text: str
     percent: str = ""
@@ -25,7 +25,7 @@ class MetricRow(NamedTuple):
     Attributes:
         name: Its name in words.
         unit: Unit of the numbers.
-        cells: Value of the first run; value and difference to the first of each other one.
+        cells: Value of the first run, then value and difference from the first run of each other run.
     """
 
     name: str
@@ -34,13 +34,13 @@ class MetricRow(NamedTuple):
 
 
 def verdict_counts(scorecards: Iterable[Scorecard]) -> dict[Verdict, int]:
-    """How many claims came to each verdict that any came to."""
+    """Return the number of claims by verdict, without verdicts of no claim."""
     verdicts = [item.verdict for card in scorecards for item in card.judged]
     return {verdict: verdicts.count(verdict) for verdict in Verdict if verdict in verdicts}
 
 
 def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
-    """What was run: titles of the columns, and a row for each run."""
+    """Return the titles of the table of files, and a row for each run."""
     runs = [(group, run) for group in groups for run in group.runs]
     changed = [changed_parameters(run) for _, run in runs]
     titles = ["File", "Manoeuvre", "Controller", "Vehicle", "Duration", *(["Changed"] if any(changed) else [])]
@@ -54,7 +54,7 @@ def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
 
 
 def changed_parameters(run: Run) -> str:
-    """The parameters that the user replaced, with their values and keys; empty where there are none."""
+    """Describe the overrides of a run, with their values and keys; empty without overrides."""
     changed: Any = run.recording.metadata.get("overrides")
     return ", ".join(_told(*one) for one in changed.items()) if isinstance(changed, Mapping) else ""
 
@@ -65,13 +65,13 @@ def _told(key: str, value: Any) -> str:
 
 
 def metric_titles(group: Group) -> list[str]:
-    """Titles of the columns of `metric_rows`."""
+    """Return the titles of the columns of `metric_rows`."""
     first, *others = (run.name for run in group.runs)
     return ["Metric", "Unit", first, *(title for name in others for title in (name, f"{name} against {first}"))]
 
 
 def metric_rows(group: Group) -> list[MetricRow]:
-    """Metrics with the differences to the first run."""
+    """Return the metrics, with their differences from the first run."""
     values = [run.recording.metrics for run in group.runs]
     rows = []
     for name in dict.fromkeys(name for metrics in values for name in metrics):
@@ -85,7 +85,7 @@ def metric_rows(group: Group) -> list[MetricRow]:
 
 
 def number(name: str, value: float) -> str:
-    """The value of a metric [SI] in the unit that is shown: three decimals, fewer where large; a dash for none."""
+    """Write the value of a metric [SI] for display: three decimals, fewer for large values; a dash for nan."""
     if not math.isfinite(value):
         return "\N{EN DASH}"
     metric = recorded_metric(name)
@@ -93,10 +93,9 @@ def number(name: str, value: float) -> str:
 
 
 def difference_text(name: str, value: float, first: float) -> Cell:
-    """By how much the value of a metric [SI] differs from that of the first run.
+    """Write the difference of a metric [SI] from its value in the first run.
 
-    In percent too, where that value is more than a driver or a sensor would miss; not of a negative one, of which more
-    is less.
+    The cell has a percentage too, if the first value is significant and positive.
     """
     if not (math.isfinite(value) and math.isfinite(first)):
         return Cell("\N{EN DASH}")

@@ -124,7 +124,7 @@ def test_a_system_that_does_as_much_straight_ahead_does_not_act(scenario):
         run.channels["steering_wheel_rad"] = np.where(ahead, 0.0, run["steering_wheel_rad"])
         run.channels[demand] = np.where(ahead, largest_rad, run[demand])
         obstacles = {claim.obstacle for claim in SCENARIOS[scenario](runs)}
-        assert all(obstacle.startswith(f"the run {system} never asks for") for obstacle in obstacles)
+        assert all(obstacle.startswith(f"the run {system} never demands") for obstacle in obstacles)
 
 
 def test_claims_are_found_by_the_name_of_the_manoeuvre():

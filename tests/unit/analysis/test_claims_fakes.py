@@ -125,7 +125,7 @@ def test_what_stands_against_a_claim_is_said(scenario):
         assert claim.obstacle == ""
     for claim in SCENARIOS[name](runs | {"ars": runs["afs"]}):
         assert claim.obstacle == (
-            "the run ars never asks for 0.05 deg of rear steer more than straight ahead, as a mean over 0.2 s"
+            "the run ars never demands 0.05 deg of rear steer more than straight ahead, as a mean over 0.2 s"
         )
     for claim in SCENARIOS[name](runs | {"afs": shortened(runs["afs"], 3.0)}):
         assert claim.obstacle == "the run afs ends too early"

@@ -1,4 +1,4 @@
-"""Three runs of a scenario, one a system, as all claims look at them."""
+"""The runs of the three systems in a scenario, as all claims use them."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ from activesteer.metric_table import STEER_RAD
 Metrics = Mapping[str, float]
 
 
-class Trio:
+class SystemRuns:
     """The runs none, ars and afs of a scenario.
 
     Attributes:
         recordings: The runs, by system.
-        metrics: Their metrics, by system; nan for one that a run cut short does not have.
-        whole: Whether all three came to the end of their manoeuvre.
-        obstacle: Why no claim can pass on these runs, a sentence; empty where nothing stands against it. A run must
-            be whole. That of ars must turn the rear wheels and that of afs the superposition gear, by
-            `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`action.largest_action`);
-            neither may ask the other for as much in any instant, and none asks nobody: what a system did not do proves
-            nothing about it.
+        metrics: Their metrics, by system; nan for metrics that an incomplete run does not have.
+        whole: Whether all three runs reach the end of their manoeuvre.
+        obstacle: Why no claim can pass on these runs, a sentence; empty if nothing prevents it. A run must be whole.
+            The run of ars must turn the rear wheels and the run of afs the superposition gear, by
+            `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`action.largest_action`).
+            No run may demand as much of an actuator that its system does not have: an action that a system did not
+            perform proves nothing.
     """
 
     def __init__(
         self, recordings: Mapping[str, RecordingLike], metrics: Callable[[RecordingLike], Metrics], what: str
     ) -> None:
-        """Evaluates the runs.
+        """Evaluate the runs.
 
         Args:
-            recordings: Runs by system; more than the three are no matter.
-            metrics: What evaluates a run.
+            recordings: Runs by system; further runs are ignored.
+            metrics: Function that evaluates a run.
             what: Name of the manoeuvre, for errors.
 
         Raises:
             ParameterError: one of the three runs is missing.
-            RecordingError: a run that is whole cannot be evaluated, or a channel is missing.
+            RecordingError: a whole run cannot be evaluated, or a channel is missing.
         """
         check_systems(recordings, what)
         self.recordings = {system: recordings[system] for system in SYSTEMS}
@@ -54,53 +54,53 @@ class Trio:
         self.obstacle = ", ".join(f"the run {system} ends too early" for system in cut) or _pretence(recordings)
 
     def judge(self, statement: Statement, holds: bool, values: dict[str, float]) -> Claim:
-        """The claim: it passes where its criterion holds and nothing stands against it."""
+        """Return the claim, which passes if its criterion holds and there is no obstacle."""
         return Claim(statement, holds and not self.obstacle, values, self.obstacle)
 
     def pick(self, *names: str) -> dict[str, float]:
-        """Metrics of all systems, named `<system>_<metric>`."""
+        """Return metrics of all systems, named `<system>_<metric>`."""
         return {f"{system}_{name}": self.metrics[system][name] for name in names for system in SYSTEMS}
 
     def size(self, system: str, name: str) -> float:
-        """Magnitude of a metric."""
+        """Return the magnitude of a metric."""
         return abs(self.metrics[system][name])
 
     def lowers(self, system: str, name: str, fraction: float, minimum: float) -> bool:
-        """Whether a system brings a metric's magnitude down, to a part of that without control and noticeably.
+        """Return whether a system lowers the magnitude of a metric to a fraction, and noticeably.
 
         Args:
             system: The system.
             name: The metric.
-            fraction: Most of the value without control that may be left.
-            minimum: By how much it must be smaller at least.
+            fraction: Largest fraction of the value without control that may be left.
+            minimum: Least difference from the value without control.
         """
         none, value = self.size("none", name), self.size(system, name)
         return value <= fraction * none and none - value >= minimum
 
     def both_lower(self, name: str, fraction: float, minimum: float) -> bool:
-        """Whether both systems do; see `lowers`."""
+        """Return whether both systems lower a metric; see `lowers`."""
         return all(self.lowers(system, name, fraction, minimum) for system in SYSTEMS_WITH_CONTROL)
 
     def is_smallest(self, system: str, name: str, minimum: float) -> bool:
-        """Whether a metric's magnitude is noticeably below those of the two other runs."""
+        """Return whether the magnitude of a metric is noticeably below the two other runs."""
         others = [self.size(other, name) for other in SYSTEMS if other != system]
         return all(other - self.size(system, name) >= minimum for other in others)
 
     def is_largest(self, system: str, name: str, minimum: float) -> bool:
-        """Whether a metric's magnitude is noticeably above those of the two other runs."""
+        """Return whether the magnitude of a metric is noticeably above the two other runs."""
         others = [self.size(other, name) for other in SYSTEMS if other != system]
         return all(self.size(system, name) - other >= minimum for other in others)
 
 
 class _Whole(dict[str, float]):
-    """Metrics of a run that may be of another kind than the name of its manoeuvre says."""
+    """Metrics of a run whose manoeuvre may be of another kind than its name says."""
 
     def __missing__(self, name: str) -> float:
-        raise RecordingError(f"the run has no metric {name}: is it what its name says?")
+        raise RecordingError(f"the run has no metric {name}: its manoeuvre is of another kind")
 
 
 class _Cut(dict[str, float]):
-    """Metrics of a run that was cut short: what it does not have is not known."""
+    """Metrics of an incomplete run: those that it does not have are unknown."""
 
     def __missing__(self, name: str) -> float:
         return math.nan
@@ -116,7 +116,7 @@ def _evaluated(recording: RecordingLike, metrics: Callable[[RecordingLike], Metr
 
 
 def _is_cut_short(recording: RecordingLike) -> bool:
-    """Whether a run ended before its manoeuvre does; its last row lies one step before the end."""
+    """Return whether a run ended before its manoeuvre; the last row of a whole run lies one step before the end."""
     maneuver: Any = recording.metadata.get("maneuver")
     duration_s = maneuver.get("duration_s") if isinstance(maneuver, Mapping) else None
     time_s = recording.time_s
@@ -127,13 +127,13 @@ def _is_cut_short(recording: RecordingLike) -> bool:
 
 
 def _pretence(recordings: Mapping[str, RecordingLike]) -> str:
-    """What a run does that its system does not, or does not do that it should, a sentence; empty where all fits."""
+    """Describe an action of a run that does not fit its system; empty if all actions fit."""
     for system in SYSTEMS:
         for name, owner in (("rear_steer", "ars"), ("superposition", "afs")):
             demand = f"{name}_demand_rad"
             angle = f"{math.degrees(STEER_RAD):.2f} deg of {name.replace('_', ' ')}"
             if system != owner and float(np.abs(recordings[system][demand]).max()) >= STEER_RAD:
-                return f"the run {system} asks for {angle}"
+                return f"the run {system} demands {angle}"
             if system == owner and not largest_action(recordings[system], demand) >= STEER_RAD:
-                return f"the run {system} never asks for {angle} more than straight ahead, as a mean over {MEAN_S:g} s"
+                return f"the run {system} never demands {angle} more than straight ahead, as a mean over {MEAN_S:g} s"
     return ""
