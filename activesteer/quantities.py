@@ -1,6 +1,6 @@
-"""How quantities are shown to a reader: name, unit, factor from the SI value, digits, smallest height of an axis.
+"""Display of quantities: label, unit, factor from the SI value, digits, smallest height of an axis.
 
-Everything is SI and radians inside; whatever is printed, plotted or drawn takes its unit from here.
+Values are SI and radians. Everything that is printed, plotted or drawn takes its unit from here.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ _DEG: Final = math.degrees(1.0)
 
 
 class DisplayUnit(NamedTuple):
-    """A unit as it is shown.
+    """Unit for display.
 
     Attributes:
-        name: Its name; `-` for a pure number.
-        factor: From the SI value to this unit.
+        name: Name of the unit; `-` for a pure number.
+        factor: Factor from the SI value.
     """
 
     name: str
@@ -50,15 +50,15 @@ _KILONEWTON: Final = DisplayUnit("kN", 1e-3)
 
 
 class Quantity(NamedTuple):
-    """A recorded signal as it is shown.
+    """Display of a recorded signal.
 
     Attributes:
         channel: Name of the channel.
-        label: Its name.
-        short: Its name where there is little room.
-        unit: Unit that it is shown in, with the factor from the SI value.
-        digits: Digits behind the point where its value is written out.
-        min_span: Smallest height of an axis, in that unit: a signal that hardly moves shall look like it.
+        label: Label of the signal.
+        short: Short label.
+        unit: Display unit.
+        digits: Digits after the decimal point.
+        min_span: Smallest height of an axis in the display unit, which keeps a nearly constant signal flat.
     """
 
     channel: str
@@ -70,24 +70,24 @@ class Quantity(NamedTuple):
 
     @property
     def factor(self) -> float:
-        """From the SI value to the unit that is shown."""
+        """Factor from the SI value to the display unit."""
         return self.unit.factor
 
     @property
     def title(self) -> str:
-        """Label and unit, as they stand over a plot."""
+        """Label and unit, the title of a plot."""
         return f"{self.label[0].upper()}{self.label[1:]} [{self.unit.name}]"
 
     @property
     def axis_title(self) -> str:
-        """Short name and unit in two lines, as they stand beside an axis."""
+        """Short label and unit in two lines, the title of an axis."""
         return f"{self.short}\n[{self.unit.name}]"
 
     def value_text(self, value: float) -> str:
-        """A value as it is written out, without its unit and without a minus sign before a zero.
+        """Return a value as text without its unit, and a zero without a minus sign.
 
         Args:
-            value: The value, SI; what is not finite is not available.
+            value: The value, SI; `n/a` if it is not finite.
         """
         if not math.isfinite(value):
             return "n/a"
@@ -101,23 +101,20 @@ _AS_WRITTEN: Final = {
     "_1ps": "1/s", "_mps": "m/s", "_kmh": "km/h", "_Nm": "N m", "_Hz": "Hz", "_kg": "kg", "_rad": "rad", "_deg": "deg",
     "_mm": "mm", "_Pa": "Pa", "_m": "m", "_s": "s", "_N": "N", "_g": "g",
 }  # fmt: skip
-"""Ending of a key or a column -> the unit that its values are written in."""
+"""Suffix of a key or a column -> unit of its values."""
 
 
 def unit_of(name: str) -> str:
-    """The unit that a name ends in.
+    """Return the unit at the end of a name; empty for a pure number.
 
     Args:
         name: Name of a metric, or dotted key of a parameter.
-
-    Returns:
-        The unit; empty for a pure number and for what is none.
     """
     return next((unit for ending, unit in _AS_WRITTEN.items() if name.endswith(ending)), "")
 
 
 _FILES: Final = frozenset({"maneuver", "vehicle", "controllers", "overrides"})
-"""Tables that say only where a parameter stands."""
+"""Tables that only locate a parameter."""
 _PARAMETER_WORDS: Final = {
     "mu": "friction coefficient", "cg": "centre of gravity", "ars": "ARS", "afs": "AFS", "lqr": "LQR", "esc": "ESC",
     "mpc": "MPC",
@@ -125,14 +122,13 @@ _PARAMETER_WORDS: Final = {
 
 
 def parameter_label(key: str) -> tuple[str, str]:
-    """What a parameter is called, by the words of its key and of the tables that it is in.
+    """Return the label and the unit of a parameter, from the words of its key and its tables.
 
     Args:
-        key: Dotted key, as `controllers.ars.corrector.proportional_gain_s`.
+        key: Dotted key, such as `controllers.ars.corrector.proportional_gain_s`.
 
     Returns:
-        Its name in words, as `ARS corrector: proportional gain`, and the unit of its values; empty for a pure number
-        and for what is none.
+        The label, such as `ARS corrector: proportional gain`, and the unit; empty for a pure number.
     """
     *tables, name = key.removesuffix(next((end for end in _AS_WRITTEN if key.endswith(end)), "")).split(".")
     within, what = (
@@ -143,16 +139,16 @@ def parameter_label(key: str) -> tuple[str, str]:
 
 
 def parameter_title(key: str) -> str:
-    """Name and unit of a parameter in one text, as `ARS corrector: proportional gain [s]`."""
+    """Return label and unit of a parameter, such as `ARS corrector: proportional gain [s]`."""
     words, unit = parameter_label(key)
     return f"{words} [{unit}]" if unit else words
 
 
 def display_unit(name: str) -> DisplayUnit:
-    """The unit that a value is shown in.
+    """Return the display unit of a value.
 
     Args:
-        name: Name of a channel, a metric or a parameter, ending in its SI unit.
+        name: Name of a channel or parameter, ending in its SI unit.
     """
     return next((unit for suffix, unit in _BY_SUFFIX.items() if name.endswith(suffix)), _PURE)
 
@@ -161,7 +157,7 @@ _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
 
 
 def typeset(text: str) -> str:
-    """A text of numbers as a page shows it: minus signs, not hyphens, before numbers, and m/s² with its superscript."""
+    """Return a text of numbers for a page: minus signs instead of hyphens, and m/s² with its superscript."""
     return _NEGATIVE.sub("\N{MINUS SIGN}", text).replace("m/s2", "m/s²")
 
 
@@ -172,9 +168,9 @@ def _row(
 
 
 MEASURED: Final = "measured"
-"""Before the name of a channel, which is then what a sensor says of it."""
+"""Prefix of a channel for the measured value."""
 ESTIMATED: Final = "estimated"
-"""The same of what a controller estimates."""
+"""Prefix of a channel for the estimated value."""
 _QUANTITIES: Final = {
     row.channel: row
     for row in (
@@ -210,10 +206,10 @@ _QUANTITIES: Final = {
 
 
 def quantity_of(channel: str) -> Quantity:
-    """How a channel is shown.
+    """Return the display of a channel.
 
     Args:
-        channel: Its name, with or without a corner, `measured` or `estimated` before it.
+        channel: Name of the channel, possibly with a corner, `measured` or `estimated` before it.
     """
     corner, _, rest = channel.partition("_")
     if corner in (MEASURED, ESTIMATED):
