@@ -8,6 +8,7 @@ import sys
 from typing import Any
 
 from activesteer.commands.arguments import add_car, add_json, overrides_of
+from activesteer.commands.output import print_json
 from activesteer.errors import ParameterError
 
 
@@ -38,7 +39,7 @@ def _identify(options: argparse.Namespace) -> int:
         options.output = file
     result = identify(options.vehicle, overrides, progress)
     if options.json:
-        print(result.to_json())
+        print_json(result.to_json())
     else:
         print(result.table())
     if options.write:

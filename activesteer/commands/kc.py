@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.commands.arguments import add_car, add_figures_folder, add_json, overrides_of
+from activesteer.commands.output import print_json
 
 
 def add_to(commands: Any) -> None:
@@ -28,7 +29,10 @@ def _kc(options: argparse.Namespace) -> int:
     from activesteer.rigs import kinematics_compliance
 
     result = kinematics_compliance(options.vehicle, overrides_of(options))
-    print(result.to_json() if options.json else result.table())
+    if options.json:
+        print_json(result.to_json())
+    else:
+        print(result.table())
     if options.tables is not None:
         from activesteer.errors import ParameterError
         from activesteer.files import write_text

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import textwrap
 from dataclasses import dataclass
+from typing import Any
 
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.files import json_text
 from activesteer.rigs.kc.definitions import DEFINITIONS, Axle
 from activesteer.rigs.kc.programme import Measured
 from activesteer.rigs.kc.sweep import Sweep
@@ -76,8 +76,8 @@ class KcResult:
         """The metrics outside their bands."""
         return tuple(entry for entry in self.metrics if entry.inside is False)
 
-    def to_json(self) -> str:
-        """Return the metrics as JSON: name, axle, value, unit, band, inside, source; a missing value is null."""
+    def to_json(self) -> dict[str, Any]:
+        """Return the metrics as JSON values: name, axle, value, unit, band, inside, source; a missing value is null."""
         rows = [
             {
                 "name": entry.name,
@@ -90,7 +90,7 @@ class KcResult:
             }
             for entry in self.metrics
         ]
-        return json_text({"metrics": rows})
+        return {"metrics": rows}
 
     def table(self) -> str:
         """Return the metrics as text of 80 columns, a line each, with their target bands."""

@@ -22,7 +22,6 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.tables import comparison
 from activesteer.controllers import SingleTrackParameters
 from activesteer.errors import RecordingError
-from activesteer.files import json_text
 from activesteer.metric_table import metric
 from activesteer.scenario import FileOrTable, check_gains, check_parts, resolve
 from activesteer.scenario.vehicle_file import write_values
@@ -66,8 +65,8 @@ class Identification:
         keys = "\n".join(f"{key} = {value}" for key, value in single_track_lines(self.single_track).items())
         return f"{shown}\n\n[single_track]\n{keys}"
 
-    def to_json(self) -> str:
-        """The same as JSON: `metrics` with name, test, value, unit, band, inside, source; `single_track` in SI."""
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values: `metrics` with name, test, value, unit, band, inside, source; `single_track` in SI."""
         metrics = []
         for test, handling in self.tests.items():
             for name, value in handling._asdict().items():
@@ -85,7 +84,7 @@ class Identification:
                     }
                 )  # fmt: skip
         known = {key: value for key, value in vars(self.single_track).items() if value is not None}
-        return json_text({"vehicle": self.vehicle, "metrics": metrics, "single_track": known})
+        return {"vehicle": self.vehicle, "metrics": metrics, "single_track": known}
 
 
 def identify(

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from activesteer.errors import ParameterError
+from activesteer.files import json_text
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, draw, kinematics_compliance
 from activesteer.rigs.kc.definitions import DEFINITIONS
@@ -41,7 +42,7 @@ def test_dry_friction_takes_no_part() -> None:
 
 
 def test_json_has_what_is_promised() -> None:
-    table = json.loads(compact().to_json())
+    table = json.loads(json_text(compact().to_json()))
     assert set(table) == {"metrics"}
     assert len(table["metrics"]) >= 40
     for row in table["metrics"]:

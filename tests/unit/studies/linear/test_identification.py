@@ -12,6 +12,7 @@ import pytest
 from activesteer.analysis.handling import Handling
 from activesteer.config import read_toml
 from activesteer.controllers import SingleTrackParameters
+from activesteer.files import json_text
 from activesteer.resources import find_vehicle
 from activesteer.scenario import load_car
 from activesteer.studies.linear.identification import Identification, single_track_response, write_single_track
@@ -38,7 +39,7 @@ RESULT = Identification("made up", {"100 m": HANDLING}, PARAMETERS)
 
 
 def test_json_says_what_is_inside_its_band_and_leaves_out_what_is_not_defined():
-    document = json.loads(RESULT.to_json())
+    document = json.loads(json_text(RESULT.to_json()))
     metrics = {metric["name"]: metric for metric in document["metrics"]}
     assert metrics["understeer_gradient"]["value"] == pytest.approx(2.5)
     assert (metrics["understeer_gradient"]["unit"], metrics["understeer_gradient"]["inside"]) == ("deg/g", True)
