@@ -1,4 +1,4 @@
-"""What is driven, by which car."""
+"""Scenarios: manoeuvre, car and driver with their overrides."""
 
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, load_car
 from activesteer.scenario.gains import check_gains, unread_gains

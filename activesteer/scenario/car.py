@@ -1,4 +1,4 @@
-"""A car as its files describe it: vehicle file, MJCF, tyres and overrides, checked before anything is built."""
+"""A car as its files describe it: vehicle file, MJCF, tyres and overrides, checked before the car is built."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle, VehicleParameters
 
 TIMESTEP_RANGE_S: Final = Range(1e-4, 5e-3)
-"""Steps of the engine that a car of stiff links is stable and accurate at [s]."""
+"""Steps of the engine for which a car with stiff links is stable and accurate [s]."""
 FileOrTable = str | os.PathLike[str] | Mapping[str, Any]
 
 
-_DRIVER_HINT: Final = "who drives is no matter of the car: see models/drivers, --driver and --set driver.preview_s=1.2"
+_DRIVER_HINT: Final = "a vehicle file has no driver: see models/drivers, --driver and --set driver.preview_s=1.2"
 
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleConfig(VehicleParameters):
-    """A whole vehicle file: the car, and what the controllers know of it."""
+    """A whole vehicle file: the car, and its properties that controllers know."""
 
     single_track: SingleTrackParameters
-    """The car as the controllers see it."""
+    """Single-track model of the car, for controllers."""
     two_track: TwoTrackParameters | None = None
-    """What estimators know beyond that; without it there are none."""
+    """Further properties for estimators; a car without this table has no estimator."""
     controllers: ControllerParameters = field(default_factory=ControllerParameters)
     """Gains and limits."""
     KEY_HINTS: ClassVar = VehicleParameters.KEY_HINTS | {"driver": _DRIVER_HINT}
@@ -53,9 +53,9 @@ class Car:
         config: The vehicle file.
         mjcf: The model file.
         tyres: Tyres of the front and of the rear axle.
-        new_tyres: The same without the factors of the vehicle file.
-        overrides: What was changed against the vehicle file.
-        files: What it was made from, by name, to be kept with a recording.
+        new_tyres: The tyres without the factors of the vehicle file.
+        overrides: Changes of the vehicle file.
+        files: Name -> content of all its files, to be kept with a recording.
     """
 
     config: VehicleConfig
@@ -71,18 +71,15 @@ class Car:
         return self.config.name
 
     def with_ideal_sensors(self) -> Car:
-        """The car as measuring equipment sees it."""
+        """Return the car with ideal sensors, like measuring equipment."""
         return replace(self, config=replace(self.config, sensors=Sensors()))
 
     def on(self, road: Road | None = None, timestep_s: float = DEFAULT_TIMESTEP_S) -> Vehicle:
-        """The car in the engine, at rest in static equilibrium.
+        """Build the car in the engine, at rest in static equilibrium.
 
         Args:
-            road: Friction and grade; level and dry where not given.
+            road: Friction and grade; level and dry by default.
             timestep_s: Step of the engine, 0.1 to 5 ms [s].
-
-        Returns:
-            A new vehicle.
 
         Raises:
             ParameterError: the step is out of range.
@@ -94,14 +91,11 @@ class Car:
 
 
 def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | None = None) -> Car:
-    """Reads and checks a car.
+    """Read and check a car.
 
     Args:
         vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value: `factors.mass`, `vehicle.tyres.rear`.
-
-    Returns:
-        The car.
+        overrides: Dotted key -> value, such as `factors.mass` or `vehicle.tyres.rear`.
 
     Raises:
         ParameterError: the vehicle is not found or wrong, or an override names a key that does not exist.
@@ -121,12 +115,12 @@ def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | No
 
 
 def car_with(vehicle: FileOrTable, overrides: list[Override]) -> Car:
-    """The car with overrides that are known to be meant for it; see `load_car`."""
+    """Read a car with overrides of the vehicle file only; see `load_car`."""
     table, source, folder, files = read_table(vehicle, "vehicle", find_vehicle, ParameterError)
     known = table.get("single_track")
     table, source = applied(VehicleConfig, table, source, overrides)
     if table.get("single_track") == IDENTIFY and isinstance(known, Mapping):
-        # Short for the key `source` of the table.
+        # The word alone stands for the key `source` of the table.
         table["single_track"] = {**known, "source": IDENTIFY}
     config = build(VehicleConfig, table, source)
     mjcf = _find_file(config.mjcf, folder, models_dir() / "mjcf", source, ("mjcf",), ModelError)
@@ -149,16 +143,16 @@ def _tyre(path: Path, config: VehicleConfig) -> TyreParameters:
 def read_table(
     given: FileOrTable, part: str, find: Any, error: type[ActiveSteerError]
 ) -> tuple[dict[str, Any], Source, Path | None, dict[str, bytes]]:
-    """The table of a manoeuvre or vehicle, with its name.
+    """Read the table of a manoeuvre, vehicle or driver, and add its name.
 
     Args:
         given: Name, path, or the table itself.
         part: `maneuver`, `vehicle` or `driver`.
-        find: Name or path -> file.
-        error: Class of the errors to raise.
+        find: Function from a name or path to the file.
+        error: Class of the errors.
 
     Returns:
-        The table, its source, the folder of its file and the file by its name; a table has no folder and no file.
+        The table, its source, the folder of its file, and the file by name. A given table has no folder and no file.
 
     Raises:
         ActiveSteerError: the file is not found or cannot be read; of class `error`.
@@ -181,7 +175,7 @@ def _find_file(
     key: tuple[str, ...],
     error: type[ModelError] | type[TyreFileError],
 ) -> Path:
-    """A file that a vehicle file names: beside the vehicle file, among the package's models, or a path of its own."""
+    """Find a file of a vehicle file: beside the vehicle file, among the package's models, or by its own path."""
     beside = () if own is None else (own / name,)
     for candidate in (*beside, folder / name, user_path(name, error)):
         if is_file(candidate):

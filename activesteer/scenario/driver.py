@@ -1,4 +1,4 @@
-"""Who drives: a driver file with overrides, or code of a user's own."""
+"""The driver of a scenario: a driver file with overrides, or a user's code."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from activesteer.scenario.overrides import Override, applied
 
 @dataclass(frozen=True)
 class ChosenDriver:
-    """Who drives.
+    """The driver of a scenario.
 
     Attributes:
-        plugin: What makes him.
-        parameters: The driver file; for code of a user's own that of the default driver, which the code may look at.
-        files: What he was made from, by name, to be kept with a recording.
+        plugin: Plugin that creates the driver.
+        parameters: The driver file; for a user's code the file of the default driver, which the code can read.
+        files: Name -> content of all files, to be kept with a recording.
     """
 
     plugin: Plugin
@@ -30,27 +30,27 @@ class ChosenDriver:
     files: Mapping[str, bytes]
 
     def to_table(self) -> dict[str, Any]:
-        """The driver as he is recorded: his file's table, or what a user's own code was given."""
+        """Return the table that is recorded: the driver file, or the parameters of a user's code."""
         table = to_table(self.parameters)
         if self.plugin.ours:
             return table
         return {"name": self.plugin.name, "parameters": dict(self.plugin.parameters), "setup": table}
 
     def for_searches(self) -> ChosenDriver:
-        """Who drives where something must be found before a run: the package's own code, which does as asked."""
+        """Return the driver of searches before a run: the package's code, which follows the setpoint."""
         table = {"name": self.parameters.name}
         return replace(self, plugin=find_driver(table))
 
 
 def driver_with(given: Any, overrides: list[Override]) -> ChosenDriver:
-    """The driver with overrides that are known to be meant for him.
+    """Read a driver with overrides of the driver file only.
 
     Args:
-        given: Name, path or table of a driver, or a user's own code; see `find_driver`.
+        given: Name, path or table of a driver, or a user's code; see `find_driver`.
         overrides: Keys of the driver file to replace.
 
     Raises:
-        DriverError: there is no such driver, or his file is wrong.
+        DriverError: there is no such driver, or the file is wrong.
         ParameterError: an override names a key that does not exist.
     """
     plugin, is_file = find_driver(given), is_driver_file(given)

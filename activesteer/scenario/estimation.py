@@ -1,4 +1,4 @@
-"""What estimators know of a car: what its files say, whatever it carries and whatever was changed on it."""
+"""Properties of a car that estimators know: those of its files, without load and other changes."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 
 _SLIP_ANGLES: Final = 41
 _LARGEST_SLIP_ANGLE_RAD: Final = np.radians(20.0)
-"""Beyond it the force is taken for that at it [rad]."""
+"""Largest slip angle of the grid; beyond it the force stays constant [rad]."""
 _LOADS: Final = 10
 _LARGEST_LOAD: Final = 3.0
-"""Largest load of the grid, over that of standing still; beyond it the force is taken for that at it."""
+"""Largest load of the grid over the static load; beyond it the force stays constant."""
 _SPEED_MPS: Final = 20.0
-"""Speed at which tyres are evaluated [m/s]."""
+"""Speed at which the tyres are evaluated [m/s]."""
 
 
 def estimator_setup(car: Car) -> EstimatorSetup | None:
-    """What estimators may know of a car; None where its file has no table [two_track]."""
+    """Return the properties that estimators may know; None if the vehicle file has no table [two_track]."""
     config, body = car.config, car.config.single_track
     if config.two_track is None:
         return None
@@ -41,7 +41,7 @@ def estimator_setup(car: Car) -> EstimatorSetup | None:
 
 
 def _known(parameters: TyreParameters, load_N: float) -> KnownTyre:
-    """What is known of a tyre that carries a load when the car stands."""
+    """Evaluate a tyre with this static load."""
     tyre = MagicFormula(parameters)
     angles_rad = np.linspace(0.0, _LARGEST_SLIP_ANGLE_RAD, _SLIP_ANGLES)
     loads_N = np.linspace(0.0, _LARGEST_LOAD * load_N, _LOADS)

@@ -1,4 +1,4 @@
-"""Overrides of the table [controllers]: which they are, and whether a controller that drives reads them."""
+"""Overrides of the table [controllers], and the check that a controller reads them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _KEYS: Final = frozenset(field.name for field in fields(ControllerParameters))
 
 
 def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Overrides of the table [controllers]: key -> the names of the fields that lead to what it replaces."""
+    """Return the overrides of the table [controllers]: key -> names of the fields on the path to its value."""
     split = {key: key.removeprefix("vehicle.").split(".") for key in overrides}
     return {
         key: field_path(ControllerParameters, rest) for key, (first, *rest) in split.items() if first == "controllers"
@@ -22,11 +22,11 @@ def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> dict[str, frozenset[str]]:
-    """Overrides that none of these controllers reads: key -> what of the table [controllers] it replaces.
+    """Return the overrides that none of these controllers reads: key -> keys of the table [controllers] it replaces.
 
     Args:
         overrides: Dotted key -> value, as for `resolve`.
-        controllers: Those that drive, as for `simulate`.
+        controllers: Controllers, as for `simulate`.
     """
     read = frozenset[str]().union(*map(keys_read, controllers))
     replaced = {
@@ -37,14 +37,14 @@ def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> di
 
 
 def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> None:
-    """Every override of the table [controllers] is read by one of the controllers that drive.
+    """Check that every override of the table [controllers] is read by one of these controllers.
 
     Args:
         overrides: Dotted key -> value, as for `resolve`.
-        controllers: Those that drive, as for `simulate`; none where nothing is controlled.
+        controllers: Controllers, as for `simulate`; may be empty.
 
     Raises:
-        ParameterError: one is not; what is allowed are the keys that they read.
+        ParameterError: no controller reads an override; `allowed` has the keys that they read.
     """
     for key, names in unread_gains(overrides, controllers).items():
         readers = [name for name in CONTROLLER.names() if names & keys_read(name)]

@@ -1,7 +1,7 @@
-"""The files of an MJCF model, read and looked over before the engine compiles them.
+"""The files of an MJCF model, read and checked before the engine compiles them.
 
-The engine trusts its input: a few bytes can ask it for a height field, a texture or copies of a body that fill the
-memory or take minutes. What a car needs is far from that, so sizes are bounded here, where a message can name them.
+The engine trusts its input: a few bytes can request a height field, a texture or copies of a body that fill the memory
+or take minutes. A car needs much less, so this module limits the sizes and names the limit in its message.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ _MAX_ASSET_BYTES: Final = 50_000_000
 _MAX_PIXELS: Final = 20_000_000
 """Pixels of a texture, samples of a height field."""
 _MAX_COPIES: Final = 1000
-"""Copies that `replicate`, `composite` and `flexcomp` may make, over all levels."""
+"""Maximum of copies by `replicate`, `composite` and `flexcomp`, over all levels."""
 _MAX_NUMBER: Final = 1e5
-"""Largest whole number that an attribute of _COUNTS may have."""
+"""Largest number in an attribute of _COUNTS."""
 _MAX_MEMORY: Final = 1e9
-"""Bytes that the model may set aside for the engine."""
+"""Maximum of memory that a model reserves for the engine [bytes]."""
 _BYTES: Final = {"K": 2.0**10, "M": 2.0**20, "G": 2.0**30, "T": 2.0**40, "P": 2.0**50, "E": 2.0**60}
 _COUNTS: Final = {
     "size": None,
@@ -45,24 +45,24 @@ _COUNTS: Final = {
     ),
     "mesh": ("maxhullvert",),
 }
-"""Element -> attributes that say how much the engine sets aside or how often it iterates; None for all of them."""
+"""Element -> attributes with amounts of memory or numbers of iterations; None for all attributes."""
 _COPYING: Final = ("replicate", "composite", "flexcomp")
 _COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")
 
 
 def model_files(mjcf: Path) -> dict[str, bytes]:
-    """Reads an MJCF file, what it includes, and what its meshes, textures and height fields are read from.
+    """Read an MJCF file, its included files, and the files of its meshes, textures and height fields.
 
     Args:
         mjcf: The model file.
 
     Returns:
-        Path relative to the model's folder -> content, the model file first; of a mesh or picture, which may be large,
-        only its SHA-256, under its path and `.sha256`.
+        Path relative to the model's folder -> content, the model file first. A mesh or picture may be large, so only
+        its SHA-256 is returned, under its path and `.sha256`.
 
     Raises:
-        ModelError: a file cannot be read or is no XML, or the model asks for more than a car needs.
+        ModelError: a file cannot be read or is not XML, or the model requests more than a car needs.
     """
     files: dict[str, bytes] = {}
     elements = 0
@@ -74,7 +74,7 @@ def model_files(mjcf: Path) -> dict[str, bytes]:
         files[name] = read_bytes(path, ModelError, _MAX_XML_BYTES)
         root = _parsed(files[name], name)
         if path == mjcf and root.tag != "mujoco":
-            raise ModelError("is no MJCF: its first element is not <mujoco>", file=name)
+            raise ModelError("is not an MJCF file: its first element is not <mujoco>", file=name)
         for element, copies, depth in _walk(root):
             elements += 1
             if elements > _MAX_ELEMENTS or depth > _MAX_DEPTH or len(files) > _MAX_FILES:
@@ -108,17 +108,17 @@ def _name(path: Path, mjcf: Path) -> str:
 def _parsed(data: bytes, name: str) -> ElementTree.Element:
     text = _COMMENT.sub("", data.decode("utf-8", "replace").removeprefix("\ufeff"))
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ModelError("an MJCF file has no DOCTYPE and no entities of its own", file=name)
+        raise ModelError("an MJCF file must not have a DOCTYPE or entities", file=name)
     try:
         return ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as reason:
-        # The position alone: the file may be someone else's.
+        # Report the position only: the content may be confidential.
         line = getattr(reason, "position", (None,))[0]
-        raise ModelError("no valid XML", file=name, line=line) from reason
+        raise ModelError("is not valid XML", file=name, line=line) from reason
 
 
 def _walk(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, float, int]]:
-    """Every element, how many copies of it there will be, and its depth."""
+    """Yield every element, the number of its copies, and its depth."""
     stack = [(root, 1.0, 0)]
     while stack:
         element, copies, depth = stack.pop()
@@ -142,7 +142,7 @@ def _included(element: ElementTree.Element, path: Path, mjcf: Path, name: str) -
 
 
 def _check(element: ElementTree.Element, copies: float, name: str) -> None:
-    """What an element asks the engine to make."""
+    """Check the amounts that an element requests from the engine."""
     tag = element.tag
     if copies > _MAX_COPIES:
         raise _too_much(f"<{tag}> makes {copies:.3g} copies", _MAX_COPIES, name)
@@ -166,7 +166,7 @@ def _check(element: ElementTree.Element, copies: float, name: str) -> None:
 
 
 def _asset_names(element: ElementTree.Element) -> list[str]:
-    """Files that a mesh, texture, height field or skin is read from."""
+    """Return the files of a mesh, texture, height field or skin."""
     return [file for attribute, file in element.items() if attribute.startswith("file") and file]
 
 
@@ -180,4 +180,4 @@ def _check_asset(path: Path, name: str) -> bytes:
 
 
 def _too_much(what: str, maximum: float, name: str) -> ModelError:
-    return ModelError(f"{what}; a car needs no more than {maximum:g}", file=name, allowed=maximum)
+    return ModelError(f"{what}; a car needs at most {maximum:g}", file=name, allowed=maximum)

@@ -1,4 +1,4 @@
-"""Overrides: single keys of a file replaced for one run, each at most once and none without effect on another."""
+"""Overrides: single keys of a file replaced for one run, each at most once."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class Override(NamedTuple):
     """One replaced key.
 
     Attributes:
-        given: The key as it was given.
-        path: The keys inside the file that it leads to.
-        value: What is put there.
+        given: The key as given.
+        path: Path of keys inside the file.
+        value: The new value.
     """
 
     given: str
@@ -28,14 +28,14 @@ class Override(NamedTuple):
 
 
 def plain(overrides: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Overrides with NumPy's numbers and arrays as Python's: sweeps are made of them, JSON is not.
+    """Convert NumPy's numbers and arrays in overrides to Python's, because JSON cannot store them.
 
     Raises:
-        ParameterError: a key is no text.
+        ParameterError: a key is not text.
     """
     for key in overrides or {}:
         if not isinstance(key, str):
-            raise ParameterError(f"the key of an override is a text as 'road.mu', not {shown(key)}", value=key)
+            raise ParameterError(f"the key of an override is text such as 'road.mu', not {shown(key)}", value=key)
     return {
         key: value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
         for key, value in (overrides or {}).items()
@@ -45,26 +45,26 @@ def plain(overrides: Mapping[str, Any] | None) -> dict[str, Any]:
 def applied(
     cls: type, table: Mapping[str, Any], source: Source, overrides: Sequence[Override]
 ) -> tuple[dict[str, Any], Source]:
-    """A file's table with the overrides put in.
+    """Apply overrides to the table of a file.
 
     Args:
-        cls: Dataclass that the table will become.
+        cls: Dataclass of the table.
         table: The table.
-        source: Where it came from.
-        overrides: What to replace.
+        source: Source of the table.
+        overrides: The overrides.
 
     Returns:
-        The new table, and its source, which knows what does not come from there.
+        The new table, and its source, which knows the overridden keys.
 
     Raises:
-        ParameterError: a key does not exist, or one override replaces what another one gives.
+        ParameterError: a key does not exist, or two overrides set the same value.
     """
     paths = [field_path(cls, override.path) for override in overrides]
     for (one, above), (other, below) in combinations(zip(overrides, paths, strict=True), 2):
         shorter = min(len(above), len(below))
         if above[:shorter] == below[:shorter]:
             raise ParameterError(
-                f"replaces what {one.given} gives; leave one of the two out",
+                f"replaces the value of {one.given}; leave one of the two out",
                 key=other.given,
                 value=other.value,
                 overridden=True,

@@ -13,47 +13,47 @@ from activesteer.files import user_path
 from activesteer.recording import Recording
 
 _LONGEST: Final = 200_000
-"""Most points of a table; what is recorded with more is thinned."""
+"""Maximum of points of a table; a longer recording is thinned."""
 _ON_GROUND: Final = 0.5
-"""Speed from which on a car drives [m/s]."""
+"""Minimum speed of a manoeuvre with a moving car [m/s]."""
 
 
 def is_recording(maneuver: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether what is given for a manoeuvre is a recording, whose inputs are to be driven again."""
+    """Return whether a manoeuvre is given as a recording, whose inputs are driven again."""
     return isinstance(maneuver, (str, os.PathLike)) and os.fspath(maneuver).endswith(".mcap")
 
 
 def recorded_inputs(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The manoeuvre of a file; see `open_loop_of`. Of a damaged one, what comes before the damage.
+    """Return the manoeuvre of a file; see `open_loop_of`. A damaged file is used up to the damage.
 
     Raises:
-        RecordingError: it cannot be read, or lacks something.
+        RecordingError: the file cannot be read, or lacks a channel.
     """
     file = user_path(path, RecordingError)
     return open_loop_of(Recording.open(file, recover=True), file.stem)
 
 
 def led(table: dict[str, Any], lag_s: float) -> dict[str, Any]:
-    """The manoeuvre with its steering demanded earlier, so that the steering wheel stands where it was recorded.
+    """Advance the steering demand of a manoeuvre, so that the steering wheel angle equals the recorded one.
 
     Args:
         table: Table of an open-loop manoeuvre.
-        lag_s: How much earlier [s]; see `Vehicle.steering_lag_s`.
+        lag_s: Time by which to advance it [s]; see `Vehicle.steering_lag_s`.
     """
     steering = table["steering"]
     return table | {"steering": steering | {"time_s": [time_s - lag_s for time_s in steering["time_s"]]}}
 
 
 def open_loop_of(recording: Recording, name: str, begin_s: float = 0.0) -> dict[str, Any]:
-    """The manoeuvre that turns the steering wheel, or moves the rack, and holds the speed as in a recording.
+    """Return the manoeuvre with the steering wheel angle, or rack travel, and the speed of a recording.
 
-    The time of the manoeuvre is that of the recording, from zero to its end: before its first row the first values
-    hold. A brake pedal (`brake_pedal`, 0 to 1) is pressed where it was recorded; meanwhile the speed is not held.
+    The manoeuvre has the time axis of the recording, from zero to its end; before the first row the first values hold.
+    A recorded brake pedal (`brake_pedal`, 0 to 1) is pressed again; meanwhile the speed is not held.
 
     Args:
-        recording: With `steering_wheel_rad` or `rack_m`, and `speed_mps` or `vx_mps`.
-        name: What to call it.
-        begin_s: Instant of the recording that is zero in the manoeuvre [s].
+        recording: Recording with `steering_wheel_rad` or `rack_m`, and `speed_mps` or `vx_mps`.
+        name: Name of the manoeuvre.
+        begin_s: Time of the recording that is zero in the manoeuvre [s].
 
     Returns:
         The table of the manoeuvre, for `resolve`.

@@ -1,4 +1,4 @@
-"""What is driven, by which car and driver: all three with their overrides, checked before anything runs."""
+"""A scenario: manoeuvre, car and driver with their overrides, checked before the run."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class Scenario:
     Attributes:
         maneuver: The manoeuvre.
         car: The car.
-        driver: Who drives it.
-        overrides: What was changed against their files.
-        files: What it was made from, by name, to be kept with the recording.
+        driver: The driver.
+        overrides: Changes of their files.
+        files: Name -> content of all files, to be kept with the recording.
     """
 
     maneuver: Maneuver
@@ -42,7 +42,7 @@ class Scenario:
     files: dict[str, bytes] = field(default_factory=dict)
 
     def controller_setup(self, timestep_s: float) -> ControllerSetup:
-        """What controllers may know."""
+        """Return the properties of the car that controllers may know."""
         car, replaced = self.car.config, frozenset(map(".".join, gain_paths(self.overrides).values()))
         return ControllerSetup(
             car.single_track, car.controllers, car.steering.ratio, timestep_s, replaced, estimator_setup(self.car)
@@ -51,7 +51,7 @@ class Scenario:
     def driver_setup(
         self, timestep_s: float, rack_per_steering_wheel_m: float | None, wheel_radius_m: float
     ) -> DriverSetup:
-        """What drivers may know."""
+        """Return the properties of the car that drivers may know."""
         car = self.car.config
         return DriverSetup(
             car.single_track, self.driver.parameters, car.steering.ratio, car.steering.steering_wheel_limit_rad,
@@ -68,17 +68,14 @@ def resolve(
     overrides: Mapping[str, Any] | None = None,
     driver: Any = DEFAULT_DRIVER,
 ) -> Scenario:
-    """Reads and checks everything that a run needs.
+    """Read and check all inputs of a run.
 
     Args:
         maneuver: Name, path, or table of a manoeuvre; or path of a recording (`.mcap`), whose inputs are driven.
         vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value: `speed_kmh`, `road.mu`, `controllers.ars.limit_deg`; with `maneuver.` or
-            `vehicle.` in front where both have such a key, and `driver.` in front of keys of the driver.
-        driver: Name, path or table of a driver, or a user's own code; see `find_driver`.
-
-    Returns:
-        The scenario.
+        overrides: Dotted key -> value, such as `speed_kmh`, `road.mu` or `controllers.ars.limit_deg`. Start the key
+            with `maneuver.` or `vehicle.` if both have it, and with `driver.` for keys of the driver.
+        driver: Name, path or table of a driver, or your own code; see `find_driver`.
 
     Raises:
         ManeuverError: the manoeuvre is not found or wrong.
@@ -100,7 +97,7 @@ def resolve(
     table, source, folder, files = read_table(given, "maneuver", find_maneuver, ManeuverError)
     kind = maneuver_class(table, source)
     if folder is not None:
-        # A table may come from a recording, which holds both what was asked for and what it led to.
+        # A given table may come from a recording, which holds both an input and the value derived from it.
         check_overruled(kind, table, source, leaf_keys(table))
     changes = plain(overrides)
     sorted_out: dict[str, list[Override]] = {part: [] for part in _PARTS}
@@ -122,7 +119,7 @@ def resolve(
 
 
 def _with_speed_in_title(built: Maneuver, of_file: Mapping[str, Any]) -> Maneuver:
-    """The manoeuvre; where its title says the speed of its file and another is driven, with that one in the title."""
+    """Return the manoeuvre with the driven speed in its title, if the title contains the speed of its file."""
     said = f"{of_file.get('speed_kmh', math.nan):g} km/h"
     driven = f"{3.6 * built.speed_mps:.4g} km/h"
     if driven == said or built.title != of_file.get("title"):
@@ -131,33 +128,33 @@ def _with_speed_in_title(built: Maneuver, of_file: Mapping[str, Any]) -> Maneuve
 
 
 def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequence[str]) -> None:
-    """For what makes a manoeuvre, or chooses who drives, itself: overrides are of other parts, or of the road.
+    """Check the overrides of a command that sets the manoeuvre or the driver itself.
 
     Args:
         overrides: Dotted key -> value, as for `resolve`.
-        scenario: What was resolved with them.
-        parts: `vehicle`, `driver`: those that overrides may change.
+        scenario: Scenario with these overrides.
+        parts: Parts that overrides may change beside the road: `vehicle`, `driver`.
 
     Raises:
-        ParameterError: one changes another part.
+        ParameterError: an override changes another part.
     """
     for key, value in overrides.items():
         part, path = _which_part(key, type(scenario.maneuver))
         if part not in parts and path[0] != "road":
-            allowed, made = [*parts, "road"], {"maneuver": "manoeuvre"}.get(part, part)
+            allowed, word = [*parts, "road"], {"maneuver": "manoeuvre"}.get(part, part)
             raise ParameterError(
-                f"is of the {made}, which is made here; keys of {' and '.join(allowed)} can be changed",
+                f"belongs to the {word}, which this command sets; keys of {' and '.join(allowed)} can be changed",
                 key=key, value=value, allowed=allowed, overridden=True,
             )  # fmt: skip
 
 
 def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
-    """Whether an override is meant for the manoeuvre, the vehicle or the driver, and the key inside it."""
+    """Return the part that an override changes (manoeuvre, vehicle or driver), and the key inside it."""
     first, *rest = key.split(".")
     if first in _PARTS and rest:
         return first, rest
     paths = {"maneuver": key_paths(kind), "vehicle": key_paths(VehicleConfig)}
-    # A key may name a whole table, a value, or, behind the number of a list's entry, a value in it.
+    # A key names a table, a value, or a value in an entry of a list, after the number of the entry.
     dotted = key + "."
     holders = [
         part
@@ -168,7 +165,7 @@ def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
         return holders[0], [first, *rest]
     if holders:
         raise ParameterError(
-            f"both manoeuvre and vehicle have this key; say maneuver.{key} or vehicle.{key}", key=key, overridden=True
+            f"both manoeuvre and vehicle have this key; use maneuver.{key} or vehicle.{key}", key=key, overridden=True
         )
     known = [f"{part}.{path}" for part in paths for path in paths[part]] + paths["maneuver"] + paths["vehicle"]
     known += [f"driver.{path}" for path in key_paths(DriverParameters)]
@@ -179,7 +176,7 @@ def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
 
 
 def value_of(scenario: Scenario, key: str) -> Any:
-    """What a key of the manoeuvre, the vehicle or the driver is in a scenario.
+    """Return the value of a key of the manoeuvre, the vehicle or the driver.
 
     Args:
         scenario: The scenario.
@@ -189,7 +186,7 @@ def value_of(scenario: Scenario, key: str) -> Any:
         The value; a number in the unit of the key.
 
     Raises:
-        ParameterError: there is no such key, or there is nothing behind it.
+        ParameterError: there is no such key, or a part of it has no value.
     """
     part, path = _which_part(key, type(scenario.maneuver))
     value: Any = {"maneuver": scenario.maneuver, "vehicle": scenario.car.config, "driver": scenario.driver.parameters}[
@@ -203,13 +200,13 @@ def value_of(scenario: Scenario, key: str) -> Any:
         names = [field.name for field in fields(value)] if is_dataclass(value) else []
         field_name, factor = field_in_unit(name, names)
         if field_name is None:
-            raise ParameterError(f"there is nothing behind {name}", key=key)
+            raise ParameterError(f"{name} has no value here", key=key)
         value = getattr(value, field_name)
     return value / factor if factor != 1.0 else value
 
 
 def describe(scenario: Scenario) -> dict[str, Any]:
-    """The resolved parameters as plain tables, from which the same scenario can be built again."""
+    """Return the resolved parameters as plain tables, from which the same scenario can be built again."""
     return {
         "maneuver": to_table(scenario.maneuver),
         "vehicle": to_table(scenario.car.config),

@@ -1,6 +1,6 @@
-"""Writes values into a table of a vehicle file, with the command they come from; all else, comments too, stays.
+"""Writing of values into a table of a vehicle file, with the command that found them; all other lines stay.
 
-By lines: tomlkit, which keeps comments as well, puts a new key behind the comment that belongs to the next table.
+The module edits lines, because tomlkit puts a new key behind the comment that belongs to the next table.
 """
 
 from __future__ import annotations
@@ -16,38 +16,38 @@ from activesteer.errors import ParameterError
 from activesteer.files import write_text
 
 _NOTE: Final = "# Written by `"
-"""How the line begins that says where the values come from; an older one of these is replaced."""
+"""Start of the comment with the origin of the values, which replaces an older one."""
 _SAME: Final = {"characteristic_speed_mps": "characteristic_speed_kmh"}
-"""Other spellings of a key that is written."""
+"""Written key -> its other spelling in a file."""
 
 
 def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], command: str, date: str) -> None:
-    """Replaces values in a table of a vehicle file.
+    """Replace values in a table of a vehicle file.
 
-    Keys keep their place and the comments behind them, missing ones are added at the end of the table; command and date
-    stand in a comment below the table's header.
+    Keys keep their place and their comments; missing keys are added at the end of the table. A comment below the header
+    of the table names command and date.
 
     Args:
         vehicle_file: The file.
         table: Name of the table.
-        values: Key -> value as it is written.
+        values: Key -> value as text.
         command: Command that found the values.
-        date: Its date, as 2026-11-21.
+        date: Date, such as 2026-11-21.
 
     Raises:
-        ParameterError: the file cannot be read or written, is no TOML, or has no such table.
+        ParameterError: the file cannot be read or written, is not TOML, or has no such table.
     """
     before, source = read_toml(vehicle_file)
     lines = source.text.splitlines()
     header = next((number for number, line in enumerate(lines) if _is_header(line, table)), None)
     if header is None:
         raise ParameterError(
-            "there is no such table to write to; add its line where it shall stand",
+            "there is no such table; add its header to the file",
             file=str(vehicle_file),
             key=f"[{table}]",
         )
     end = next((number for number in range(header + 1, len(lines)) if _is_header(lines[number])), len(lines))
-    # Blank lines and comments above the next header belong to that.
+    # Blank lines and comments above the next header belong to the next table.
     while end > header + 1 and not re.match(r"\s*[\w\"'-]+\s*=", lines[end - 1]):
         end -= 1
     body, missing = [f"{_NOTE}{command}` on {date}."], dict(values)
@@ -70,7 +70,7 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
     kept = {key: value for key, value in before[table].items() if key not in {*values, *_SAME}}
     if {**before, table: None} != {**after, table: None} or kept.items() - after[table].items():
         raise ParameterError(
-            "is not written as one key a line; write it so, or edit it by hand",
+            "needs one key per line; reformat it, or edit it by hand",
             file=str(vehicle_file),
             key=f"[{table}]",
         )

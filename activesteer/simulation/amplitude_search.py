@@ -1,6 +1,6 @@
-"""How far the steering wheel must be turned: found by driving the control-free car, before a manoeuvre is run.
+"""Search for the steering wheel amplitude of a manoeuvre by driving the control-free car.
 
-Every controller is then given the same input. What was found is kept by everything that it depends on; see
+The result is the input for every controller. It is kept under a key of everything that it depends on; see
 `amplitude_store`.
 """
 
@@ -32,29 +32,29 @@ from activesteer.simulation.recorder import Recorder
 from activesteer.version import __version__
 
 _TOLERANCE: Final = 5e-4
-"""Relative error of the lateral acceleration at which the search for a steady turn ends."""
+"""Relative error of the lateral acceleration at which the search for a steady turn stops."""
 _RUNS: Final = 8
 _STEADY_S: Final = 0.5
-"""Length of the end of a run of that search over which the steady state is taken [s]."""
+"""Length of the final part of a run that is averaged as the steady state [s]."""
 _CHUNK_S: Final = 0.25
-"""How often it is looked whether a ramp has come far enough [s]."""
+"""Interval between two checks of whether a ramp has reached its end [s]."""
 _ROUNDED_RAD: Final = math.radians(0.1)
-"""FMVSS 126 rounds A to 0.1 deg, which also makes it the same on every machine."""
+"""FMVSS 126 rounds A to 0.1 deg, which also makes A the same on every machine."""
 
 
 def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
-    """The steering wheel angle that a manoeuvre asks to be found.
+    """Find the steering wheel angle that a manoeuvre needs.
 
     Args:
-        scenario: Car and tyres; its manoeuvre is the one that asks.
-        search: What it asks for.
+        scenario: Manoeuvre, car and driver.
+        search: Search of the manoeuvre.
         timestep_s: Step of the simulation [s].
 
     Returns:
         Steering wheel angle [rad].
 
     Raises:
-        ManeuverError: no angle gives what is asked for.
+        ManeuverError: no angle gives the lateral acceleration.
     """
     probed = replace(scenario, maneuver=search.probe, driver=scenario.driver.for_searches())
     key = _key(probed, search, timestep_s)
@@ -70,10 +70,10 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
 
 
 def _key(scenario: Scenario, search: Search, timestep_s: float) -> str:
-    """Digest of everything that decides what is found.
+    """Digest of everything that the amplitude depends on.
 
-    The model as the engine has compiled it holds the content of all model and tyre files, the road and the step.
-    Controllers decide nothing: it is the control-free car that is driven.
+    The compiled model includes the content of all model and tyre files, the road and the step. Controllers have no
+    influence, because the car is driven without control.
     """
     model = scenario.car.on(scenario.maneuver.road, timestep_s).model
     compiled_model = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
@@ -98,7 +98,7 @@ def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> f
     start = simulation.save_state()
     car, speed = scenario.car.config.single_track, max(probe.speed_mps, 1.0)
     wheelbase = car.cg_to_front_m + car.cg_to_rear_m
-    # First guess: Ackermann angle with the understeer of a usual car, some 2.5 deg per g.
+    # First guess: Ackermann angle with the understeer of a typical car, about 2.5 deg/g.
     angle = scenario.car.config.steering.ratio * wanted * (wheelbase / speed**2 + 0.0044)
     tried: list[tuple[float, float]] = []
     for _ in range(_RUNS):
@@ -132,16 +132,16 @@ def _steady_acceleration(simulation: ClosedLoop, maneuver: StepSteer, start: Any
 
 
 def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> float:
-    """The line through lateral acceleration over steering wheel angle, at the acceleration asked for.
+    """Evaluate the regression line of the lateral acceleration over the angle at the required acceleration.
 
-    The model is its own mirror image, so that one side stands for both.
+    The model is symmetric, so one side represents both.
     """
     wanted, probe = search.lateral_acceleration_mps2, search.probe
     high = FIT[1] * wanted
     simulation = ClosedLoop(scenario, "none", timestep_s)
     recorder = Recorder(simulation.vehicle, simulation.steps)
     chunk, left = round(_CHUNK_S / timestep_s), simulation.steps
-    # A little further than the line goes, so that all of it is settled.
+    # Drive slightly beyond the range of the line, so that all of the range is settled.
     ay = np.zeros(1)
     while left > 0 and ay[-1] < 1.05 * high:
         simulation.advance(min(chunk, left), recorder)

@@ -1,8 +1,8 @@
-"""Amplitudes that were found by driving, kept for the process and, in the user's cache folder, for the next one.
+"""Store of amplitudes found by driving, in the process and in the user's cache folder.
 
-The folder is `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/activesteer/amplitudes`; it may be deleted
-at any time. A file is named by the key of its number and holds the number with a hash of both, so that one that is
-damaged, or belongs elsewhere, is not taken; where nothing can be read or written, nothing is kept there.
+The folder is `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/activesteer/amplitudes`. You can delete it
+at any time. The name of a file is the key of its number. The file holds the number and a hash of both, so that a damaged
+or misplaced file is ignored. If the folder cannot be read or written, nothing is stored there.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from activesteer.errors import ActiveSteerError
 from activesteer.files import read_bytes
 
 MAX_KEPT: Final = 1000
-"""Numbers that are kept, in the process and in the folder; the oldest make room."""
+"""Maximum of numbers in the process and in the folder; the oldest are deleted first."""
 _MAX_BYTES: Final = 200
 _SUFFIX: Final = ".amplitude"
 _in_process: dict[str, float] = {}
@@ -29,28 +29,22 @@ _writes = True
 
 
 def folder() -> Path:
-    """Where the numbers are kept.
-
-    Returns:
-        A folder, which need not exist.
+    """Return the folder of the numbers, which need not exist.
 
     Raises:
         RuntimeError: the user has no home folder.
     """
     given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    # The XDG base directory specification: a path that is not absolute is to be ignored.
+    # XDG base directory specification: ignore a path that is not absolute.
     cache = given if given.is_absolute() else Path.home() / ".cache"
     return cache / "activesteer" / "amplitudes"
 
 
 def recall(key: str) -> float | None:
-    """A number that was kept.
+    """Return a stored number, bit for bit; None if there is none.
 
     Args:
-        key: Hexadecimal digest of everything that decides the number.
-
-    Returns:
-        The number, bit for bit; None where it is not known.
+        key: Hexadecimal digest of everything that the number depends on.
     """
     if _reads and key not in _in_process:
         with contextlib.suppress(ActiveSteerError, RuntimeError, ValueError):
@@ -62,10 +56,10 @@ def recall(key: str) -> float | None:
 
 
 def keep(key: str, value: float) -> None:
-    """Keeps a number.
+    """Store a number.
 
     Args:
-        key: Hexadecimal digest of everything that decides it.
+        key: Hexadecimal digest of everything that the number depends on.
         value: The number.
     """
     _remember(key, value)
@@ -77,7 +71,7 @@ def keep(key: str, value: float) -> None:
         part = place / f"{key}-{secrets.token_hex(4)}{_SUFFIX}"
         try:
             part.write_text(_line(key, value), encoding="ascii")
-            # Not `files.replacing`, which follows links: what stands here may be a link to a file of someone's.
+            # Not `files.replacing`, which follows links: a link here may point to any file of the user.
             part.replace(place / f"{key}{_SUFFIX}")
         finally:
             part.unlink(missing_ok=True)
@@ -89,8 +83,8 @@ def keep(key: str, value: float) -> None:
 
 @contextlib.contextmanager
 def not_on_disk() -> Iterator[None]:
-    """Numbers that are found inside stay in the process: the thousand cars of a study are not met again."""
-    global _writes  # noqa: PLW0603 - of the process, as the numbers are
+    """Keep numbers found inside in the process only, because the many cars of a study do not occur again."""
+    global _writes  # noqa: PLW0603 - one setting for the process, like the numbers
     before, _writes = _writes, False
     try:
         yield

@@ -1,4 +1,4 @@
-"""What the car looks like, taken from geoms and tendons of its model, for viewers of recordings."""
+"""Appearance of the car for viewers of recordings, from the geoms and tendons of its model."""
 
 from __future__ import annotations
 
@@ -19,25 +19,14 @@ _KINDS: Final = {
 
 
 def scene_of(model: mujoco.MjModel) -> tuple[ScenePart, ...]:
-    """All that a viewer can draw of a car.
-
-    Args:
-        model: The car.
-
-    Returns:
-        Solids in the frames of their bodies, and the links, springs and dampers between bodies.
-    """
+    """Return the solids of a car in the frames of their bodies, and the links, springs and dampers between bodies."""
     return (*primitives_of(model), *links_of(model))
 
 
 def primitives_of(model: mujoco.MjModel) -> tuple[Primitive, ...]:
-    """The visible geoms of all bodies but the world, as simple solids.
+    """Return the visible geoms of all bodies but the world as simple solids, in the frames of their bodies.
 
-    Args:
-        model: The car. A capsule becomes a cylinder of the same length; meshes and planes are left out.
-
-    Returns:
-        The solids, in the frames of their bodies.
+    A capsule becomes a cylinder of the same length; meshes and planes are left out.
     """
     solids = []
     for index in range(model.ngeom):
@@ -66,14 +55,11 @@ def primitives_of(model: mujoco.MjModel) -> tuple[Primitive, ...]:
 
 
 def links_of(model: mujoco.MjModel) -> tuple[Link, ...]:
-    """The tendons that run straight from site to site: suspension links, springs, dampers.
+    """Return the tendons that run straight from site to site, in the order of the model.
 
-    Args:
-        model: The car. A fixed tendon has no shape of its own (the front springs and dampers lie along the strut): it
-            is drawn between the sites `NAME_inner` and `NAME_outer` where the model has them, and left out otherwise.
-
-    Returns:
-        Them, in the order of the model. What is called `..._spring` or `..._damper` is one.
+    A tendon named `..._spring` or `..._damper` is a spring or damper; others are links. A fixed tendon has no shape of
+    its own (the front springs and dampers lie along the strut). It is drawn between the sites `NAME_inner` and
+    `NAME_outer` if the model has them.
     """
     links = []
     for index in range(model.ntendon):

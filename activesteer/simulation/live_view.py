@@ -1,4 +1,4 @@
-"""A drive while it happens: the simulation, held to the pace of a clock, and the scene on which it is seen."""
+"""A drive in a window: the simulation at the pace of a clock, and the scene that shows it."""
 
 from __future__ import annotations
 
@@ -18,38 +18,42 @@ from activesteer.video.cameras import CUTAWAY
 from activesteer.video.gauges import MIN_SPEED_MPS
 
 FRAME_S: Final = 0.016
-"""Least time from one picture to the next [s]: a screen shows 60 a second."""
+"""Minimum time between two pictures [s]: a screen shows 60 per second."""
 _MAX_S: Final = 0.1
-"""Most time from one picture to the next [s]: where drawing or simulating takes longer, the drive becomes slower
-than the clock, instead of ever more jerky."""
+"""Maximum time between two pictures [s]. If drawing or simulating takes longer, the drive becomes slower than the clock
+instead of jerky."""
 _TURN_S: Final = 0.4
-"""Time constant with which the camera turns after the car [s]."""
+"""Time constant of the camera's heading behind the car's [s]."""
 
 
 class Viewer(Protocol):
-    """What of MuJoCo's passive viewer is used here."""
+    """Part of the interface of MuJoCo's passive viewer."""
 
     cam: Any
 
     def is_running(self) -> bool:
-        """Whether its window is still open."""
+        """Return whether the window is still open."""
         ...
 
     def lock(self) -> AbstractContextManager[Any]:
-        """Held while what it draws is changed."""
+        """Return the lock to hold while the scene changes."""
         ...
 
     def sync(self) -> None:
-        """Shows what is there now."""
+        """Show the present scene."""
         ...
 
     def set_texts(self, texts: Any) -> None:
-        """Shows text over the picture: font, place, left column, right column; `None` for the usual ones."""
+        """Show text over the picture: font, place, left column, right column; `None` for the default."""
         ...
 
 
 class Pacer:
-    """Holds simulated time to the time of a clock."""
+    """Keeper of simulated time to the time of a clock.
+
+    Attributes:
+        lost_s: Delay of the drive behind the clock so far [s of the clock].
+    """
 
     def __init__(
         self,
@@ -57,27 +61,26 @@ class Pacer:
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], object] = time.sleep,
     ) -> None:
-        """Takes the clock, which starts with the first picture.
+        """Take a clock, which starts with the first picture.
 
         Args:
-            speed: Simulated seconds that pass in one of the clock.
-            clock: Tells the time [s].
-            sleep: Waits for a time [s].
+            speed: Simulated seconds per second of the clock.
+            clock: Function that returns the time [s].
+            sleep: Function that waits for a time [s].
         """
         self._speed, self._clock, self._sleep = speed, clock, sleep
         self._start_s: float | None = None
         self.lost_s = 0.0
-        """How much longer the drive has taken than it should have [s of the clock]."""
 
     def next(self, shown_s: float) -> float:
-        """Waits, if need be, until the next picture is due.
+        """Wait until the next picture is due.
 
         Args:
-            shown_s: Instant that the last picture showed [s].
+            shown_s: Simulated time of the last picture [s].
 
         Returns:
-            The instant that the next one is to show [s]: the one that the clock has come to, or a little before it
-            where that would be too large a leap. The clock then waits.
+            Simulated time of the next picture [s]: the time of the clock, or an earlier time if that step would be too
+            large. The clock is then set back.
         """
         now_s = self._clock()
         if self._start_s is None:
@@ -94,12 +97,12 @@ class Pacer:
 
 
 class DriveResult(NamedTuple):
-    """How a drive went that somebody watched.
+    """Result of a drive in a window.
 
     Attributes:
-        simulated_s: How far it came [s].
-        pictures: How many pictures were shown.
-        finished: Whether it came to its end before the window was closed.
+        simulated_s: Simulated time [s].
+        pictures: Number of pictures shown.
+        finished: Whether the drive finished before the window was closed.
     """
 
     simulated_s: float
@@ -108,12 +111,12 @@ class DriveResult(NamedTuple):
 
 
 def scene_for(simulation: ClosedLoop, maneuver: Maneuver, *, cutaway: bool = False) -> RenderScene:
-    """The scene for a simulation's car.
+    """Return the scene for a simulation's car.
 
     Args:
         simulation: The simulation.
         maneuver: The manoeuvre, whose road and course are shown.
-        cutaway: Whether the body is to be seen through.
+        cutaway: Whether the body is transparent.
 
     Raises:
         PlaybackError: the car cannot be drawn.
@@ -125,16 +128,16 @@ def scene_for(simulation: ClosedLoop, maneuver: Maneuver, *, cutaway: bool = Fal
 
 
 def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pacer) -> DriveResult:
-    """Drives a manoeuvre from its beginning to its end, or until the window is closed, and shows it.
+    """Drive and show a manoeuvre from start to end, or until the window is closed.
 
-    The engine that simulates and the model that is drawn are two: whatever is done in the window, such as pulling at
-    the car or pausing, does not reach the simulation.
+    The drawn model is separate from the simulated one: actions in the window, such as pulling at the car or pausing, do
+    not affect the simulation.
 
     Args:
-        simulation: The simulation, at its beginning.
-        scene: Where its car is the only one.
+        simulation: The simulation, at its start.
+        scene: Scene with its car only.
         viewer: The viewer of the scene.
-        pacer: Holds the pace.
+        pacer: Keeper of the pace.
 
     Raises:
         ActiveSteerError: the run failed.
@@ -145,7 +148,7 @@ def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pac
     while viewer.is_running():
         now_s = done * timestep_s
         viewer.set_texts((None, None, *_texts(simulation, now_s)))
-        # All in one: a picture drawn between would have the camera of one instant and the car of another.
+        # Under one lock: a picture in between would combine the camera of one instant with the car of another.
         with viewer.lock():
             scene.place(0, vehicle.data.xpos[1:], vehicle.data.xquat[1:])
             scene.update()
@@ -162,7 +165,7 @@ def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pac
 
 
 class _Follow:
-    """Moves the camera along with the car; from which side and how far away stays in the hands of who watches."""
+    """Camera that moves with the car; the user chooses direction and distance."""
 
     def __init__(self, simulation: ClosedLoop) -> None:
         self._simulation = simulation
@@ -184,7 +187,7 @@ class _Follow:
 
 
 def _texts(simulation: ClosedLoop, time_s: float) -> tuple[str, str]:
-    """Names and values, a line for each."""
+    """Return names and values, one line each."""
     vehicle = simulation.vehicle
     measured, motion = vehicle.measure(), vehicle.motion()
     moving = motion.speed_mps > MIN_SPEED_MPS

@@ -1,4 +1,4 @@
-"""What must be found by driving before a scenario can be run: single-track model, amplitude of the steering wheel."""
+"""Searches by driving before a scenario can run: single-track model, amplitude of the steering wheel."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from activesteer.theory.single_track import IDENTIFY
 
 
 def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scenario:
-    """The scenario with everything known that must be found by driving first: steering angle, single-track model.
+    """Return the scenario with the results of all searches: single-track model, steering wheel amplitude.
 
     Args:
         scenario: A scenario.
         timestep_s: Step of the simulation [s].
 
     Returns:
-        A scenario that can be run with any controller, always with the same input.
+        A scenario whose input is the same for every controller.
 
     Raises:
-        ManeuverError: no amplitude gives what is asked for.
+        ManeuverError: no amplitude gives the lateral acceleration.
     """
     if scenario.car.config.single_track.source == IDENTIFY:
         scenario = with_identified_single_track(scenario, _test_drive)
-    # The search drives the car in order, with ideal sensors: the input is the same whatever those of the car are.
+    # The search drives the car without faults and with ideal sensors, so that the input does not depend on them.
     search = replace(scenario.maneuver, fault=()).search
     if search is None:
         return scenario

@@ -1,4 +1,4 @@
-"""What a recording holds beside its rows: all that is needed to make the run again."""
+"""Contents of a recording apart from its rows: everything needed to repeat the run."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from activesteer.version import __version__
 
 
 class RunContext(NamedTuple):
-    """What goes into a recording beside its rows.
+    """Contents of a recording apart from its rows.
 
     Attributes:
         channels: The table of channels.
         body_names: Bodies whose poses are recorded.
         metadata: Resolved parameters, versions.
-        files: Manoeuvre, vehicle, model and tyre files, and a user's own controller and driver.
-        scene: What the car looks like.
+        files: Manoeuvre, vehicle, model and tyre files, and the code of a user's controller and driver.
+        scene: Appearance of the car.
     """
 
     channels: tuple[Channel, ...]
@@ -38,7 +38,7 @@ class RunContext(NamedTuple):
 
     @classmethod
     def of(cls, scenario: Scenario, vehicle: Vehicle, controller: Plugin) -> RunContext:
-        """The context of a run of a scenario, before it is driven."""
+        """Return the context of a run of a scenario, before the run."""
         metadata = {
             "controller": controller.name,
             **({"controller_parameters": dict(controller.parameters)} if controller.parameters else {}),
@@ -54,14 +54,14 @@ class RunContext(NamedTuple):
         return cls(vehicle.channels.channels, vehicle.body_names, metadata, files, scene_of(vehicle.model))
 
     def recording(self, recorder: Recorder) -> Recording:
-        """What a recorder that keeps all rows has taken."""
+        """Return the recording of a recorder that keeps all rows."""
         time_s, values, poses = recorder.result()
         return Recording(
             self.channels, time_s, values, poses=poses, metadata=self.metadata, attachments=self.files, scene=self.scene
         )
 
     def writer(self, path: Path) -> McapWriter:
-        """A file that rows can be written to.
+        """Open a file for the rows.
 
         Raises:
             RecordingError: the file cannot be written.

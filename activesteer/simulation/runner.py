@@ -1,4 +1,4 @@
-"""One run from its inputs to a recording: `simulate`, and the same with a file written on the way."""
+"""One run from its inputs to a recording: `simulate`, and the same with a file."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ def simulate(
     driver: Any = DEFAULT_DRIVER,
     timestep_s: float = DEFAULT_TIMESTEP_S,
 ) -> Recording:
-    """Drives a manoeuvre and returns what happened.
+    """Drive a manoeuvre and return its recording.
 
     Args:
         maneuver: Name, path, or table of a manoeuvre.
-        controller: `none`, `ars`, `afs`, or a user's own: `my_file.py:MyController?gain=2`, a class, an object (the run
-            works on a copy of it), or a function that makes one; see `activesteer.plugins.find`.
+        controller: `none`, `ars`, `afs`, or your own: `my_file.py:MyController?gain=2`, a class, an object (the run
+            uses a copy), or a function that returns one; see `activesteer.plugins.find`.
         vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value, as `{"speed_kmh": 100, "road.mu": 0.4, "controllers.ars.limit_deg": 2}`.
-        driver: Name, path or table of a driver, or a user's own code in the same forms as a controller.
+        overrides: Dotted key -> value, such as `{"speed_kmh": 100, "road.mu": 0.4, "controllers.ars.limit_deg": 2}`.
+        driver: Name, path or table of a driver, or your own code in the same forms as a controller.
         timestep_s: Step of engine, driver and controller [s].
 
     Returns:
         The recording, with metrics.
 
     Raises:
-        ActiveSteerError: an input is wrong, or the run failed; a failed run's recording is the error's `recording`.
+        ActiveSteerError: an input is wrong, or the run failed; `recording` of the error then holds the recorded rows.
 
     Example:
         >>> import activesteer
@@ -63,22 +63,22 @@ def run_scenario(
     timestep_s: float = DEFAULT_TIMESTEP_S,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
-    """Runs a scenario, and writes the recording while it runs where a path is given.
+    """Run a scenario; if a path is given, write the recording during the run.
 
     Args:
-        scenario: What to run; an amplitude that has to be found by driving is found first, if it is not known yet.
+        scenario: Scenario to run. An amplitude that is not known yet is searched for first.
         controller: The controller, as in `simulate`.
         path: MCAP file to write.
         timestep_s: Step of the simulation [s].
-        progress: Called about every simulated second with the fraction that is done, 0 to 1.
+        progress: Function that is called about every simulated second with the completed fraction, 0 to 1.
 
     Returns:
-        The recording, with metrics; where the run cannot be evaluated, as when it is too short, there are none and
-        the metadata's `metrics_error` says why. That of a run too long for memory (`MAX_KEPT_VALUES`) reads from the
-        file, which holds most channels to 32 bit.
+        The recording, with metrics. A run that cannot be evaluated, for example because it is too short, has no
+        metrics, and its metadata `metrics_error` gives the reason. The recording of a run too long for memory
+        (`MAX_KEPT_VALUES`) reads from the file, which holds most channels with 32 bits.
 
     Raises:
-        ActiveSteerError: the run failed. What was recorded until then is in the file, and in the error's `recording`.
+        ActiveSteerError: the run failed. The rows recorded until then are in the file, and in the error's `recording`.
     """
     return _driven(Simulation(scenario, controller, timestep_s=timestep_s), path, progress)
 

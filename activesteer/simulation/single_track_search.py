@@ -1,4 +1,4 @@
-"""The single-track model that fits a car, found by driving it: two tests at constant speed, in the linear range.
+"""Search for the single-track model of a car by driving it: two tests at constant speed, in the linear range.
 
 Mass, yaw inertia and axle distances are those of the model at static ride; see `studies.linear.identification`.
 """
@@ -21,12 +21,12 @@ from activesteer.theory.single_track import IDENTIFIED, SingleTrackParameters, c
 from activesteer.vehicle.mass_properties import mass_properties
 
 Run = Callable[[Scenario], RecordingLike]
-"""Makes a run of a scenario; handed over, since who runs scenarios asks here first."""
+"""Function that runs a scenario; an argument, because the runner itself calls this module."""
 
 CONSTANT_SPEED_TESTS: Final = {"80 km/h": 80.0, "100 km/h": 100.0}
-"""Tests at constant speed: name and speed [km/h]; the single-track model comes from these."""
+"""Tests at constant speed that give the single-track model: name -> speed [km/h]."""
 _LINEAR: Final = {"duration_s": 12.0, "steer.end_deg": 50.0}
-"""What a test at constant speed is cut to where only the linear range is wanted."""
+"""Overrides that limit a test at constant speed to the linear range."""
 
 
 class Body(NamedTuple):
@@ -46,7 +46,7 @@ class Body(NamedTuple):
 
 
 def linear_tests(vehicle: FileOrTable, overrides: Mapping[str, Any] | None = None) -> list[Scenario]:
-    """The tests at constant speed, as far as the range is linear."""
+    """Return the tests at constant speed, limited to the linear range."""
     return [
         resolve("slowly_increasing_steer", vehicle, {**(overrides or {}), **_LINEAR, "speed_kmh": speed})
         for speed in CONSTANT_SPEED_TESTS.values()
@@ -54,24 +54,24 @@ def linear_tests(vehicle: FileOrTable, overrides: Mapping[str, Any] | None = Non
 
 
 def single_track_of(scenarios: list[Scenario], run: Run) -> SingleTrackParameters:
-    """The single-track model that fits the car in the tests."""
+    """Return the single-track model that fits the car in the tests."""
     body = body_of(scenarios[0].car)
     return fitted(body, [handling_in(scenario, body, run) for scenario in scenarios])
 
 
 def with_identified_single_track(scenario: Scenario, run: Run) -> Scenario:
-    """The scenario with controllers and driver who know the car as it is, load and all.
+    """Return the scenario with the single-track model of the car as it is, including its load.
 
     Raises:
-        ModelError: the car oversteers; it has no characteristic speed.
+        ModelError: the car oversteers, so it has no characteristic speed.
     """
     car = scenario.car
-    found = single_track_of([replace(test, car=car) for test in linear_tests("compact")], run)
-    return replace(scenario, car=replace(car, config=replace(car.config, single_track=found)))
+    single_track = single_track_of([replace(test, car=car) for test in linear_tests("compact")], run)
+    return replace(scenario, car=replace(car, config=replace(car.config, single_track=single_track)))
 
 
 def body_of(car: Car) -> Body:
-    """Mass properties of the whole car, from the model at static ride."""
+    """Return the mass properties of the whole car, from the model at static ride."""
     vehicle = car.on()
     body = mass_properties(vehicle.model, vehicle.data)
     front, rear = (vehicle.data.xpos[vehicle.model.body(f"{axle}l_wheel").id, 0] for axle in "fr")
@@ -80,14 +80,14 @@ def body_of(car: Car) -> Body:
 
 
 def handling_in(scenario: Scenario, body: Body, run: Run) -> Handling:
-    """Steady-state handling of a car in a test."""
+    """Return the steady-state handling of a car in a test."""
     return evaluate(
         run(scenario), CarGeometry(body.cg_to_front_m, body.cg_to_rear_m, scenario.car.config.steering.ratio)
     )
 
 
 def fitted(body: Body, tests: list[Handling]) -> SingleTrackParameters:
-    """The model whose slip angles and understeer are the mean of those of the tests at constant speed."""
+    """Return the model with the mean slip angles and understeer of the tests at constant speed."""
     wheelbase = body.cg_to_front_m + body.cg_to_rear_m
 
     def mean(name: str) -> float:
@@ -98,7 +98,7 @@ def fitted(body: Body, tests: list[Handling]) -> SingleTrackParameters:
         gradient_degpg = math.degrees(understeer) * GRAVITY_MPS2
         raise ModelError(
             f"the car oversteers: its understeer gradient is {gradient_degpg:.3g} deg/g, and the characteristic speed "
-            "of the single-track model needs one above 0"
+            "of the single-track model needs a positive gradient"
         )
     return SingleTrackParameters(
         source=IDENTIFIED,
