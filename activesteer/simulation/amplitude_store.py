@@ -1,8 +1,8 @@
 """Store of amplitudes found by driving, in the process and in the user's cache folder.
 
 The folder is `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/activesteer/amplitudes`. You can delete it
-at any time. The name of a file is the key of its number. The file holds the number and a hash of both, so that a damaged
-or misplaced file is ignored. If the folder cannot be read or written, nothing is stored there.
+at any time. The name of a file is the key of its number. The file holds the number and a hash of both, so a damaged or
+misplaced file is ignored. If the folder cannot be read or written, nothing is stored there.
 """
 
 from __future__ import annotations

@@ -402,10 +402,10 @@ class Vehicle(Uncopyable):
         return self._sensors
 
     def put_sensors_between(self, *, wanted: bool) -> None:
-        """Has brakes listen to sensors where these are ideal, as they must where a sensor may fail.
+        """Insert ideal sensors that can fail between the truth and the brakes, or remove them.
 
         Args:
-            wanted: Whether they shall; else they are the truth again.
+            wanted: Whether to insert the sensors; no effect on a car with sensors of its own.
         """
         if self.parameters.sensors.is_ideal and wanted is (self._sensors is None):
             self._sensors = SensorBlock(self.parameters.sensors, float(self.model.opt.timestep)) if wanted else None

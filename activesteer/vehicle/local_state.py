@@ -1,8 +1,8 @@
-"""The state of a rolling car without its cyclic coordinates: what is left does not depend on where it is or heads.
+"""The state of a rolling car without its cyclic coordinates, independent of position and heading.
 
-Tyres on a level, even road do not know the position on the road, the heading or the rotation angles of the wheels.
-Taken out of the state, with the velocities turned into the heading, they leave a state in which driving straight on
-is a point of rest, about which the car can be linearised.
+On a level, even road the forces do not depend on position, heading or the rotation angles of the wheels. Without these
+coordinates, and with velocities in axes along the heading, straight driving is an equilibrium about which the car can
+be linearised.
 """
 
 from __future__ import annotations
@@ -18,30 +18,31 @@ from activesteer.vehicle.chassis_heading import turn_chassis_back
 
 _AXES: Final = ("x", "y", "z", "roll", "pitch", "yaw")
 _JOINT_DOFS: Final = {0: _AXES, 1: ("_x", "_y", "_z"), 2: ("",), 3: ("",)}
-"""MuJoCo's kinds of joints (free, ball, slide, hinge) -> what is added to the joint's name for each of its dofs."""
+"""MuJoCo's kind of joint (free, ball, slide, hinge) -> suffixes of the joint's name, one for each of its dofs."""
 
 
 _WIND_UP: Final = ("_brake", "rack_friction")
-"""Ends of the names of actuators whose activation is a wind-up before slipping."""
+"""Suffixes of actuators whose activation is a wind-up before slipping."""
 
 
 class LocalState:
-    """Reads and writes the state of a vehicle as one vector of differences from a reference state.
+    """The state of a vehicle as one vector of differences from a reference state.
 
-    The vector holds: coordinates (roll and pitch as rotations about the chassis' axes), velocities (those of the
-    chassis' origin along heading, left, up; rotations about the chassis' axes), activations (servos, carcass
-    deflections of the tyres). Left out are position on the road, heading, rotation angles of the wheels, and the
-    wind-up of what either holds or slips, brake pads and rack: pads slip in a rolling wheel and have no motion of their
-    own, of the rack see `linearisation`. Seals of dampers, if they rub at all, are shaken loose by the road, which
-    makes them smooth.
+    The vector holds coordinates (roll and pitch as rotations about the chassis' axes), velocities (of the chassis'
+    origin along heading, left, up; rotations about the chassis' axes), and activations (servos, carcass deflections of
+    the tyres).
+
+    It leaves out the position on the road, the heading, the rotation angles of the wheels, and the wind-up of parts
+    that hold or slip. The brake pads of a rolling wheel slip and have no motion of their own; for the rack see
+    `linearisation`. The friction of damper seals, if any, is included, because excitation by the road makes it smooth.
 
     Attributes:
-        names: Names of the elements: a coordinate has its joint's name, its velocity `d_` in front.
+        names: Names of the elements: a coordinate has the name of its joint, its velocity starts with `d_`.
         vehicle: The car.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Takes the present state of the vehicle as the reference.
+        """Take the present state of the vehicle as the reference.
 
         Args:
             vehicle: The car, rolling along the world's x axis.
@@ -77,14 +78,14 @@ class LocalState:
         self.take_reference()
 
     def take_reference(self) -> None:
-        """Makes the present state of the vehicle the reference, after turning it to the origin and the x axis."""
+        """Move the car to the origin, heading along x, and take its state as the reference."""
         self._turn_home()
         data = self.vehicle.data
         self._qpos, self._qvel, self._act = data.qpos.copy(), data.qvel.copy(), data.act.copy()
         self._state = self.vehicle.save_state()
 
     def read(self) -> Array:
-        """Difference of the present state from the reference, shape (len(names),). Turns the car home."""
+        """Move the car to the origin, and return its difference from the reference, shape (len(names),)."""
         self._turn_home()
         data, model = self.vehicle.data, self.vehicle.model
         difference = np.empty(model.nv)
@@ -94,7 +95,7 @@ class LocalState:
         )
 
     def write(self, difference: Array) -> None:
-        """Sets the vehicle to the reference and a difference from it.
+        """Set the vehicle to the reference plus a difference.
 
         Args:
             difference: Shape (len(names),).
@@ -110,9 +111,9 @@ class LocalState:
         data.act[self._activations] += difference[count + model.nv :]
 
     def _turn_home(self) -> None:
-        """Puts the car at the origin of the road with heading 0 and unturned wheels; its motion stays."""
+        """Put the car at the origin of the road with heading 0 and unturned wheels; its motion stays."""
         data = self.vehicle.data
-        # Heading of the chassis' x axis (ISO 8855): a rotation about that axis leaves it alone.
+        # The heading of the chassis' x axis (ISO 8855) does not change with a rotation about that axis.
         turn_chassis_back(data, 0.5 * float(yaw_of(data.qpos[3:7])))
         data.qpos[:2] = 0.0
         data.qpos[self._spins] = 0.0

@@ -1,4 +1,4 @@
-"""Reading and writing the engine's memory from compiled code: addresses become numba pointers and arrays."""
+"""Access to the engine's memory from compiled code: addresses become numba pointers and arrays."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from activesteer.compilation import inlined
 
 
 def pointer_to(numba_type: types.Type) -> Any:
-    """An intrinsic: address (intp) -> pointer to a type."""
+    """Return an intrinsic: address (intp) -> pointer to a type."""
 
     @intrinsic
     def cast(_typing_context, _address):
@@ -35,18 +35,18 @@ word_pointer = pointer_to(types.intp)
 
 @inlined
 def word(address):
-    """The machine word at an address."""
+    """Read the machine word at an address."""
     return word_pointer(address)[0]
 
 
 @inlined
 def array_at(struct, offset, size):
-    """The float64 array whose pointer stands `offset` bytes into a struct, as a 1-D view of `size` elements."""
+    """Return the float64 array whose pointer is `offset` bytes into a struct, as a 1-D view of `size` elements."""
     return carray(f64_pointer(word(struct + offset)), (size,))
 
 
 def records_at(kind: np.dtype[Any]) -> Any:
-    """Compiled code: address, a distance from it in numbers, how many -> records of float64, as an array."""
+    """Return compiled code: address, distance from it in numbers, count -> array of records of float64."""
     pointer = pointer_to(from_dtype(kind))
 
     @inlined

@@ -64,7 +64,7 @@ def test_linearise_takes_other_values_of_the_car(capsys):
 )
 def test_what_makes_its_manoeuvre_itself_takes_no_override_of_it(capsys, words, part):
     assert main(words) == 1
-    assert f"is of the {part}, which is made here" in capsys.readouterr().err
+    assert f"belongs to the {part}, which this command sets" in capsys.readouterr().err
 
 
 def test_linearise_needs_a_speed(capsys):

@@ -1,4 +1,4 @@
-"""From the engine's raw rows to the recorded channels: units, axes, signs. The only room that says what each is."""
+"""The recorded channels, computed from the engine's raw rows: units, axes, signs."""
 
 from activesteer.vehicle.channels.channel_map import MAX_VALUE, ChannelMap
 from activesteer.vehicle.channels.raw_rows import RawRows

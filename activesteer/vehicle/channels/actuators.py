@@ -1,4 +1,4 @@
-"""Channels of the actuators: torques of drive, brakes and motors, dry friction, and what is at a limit."""
+"""Channels of the actuators: torques of drive, brakes and motors, dry friction, and flags for limits."""
 
 from __future__ import annotations
 
@@ -14,11 +14,7 @@ from activesteer.vehicle.toe_link_screws import SCREW
 
 
 def actuator_signals(model: mujoco.MjModel) -> Iterator[Signal]:
-    """Torques of drive and brakes, dry friction, and whether a servo without a motor of its own is at a limit.
-
-    Args:
-        model: The car.
-    """
+    """Yield torques of drive and brakes, dry friction, and flags of servos without a motor that are at a limit."""
     for index in range(model.nu):
         name, force = model.actuator(index).name, Column("actuator_force", index)
         if name.endswith(("_drive", "_brake")):
@@ -33,16 +29,12 @@ def actuator_signals(model: mujoco.MjModel) -> Iterator[Signal]:
             and model.actuator_trntype[index] != int(mujoco.mjtTrn.mjTRN_TENDON)
             and not _has_motor(model, name)
         ):
-            meaning = f"1 where {name} is at its angle, rate or torque limit"
+            meaning = f"1 if {name} is at its angle, rate or torque limit"
             yield signal("vehicle", f"{name}_saturated", "", meaning, _limits(model, index))
 
 
 def motor_signals(model: mujoco.MjModel) -> Iterator[Signal]:
-    """What the motors of screws in the toe links, and of the superposition, do.
-
-    Args:
-        model: The car.
-    """
+    """Yield the signals of the motors of screws in the toe links, and of the superposition."""
     for name, words in (
         ("rl", "of the left toe link"), ("rr", "of the right toe link"), ("rear", "of both toe links"),
         (NAME, "of the superposition"),

@@ -16,10 +16,10 @@ from activesteer.vehicle.channels.raw_rows import Column, sensor
 _STANDSTILL_MPS: Final = 0.2
 """Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""
 _ROCKS_BACK_MPS: Final = 1.0
-"""Likewise backwards below this speed, as where a car that has stopped swings back on suspension and tyres [m/s]."""
+"""Limit for driving backwards, for a stopped car that swings back on suspension and tyres [m/s]."""
 
 _EXACT: Final = ("x_m", "y_m", "yaw_rad", "front_axle_x_m", "front_axle_y_m")
-"""Channels that grow with the way, and so need more than 32 bit in a file."""
+"""Channels that grow with the distance and need more than 32 bits in a file."""
 MOTION_CHANNELS: Final = tuple(
     Channel(name, unit, meaning, "vehicle", name not in _EXACT)
     for name, unit, meaning in (
@@ -44,11 +44,11 @@ MOTION_CHANNELS: Final = tuple(
         ("front_axle_y_m", "m", "position of the middle of the front axle, world y"),
     )
 )
-"""Those that are worked out are members of a `CarMotion`."""
+"""Channels of the motion. A channel that is computed has the name of its attribute of `CarMotion`."""
 
 
 def motion_copied(model: mujoco.MjModel) -> dict[str, Column]:
-    """Channels of `MOTION_CHANNELS` that the engine's sensors say as they are.
+    """Return the channels of `MOTION_CHANNELS` that are copied from the engine's sensors.
 
     Raises:
         ModelError: a sensor is missing.
@@ -64,7 +64,7 @@ def motion_copied(model: mujoco.MjModel) -> dict[str, Column]:
 
 
 def motion_inputs(model: mujoco.MjModel) -> tuple[Column, ...]:
-    """What the others are worked out from: orientation, velocity, acceleration, and two of the body's angular rates.
+    """Return the inputs of the other channels: orientation, velocity, acceleration, two of the body's angular rates.
 
     Raises:
         ModelError: a sensor is missing.
@@ -80,7 +80,7 @@ _ARRAY: Final = types.Array(types.float64, 2, "A")
 
 @compiled_call(types.void, _ARRAY, _ARRAY)
 def _angle_sides(columns, out):
-    """Of yaw and roll (ISO 8855: yaw, pitch, roll in this order) both sides of the tangent, of pitch the sine."""
+    """Compute both sides of the tangent of yaw and roll, and the sine of pitch (ISO 8855: yaw, pitch, roll)."""
     for row in range(len(columns)):
         w, x, y, z = columns[row, 0], columns[row, 1], columns[row, 2], columns[row, 3]
         out[row, 0], out[row, 2] = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
@@ -91,18 +91,18 @@ def _angle_sides(columns, out):
 
 @compiled_call(types.void, _ARRAY, _ARRAY, _ARRAY, types.Array(types.float64, 1, "C"), _ARRAY)
 def _in_the_road_plane(columns, sines, cosines, gravity_mps2, out):
-    """Velocity, acceleration and yaw rate; sines and cosines of yaw, roll and pitch."""
+    """Compute velocity, acceleration and yaw rate from sines and cosines of yaw, roll and pitch."""
     for row in range(len(columns)):
         vx, vy, ax, ay, az = columns[row, 4], columns[row, 5], columns[row, 6], columns[row, 7], columns[row, 8]
         sin, sr, sp = sines[row, 0], sines[row, 1], sines[row, 2]
         cos, cr, cp = cosines[row, 0], cosines[row, 1], cosines[row, 2]
         out[row, 0], out[row, 1] = vx * cos + vy * sin, vy * cos - vx * sin
-        # An accelerometer measures the specific force: turned into the road plane, gravity (which has a part there on a
-        # grade) is added to get the acceleration.
+        # An accelerometer measures the specific force. After rotation into the road plane, add gravity, which has a
+        # component in this plane on a grade.
         out[row, 2] = cp * ax + sp * (sr * ay + cr * az) + gravity_mps2[0] * cos
         out[row, 3] = cr * ay - sr * az - gravity_mps2[0] * sin
         out[row, 4] = -sp * ax + cp * (sr * ay + cr * az) + gravity_mps2[2]
-        # Euler angle rate about the road's normal, not the body's z axis.
+        # Rate of the Euler angle about the road's normal, not about the body's z axis.
         out[row, 5] = (sr * columns[row, 9] + cr * columns[row, 10]) / cp
 
 
@@ -110,14 +110,14 @@ class CarMotion:
     """Motion of the centre of gravity in the axes of ISO 8855, from sensors in world and body axes."""
 
     def __init__(self, columns: Array, gravity_mps2: Array, last_yaw_rad: float) -> None:
-        """Evaluates all of it; the members are called as the channels.
+        """Evaluate all quantities, which have the names of their channels.
 
-        Sines and angles are numpy's: it works out eight at a time, and recordings keep their last digits.
+        Sines and angles use numpy, which computes eight at a time; recordings keep its last digits.
 
         Args:
-            columns: Those of `motion_inputs`, shape (n, 11), by column.
-            gravity_mps2: Acceleration of gravity in the world [m/s2].
-            last_yaw_rad: Yaw angle of the row before the first one, which the angle is unwrapped from [rad].
+            columns: Columns of `motion_inputs`, shape (n, 11), by column.
+            gravity_mps2: Gravitational acceleration in the world [m/s2].
+            last_yaw_rad: Yaw angle of the row before the first one, from which the angle is unwrapped [rad].
         """
         sides, angles, turned = (np.empty((len(columns), count), order="F") for count in (5, 3, 6))
         _angle_sides(columns, sides)
@@ -125,7 +125,7 @@ class CarMotion:
         np.arcsin(sides[:, 4], out=angles[:, 2])
         self.yaw_rad, self.roll_rad, self.pitch_rad = angles.T
         steps = np.abs(self.yaw_rad[1:] - self.yaw_rad[:-1])
-        # Unwrapping takes longer than all the rest; where no jump is to be taken out, it adds 0.
+        # Unwrapping takes longer than everything else; without a jump it only adds 0.
         if steps.max(initial=abs(self.yaw_rad[0] - last_yaw_rad)) < np.pi:
             self.yaw_rad += 0.0
         else:

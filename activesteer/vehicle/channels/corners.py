@@ -10,10 +10,10 @@ import numpy as np
 
 from activesteer.brakes.records import PER_WHEEL, PLACES
 from activesteer.conventions import CORNERS, Array
+from activesteer.signals import CORNERS_IN_WORDS
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels.raw_rows import Column, Computed, Signal, Values, sensor, signal
 
-_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 _TYRE: Final = (
     ("fx_N", "tyre_fx_N", "N", "longitudinal tyre force at the contact point, ISO-W"),
     ("fy_N", "tyre_fy_N", "N", "lateral tyre force at the contact point, ISO-W, left positive"),
@@ -24,36 +24,38 @@ _TYRE: Final = (
     ("slip_ratio", "slip_ratio", "", "transient longitudinal slip, positive drives"),
     ("slip_angle_rad", "slip_angle_rad", "rad", "transient slip angle, positive gives negative force"),
     ("inclination_rad", "inclination_rad", "rad", "inclination of the wheel against the road about +x"),
-    ("loaded_radius_m", "loaded_radius_m", "m", "distance of wheel centre and contact point"),
-    ("limited", "tyre_limited", "", "1 where the tyre is outside its file's range of validity"),
+    ("loaded_radius_m", "loaded_radius_m", "m", "distance between wheel centre and contact point"),
+    ("limited", "tyre_limited", "", "1 if the tyre is outside its file's range of validity"),
     ("contact_x_m", "contact_x_m", "m", "contact point with the road, world x"),
     ("contact_y_m", "contact_y_m", "m", "contact point with the road, world y"),
     ("mu", "mu", "", "friction of the road at the contact point"),
     (
         "friction_utilisation", "friction_utilisation", "",
-        "fraction of the tyre's peak friction at its load that is used",
+        "used fraction of the tyre's peak friction at its load",
     ),
 )  # fmt: skip
 """Output of the native forces -> its channel: name, unit, meaning."""
 _BRAKES: Final = (
-    ("demand_Pa", "brake_pressure_demand_Pa", "Pa", "brake pressure that driver and controller ask for", "corners"),
+    ("demand_Pa", "brake_pressure_demand_Pa", "Pa", "brake pressure demand of driver and controller", "corners"),
     ("pressure_Pa", "brake_pressure_Pa", "Pa", "pressure in the wheel brake", "corners"),
     ("phase", "abs_phase", "", "anti-lock control: 0 off, 1 releases, 2 recovers, 3 builds up pressure", "corners"),
-    ("reference_mps", "abs_speed_mps", "m/s", "speed of the car as the brakes' control unit estimates it", "vehicle"),
+    (
+        "reference_mps",
+        "abs_speed_mps",
+        "m/s",
+        "speed of the car, estimated by the control unit of the brakes",
+        "vehicle",
+    ),
     ("tcs_active", "tcs_active", "", "1 while traction control limits the drive", "vehicle"),
 )
 """Field of `BRAKE_STATE` -> its channels: name, unit, meaning, group."""
 
 
 def corner_signals(model: mujoco.MjModel) -> Iterator[Signal]:
-    """What each wheel does: its tyre, and where it is against the chassis.
-
-    Args:
-        model: The car.
-    """
+    """Yield the signals of each wheel: its tyre, and its position relative to the chassis."""
     at_rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, at_rest)
-    for index, (corner, words) in enumerate(_WORDS.items()):
+    for index, (corner, words) in enumerate(CORNERS_IN_WORDS.items()):
 
         def of(
             name: str, unit: str, meaning: str, values: Values, *, corner: str = corner, words: str = words
@@ -75,23 +77,23 @@ def corner_signals(model: mujoco.MjModel) -> Iterator[Signal]:
 
 
 def brake_signals() -> Iterator[Signal]:
-    """Pressures, and what the control unit of the brakes knows and does."""
+    """Yield the pressures, and the signals of the control unit of the brakes."""
     for field, name, unit, meaning, group in _BRAKES:
         first = PLACES[field]
         if field in PER_WHEEL:
-            for index, (corner, words) in enumerate(_WORDS.items()):
+            for index, (corner, words) in enumerate(CORNERS_IN_WORDS.items()):
                 yield signal(group, f"{corner}_{name}", unit, f"{meaning}, {words}", Column("brakes", first + index))
         else:
             yield signal(group, name, unit, meaning, Column("brakes", first))
 
 
 def toe(forward: Array, left: Array) -> Array:
-    """Steer angle of a wheel [rad] from two parts of its spin axis, in chassis axes."""
+    """Return the steer angle of a wheel from two components of its spin axis in chassis axes [rad]."""
     return np.arctan2(-forward, left)
 
 
 def _against_chassis(height: Column, design_m: float, axis: tuple[Column, ...]) -> tuple[Values, Values, Values]:
-    """Travel, steer angle and camber from the sensors of a wheel's height and of its spin axis."""
+    """Return travel, steer angle and camber from the sensors of a wheel's height and spin axis."""
     return (
         Computed(lambda height_m: height_m - design_m, (height,)),
         Computed(toe, axis[:2]),
@@ -100,7 +102,7 @@ def _against_chassis(height: Column, design_m: float, axis: tuple[Column, ...]) 
 
 
 def _design_height(model: mujoco.MjModel, at_rest: mujoco.MjData, corner: str) -> float:
-    """Height of a wheel centre in vehicle axes in the design position [m]."""
+    """Return the height of a wheel centre in vehicle axes in the design position [m]."""
     chassis = model.body("chassis").id
     offset = at_rest.xpos[model.body(f"{corner}_wheel").id] - at_rest.xpos[chassis]
     return float((at_rest.xmat[chassis].reshape(3, 3).T @ offset)[2])

@@ -13,26 +13,26 @@ from activesteer.vehicle.curve_axle_model import HOLDING_TENDON
 
 
 def link_signals(model: mujoco.MjModel) -> Iterator[Signal]:
-    """Axial forces of everything that is a tendon with a stiffness of its own; tension positive."""
+    """Yield the axial forces of all tendons with a stiffness, tension positive."""
     for index in range(model.ntendon):
         if model.tendon_stiffness[index] == 0.0 and not model.tendon_stiffnesspoly[index].any():
             continue
         if model.tendon(index).name.endswith(HOLDING_TENDON):
-            # Five springs that stand for all links of a wheel; none of them is a part of the car.
+            # Five springs replace all links of a wheel; they are not parts of the car.
             continue
-        # What a damper's tendon has of a spring are the stops at both ends of its travel.
+        # The stiffness of a damper's tendon represents the stops at both ends of its travel.
         name = model.tendon(index).name.replace("_damper", "_stop")
         yield signal("links", f"{name}_force_N", "N", f"axial force of {name}, tension positive", _force(model, index))
 
 
 def axial_force(model: mujoco.MjModel, tendon: int) -> AxialForce:
-    """The law of a tendon's own stiffness."""
+    """Return the law of a tendon's stiffness."""
     stiffness = model.tendon_stiffness[tendon], *model.tendon_stiffnesspoly[tendon]
     return AxialForce._make((tendon, *stiffness, model.tendon_damping[tendon], *model.tendon_lengthspring[tendon]))
 
 
 def _force(model: mujoco.MjModel, tendon: int) -> Values:
-    """That law, and of a link whose length a screw changes also what its actuator adds."""
+    """Return the axial force of a tendon; a screw in the link adds the force of its actuator."""
     law = axial_force(model, tendon)
     along = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
     screws = np.flatnonzero(along & (model.actuator_trnid[:, 0] == tendon) & (model.actuator_gainprm[:, 0] > 0.0))

@@ -1,7 +1,7 @@
-"""Channels from the engine's raw rows in compiled code: what is copied, and the forces of links and springs.
+"""Compiled computation of channels from the engine's raw rows: copies, forces of links and springs, limits.
 
-All go through the rows a few at a time: raw rows lie one behind the other, and so do channels; what the processor has
-to fetch for one of them is then used before it goes.
+The code works on a few rows at a time. Raw rows lie one after the other, and so do channels, so the data that the
+processor fetches for one channel is still in its cache for the next.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from activesteer.vehicle.channels.raw_rows import Actuator, AxialForce, RawRows
 from activesteer.vehicle.native_memory import f64_pointer
 
 _ROWS_AT_ONCE: Final = 8
-"""As many float64 as a cache line holds."""
+"""Number of float64 in a cache line."""
 
 
 def record_of(law: type[AxialForce | Actuator]) -> np.dtype:
-    """A law as compiled code reads it."""
+    """Return the record of a law for compiled code."""
     return np.dtype([(name, np.intp if kind is int else np.float64) for name, kind in get_type_hints(law).items()])
 
 
@@ -38,7 +38,7 @@ _LENGTH, _VELOCITY, _CTRL, _ACT, _FORCE = (
 
 @inlined
 def _place(array, row, column):
-    """Pointer to a number: numba's own indexing looks each time whether an index is negative."""
+    """Pointer to a number, without the check for negative indices in numba's indexing."""
     return f64_pointer(array.ctypes.data + row * array.strides[0] + column * array.strides[1])
 
 
@@ -106,25 +106,24 @@ def _take(rows, start, count, copies, input_copies, forces, actuators, out, inpu
 
 @compiled_call(types.boolean, _ROWS, _COPIES, _COPIES, _FORCES, _ACTUATORS, _ARRAY, _ARRAY, types.float64)
 def take_rows(rows, copies, input_copies, forces, actuators, out, inputs, largest):
-    """Turns raw rows into all channels that compiled code makes.
+    """Compute all channels of compiled code.
 
     Args:
         rows: The arrays of a `RawRows`, shape (n, m) each.
-        copies: What is copied to channels: for each array where its part of the two others ends, columns of the array,
-            columns of `out` that they become.
-        input_copies: What is copied to `inputs`, likewise.
-        forces: Laws of springs, stops and links, and the columns of `out` that their forces become [N].
-        actuators: Actuators, and the columns of `out` that become 1 where they are at a limit of angle, rate or force,
-            and 0 elsewhere.
-        out: Where the channels go, shape (n, k), by column.
-        inputs: Where the other copies go, shape (n, j), by column.
-        largest: Most that the size of a value may be.
+        copies: Copies to channels: for each array the end of its part in the two other tables, columns of the array,
+            columns of `out`.
+        input_copies: Copies to `inputs`, in the same form.
+        forces: Laws of springs, stops and links, and the columns of `out` for their forces [N].
+        actuators: Actuators, and the columns of `out` for their flags: 1 at a limit of angle, rate or force, else 0.
+        out: Channels, shape (n, k), by column; written.
+        inputs: The other copies, shape (n, j), by column; written.
+        largest: Largest allowed magnitude.
 
     Returns:
-        Whether all channels are finite and none is larger.
+        Whether all channels are finite and within this magnitude.
     """
     good, whole = True, len(out) - len(out) % _ROWS_AT_ONCE
-    # A count that the compiler knows: it then keeps these rows of a column in one register.
+    # The compiler knows this count and keeps these rows of a column in one register.
     for start in range(0, whole, _ROWS_AT_ONCE):
         good &= _take(rows, start, _ROWS_AT_ONCE, copies, input_copies, forces, actuators, out, inputs, largest)
     return good & _take(rows, whole, len(out) - whole, copies, input_copies, forces, actuators, out, inputs, largest)
@@ -132,12 +131,12 @@ def take_rows(rows, copies, input_copies, forces, actuators, out, inputs, larges
 
 @compiled_call(types.boolean, _ARRAY, _PLACES, types.float64)
 def within(values, columns, largest):
-    """Whether all values in some columns are finite, and none is larger.
+    """Return whether all values in some columns are finite and within a magnitude.
 
     Args:
         values: Channels, shape (n, k).
-        columns: Which columns of them.
-        largest: Most that the size of a value may be.
+        columns: Columns to check.
+        largest: Largest allowed magnitude.
     """
     good = True
     for index in range(len(columns)):

@@ -1,4 +1,4 @@
-"""What is taken from the engine in each step, and how a channel is made of it."""
+"""Raw rows of the engine, and the rules that turn them into channels."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ class RawRows(NamedTuple):
     actuator_force: Array
     ctrl: Array
     commands: Array
-    """What driver and controller asked for, as `write_commands` leaves it."""
+    """Commands of driver and controller, as `write_commands` leaves them."""
     measured: Array
-    """What the sensors said when driver and controller decided; empty with ideal sensors."""
+    """Measurement on which driver and controller based their commands; empty with ideal sensors."""
     brakes: Array
     """A `BRAKE_STATE`."""
     estimate: Array
-    """The members of an `Estimate`; empty where no controller makes one."""
+    """Fields of an `Estimate`; empty without an estimator."""
 
 
 ENGINE_ARRAYS: Final = RawRows._fields[: RawRows._fields.index("commands")]
-"""Those of the engine, which calls them so too."""
+"""The arrays of the engine, by their names in the engine."""
 
 
 class Column(NamedTuple):
@@ -44,64 +44,71 @@ class Column(NamedTuple):
 
 
 class AxialForce(NamedTuple):
-    """The law of a tendon with a stiffness of its own, tension positive."""
+    """Axial force of a tendon with a stiffness, tension positive.
+
+    The spring force is a polynomial in the elongation, with the coefficients [N/m], [N/m2] and [N/m3]. The tendon is
+    compressed below the length `low_m`, stretched above `high_m`, and slack in between.
+    """
 
     tendon: int
     stiffness_Npm: float
-    """First coefficient of the polynomial in the elongation; so the next two [N/m2], [N/m3]."""
     second_Npm2: float
     third_Npm3: float
     damping_Nspm: float
     low_m: float
-    """Length below which it is compressed, and above the next one stretched; between them it is slack."""
     high_m: float
 
 
 class Actuator(NamedTuple):
-    """The limits of an actuator that follows a command with a lag."""
+    """Limits of an actuator that follows a command with a lag.
+
+    Attributes:
+        control: Place of the actuator among the commands and the forces.
+        activation: Place of the actuator among the activations.
+        lag_s: Time constant [s].
+        rate_radps: Largest rate.
+        low_rad: Lower limit of the angle; `high_rad` is the upper one.
+        low_Nm: Lower limit of the torque; `high_Nm` is the upper one. Infinite if there is no limit.
+    """
 
     control: int
-    """Its place among the commands and the forces."""
     activation: int
-    """Its place among the activations."""
     lag_s: float
     rate_radps: float
     low_rad: float
     high_rad: float
     low_Nm: float
-    """Its forces; without limits, those of a float."""
     high_Nm: float
 
 
 class Computed(NamedTuple):
-    """What is worked out from columns by numpy, for many rows at once."""
+    """A channel that numpy computes from columns, which are the arguments of `law`."""
 
     law: Callable[..., Array]
-    """Takes the columns one by one."""
     columns: tuple[Column, ...]
 
 
 Values: TypeAlias = Column | AxialForce | Actuator | Computed
-"""How to get a channel from raw rows."""
+"""Rule that gives a channel from raw rows."""
 
 
 def sensor(model: mujoco.MjModel, name: str) -> tuple[Column, ...]:
-    """Columns of a sensor of the engine.
+    """Return the columns of a sensor of the engine.
 
     Raises:
-        ModelError: there is none of this name.
+        ModelError: there is no sensor of this name.
     """
     place = sensor_columns(model, name)
     return tuple(Column("sensordata", column) for column in range(place.start, place.stop))
 
 
 class Signal(NamedTuple):
-    """A channel, and how to get it."""
+    """A channel, and the rule that gives its values."""
 
     channel: Channel
     values: Values
 
 
 def signal(group: str, name: str, unit: str, meaning: str, values: Values) -> Signal:
-    """A signal of a channel that 32 bit are enough for; see `Channel`."""
+    """Return a signal of a channel that is stored with 32 bits; see `Channel`."""
     return Signal(Channel(name, unit, meaning, group), values)

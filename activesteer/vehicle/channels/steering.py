@@ -1,4 +1,4 @@
-"""Channels of the steering: from the steering wheel to the wheels, and what the hands feel."""
+"""Channels of the steering, from the steering wheel to the wheels, with the torque of the hands."""
 
 from __future__ import annotations
 
@@ -14,12 +14,7 @@ from activesteer.vehicle.parameters import Steering
 
 
 def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:
-    """Angles of steering wheel, superposition and wheels, torque of the hands, travel of the rack.
-
-    Args:
-        model: The car.
-        steering: Its ratio and its assistance.
-    """
+    """Return angles of steering wheel, superposition and wheels, torque of the hands, travel of the rack."""
     of, ratio, felt = partial(signal, "vehicle"), steering.ratio, 1.0 - steering.assist_fraction
     wheel, added, rack, rl, rr = (
         column
@@ -34,7 +29,7 @@ def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:
             wheel,
         ),
         of(
-            "steering_wheel_demand_rad", "rad", "steering wheel angle that the driver demands", Column("ctrl", demand),
+            "steering_wheel_demand_rad", "rad", "steering wheel angle demand of the driver", Column("ctrl", demand),
         ),
         of(
             "hand_torque_Nm", "Nm", "torque of the hands at the steering wheel, left positive",
@@ -58,10 +53,10 @@ def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:
 
 
 def _column_torque(model: mujoco.MjModel, felt: float) -> AxialForce | None:
-    """A fraction of the torque that the column carries [N m]; None where there is no column.
+    """Return a fraction of the torque in the steering column [N m]; None without a column.
 
-    The actuator that stands for the hands does not say it: its force is that of the demand of this step against the
-    angle at its beginning, and the engine carries out what is left of it at the end.
+    The force of the hands' actuator is not this torque. The engine evaluates that force from the demand of this step
+    and the angle at its start, but applies the force at the end of the step.
     """
     arms = tendon_arms(model, "steering_column")
     if "steering_wheel" not in arms:

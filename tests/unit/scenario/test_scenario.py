@@ -117,7 +117,7 @@ def test_override_replaces_a_whole_table():
         ("controllers.asr.limit_deg", "controllers.asr.limit_deg", "'controllers.ars.limit_deg'"),
         ("maneuver.sped_kmh", "sped_kmh", "did you mean 'speed_kmh'"),
         ("vehicle.tyres.frnt", "tyres.frnt", "did you mean 'front'"),
-        ("name", "name", "say maneuver.name or vehicle.name"),
+        ("name", "name", "use maneuver.name or vehicle.name"),
         ("speed_kmh.x", "speed_kmh.x", "speed_kmh is a value, not a table"),
     ],
 )
