@@ -1,1 +1,1 @@
-"""What is drawn of cars wherever they are shown, in rerun, film and live view: bodies, wheel angles, tyre forces."""
+"""Parts of cars for rerun, film and live view: bodies, wheel angles, tyre forces."""

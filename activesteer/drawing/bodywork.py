@@ -1,7 +1,7 @@
-"""What cars are drawn with in place of the plain solids of their models: a body, and wheels with spokes.
+"""A body and wheels with spokes, drawn in place of the plain solids of a car's model.
 
-It is looks alone, put on when something is drawn: no model and no recording knows of it. The surfaces are made by
-`tools/make_bodies.py`.
+They are added when something is drawn: no model and no recording contains them. `tools/make_bodies.py` makes the
+surfaces.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from activesteer.resources import models_dir
 from activesteer.road.footprint import Footprint
 
 CHASSIS: Final = "chassis"
-"""Body that carries the shell, and that cameras follow."""
+"""Body that carries the shell and that cameras follow."""
 SEE_THROUGH: Final = 0.5
-"""Solids of a model with less opacity are the shell of its body."""
+"""Opacity below which a solid of a model is part of its shell."""
 _SALOON_FROM_M: Final = 2.72
-"""Cars with a longer wheelbase are drawn as saloons, others as hatchbacks [m]."""
+"""Least wheelbase of a car that is drawn as a saloon [m]; others are hatchbacks."""
 _DRAWN: Final = {"hatchback": (2.637, 1.8), "saloon": (2.85, 1.86)}
-"""Wheelbase and width that the surfaces were made for [m]."""
+"""Wheelbase and width of the surfaces [m]."""
 _COLOURS: Final = {
     "glass": (0.07, 0.09, 0.12),
     "trim": (0.06, 0.06, 0.07),
@@ -44,11 +44,11 @@ class Panel(NamedTuple):
 
     Attributes:
         body: Name of the body.
-        name: What it is, such as `glass`.
+        name: Name of the part, such as `glass`.
         vertices_m: Its points in the frame of the body [m], shape (n, 3).
         normals: Directions of the surface there, shape (n, 3).
         faces: Corners of its triangles, counter-clockwise from outside, shape (m, 3).
-        rgb: Its colour, 0 to 1; None where it has the paint of the car.
+        rgb: Its colour, 0 to 1; None for the paint of the car.
     """
 
     body: str
@@ -60,19 +60,19 @@ class Panel(NamedTuple):
 
     @property
     def shell(self) -> bool:
-        """Whether it is of the body, which hides what is below it, and not of a wheel."""
+        """Whether the surface belongs to the body, which hides the parts below it, and not to a wheel."""
         return not self.body.endswith("_wheel")
 
 
 def dressed(parts: Sequence[ScenePart], size: Footprint | None) -> tuple[tuple[ScenePart, ...], tuple[Panel, ...]]:
-    """A car with a body and wheels.
+    """Return a car with a body and wheels.
 
     Args:
-        parts: What its model looks like.
-        size: Its size; where it is not known, the car stays as it is.
+        parts: Parts of its model.
+        size: Its size; None leaves the car as it is.
 
     Returns:
-        What of the model is still to be drawn, and the panels.
+        The parts of the model that are still drawn, and the panels.
     """
     if size is None:
         return tuple(parts), ()
@@ -93,7 +93,7 @@ def _body(size: Footprint) -> tuple[Panel, ...]:
     panels = []
     for part, vertices, normals, faces in _surfaces(name):
         points = vertices * (1.0, size.width_m / width_m, 1.0)
-        # Only what is between the axles becomes longer.
+        # Only the part between the axles becomes longer.
         points[:, 0] -= np.clip(-points[:, 0] / wheelbase_m, 0.0, 1.0) * (size.wheelbase_m - wheelbase_m)
         panels.append(Panel(CHASSIS, part, points, normals, faces, _COLOURS.get(part)))
     return tuple(panels)

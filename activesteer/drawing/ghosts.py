@@ -13,14 +13,14 @@ _SEEN_M: Final = 1.0
 
 
 def share_seen(apart_m: Array | float) -> Array:
-    """How much of a ghost's opacity it has: it fades from 1 m to 0.2 m from the car, and nearer it is not drawn.
+    """Return the fraction of a ghost's opacity: it fades between 1 m and 0.2 m from the car and vanishes below.
 
     Two surfaces in one place would show through each other in patches.
 
     Args:
-        apart_m: Between the chassis of the ghost and that of the car [m].
+        apart_m: Distance between the chassis of ghost and car [m].
 
     Returns:
-        0 to 1.
+        Fraction, 0 to 1.
     """
     return np.clip((apart_m - _HIDDEN_M) / (_SEEN_M - _HIDDEN_M), 0.0, 1.0)

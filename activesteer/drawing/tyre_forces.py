@@ -19,17 +19,17 @@ CHANNELS: Final = (
         for name in ("tyre_fx_N", "tyre_fy_N", "contact_x_m", "contact_y_m", "steer_rad")
     ),
 )
-"""What a recording must have for its arrows."""
+"""Channels that the arrows need."""
 _SCALE_NPM: Final = 1500.0
-"""Force that an arrow of one metre stands for on a road with a friction of 1 [N/m]."""
+"""Force per length of an arrow on a road with a friction of 1 [N/m]."""
 _MIN_MU: Final = 0.02
 _ABOVE_ROAD_M: Final = 0.1
 
 
 def force_scale(recordings: Sequence[Recording]) -> float:
-    """Force that an arrow of one metre stands for [N/m], the same for all runs that are shown together.
+    """Return the force per length of an arrow [N/m], the same for all runs that are shown together.
 
-    It is proportional to the largest friction that any of their tyres met.
+    It is proportional to the largest friction under any of their tyres.
 
     Args:
         recordings: The runs.
@@ -41,11 +41,11 @@ def force_scale(recordings: Sequence[Recording]) -> float:
 
 
 def force_arrows(recording: Recording, scale_NpM: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Where the arrows begin, and what they are, in the world.
+    """Return origins and vectors of the arrows in the world.
 
     Args:
-        recording: A run that has `CHANNELS`.
-        scale_NpM: See `force_scale`.
+        recording: A run with `CHANNELS`.
+        scale_NpM: Force per length of an arrow [N/m]; see `force_scale`.
 
     Returns:
         Origins and vectors [m], each of shape (rows, 4, 3).

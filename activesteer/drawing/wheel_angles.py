@@ -1,4 +1,4 @@
-"""Angles of the wheels as wedges, drawn so much larger that 2 deg of rear steering are seen.
+"""Angles of the wheels as enlarged wedges, on which 2 deg of rear steering can be seen.
 
 Points are in the axes of the car: x forward and y left, the origin on the road below the middle of its front axle.
 """
@@ -18,30 +18,30 @@ from activesteer.road.footprint import Footprint
 
 CHANNELS: Final = tuple(f"{corner}_steer_rad" for corner in CORNERS)
 RADIUS_M: Final = 1.2
-"""From the tip of a wedge to its arc [m]."""
+"""Distance from the tip of a wedge to its arc [m]."""
 SLICES: Final = 12
-"""Triangles of a wedge."""
+"""Number of triangles of a wedge."""
 _FACTORS: Final = (10, 5, 2, 1)
 _WIDEST_RAD: Final = math.radians(90.0)
-"""No wedge becomes wider: an axle that steers further is drawn with a smaller factor [rad]."""
+"""Widest wedge [rad]; a larger angle lowers the factor of its axle."""
 _BESIDE_M: Final = 0.4
-"""From the side of the body to the tips of the wedges, which it would hide [m]."""
+"""Distance from the side of the body to the tips of the wedges, which the body would hide [m]."""
 _WHEEL_M: Final = 0.36, 0.13
-"""Half length and half width of a wheel in a plan [m]."""
+"""Half length and half width of a wheel in plan view [m]."""
 _NOTHING_RAD: Final = math.radians(0.05)
-"""An angle that is written as zero has no side."""
+"""Least angle with a side [rad]; a smaller one is written as zero."""
 
 
 def factors(recordings: Sequence[Recording]) -> tuple[int, ...]:
-    """How many times larger the angles of each wheel are drawn, the same for all runs that are shown together.
+    """Return the factors that enlarge the angles of each wheel, the same for all runs that are shown together.
 
-    Ten, and less for an axle that steers by more than 9 deg.
+    The factor is ten, and less for an axle that steers by more than 9 deg.
 
     Args:
         recordings: The runs.
 
     Returns:
-        One for each wheel, the same at both wheels of an axle.
+        A factor for each wheel, the same at both wheels of an axle.
     """
     found: list[int] = []
     for axle in (CHANNELS[:2], CHANNELS[2:]):
@@ -52,14 +52,14 @@ def factors(recordings: Sequence[Recording]) -> tuple[int, ...]:
 
 
 def angles_at(recording: Recording, time_s: Array | float) -> Array:
-    """Steer angles of the wheels at some instants, between the rows of a recording.
+    """Return the steer angles of the wheels at instants, interpolated between the rows of a recording.
 
     Args:
         recording: The run.
         time_s: The instants [s], of any shape.
 
     Returns:
-        Angles [rad], left positive, shape (..., 4); nan where they were not recorded.
+        Angles [rad], left positive, shape (..., 4); nan for a wheel without a recorded angle.
     """
     return np.stack(
         [
@@ -71,11 +71,11 @@ def angles_at(recording: Recording, time_s: Array | float) -> Array:
 
 
 def wedges(angle_rad: Array, factor: Sequence[int]) -> Array:
-    """Wedges from straight ahead to where the wheels point, their tips at the origin.
+    """Return wedges from straight ahead to the headings of the wheels, with their tips at the origin.
 
     Args:
         angle_rad: Steer angles [rad], left positive, shape (..., 4).
-        factor: See `factors`.
+        factor: Factor of each wheel; see `factors`.
 
     Returns:
         Points [m], shape (..., 4, SLICES + 2, 2): the tip, then the arc from straight ahead on.
@@ -87,19 +87,19 @@ def wedges(angle_rad: Array, factor: Sequence[int]) -> Array:
 
 
 def wheel_centres(size: Footprint) -> Array:
-    """Where the wheels are [m], shape (4, 2)."""
+    """Return the places of the wheels [m], shape (4, 2)."""
     half = 0.5 * size.width_m - _WHEEL_M[1]
     return np.array([(x, side * half) for x in (0.0, -size.wheelbase_m) for side in (1.0, -1.0)])
 
 
 def tips_beside(size: Footprint) -> Array:
-    """Where wedges beside the car have their tips [m], shape (4, 2)."""
+    """Return the tips of wedges beside the car [m], shape (4, 2)."""
     beside = 0.5 * size.width_m + _BESIDE_M
     return np.array([(x, side * beside) for x in (0.0, -size.wheelbase_m) for side in (1.0, -1.0)])
 
 
 class Plan(NamedTuple):
-    """A car from above; every part is a closed line in the axes of the car.
+    """A car in plan view; every part is a closed line in the axes of the car.
 
     Attributes:
         body: Outline of the body [m], shape (points, 2).
@@ -113,12 +113,12 @@ class Plan(NamedTuple):
 
 
 def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:
-    """The car from above with enlarged angles of its wheels.
+    """Return the plan view of a car with enlarged angles of its wheels.
 
     Args:
         size: Its size.
         angle_rad: Steer angles [rad], left positive, shape (..., 4).
-        factor: See `factors`.
+        factor: Factor of each wheel; see `factors`.
     """
     front, rear, half = size.front_m, size.rear_m, 0.5 * size.width_m
     body = np.array(
@@ -136,7 +136,7 @@ def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:
 
 
 def words(angle_rad: float) -> str:
-    """The true angle that a wedge shows, and its side; nothing where it is not known.
+    """Write the true angle of a wedge and its side; empty for an unknown angle.
 
     Args:
         angle_rad: Steer angle [rad], left positive.

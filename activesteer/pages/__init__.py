@@ -1,4 +1,4 @@
-"""HTML pages that need nothing but themselves: jinja2 templates over one frame and one stylesheet, no network."""
+"""HTML pages that need no other file and no network: jinja2 templates with one frame and one stylesheet."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def render(template: str, **content: Any) -> str:
 
     Args:
         template: File name of the template.
-        **content: What it shows. Text is escaped, `| tojson` writes data that a script can read, and markup made
-            elsewhere must be a `Markup`.
+        **content: Values for the template. Text is escaped, `| tojson` writes data for a script, and markup must be a
+            `Markup`.
     """
     return _environment().get_template(template).render(content)
 
@@ -39,7 +39,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    # The filter escapes `<`, `>`, `&` and quotes; JSON has no nan, which must not come out as something else.
+    # The filter escapes `<`, `>`, `&` and quotes. JSON has no nan, so nan is an error.
     environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "separators": (",", ":"), "allow_nan": False}
     environment.globals |= {"version": __version__, "asset": _asset}
     environment.globals |= {"run_colours": RUN_COLOURS, "run_colours_on_dark": RUN_COLOURS_ON_DARK}
@@ -52,7 +52,7 @@ def _typeset(text: Text) -> Text:
 
 
 def _asset(name: str) -> Markup:
-    """A file of ours as it is: stylesheets and scripts."""
+    """Return a stylesheet or a script as it is."""
     loader = PackageLoader("activesteer.pages")
     return Markup(loader.get_source(_environment(), name)[0])
 

@@ -1,4 +1,4 @@
-"""The standards that there are."""
+"""The available standards."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ STANDARDS: Final[dict[str, Standard]] = {
 
 
 def standard_of(name: str) -> Standard:
-    """A standard by its name.
+    """Return a standard by its name.
 
     Raises:
-        ParameterError: there is none of that name, or none is named.
+        ParameterError: no standard has this name, or the name is empty.
     """
     if not name:
         raise ParameterError(f"which standard? {nearest_names('', STANDARDS)}", value=name, allowed=tuple(STANDARDS))

@@ -1,4 +1,4 @@
-"""A test by a standard: every controller is driven and evaluated, and the result written."""
+"""A test by a standard: drive and evaluate every controller, and write the result."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from activesteer.studies.engine.workers import workers_for
 
 @dataclass(frozen=True)
 class Examination:
-    """What came out.
+    """Result of a test.
 
     Attributes:
         standard: The standard.
         vehicle: Name of the vehicle.
-        driver: Name of who drives.
-        overrides: What was changed of it.
-        findings: Controller -> what came out.
-        versions: What it was made with.
-        date: When [UTC].
+        driver: Name of the driver.
+        overrides: Overrides of the user.
+        findings: Controller -> findings.
+        versions: Versions of the program and its libraries.
+        date: Date of the test [UTC].
     """
 
     standard: Standard
@@ -44,11 +44,11 @@ class Examination:
 
     @property
     def failed(self) -> list[str]:
-        """Controllers whose car breaks a limit, or with which it cannot be tested."""
+        """Controllers whose car breaks a limit or cannot be tested."""
         return [name for name, found in self.findings.items() if found.passed is False or found.error]
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return JSON values."""
         return {
             "standard": self.standard.name,
             "edition": self.standard.edition,
@@ -72,21 +72,21 @@ def examine(
     scheduler: str | None = None,
     progress: Callable[[str, str, int, int], None] | None = None,
 ) -> Examination:
-    """Drives and evaluates a standard.
+    """Drive and evaluate a standard.
 
     Args:
         name: Name of the standard, one of `catalogue.STANDARDS`.
-        controllers: Names or files of controllers, each of which is a test of its own.
+        controllers: Names or files of controllers; each is tested separately.
         vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value, of the car, of who drives, or of the road: the standard says what is driven.
-        driver: Who drives, as for `simulate`; whom the standard asks for where not given.
-        output: Folder for the runs, which can be gone on with; they are not kept where not given.
-        jobs: Number of processes; that of the processors where not given.
+        overrides: Dotted key -> value, of car, driver or road; the standard defines the manoeuvres.
+        driver: Driver, as for `simulate`; by default the standard's.
+        output: Folder for the runs, which can be resumed; without it the runs are not kept.
+        jobs: Number of processes; by default the number of processors.
         scheduler: Address of a Dask scheduler that drives the runs instead.
-        progress: Called with controller, series, how many of its runs are done, and how many there are.
+        progress: Called with controller, series, number of finished runs, and number of all runs.
 
     Returns:
-        The examination.
+        The result.
 
     Raises:
         ActiveSteerError: an input is wrong.
@@ -106,7 +106,7 @@ def examine(
                 if progress is not None:
                     progress(label, series, done, total)
 
-            unread = unread_gains(given, [controller])  # which another one reads
+            unread = unread_gains(given, [controller])  # another controller reads them
             own = {key: value for key, value in given.items() if key not in unread}
             ground = ProvingGround(standard.name, vehicle, driver, controller, own, folder, workers, tell)
             try:
@@ -118,10 +118,10 @@ def examine(
 
 
 def write_json(result: Examination, path: Path) -> Path:
-    """Writes the result as JSON; a file that exists is replaced.
+    """Write the result as JSON and return its path; an existing file is replaced.
 
     Raises:
-        ParameterError: it cannot be written.
+        ParameterError: the file cannot be written.
     """
     make_folder(path.parent, ParameterError)
     return write_text(path, json_text(result.to_json()) + "\n", ParameterError)

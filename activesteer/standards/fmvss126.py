@@ -1,4 +1,4 @@
-"""FMVSS 126 and UN R140: electronic stability control, the series of sines with dwell."""
+"""FMVSS 126 and UN R140: electronic stability control, tested by series of sines with dwell."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Ru
 RAMP_DEGPS: Final = 13.5
 """Rate of the slowly increasing steer [deg/s]; S7.6."""
 RAMPS: Final = 3
-"""How many of them to each side."""
+"""Number of slow ramps to each side."""
 FIRST_FACTOR, STEP_FACTOR, LAST_FACTOR = 1.5, 0.5, 6.5
 """The amplitudes as multiples of A; S7.9.2 to S7.9.4."""
 LEAST_LAST_DEG, MOST_DEG = 270.0, 300.0
-"""The last amplitude is at least the one, and none is above the other [deg]."""
+"""Least last amplitude, and largest of all amplitudes [deg]."""
 DISPLACED_FROM: Final = 5.0
 """Multiple of A from which the displacement counts; S5.2.3."""
 LEAST_DISPLACEMENT_M: Final = 1.83
 LEAST_HEAVY_DISPLACEMENT_M: Final = 1.52
 HEAVY_KG: Final = 3500.0
-"""Displacement that is needed [m], and mass above which the smaller one is enough [kg]."""
+"""Required displacements [m], and mass above which the smaller one suffices [kg]."""
 RATIOS: Final = ("yaw_ratio_1s", "yaw_ratio_175s")
 _METRICS: Final = ("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share")
 _BEGIN_S: Final = 1.5
-"""When the sine begins: the signals are zeroed over the second before [s]."""
+"""Beginning of the sine [s]; the signals are zeroed over the second before."""
 _SINE: Final = {"steer.start_s": _BEGIN_S, "duration_s": 5.6}
 _RAMP: Final = {"steer.end_deg": 120.0, "duration_s": 10.0, "road.mu": 0.9}
 
 
 def amplitudes(a_deg: float) -> list[tuple[float, float]]:
-    """The amplitudes of a series.
+    """Return the amplitudes of a series.
 
     Args:
         a_deg: A [deg].
 
     Returns:
-        Multiple of A and amplitude [deg] of each run: from 1.5 A by 0.5 A to the greater of 6.5 A and 270 deg, and
-        where 6.5 A is above 300 deg to 300 deg.
+        Multiple of A and amplitude [deg] of each run: from 1.5 A in steps of 0.5 A to the greater of 6.5 A and 270 deg,
+        but at most to 300 deg.
     """
     last = LAST_FACTOR * a_deg
     last = MOST_DEG if last > MOST_DEG else max(last, LEAST_LAST_DEG)
@@ -56,11 +56,11 @@ def amplitudes(a_deg: float) -> list[tuple[float, float]]:
 
 
 def verdict(row: Mapping[str, float], least_m: float) -> list[str]:
-    """What of a run breaks the limits, in words; nothing where it keeps them.
+    """Describe the limits that a run breaks; empty if it keeps them.
 
     Args:
         row: `factor`, `yaw_ratio_1s`, `yaw_ratio_175s`, `displacement_m`.
-        least_m: Displacement that is needed [m].
+        least_m: Required displacement [m].
     """
     broken = [
         f"yaw rate {100.0 * row[name]:.0f} % {after_s:.2f} s after completion of steer ({100.0 * limit:.0f} % allowed)"
@@ -108,10 +108,10 @@ def _examine(ground: Ground) -> Findings:
 
 
 def _reference_angle(ground: Ground) -> tuple[float, dict[str, list[float]]]:
-    """A [deg]: the mean of six slow ramps, each rounded to 0.1 deg, and they themselves by side."""
+    """Return A [deg], the mean of six slow ramps, and the angles of the ramps by side, rounded to 0.1 deg."""
     sensors = ground.scenario("slowly_increasing_steer").car.config.sensors
     signs = {"left": 1.0, "right": -1.0}
-    # Sensors with noise are the only thing that tells repetitions apart.
+    # Repetitions differ only by the noise of the sensors.
     noise = [{} if sensors.seed is None else {"sensors.seed": sensors.seed + number} for number in range(RAMPS)]
     cases = [{"steer.rate_degps": sign * RAMP_DEGPS, **other} for sign in signs.values() for other in noise]
     runs = ground.drive("slowly_increasing_steer", "slowly_increasing_steer", cases, _RAMP)
@@ -199,14 +199,14 @@ STANDARD: Final = Standard(
     name="fmvss126",
     title="FMVSS 126 / UN R140: electronic stability control, sine with dwell",
     edition=(
-        "49 CFR 571.126, S5.2 and S7.6 to S7.11, in the text of 2008 and later; UN Regulation 140 asks for the same. "
-        "Written from knowledge of the public text; the range of the regression is that of NHTSA TP-126."
+        "49 CFR 571.126, S5.2 and S7.6 to S7.11, in the text of 2008 and later; UN Regulation 140 has the same "
+        "requirements. Written from knowledge of the public text; the range of the regression is that of NHTSA TP-126."
     ),
     implemented=(
         "Slowly increasing steer at 13.5 deg/s and 80 km/h, three left and three right, of the car as it is, with its "
         "controller. A is the steering wheel angle at 0.3 g by linear regression from 0.1 to 0.375 g, to 0.1 deg.",
         "Sine of 0.7 Hz with a dwell of 500 ms at the second peak, throttle released at 80 km/h when it begins, from "
-        "1.5 A by 0.5 A to the greater of 6.5 A and 270 deg, to 300 deg where 6.5 A is above; left first, right first.",
+        "1.5 A in steps of 0.5 A to the greater of 6.5 A and 270 deg, at most 300 deg; left first and right first.",
         "Steering wheel angle filtered at 10 Hz, yaw rate and lateral acceleration at 6 Hz, by 12-pole phaseless "
         "Butterworth filters, and zeroed over the second before the wheel turns at more than 75 deg/s for 200 ms.",
         "Limits: yaw rate 1.00 and 1.75 s after completion of steer at most 35 and 20 % of its first peak after the "
@@ -217,8 +217,8 @@ STANDARD: Final = Standard(
         "Whether the system is an electronic stability control by S5.1, how it detects malfunctions, telltales (S5.3).",
         "Brake and tyre conditioning (S7.4, S7.5): the model has no warm-up. Ambient conditions; outriggers.",
         "With ideal sensors, the default, the three repetitions to a side are the same run.",
-        "The car is driven as its file has it; driver and measuring equipment are loaded with --set load. keys. The "
-        "mass that decides on 1.83 or 1.52 m is that of the car as driven, not its gross vehicle weight rating.",
+        "The car is driven as in its file; driver and measuring equipment are loaded with --set load. keys. The "
+        "mass that decides on 1.83 or 1.52 m is the mass of the car as driven, not its gross vehicle weight rating.",
         "Road: even, 0.9 times the friction of the tyre file, in place of a peak friction of 0.9 of a reference tyre.",
     ),
     examine=_examine,

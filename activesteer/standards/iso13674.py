@@ -21,16 +21,16 @@ from activesteer.standards.steering_angle import steering_wheel_at
 SPEED_KMH: Final = 100.0
 """Speed [km/h]."""
 AY_MPS2: Final = 2.0
-"""Lateral acceleration of the weave's peaks, and where the transition ends [m/s2]."""
+"""Lateral acceleration of the weave's peaks, and of the end of the transition [m/s2]."""
 WEAVE_Hz: Final = 0.2
 """Frequency of the weave [Hz]."""
 PERIODS: Final = 6
 _DROPPED: Final = 2
-"""Periods driven, and how many of them pass before the motion is periodic."""
+"""Number of periods, and number of those before the motion is periodic."""
 TRANSITION_DEGPS: Final = 5.0
 """Rate of the steering wheel in the transition test [deg/s]."""
 _CENTRE_MPS2: Final = 0.5
-"""Lateral acceleration to either side over which a slope of the transition is taken [m/s2]."""
+"""Range of lateral acceleration to either side for the slopes of the transition [m/s2]."""
 _BEGIN_S: Final = 1.0
 _SAMPLE_S: Final = 0.02
 _CHANNELS: Final = ("steering_wheel_rad", "yaw_rate_radps", "ay_mps2", "hand_torque_Nm")
@@ -46,14 +46,14 @@ Signals = Mapping[str, Array]
 
 
 def weave_loops(signals: Signals) -> list[dict[str, Any]]:
-    """Gradient and dead bands of every cross-plot.
+    """Return gradient and dead bands of every cross-plot.
 
     Args:
         signals: Steering wheel angle, yaw rate, lateral acceleration, hand torque, over whole periods.
 
     Returns:
-        For each `abscissa`, `ordinate`, and in the units that these are shown in `gradient`, `ordinate_dead_band`,
-        `abscissa_dead_band`; None where a signal does not pass through zero.
+        For each plot `abscissa`, `ordinate`, and in their units for display `gradient`, `ordinate_dead_band`,
+        `abscissa_dead_band`; None if a signal does not pass through zero.
     """
     found = []
     for abscissa, ordinate in _PLOTS:
@@ -86,8 +86,8 @@ def _examine(ground: Ground) -> Findings:
     through = _through_centre(transition)
     lines = transition_lines(through)
     summary = (
-        f"weave: {loops[0]['gradient']:.3f} m/s² per deg of the steering wheel, the car comes "
-        f"{loops[0]['abscissa_dead_band']:.2f} deg after it; transition: {lines[0]['slope']:.3f} m/s² per deg"
+        f"weave: {loops[0]['gradient']:.3f} m/s² per deg of the steering wheel, the car lags "
+        f"{loops[0]['abscissa_dead_band']:.2f} deg behind it; transition: {lines[0]['slope']:.3f} m/s² per deg"
     )
     tables = [
         Table(
@@ -107,7 +107,7 @@ def _examine(ground: Ground) -> Findings:
 
 
 def _weave(angle_deg: float) -> dict[str, Any]:
-    """The manoeuvre: a second straight ahead, then the sine."""
+    """Return the manoeuvre: a second straight ahead, then the sine."""
     length_s = PERIODS / WEAVE_Hz
     times = np.arange(round(length_s / _SAMPLE_S) + 1) * _SAMPLE_S
     angles = angle_deg * np.sin(2.0 * math.pi * WEAVE_Hz * times)
@@ -124,21 +124,21 @@ def _weave(angle_deg: float) -> dict[str, Any]:
 
 
 def _through_centre(runs: list[Run]) -> dict[str, Array]:
-    """Both transitions as one way from the right to the left, up to the lateral acceleration asked for."""
+    """Join both transitions from the right to the left, up to the wanted lateral acceleration."""
     left, right = ({name: run[name] for name in _CHANNELS} for run in runs)
     ends = [int(np.argmax(np.abs(side["ay_mps2"]) >= AY_MPS2)) or len(side["ay_mps2"]) for side in (left, right)]
     return {name: np.concatenate([right[name][: ends[1]][::-1], left[name][: ends[0]]]) for name in _CHANNELS}
 
 
 def transition_lines(signals: Signals) -> list[dict[str, Any]]:
-    """Slope at the centre of what the car does, and the line beside the centre of what the hands feel.
+    """Return the slopes of the car's response at the centre, and the lines of the hand torque beside the centre.
 
     Args:
         signals: As for `weave_loops`, from one side through straight ahead to the other.
 
     Returns:
-        For each `abscissa`, `ordinate`, `slope`, and of the hand torque `intercept`: where the line from 0.5 m/s² on
-        would begin, the friction of the steering.
+        For each plot `abscissa`, `ordinate`, `slope`, and for the hand torque `intercept`: the beginning of the line
+        from 0.5 m/s² on, which is the friction of the steering.
     """
     ay = signals["ay_mps2"]
     near = np.abs(ay) <= _CENTRE_MPS2
@@ -170,7 +170,7 @@ STANDARD: Final = Standard(
         "are evaluated. Gradients around zero and dead bands of lateral acceleration, yaw rate and hand torque over "
         "steering wheel angle, and of hand torque over lateral acceleration.",
         "Transition: from straight ahead at 5 deg/s of the steering wheel to 2 m/s², left and right. Slopes of lateral "
-        "acceleration and yaw rate within 0.5 m/s² of the centre; lines of the hand torque beyond, where they begin.",
+        "acceleration and yaw rate within 0.5 m/s² of the centre; intercepts of the lines of the hand torque beyond.",
     ),
     left_out=(
         "Polynomials that are fitted to measured loops. Deceleration, side wind, crown and unevenness of the road.",

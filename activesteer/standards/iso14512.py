@@ -10,9 +10,9 @@ from activesteer.standards.page_parts import metrics_table, time_panels
 from activesteer.standards.standard import Findings, Ground, Run, Standard
 
 AFTER_S: Final = 1.0
-"""Time after the brake at which the car is looked at [s]."""
+"""Time after the beginning of braking at which the car is evaluated [s]."""
 HIGH, LOW = 0.9, 0.3
-"""Friction of the two sides, relative to that of the tyre file."""
+"""Friction of the two sides, relative to the tyre file."""
 _CASES: Final = {
     "high friction on the left": {"road.mu_left": HIGH, "road.mu_right": LOW},
     "high friction on the right": {"road.mu_left": LOW, "road.mu_right": HIGH},
@@ -22,14 +22,14 @@ _BEGIN_S: Final = 0.5
 
 
 def after_one_second(run: Run, begin_s: float) -> dict[str, float]:
-    """What the car does 1 s after the brake.
+    """Return the motion of the car 1 s after the beginning of braking.
 
     Args:
         run: The run, straight along x before the brake.
         begin_s: Beginning of braking [s].
 
     Returns:
-        Yaw rate, yaw angle and lateral deviation, left positive; nan where the run ends before.
+        Yaw rate, yaw angle and lateral deviation, left positive; nan if the run ends before.
     """
     then_s = begin_s + AFTER_S
     return {

@@ -15,7 +15,7 @@ _BEGIN_S: Final = 0.5
 
 
 def corrected_distance(distance_m: float, speed_mps: float, nominal_mps: float) -> float:
-    """Stopping distance at the nominal speed [m]: it goes with the square of the speed."""
+    """Return the stopping distance at the nominal speed [m]; it is proportional to the square of the speed."""
     return distance_m * (nominal_mps / speed_mps) ** 2
 
 
@@ -54,7 +54,7 @@ STANDARD: Final = Standard(
     ),
     left_out=(
         "Repetitions and their mean: without noise every run is the same.",
-        "Temperature of brakes and tyres, bedding in. The wet surface is had with --set road.mu.",
+        "Temperature of brakes and tyres, bedding in. For a wet surface use --set road.mu.",
     ),
     examine=_examine,
 )

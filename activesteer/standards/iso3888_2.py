@@ -13,33 +13,33 @@ from activesteer.standards.page_parts import cell, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 
 DRIVER: Final = "expert"
-"""The standard asks for a skilled driver."""
+"""The standard requires a skilled driver."""
 MARGINS_M: Final = (0.1, 0.15, 0.2)
-"""Margins of the lines that he tries at every speed [m]: which one is best depends on car and speed."""
+"""Margins of the lines at every speed [m]; the best one depends on car and speed."""
 THROTTLE_OFF_M: Final = 2.0
 """Distance into the entry lane after which the throttle is released [m]."""
 COARSE_KMH: Final = (35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 70.0, 75.0, 80.0)
-"""Entry speeds that are tried first [km/h]; beyond the highest and below the lowest it is not looked."""
+"""Entry speeds of the coarse search [km/h], which ends at the highest and the lowest."""
 FINE_KMH: Final = 1.0
 """Resolution of the search [km/h]."""
 _CHANNELS: Final = ("x_m", "y_m", "speed_mps", "steering_wheel_rad", "yaw_rate_radps", "sideslip_rad")
 _SHOWN: Final = ("steering_wheel_rad", "yaw_rate_radps", "sideslip_rad", "speed_mps")
 _DURATION_S: Final = 14.0
 _BEYOND_M: Final = 10.0
-"""How far behind the last lane a track is drawn [m]."""
+"""Length of a track behind the last lane [m]."""
 
 Try = Callable[[str, Sequence[float]], list[bool]]
-"""Name of a series, entry speeds [km/h] -> whether each is clean."""
+"""Function from the name of a series and entry speeds [km/h] to whether each is clean."""
 
 
 def highest_clean(attempt: Try) -> float | None:
-    """The highest clean speed, first among `COARSE_KMH` and then between it and the next one.
+    """Return the highest clean speed: first from `COARSE_KMH`, then between it and the next coarse speed.
 
     Args:
-        attempt: Drives several speeds.
+        attempt: Function that drives several speeds.
 
     Returns:
-        Speed [km/h]; None where the car is clean at none, and the highest one where it is clean there.
+        Speed [km/h]; None if the car is clean at no speed. The search does not go beyond the highest coarse speed.
     """
     clean = [speed for speed, good in zip(COARSE_KMH, attempt("coarse", COARSE_KMH), strict=True) if good]
     if not clean or clean[-1] == COARSE_KMH[-1]:
@@ -51,19 +51,19 @@ def highest_clean(attempt: Try) -> float | None:
 
 
 def is_clean(run: Run) -> bool:
-    """Whether the whole body keeps to the lanes and no cone is hit."""
+    """Return whether the whole body keeps to the lanes and hits no cone."""
     return run.metric("stays_in_lanes") == 1.0 and run.metric("cones_hit") == 0.0
 
 
 def best_run(runs: Sequence[Run], highest_kmh: float | None) -> Run | None:
-    """Of the clean runs at the highest clean speed the one with most room, or of all where there is no such speed.
+    """Return the run with most room at the highest clean speed, or at any speed if none is clean.
 
     Args:
         runs: The runs to one side.
-        highest_kmh: The highest clean speed; None where there is none.
+        highest_kmh: The highest clean speed; None without one.
 
     Returns:
-        The run; None where none could be evaluated.
+        The run; None if no run could be evaluated.
     """
     good = [run for run in runs if highest_kmh in (None, run.case["speed_kmh"]) and not run.error]
     return min(good, key=lambda run: run.metric("lane_overstep_m"), default=None)
@@ -103,7 +103,7 @@ def _words(speed_kmh: float | None) -> str:
 
 
 def _table(driven: dict[str, list[Run]]) -> Table:
-    """A row for each entry speed, the lines that were tried beside each other."""
+    """Return a row for each entry speed, with its lines beside each other."""
     rows = []
     for side, runs in driven.items():
         for speed_kmh, group in groupby(runs, key=lambda run: run.case["speed_kmh"]):
@@ -121,7 +121,7 @@ def _table(driven: dict[str, list[Run]]) -> Table:
         "speed at the end of the best [km/h]", "",
     )  # fmt: skip
     outside = frozenset(i for i, row in enumerate(rows) if row[-1] != "clean")
-    return Table("Entry speeds; a body that is inside is beyond the lanes by less than 0", columns, rows, outside)
+    return Table("Entry speeds; below 0 the body is inside the lanes", columns, rows, outside)
 
 
 def _room(run: Run) -> str:
@@ -131,7 +131,7 @@ def _room(run: Run) -> str:
 
 
 def _pictures(ground: Ground, speeds: dict[str, float | None], driven: dict[str, list[Run]]) -> list[Picture]:
-    """The best run to each side: its way between the cones, and over time."""
+    """Return the best run to each side: its track between the cones, and over time."""
     best = {side: run for side, runs in driven.items() if (run := best_run(runs, speeds[side])) is not None}
     if not best:
         return []
@@ -151,7 +151,7 @@ def _pictures(ground: Ground, speeds: dict[str, float | None], driven: dict[str,
     }
     labelled = {f"{side}, {words[side]}": run for side, run in best.items()}
     return [
-        Picture("Fastest clean runs, or where there is none the nearest to it", tracks),
+        Picture("Fastest clean runs, or the runs closest to clean", tracks),
         Picture("The same over time", time_panels(labelled, _SHOWN, 0.0, "the start")),
     ]
 
@@ -161,19 +161,19 @@ STANDARD: Final = Standard(
     title="ISO 3888-2: obstacle avoidance, highest entry speed without a cone hit",
     edition=(
         "ISO 3888-2:2011, as it is known from the literature; the text itself was not at hand. Sources differ on the "
-        "exit lane: 3 m wide is taken here."
+        "exit lane: it is 3 m wide here."
     ),
     implemented=(
         "Lanes of 12, 13.5, 11, 12.5 and 12 m on a dry road (0.9 times the friction of the tyre file), the obstacle to "
         "the left and to the right. The speed is held until 2 m into the entry lane, then the car coasts.",
         "Highest entry speed at which the whole body keeps to the lanes and no cone is hit: every 5 km/h from 35 to 80 "
         "first, then every 1 km/h above the highest clean one. At every speed three lines are tried, with margins of "
-        "0.1, 0.15 and 0.2 m to the cones; one clean run is enough.",
+        "0.1, 0.15 and 0.2 m to the cones; one clean run suffices.",
     ),
     left_out=(
-        "What a skilled driver learns from run to run: the driver expert follows paths of least jerk, and steers by "
-        "the same rule at every speed. Others are had with --driver.",
-        "Coasting is without engine drag: the clutch is open. The 2 m are those of the front axle.",
+        "A skilled driver's learning from run to run: the driver expert follows paths of least jerk, and steers by "
+        "the same rule at every speed. Choose other drivers with --driver.",
+        "The car coasts without engine drag: the clutch is open. The 2 m count from the front axle.",
     ),
     examine=_examine,
     driver=DRIVER,

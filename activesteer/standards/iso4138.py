@@ -19,7 +19,7 @@ from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standar
 RADIUS_M: Final = 100.0
 """Radius of the first method [m]."""
 FIXED_RADIUS_M: Final = 40.0
-"""Radius on which the second method begins [m]."""
+"""Initial radius of the second method [m]."""
 SPEED_KMH: Final = 80.0
 """Speed of the third method [km/h]."""
 _CHANNELS: Final = (
@@ -70,7 +70,7 @@ def _examine(ground: Ground) -> Findings:
 
 
 def _fixed_angle(ground: Ground, car: CarGeometry) -> list[Run]:
-    """The steering wheel is turned to the Ackermann angle of the radius and held while the speed rises."""
+    """Drive with the steering wheel at the Ackermann angle of the radius while the speed rises."""
     angle_deg = math.degrees(car.steering_ratio * car.wheelbase_m / FIXED_RADIUS_M)
     speed_mps = _START_KMH / 3.6
     maneuver: dict[str, Any] = {
@@ -88,7 +88,7 @@ def _fixed_angle(ground: Ground, car: CarGeometry) -> list[Run]:
         {"steering": {"time_s": [0.0, 0.5 * _ENTRY_S], "steering_wheel_deg": [0.0, sign * angle_deg]}}
         for sign in SIDES.values()
     ]
-    # A table is no value of a factor: the two sides are two series.
+    # A factor cannot have tables as values, so the two sides are two series.
     return [
         ground.drive(f"constant_angle_{side}", {**maneuver, **case}, [{"speed_kmh": _START_KMH}], curves=_CHANNELS)[0]
         for side, case in zip(SIDES, cases, strict=True)
@@ -96,7 +96,7 @@ def _fixed_angle(ground: Ground, car: CarGeometry) -> list[Run]:
 
 
 def _defined(found: Handling) -> dict[str, float]:
-    """The metrics that a method defines."""
+    """Return the metrics that a method defines."""
     return {name: value for name, value in found._asdict().items() if not math.isnan(value)}
 
 
@@ -130,7 +130,7 @@ def _picture(method: str, runs: dict[str, Run]) -> Picture:
 
 
 def _smooth(values: Array) -> Array:
-    """Mean over half a second, for the eye."""
+    """Return the mean over half a second, for the picture."""
     width = 25
     return np.convolve(values, np.full(width, 1.0 / width), mode="valid") if len(values) > width else values
 
@@ -140,9 +140,9 @@ STANDARD: Final = Standard(
     title="ISO 4138: steady-state circular driving behaviour",
     edition="ISO 4138:2021, as it is known from the literature; the text itself was not at hand.",
     implemented=(
-        f"Constant radius {RADIUS_M:g} m at slowly rising speed; constant steering wheel angle, that of Ackermann for "
-        f"{FIXED_RADIUS_M:g} m, at slowly rising speed; constant speed {SPEED_KMH:g} km/h at slowly rising steering "
-        "wheel angle. Each to the left and to the right, until the car can do no more.",
+        f"Constant radius {RADIUS_M:g} m at slowly rising speed; constant steering wheel angle, the Ackermann angle "
+        f"for {FIXED_RADIUS_M:g} m, at slowly rising speed; constant speed {SPEED_KMH:g} km/h at slowly rising "
+        "steering wheel angle. Each to the left and to the right, up to the limit of the car.",
         "Gradients of steering, understeer, sideslip and roll over lateral acceleration, from 0.5 to 2 m/s²; where the "
         "steer angle is 5 % off the line, and the largest lateral acceleration.",
     ),

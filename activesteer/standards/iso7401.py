@@ -30,15 +30,15 @@ _RESPONSES: Final = {
     "ay_mps2": display_unit("_mps2prad"),
     "roll_rad": DisplayUnit("deg/deg", 1.0),
 }
-"""Outputs and the units of their gains, which count from the steering wheel angle."""
+"""Outputs and the units of their gains over steering wheel angle."""
 _NAMES: Final = {"yaw_rate_radps": "yaw rate", "ay_mps2": "lateral acceleration", "roll_rad": "roll angle"}
 _POINTS: Final = 60
 SEQUENCES: Final = 12
-"""Runs with random steering, of a minute each; the standard asks for 12 minutes."""
+"""Number of runs with random steering, of a minute each; the standard requires 12 minutes."""
 RANDOM_SHARE: Final = 0.2
-"""Root mean square of the random angle, of the angle of the step: peaks stay below the step."""
+"""Root mean square of the random angle, as a fraction of the step's angle: the peaks stay below the step."""
 COHERENCE: Final = 0.95
-"""Where the coherence is below, noise or what is not linear has more than a twentieth of the output's power."""
+"""Bound of the coherence: below it, noise and nonlinearity have more than a twentieth of the output's power."""
 
 Responses = dict[str, FrequencyResponse]
 
@@ -108,7 +108,7 @@ def _examine(ground: Ground) -> Findings:
 
 
 def _sweep_responses(sweep: Run) -> Responses:
-    """Frequency responses to the steering wheel angle; none where the sweep failed."""
+    """Return the frequency responses to the steering wheel angle; empty if the sweep failed."""
     frequencies = np.geomspace(LOWEST_Hz, HIGHEST_Hz, _POINTS)
     try:
         return {name: frequency_response(sweep, name, frequencies) for name in _RESPONSES}
@@ -117,7 +117,7 @@ def _sweep_responses(sweep: Run) -> Responses:
 
 
 def _random_responses(runs: list[Run]) -> dict[str, RandomResponse]:
-    """The same of the runs with random steering that came to their end; none where there are none."""
+    """Return the responses from the finished runs with random steering; empty without one."""
     driven = [run for run in runs if run.channels]
     if not driven:
         return {}
@@ -125,7 +125,7 @@ def _random_responses(runs: list[Run]) -> dict[str, RandomResponse]:
 
 
 def weak_ranges(found: FrequencyResponse) -> str:
-    """Where the coherence is below `COHERENCE`: frequencies from and to, in words; empty where it is nowhere."""
+    """Describe the frequency ranges with a coherence below `COHERENCE`; empty if there is none."""
     weak = np.concatenate([[False], found.coherence < COHERENCE, [False]])
     edges = np.flatnonzero(np.diff(weak.astype(int)))
     lines = found.frequency_Hz
@@ -184,11 +184,11 @@ STANDARD: Final = Standard(
         "Random input, 0.1 to 5 Hz with the same power at all frequencies, 12 runs of a minute, the root mean square a "
         "fifth of the step's angle: the same frequency responses from averaged spectra (Hann windows of 20 s that "
         "overlap by half, estimate H1), with coherence and standard error.",
-        f"Where the coherence is below {COHERENCE:g} it is said. The bound is an assumption.",
+        f"Ranges with a coherence below {COHERENCE:g} are listed. The bound is an assumption.",
     ),
     left_out=(
-        "Pulse and single-sine input. Other speeds than 80 km/h. A driver's own random steering has less power at high "
-        "frequencies than this.",
+        "Pulse and single-sine input. Other speeds than 80 km/h. The random steering of a driver has less power at "
+        "high frequencies.",
         "Filters: the signals are those of the model, without noise.",
     ),
     examine=_examine,

@@ -22,7 +22,7 @@ _SHOWN: Final = (
 _CHANNELS: Final = ("yaw_rate_radps", "sideslip_rad", "speed_mps")
 _BEGIN_S: Final = 6.0
 _AFTER_S: Final = 2.2
-"""How long a run goes on: the car must not stand, where sideslip has no meaning [s]."""
+"""Duration after the beginning of braking [s]; the car must not stop, since sideslip has no meaning then."""
 
 
 def _examine(ground: Ground) -> Findings:
@@ -78,7 +78,7 @@ STANDARD: Final = Standard(
     edition="ISO 7975:2019, as it is known from the literature; the text itself was not at hand.",
     implemented=(
         "Steady state at 80 km/h and 5 m/s² (100 m), left and right; throttle released, brake pressed within 0.2 s, "
-        "steering wheel held. The angle is that at which the tested car reaches 5 m/s² in a slow ramp.",
+        "steering wheel held. The tested car reaches 5 m/s² at this angle in a slow ramp.",
         "Series over the deceleration by the pedal. Yaw rate deviation and path deviation 1 s after the beginning of "
         "braking against the steady circle, mean deceleration, peaks.",
     ),

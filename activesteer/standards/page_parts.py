@@ -13,10 +13,10 @@ from activesteer.quantities import quantity_of
 
 
 def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
-    """Metrics of runs beside each other.
+    """Return a table of the metrics of runs beside each other.
 
     Args:
-        title: What they are.
+        title: Title of the table.
         runs: Head of a column -> metrics; a run without a metric has an empty cell.
     """
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
@@ -28,7 +28,7 @@ def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
 
 
 def axis_label(name: str) -> str:
-    """Label and unit of a channel, as they stand at an axis."""
+    """Return label and unit of a channel, for an axis."""
     shown = quantity_of(name)
     return f"{shown.label} [{shown.unit.name}]"
 
@@ -37,18 +37,18 @@ class OverTime(Protocol):
     """A run whose channels can be drawn."""
 
     def over_time(self, channel: str, *, begin_s: float = 0.0, **words: Any) -> Curve:
-        """A channel over the time from an instant [s]."""
+        """Return a channel over the time from an instant [s]."""
         ...
 
 
 def time_panels(runs: Mapping[str, OverTime], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
-    """Channels of runs over time, a panel each.
+    """Return channels of runs over time, a panel each.
 
     Args:
         runs: Label -> run.
         channels: Channels.
-        begin_s: What time is counted from [s].
-        begin: What that is, in words.
+        begin_s: Instant that time counts from [s].
+        begin: This instant in words.
     """
     return [
         Panel(
@@ -61,5 +61,5 @@ def time_panels(runs: Mapping[str, OverTime], channels: Sequence[str], begin_s: 
 
 
 def cell(value: float | None, digits: int) -> str:
-    """A number in a table: a hyphen where there is none, and no minus before a zero."""
+    """Write a number for a table: a hyphen for None or nan, and no minus before a zero."""
     return "-" if value is None or math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"

@@ -1,4 +1,4 @@
-"""Where the runs of a standard are driven: series of runs on the study engine, in one set of workers."""
+"""The proving ground of a standard: series of runs on the study engine, in one set of workers."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from activesteer.studies.paper.fault_situations import PRESETS
 
 @dataclass(frozen=True)
 class ProvingGround:
-    """One car with one controller, and who drives its runs.
+    """A car with a controller and a driver.
 
     Attributes:
         standard: Name of the standard.
         vehicle: Name, path or table of the vehicle.
-        driver: Name, path or table of who drives, or his code.
+        driver: Name, path or table of the driver, or his code.
         controller: Name or file of the controller.
-        overrides: What the user changes of the car: dotted key -> value.
-        folder: Where the studies go that can be gone on with; None where they are not kept.
-        workers: Who makes the runs.
-        progress: Called with the series, how many runs of it are done, and how many there are.
+        overrides: Overrides of the car: dotted key -> value.
+        folder: Folder for the studies, which can be resumed; None if they are not kept.
+        workers: Processes that make the runs.
+        progress: Called with the series, number of finished runs, and number of all runs.
     """
 
     standard: str
@@ -73,7 +73,7 @@ class ProvingGround:
         return [_run(row, case) for row, case in zip(table.to_pylist(), cases, strict=True)]
 
     def fault_map(self, preset: str) -> list[dict[str, Any]]:
-        """See `Ground`; nothing of it is kept to be gone on with."""
+        """See `Ground`; the runs are not kept."""
         asked = PRESETS[preset]
         return fault_map(
             self.controller,

@@ -21,9 +21,9 @@ class Effort(NamedTuple):
     """A line of table 2 for cars (M1).
 
     Attributes:
-        radius_m: Radius to be reached [m].
+        radius_m: Radius to reach [m].
         limit_N: Greatest force at the rim until then [N].
-        case: What is the matter with the car: dotted key -> value.
+        case: Condition of the car: dotted key -> value.
     """
 
     radius_m: float
@@ -35,28 +35,28 @@ EFFORTS: Final = {
     "intact": Effort(12.0, 150.0, {}),
     "power_assist_failed": Effort(20.0, 300.0, {"steering.assist_fraction": 0.0}),
 }
-"""Name -> what is asked of the steering effort."""
+"""Name -> requirement for the steering effort."""
 WITHIN_S: Final = 4.0
-"""Time in which the radius is to be reached [s]."""
+"""Time in which the car must reach the radius [s]."""
 SPEED_KMH: Final = 10.0
 """Speed of the spiral [km/h]."""
 RIM_RADIUS_M: Final = 0.185
-"""Nominal radius of the steering wheel [m]: an assumption, that of a wheel of 370 mm; vehicle files have none."""
+"""Nominal radius of the steering wheel [m]: an assumption (diameter 370 mm); vehicle files have none."""
 PRESET: Final = "un_r79"
-"""What the fault map calls the circle of annex 4."""
+"""Name of the circle of annex 4 in the fault map."""
 CIRCLES: Final = {"circle_100m": "left", "circle_100m_right": "right"}
 _TURNED_S: Final = 3.0
-"""Time in which the steering wheel comes to the Ackermann angle of the radius: a third more is left to the car [s]."""
+"""Time in which the steering wheel reaches the Ackermann angle of the radius [s]; the car has a third more time."""
 _BEGIN_S: Final = 0.5
 _CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "speed_mps")
 
 
 class Reached(NamedTuple):
-    """What it took to reach a radius.
+    """Time and force to reach a radius.
 
     Attributes:
-        time_s: Time from the beginning of steer on; nan where it is not reached [s].
-        effort_N: Greatest force at the rim until then; nan where it is not reached [N].
+        time_s: Time from the beginning of steer; nan for a radius that is not reached [s].
+        effort_N: Greatest force at the rim until then; nan for a radius that is not reached [N].
     """
 
     time_s: float
@@ -64,7 +64,7 @@ class Reached(NamedTuple):
 
 
 def reached(run: Run, radius_m: float) -> Reached:
-    """When a car comes to a radius, and how hard it was to steer.
+    """Return time and force to reach a radius.
 
     Args:
         run: A spiral that begins at `_BEGIN_S`.
@@ -101,7 +101,7 @@ def _examine(ground: Ground) -> Findings:
         "rim_radius_m": RIM_RADIUS_M, "efforts": efforts, "faults": faults,
         "pass": all(row["pass"] for row in efforts),
     }  # fmt: skip
-    summary = f"{_effort_words(efforts)}; circle, for which there are no numbers: {_fault_words(faults)}"
+    summary = f"{_effort_words(efforts)}; circle, which has no limits: {_fault_words(faults)}"
     force = {f"{name.replace('_', ' ')}, {side}": run for name, runs in spirals.items() for side, run in runs.items()}
     pictures = [
         Picture("Spiral at 10 km/h", time_panels(force, _CHANNELS[:2], _BEGIN_S, "the beginning of steer")),
@@ -114,11 +114,11 @@ def _fault_map(ground: Ground) -> list[dict[str, Any]]:
     try:
         return ground.fault_map(PRESET)
     except SimulationDiverged as reason:
-        raise NoResult(f"the car in order does not come round the circle: {reason}") from reason
+        raise NoResult(f"the car without fault does not complete the circle: {reason}") from reason
 
 
 def _spirals(ground: Ground, name: str, effort: Effort) -> dict[str, Run]:
-    """The two runs to a radius at steadily rising steering wheel angle."""
+    """Drive to a radius on both sides at steadily rising steering wheel angle."""
     config = ground.scenario("slowly_increasing_steer").car.config
     single_track = config.single_track
     angle_deg = math.degrees(
@@ -154,23 +154,21 @@ def _effort_words(efforts: list[dict[str, Any]]) -> str:
 
 def _how(row: Mapping[str, Any]) -> str:
     if math.isnan(row["time_s"]):
-        return f"{row['radius_m']:g} m are not reached in {WITHIN_S:g} s"
+        return f"{row['radius_m']:g} m are not reached within {WITHIN_S:g} s"
     return f"{row['effort_N']:.0f} N ({row['limit_N']:.0f} allowed) after {row['time_s']:.1f} s"
 
 
 def _fault_words(faults: list[dict[str, Any]]) -> str:
     done = [row for row in faults if "error" not in row]
-    words = "no run came to its end"
+    words = "no run finished"
     if done:
         worst = max(done, key=lambda row: row["steering_correction_rad"])
         words = (
-            f"{worst['fault']} ({worst['direction']}) takes the greatest correction, "
+            f"{worst['fault']} ({worst['direction']}) needs the greatest correction, "
             f"{math.degrees(worst['steering_correction_rad']):.0f} deg of the steering wheel, with the car "
-            f"{abs(worst['lateral_offset_1s_driver_m']):.2f} m off after 1 s"
+            f"{abs(worst['lateral_offset_1s_driver_m']):.2f} m off course after 1 s"
         )
-    return words + (
-        "" if done == faults else f"; {len(faults) - len(done)} of {len(faults)} faults did not come to their end"
-    )
+    return words + ("" if done == faults else f"; {len(faults) - len(done)} of {len(faults)} faults did not finish")
 
 
 def _effort_table(efforts: list[dict[str, Any]]) -> Table:
@@ -202,7 +200,8 @@ def _fault_table(faults: list[dict[str, Any]]) -> Table:
     ]  # fmt: skip
     columns = (
         "fault", "circle", "yaw rate, change, hands fixed [deg/s]", "lateral acceleration, change, hands fixed [m/s²]",
-        "lateral offset after 1 s, hands fixed [m]", "the same with the driver [m]", "driver's correction [deg]",
+        "lateral offset after 1 s, hands fixed [m]", "lateral offset after 1 s, driver [m]",
+        "driver's correction [deg]",
         "tolerated for [s], by the fault map's limits",
     )  # fmt: skip
     outside = frozenset(i for i, row in enumerate(faults) if "error" in row)
@@ -214,7 +213,7 @@ def _shown(row: Mapping[str, Any], name: str) -> float:
 
 
 def _dots(faults: list[dict[str, Any]]) -> Picture:
-    """What each fault does, one line a fault."""
+    """Return the effects of the faults, a line for each fault."""
     names = list(dict.fromkeys(row["fault"] for row in faults))
 
     def panel(figure: str, label: str) -> Panel:
@@ -240,27 +239,27 @@ STANDARD: Final = Standard(
     edition=(
         "UN Regulation 79, revision 4 (03 series of amendments, 2018): paragraphs 6.2.4 to 6.2.6 with table 2, and "
         "annex 4, for cars (M1). The numbers are from extracts of this revision and of GB 17675-2021, which takes them "
-        "over; how the tests are driven is from memory. The text was not at hand: check it before you rely on it."
+        "over; the driving of the tests is from memory. The text was not at hand: check it before you rely on it."
     ),
     implemented=(
         "Steering effort: from straight ahead into a spiral at 10 km/h, left and right. The force at the rim until the "
-        "radius of 12 m is reached, within 4 s, is at most 150 N; with a failure, here that of the whole power assist, "
-        "at most 300 N to a radius of 20 m. These are the limits that decide between pass and fail.",
+        "radius of 12 m is reached, within 4 s, is at most 150 N; with a failure, here of the whole power assist, "
+        "at most 300 N to a radius of 20 m. These limits decide between pass and fail.",
         "Annex 4: the faults of the fault map, each set when the car goes steadily round a circle of 100 m at 80 km/h, "
-        "left-hand and right-hand: what the car does with the steering wheel held, how the driver corrects it, where "
-        "he is after 1 s. The annex asks for control without abnormal correction and has no numbers: no verdict.",
+        "left-hand and right-hand: motion of the car with the steering wheel held, correction and lateral offset with "
+        "the driver after 1 s. The annex requires control without abnormal correction and has no numbers: no verdict.",
     ),
     left_out=(
-        "Which faults there are is for manufacturer and technical service: here what a controller moves and what it "
-        "hears fails in all ways that the fault map knows. For how long a fault is tolerated goes by that map's "
-        "limits, which are assumptions and not the regulation's.",
+        "Manufacturer and technical service choose the faults: here the actuators and sensors of a controller fail in "
+        "all ways of the fault map. The tolerated time of a fault follows from the limits of the map, which are "
+        "assumptions and not part of the regulation.",
         "Leaving a curve of 50 m at 50 km/h without unusual vibration, self-centring with the hands off, transient "
         "tests by the manufacturer, warning signals, energy reserves, annex 6, steering by assistance systems.",
         f"The radius of the steering wheel, {1000.0 * RIM_RADIUS_M:.0f} mm, and the power assist, a constant fraction "
-        "of the column's torque, are assumptions. The turning radius is that of the centre of gravity's path. "
-        "The ramp of the steering wheel begins at once, as no hand does: what its inertia takes for 5 ms (17 N at the "
-        "sedan's) is not counted, the force is read every 20 ms.",
-        "The car is driven as its file has it, not at its greatest mass: --set load.payload_kg loads it.",
+        "of the column's torque, are assumptions. The turning radius is the radius of the centre of gravity's path. "
+        "The ramp of the steering wheel begins abruptly; the force for its inertia over 5 ms (17 N for the sedan) does "
+        "not count, since the force is read every 20 ms.",
+        "The car is driven as in its file, not at its greatest mass: --set load.payload_kg loads it.",
     ),
     examine=_examine,
 )

@@ -1,4 +1,4 @@
-"""What a standard is here, and what comes out of a test by it."""
+"""Structure of a standard and of the findings of its test."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ if TYPE_CHECKING:
 
 
 _LEAD_S: Final = 0.2
-"""So long before what time is counted from a curve over time begins [s]."""
+"""Time by which a curve begins before time zero [s]."""
 SIDES: Final = {"left": 1.0, "right": -1.0}
-"""Side to which a car is steered -> sign of the steering wheel angle, ISO 8855."""
+"""Side of the steering -> sign of the steering wheel angle, ISO 8855."""
 
 
-class NoResult(ManeuverError):  # noqa: N818 - what came out of a test, named as one
-    """A car cannot be tested with a controller: a run failed without which the others make no sense."""
+class NoResult(ManeuverError):  # noqa: N818 - named as the outcome of a test
+    """A car cannot be tested with a controller, because a prerequisite run failed."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run that was driven; the analysis reads it as it reads a recording.
+    """A finished run; the analysis reads it like a recording.
 
     Attributes:
-        case: What it was driven with beside the others of its series.
-        metrics: Its metrics; empty where it failed or could not be evaluated.
-        channels: Channels over time that are kept, every `CURVE_STEP_S`.
-        error: Why it has no metrics; empty where it has.
+        case: Values in which it differs from the other runs of its series.
+        metrics: Its metrics; empty if it failed or could not be evaluated.
+        channels: Kept channels over time, every `CURVE_STEP_S`.
+        error: Why it has no metrics; empty if it has some.
     """
 
     case: Mapping[str, Any]
@@ -53,11 +53,11 @@ class Run:
 
     @property
     def metadata(self) -> Mapping[str, Any]:
-        """Nothing; the car is the proving ground's."""
+        """Empty: the proving ground knows the car."""
         return {}
 
     def __getitem__(self, channel: str) -> Array:
-        """A channel over `time_s`.
+        """Return a channel over `time_s`.
 
         Raises:
             RecordingError: the run failed, or the channel was not kept.
@@ -67,26 +67,26 @@ class Run:
         return self.channels[channel]
 
     def at(self, channel: str, time_s: float) -> float:
-        """A channel at a time, interpolated; nan where the run has not got so far."""
+        """Return a channel at a time, interpolated; nan after the end of the run."""
         values = self.channels.get(channel, np.empty(0))
         return float(np.interp(time_s, self.time_s, values)) if len(values) and time_s <= self.time_s[-1] else math.nan
 
     @property
     def values(self) -> dict[str, Any]:
-        """Case and metrics, or why there are none, as JSON values."""
+        """Case and metrics, or the reason for no metrics, as JSON values."""
         return {**self.case, **(dict(self.metrics) if not self.error else {"error": self.error})}
 
     def metric(self, name: str) -> float:
-        """A metric; nan where the run has none."""
+        """Return a metric; nan if the run does not have it."""
         return self.metrics.get(name, math.nan)
 
     def over_time(self, channel: str, *, begin_s: float = 0.0, **words: Any) -> Curve:
-        """A channel in the unit that it is shown in, from shortly before what time is counted from.
+        """Return a channel in its unit for display, from shortly before time zero.
 
         Args:
-            channel: One of those that were kept.
-            begin_s: What time is counted from [s].
-            **words: Of `Curve`.
+            channel: A kept channel.
+            begin_s: Instant that time counts from [s].
+            **words: Further attributes of `Curve`.
         """
         values = self.channels.get(channel, np.empty(0))
         time_s = self.time_s[: len(values)] - begin_s
@@ -95,10 +95,10 @@ class Run:
 
 
 class Ground(Protocol):
-    """Where a car with a controller is driven; `proving_ground.ProvingGround` is the one there is."""
+    """Interface of a proving ground; `proving_ground.ProvingGround` implements it."""
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
-        """The car and a manoeuvre, resolved."""
+        """Resolve the car and a manoeuvre."""
         ...
 
     def drive(
@@ -109,13 +109,13 @@ class Ground(Protocol):
         overrides: Mapping[str, Any] | None = None,
         curves: Sequence[str] = (),
     ) -> list[Run]:
-        """Drives a series of runs.
+        """Drive a series of runs.
 
         Args:
-            series: Its name, one for each series of a test.
+            series: Name of the series, unique within a test.
             maneuver: Name, path or table.
             cases: Dotted key -> value of each run, the same keys in all of them.
-            overrides: The same for what all runs share.
+            overrides: Dotted key -> value of all runs.
             curves: Channels that are kept over time.
 
         Returns:
@@ -127,7 +127,7 @@ class Ground(Protocol):
         ...
 
     def fault_map(self, preset: str) -> list[dict[str, Any]]:
-        """Drives the faults of the controller's actuators and sensors.
+        """Drive the faults of the controller's actuators and sensors.
 
         Args:
             preset: Name of speeds and situations, one of `studies.paper.fault_situations.PRESETS`.
@@ -136,20 +136,20 @@ class Ground(Protocol):
             The rows of the map.
 
         Raises:
-            ActiveSteerError: an input is wrong, or the car in order cannot be driven so.
+            ActiveSteerError: an input is wrong, or the car without fault cannot be driven.
         """
         ...
 
 
 @dataclass(frozen=True)
 class Findings:
-    """What came out of a test of one car with one controller.
+    """Findings of a test of one car with one controller.
 
     Attributes:
-        values: What `--json` prints. With `pass` where the standard has limits, and else without it.
-        summary: The verdict, or what was found, in a sentence.
-        tables: For the page.
-        pictures: For the page.
+        values: Values that `--json` prints; with `pass` if the standard has limits.
+        summary: Verdict or findings in a sentence.
+        tables: Tables of the page.
+        pictures: Pictures of the page.
     """
 
     values: dict[str, Any]
@@ -159,17 +159,17 @@ class Findings:
 
     @classmethod
     def without_result(cls, reason: NoResult) -> Findings:
-        """What is said of a car that cannot be tested."""
+        """Return the findings of a car that cannot be tested."""
         return cls({"error": str(reason)}, f"no result: {reason}")
 
     @property
     def error(self) -> str:
-        """Why nothing can be said; empty where something can."""
+        """Why there is no result; empty with a result."""
         return self.values.get("error", "")
 
     @property
     def passed(self) -> bool | None:
-        """Whether the limits are kept; None for a test method without limits."""
+        """Whether the car keeps the limits; None for a method without limits."""
         return self.values.get("pass")
 
 
@@ -178,14 +178,14 @@ class Standard:
     """A standard.
 
     Attributes:
-        name: How it is called on the command line.
-        title: What it is.
-        edition: Which edition, and from where the text is known.
-        implemented: What of it is done here, a sentence each.
-        left_out: What is not, or not as it says.
-        examine: Drives the runs of one car with one controller, and evaluates them; a run that fails is a row, and
-            `NoResult` is raised where nothing can be said.
-        driver: Who drives where nobody else is asked for.
+        name: Its name on the command line.
+        title: Its title.
+        edition: Its edition, and the source of the text.
+        implemented: The implemented parts, a sentence each.
+        left_out: The parts that are not implemented, or are implemented differently.
+        examine: Function that drives and evaluates one car with one controller. A run that fails is a row; without any
+            result it raises `NoResult`.
+        driver: Default driver.
     """
 
     name: str

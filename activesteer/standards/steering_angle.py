@@ -1,4 +1,4 @@
-"""The steering wheel angle at which the car that is tested reaches a lateral acceleration."""
+"""The steering wheel angle at which the tested car reaches a lateral acceleration."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from activesteer.errors import RecordingError
 from activesteer.standards.standard import Ground, NoResult
 
 _RATE_DEGPS: Final = 5.0
-"""Rate of the ramp [deg/s]: the car lags behind by some 0.1 s, half a degree."""
+"""Rate of the ramp [deg/s]; the car lags by some 0.1 s, which is half a degree."""
 _LONGEST_S: Final = 30.0
 
 
 def steering_wheel_at(ground: Ground, speed_kmh: float, ay_mps2: float) -> float:
-    """The angle, from a slow ramp to the left at constant speed.
+    """Return the angle from a slow ramp to the left at constant speed.
 
     Args:
-        ground: Where the car is driven.
+        ground: The proving ground.
         speed_kmh: Speed [km/h].
         ay_mps2: Lateral acceleration [m/s2].
 
@@ -46,7 +46,7 @@ def steering_wheel_at(ground: Ground, speed_kmh: float, ay_mps2: float) -> float
             f"the car reaches {ay.max():.3g} m/s2 at {speed_kmh:g} km/h; the test needs {ay_mps2:g} m/s2",
             value=ay.max(), allowed=Range(ay_mps2),
         )  # fmt: skip
-    # Noise apart, the acceleration rises until it is reached.
+    # Apart from noise, the acceleration rises until then.
     end = int(np.argmax(ay >= ay_mps2))
     rising = np.maximum.accumulate(ay[: end + 1])
     return round(math.degrees(float(np.interp(ay_mps2, rising, run["steering_wheel_rad"][: end + 1]))), 1)

@@ -75,14 +75,14 @@ def test_more_than_the_effort_that_is_allowed_fails(force_N, steering):
 def test_a_radius_that_is_not_reached_fails():
     found = STANDARD.examine(SpiralGround(tightest_m=15.0))
     assert found.passed is False
-    assert "12 m are not reached in 4 s" in found.summary
+    assert "12 m are not reached within 4 s" in found.summary
 
 
 def test_a_fault_that_ends_the_run_is_a_row_and_no_verdict():
     found = STANDARD.examine(SpiralGround())
     rows = {(row["fault"], row["direction"]): row for row in found.values["faults"]}
     assert rows["rear:float", "right"]["error"] == "the car tips over"
-    assert "2 of 4 faults did not come to their end" in found.summary
+    assert "2 of 4 faults did not finish" in found.summary
     assert found.tables[1].outside == {2, 3}
     json.loads(json_text(found.values))
 
