@@ -2,9 +2,9 @@
 
 numba keeps compiled functions on disk and compiles again if the file of a function changes. It does not notice a change
 in another file whose functions or constants were compiled in, nor another version of the engine. Here the key is the
-content of the file and of every file of the package that it imports, directly or not, with the versions of numba,
-llvmlite, numpy and mujoco. numba chooses the folder: `NUMBA_CACHE_DIR`, `__pycache__` beside the source, or the user's
-cache. If none of them can be written, every start compiles anew.
+content of the file and of every file of the package that it imports, directly or not, with the tables (`.txt`) beside
+them and the versions of numba, llvmlite, numpy and mujoco. numba chooses the folder: `NUMBA_CACHE_DIR`, `__pycache__`
+beside the source, or the user's cache. If none of them can be written, every start compiles anew.
 
 The logger `activesteer` reports the start of compilation (INFO) and a missing cache folder (WARNING), each once.
 """
@@ -210,8 +210,11 @@ def _content(file: Path) -> bytes:
 
 @functools.cache
 def _imported(file: Path, package: Path) -> tuple[Path, ...]:
-    """Return the files of the package that a file imports from."""
-    return tuple(_imports(_content(file).decode(), package))
+    """Return the files of the package that a file imports from, and the table beside it with its name."""
+    if file.suffix != ".py":
+        return ()
+    table = file.with_suffix(".txt")
+    return (*_imports(_content(file).decode(), package), *([table] if table.is_file() else []))
 
 
 def _imports(text: str, package: Path) -> Iterator[Path]:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from enum import StrEnum
 from typing import Final
 
 from activesteer.errors import ParameterError
 
-CONFIDENCE_QUANTILE: Final = 1.959963984540054
-"""Of the normal distribution, for 95 %."""
 HOLDS_FROM: Final = 0.8
 """A claim holds if its share is at least this, with 97.5 % confidence."""
 FAILS_UP_TO: Final = 0.2
@@ -43,13 +40,10 @@ def wilson_interval(passed: int, number: int) -> tuple[float, float]:
         raise ParameterError(f"{passed} of {number} is no share", value=(passed, number))
     if number == 0:
         return 0.0, 1.0
-    share, z2 = passed / number, CONFIDENCE_QUANTILE**2 / number
-    middle = share + 0.5 * z2
-    half = math.sqrt(z2 * (share * (1.0 - share) + 0.25 * z2))
-    # At 0 and at 1 an end is exactly that; rounding must not move it.
-    low = 0.0 if passed == 0 else (middle - half) / (1.0 + z2)
-    high = 1.0 if passed == number else (middle + half) / (1.0 + z2)
-    return low, high
+    from scipy.stats import binomtest  # noqa: PLC0415 - slow to import
+
+    low, high = binomtest(passed, number).proportion_ci(method="wilson")
+    return float(low), float(high)
 
 
 def share_verdict(low: float, high: float) -> ShareVerdict:

@@ -107,6 +107,19 @@ def test_another_version_of_the_engine_counts(monkeypatch: pytest.MonkeyPatch) -
     assert compilation.content_key(source) != before
 
 
+def test_a_table_beside_a_source_counts(tmp_path: Path) -> None:
+    source, table = tmp_path / "coefficients.py", tmp_path / "coefficients.txt"
+    source.write_text("")
+    keys = []
+    for content in (None, "A 1", "A 2"):
+        if content is not None:
+            table.write_text(content)
+        for cached in (compilation._sources_key, compilation._content, compilation._imported):
+            cached.cache_clear()
+        keys.append(compilation.content_key(source))
+    assert len({*keys}) == 3
+
+
 def test_without_a_folder_that_can_be_written_it_runs_and_says_so_once(package: Path, tmp_path: Path) -> None:
     for folder in (package, package / "inner"):
         (folder / "__pycache__").write_text("")

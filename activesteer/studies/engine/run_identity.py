@@ -40,7 +40,8 @@ def source_digest() -> str:
     package = Path(activesteer.__file__).parent
     found = {}
     for part in _DECIDING:
-        for path in [package / part] if part.endswith(".py") else sorted((package / part).rglob("*.py")):
+        inside = (path for path in (package / part).rglob("*") if path.suffix in (".py", ".txt"))
+        for path in [package / part] if part.endswith(".py") else sorted(inside):
             found[path.relative_to(package).as_posix()] = path.read_bytes()
     return digest(found)[:12]
 

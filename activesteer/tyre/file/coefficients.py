@@ -1,6 +1,6 @@
-"""Section, default, quantity and meaning of every key of a .tir file, one line each.
+"""Section, default, quantity and meaning of every key of a .tir file, read from `coefficients.txt` beside this file.
 
-The columns of a line are: key, default, quantity, meaning. A default of `!` means that the file must give the key;
+The columns of the table are: key, default, quantity, meaning. A default of `!` means that the file must give the key;
 `-` means that it may be absent and that another quantity replaces it (see `parameters.parameter_array`).
 The quantity decides how `[UNITS]` of a file is applied; `1` is a pure number.
 
@@ -10,9 +10,8 @@ and the MSC PAC2002 property files.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
-
-from activesteer.tyre.file.coefficient_table import TABLE
 
 
 class Coefficient(NamedTuple):
@@ -38,7 +37,7 @@ class Coefficient(NamedTuple):
 def _parse(table: str) -> tuple[Coefficient, ...]:
     """Turn the table into records, in its order."""
     section, rows = "", []
-    for line in table.strip().splitlines():
+    for line in table.splitlines():
         if line.startswith("["):
             section = line.strip("[]")
             continue
@@ -48,7 +47,7 @@ def _parse(table: str) -> tuple[Coefficient, ...]:
     return tuple(rows)
 
 
-COEFFICIENTS: tuple[Coefficient, ...] = _parse(TABLE)
+COEFFICIENTS: tuple[Coefficient, ...] = _parse(Path(__file__).with_suffix(".txt").read_text(encoding="utf-8"))
 """Every numeric key that the package knows, in the order of the table."""
 
 BY_NAME: dict[str, Coefficient] = {coefficient.name: coefficient for coefficient in COEFFICIENTS}
