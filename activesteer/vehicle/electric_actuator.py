@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Final
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any, Final, Self
 
 from activesteer.config import Range
+from activesteer.errors import ParameterError
 
 Positive = Annotated[float, Range(1e-9)]
 STOP_BEYOND: Final = 1.03
@@ -43,6 +45,23 @@ class ElectricActuator:
     """Position loop: speed demand per position error [1/s]."""
     speed_gain_1ps: Annotated[float, Range(5.0, 700.0)] | None = None
     """Speed loop: rate at which a speed error decays, if the motor is strong enough [1/s]."""
+
+    def refuse_keys(self, problem: str) -> None:
+        """Refuse keys of a motor for an actuator without one.
+
+        Args:
+            problem: The problem and its remedy.
+
+        Raises:
+            ParameterError: a key other than `preset` is given.
+        """
+        for item in fields(self):
+            if item.name != "preset" and (value := getattr(self, item.name)) is not None:
+                raise ParameterError(problem, key=item.name, value=value)
+
+    def filled(self, preset: Mapping[str, Any]) -> Self:
+        """Return it with the preset's value for every missing key."""
+        return replace(self, **{key: value for key, value in preset.items() if getattr(self, key) is None})
 
     @property
     def voltage_ratio(self) -> float:

@@ -23,24 +23,6 @@ _MODEL_BYTES: Final = 8192
 _DATA_BYTES: Final = 262_144
 """Bytes of mjData to search: solver statistics lie before the pointers (160 KB in MuJoCo 4.0)."""
 
-_DATA_ARRAYS: Final = (
-    "qvel",
-    "act",
-    "ctrl",
-    "userdata",
-    "xpos",
-    "xmat",
-    "subtree_com",
-    "cdof",
-    "ten_J",
-    "ten_velocity",
-    "cvel",
-    "qfrc_passive",
-    "ten_length",
-    "sensordata",
-    "qpos",
-)
-
 
 class EngineLayout(NamedTuple):
     """Byte offsets inside mjModel (`m_`) and mjData (`d_`): pointers to arrays, except the first two and the last."""
@@ -64,6 +46,9 @@ class EngineLayout(NamedTuple):
     d_sensordata: int
     d_qpos: int
     d_time: int
+
+
+_DATA_ARRAYS: Final = [name[2:] for name in EngineLayout._fields[3:-1]]
 
 
 def _probe(numbers: int, timestep_s: float) -> tuple[mujoco.MjModel, mujoco.MjData]:

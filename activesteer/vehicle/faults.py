@@ -215,7 +215,7 @@ class _ActuatorFault:
 
 
 class _SensorFault:
-    """A fault of one signal; attributes as those of `_ActuatorFault`."""
+    """A fault of one signal, which changes nothing in the car; attributes as those of `_ActuatorFault`."""
 
     watches = True
 
@@ -230,13 +230,9 @@ class _SensorFault:
         self.memory: deque[float] = deque(maxlen=delay + 1 if delay else 1)
 
     def engage(self) -> None:
-        """Do nothing: a sensor's fault changes nothing in the car."""
-
-    def recover(self) -> None:
         """Do nothing."""
 
-    def release(self) -> None:
-        """Do nothing."""
+    recover = release = engage
 
     def read(self, measurement: Measurement, *, active: bool) -> Measurement:
         """Return the faulty reading for a true one."""

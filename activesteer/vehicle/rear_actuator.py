@@ -7,11 +7,10 @@ of screw) are in docs/actuators.md; forces, speeds, motors and friction are assu
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Final, Literal, Self
 
 from activesteer.config import Range
-from activesteer.errors import ParameterError
 from activesteer.vehicle.electric_actuator import ElectricActuator
 
 _HINGE: Final = "hinge"
@@ -43,13 +42,8 @@ class RearActuator(ElectricActuator):
         Raises:
             ParameterError: a key of screws is given for the hinge.
         """
-        given = [item.name for item in fields(self) if item.name != "preset" and getattr(self, item.name) is not None]
-        if self.preset == _HINGE and given:
-            raise ParameterError(
-                "has no effect on the hinge, whose numbers are in the model; preset screw_3deg is a screw",
-                key=given[0],
-                value=getattr(self, given[0]),
-            )
+        if self.preset == _HINGE:
+            self.refuse_keys("has no effect on the hinge, whose numbers are in the model; preset screw_3deg is a screw")
 
     @property
     def is_screw(self) -> bool:
@@ -69,8 +63,7 @@ class RearActuator(ElectricActuator):
 
     def resolved(self) -> Self:
         """Return it with the preset's value for every missing key."""
-        values = PRESETS[self.preset]
-        return replace(self, **{key: value for key, value in values.items() if getattr(self, key) is None})
+        return self.filled(PRESETS[self.preset])
 
 
 _COMMON: Final = {

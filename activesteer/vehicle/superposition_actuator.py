@@ -6,14 +6,14 @@ torque of the superposition. Motor and gear replace the servo's lag and rate lim
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Final, Literal, Self
 
 import mujoco
 from numpy.typing import NDArray
 
 from activesteer.config import Range
-from activesteer.errors import ModelError, ParameterError
+from activesteer.errors import ModelError
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.electric_actuator import STOP_BEYOND, ElectricActuator, known
 from activesteer.vehicle.named_parts import tendon_arms
@@ -41,12 +41,9 @@ class SuperpositionActuator(ElectricActuator):
         Raises:
             ParameterError: a key of the motor is given for the servo.
         """
-        given = [item.name for item in fields(self) if item.name != "preset" and getattr(self, item.name) is not None]
-        if not self.is_geared and given:
-            raise ParameterError(
-                "has no effect on the servo, whose numbers are in the model; preset strain_wave has a motor",
-                key=given[0],
-                value=getattr(self, given[0]),
+        if not self.is_geared:
+            self.refuse_keys(
+                "has no effect on the servo, whose numbers are in the model; preset strain_wave has a motor"
             )
 
     @property
@@ -62,7 +59,7 @@ class SuperpositionActuator(ElectricActuator):
 
     def resolved(self) -> Self:
         """Return it with the preset's value for every missing key."""
-        return replace(self, **{key: value for key, value in STRAIN_WAVE.items() if getattr(self, key) is None})
+        return self.filled(STRAIN_WAVE)
 
 
 STRAIN_WAVE: Final = {
