@@ -1,4 +1,4 @@
-"""Writes the table of claims into docs/claims.md: `python tools/make_claims_table.py`; a test holds it to that.
+"""Write the table of claims into docs/claims.md: `python tools/make_claims_table.py`; a test holds it to that.
 
 What is said of the nominal run is what `not_reproduced.toml` lists, which another test holds to the runs; the
 shares are those of the population that is stored with the package.
@@ -19,7 +19,7 @@ VEHICLE: Final = "compact"
 
 
 def table() -> str:
-    """The table, in Markdown: the statements that are about the systems alone, then those with a driver."""
+    """Return the table in Markdown: statements about the systems alone, then statements with a driver."""
     known, population = not_reproduced(VEHICLE), stored_population(VEHICLE)
     lines = []
     for kind in Kind:
@@ -27,7 +27,7 @@ def table() -> str:
         lines += ["| | statement | nominal run | population | depends most on |", "|---|---|---|---|---|"]
         for statement in STATEMENTS.values():
             if statement.kind is kind:
-                nominal = "does not come out" if statement.id in known else "holds"
+                nominal = "not reproduced" if statement.id in known else "reproduced"
                 cells = (statement.id, statement.text, nominal, *_share(population, statement.id))
                 lines.append("| " + " | ".join(cells) + " |")
         lines.append("")
@@ -43,7 +43,7 @@ def _share(population: Population | None, number: str) -> tuple[str, str]:
 
 
 def page(text: str) -> str:
-    """The page with the table in its place."""
+    """Return the page with the table in its place."""
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END)
     return f"{before}{BEGIN}\n{table()}{END}{after}"

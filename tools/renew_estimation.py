@@ -1,4 +1,4 @@
-"""Drives what docs/estimation.md says of the estimator anew, and writes its table.
+"""Drive the runs of docs/estimation.md again and write their table.
 
 python tools/renew_estimation.py
 """
@@ -23,19 +23,19 @@ RUNS: Final = (
     *((scenario, "none") for scenario in ("severe_lane_change", "brake_in_turn", "split_mu_braking",
                                           "straight_braking")),
 )  # fmt: skip
-"""The paper's five scenarios with its systems, and what is hard beside them."""
+"""The paper's five scenarios with its systems, and some harder ones."""
 SLOWEST_MPS: Final = 5.0
 LARGEST_SIDESLIP_RAD: Final = np.radians(8.0)
-"""Samples that are slower, or slide more, do not count."""
+"""Slower samples, and samples with a larger sideslip angle, do not count."""
 _HEAD: Final = (
-    "| | | greatest sideslip | error, RMS | greatest | said | speed error, RMS | greatest | NEES | NIS |",
+    "| | | peak sideslip angle | error, RMS | error, peak | filter std | speed error, RMS | speed error, peak | NEES | NIS |",
     "|---|---|---|---|---|---|---|---|---|---|",
     "| | | deg | deg | deg | deg | % | % | of 1 | of 2 |",
 )
 
 
 def row(scenario: str, system: str) -> str:
-    """One run: a system drives, and an estimator beside it says what it makes of the same sensors."""
+    """Return the row of one run: a system drives, and an estimator runs beside it on the same sensors."""
     innovations: list[float] = []
 
     class Watched:

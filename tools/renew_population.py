@@ -1,12 +1,12 @@
-"""Drives the population anew, or what is missing of it, keeps what came of it with the package, and writes its page.
+"""Drive the population again, or its missing runs, store the results with the package, and write its page.
 
     python tools/renew_population.py [-o DIR] [--samples N] [--jobs N]
     python tools/renew_population.py --comparison [-o DIR] [--samples N] [--jobs N]
 
-500 samples take half an hour on two idle processors; it can be interrupted and called again. A folder that
-`activesteer reproduce --population N -o DIR` has finished is taken as it is. tools/make_claims_table.py is to be called
-afterwards. The second line does the same with the comparison of controllers, whose table stands in
-docs/chassis_control.md; `tools/make_doc_pictures.py comparison_population` is to be called after it.
+500 samples take half an hour on two idle processors. The tool resumes an interrupted run and accepts a folder that
+`activesteer reproduce --population N -o DIR` has finished. Call tools/make_claims_table.py afterwards. The second line
+does the same for the comparison of controllers, whose table stands in docs/chassis_control.md; call
+`tools/make_doc_pictures.py comparison_population` after it.
 """
 
 from __future__ import annotations
@@ -37,47 +37,51 @@ END: Final = "<!-- end of the table -->\n"
 COMPARED: Final = ("none", "ars", "afs", "esc", "lqr", "mpc", "integrated")
 """Controllers of the comparison that belongs to the package."""
 PRODUCTION: Final = "sensors.preset = production"
-"""The share of the samples behind sensors of production cars."""
+"""Key of the samples with the sensors of production cars."""
 _HEAD: Final = """# The population
 
+After this page you know how often each claim holds if car, road, driver, line, gains and sensors vary.
+
 `activesteer reproduce --population {samples} --seed {seed}` drives {samples} variations of the {vehicle}, its road, its
-driver, his line and the gains through the paper's five scenarios with all three systems: {runs} runs. What came of them
-belongs to the package (`studies/population/`), stands beside every nominal verdict that `activesteer reproduce` prints,
-and behind the curves of the figures (10 to 90 % of the runs). `tools/renew_population.py` renews it and this page. It
-was driven with {versions}.
+driver, his line and the gains through the paper's five scenarios with all three systems: {runs} runs. The package
+stores the results (`studies/population/`). `activesteer reproduce` prints the proportions beside every nominal verdict,
+and the figures show 10 to 90 % of the runs behind the curves. `tools/renew_population.py` renews the results and this
+page. They were driven with {versions}.
 
-## What is varied
+## Varied quantities
 
-A Sobol' sequence over the ranges below, the same for the three systems. Controllers and driver are not told.
+The samples are a Sobol' sequence over the ranges below, the same for the three systems. Controllers and driver are not
+told.
 
 ```toml
 {factors}
 ```
 
-## In which share each claim holds
+## Proportion in which each claim holds
 
-*Holds* is said where the 95 % interval (Wilson) lies above 80 %, *does not hold* where it lies below 20 %, and else
-*depends*. Half of the samples have ideal sensors, half those of a production car; the share among the latter stands
-behind the verdict. The last column is the factor that explains most of the verdict by regression on every factor and
-its square, and how much of its variance; it is empty where none explains more than chance would. A claim without the
-driver is one about the open-loop manoeuvres, where the steering wheel follows a table.
+A claim *holds* if its 95 % interval (Wilson) lies above 80 %, *does not hold* if it lies below 20 %, and otherwise
+*depends*. Half of the samples have ideal sensors and half those of a production car; the column behind the verdict has
+the proportion for the latter. The last column names the factor that explains most of the verdict, by a regression on
+every factor and its square, and the fraction of the variance that it explains. It is empty if no factor explains more
+than chance. Claims without a driver are about the open-loop manoeuvres, where the steering wheel follows a table.
 
-| | what is claimed | driver | nominal | holds in | 95 % interval | verdict | with production sensors | more often |
+| | claim | driver | nominal | holds in | 95 % interval | verdict | with production sensors | more often |
 |---|---|---|---|---|---|---|---|---|
 """
 _SYSTEMS: Final = """
-## What each system does
+## Effect of each system
 
-A car is lost where its sideslip goes beyond 20 deg (it spins), where its body leaves the lanes, and where it misses a
-cone of the slalom. Changes are against the same sample without control: median, and the range of 90 % of the samples.
+A car is *lost* if its sideslip angle exceeds 20 deg (it spins), if its body leaves the lanes, or if it misses a cone of
+the slalom. A car that is lost without control and not with a system is *saved*; the reverse is *spoiled*. Changes are
+relative to the same sample without control: median, and the range of 90 % of the samples.
 
-| scenario | | lost without | of these saved | fine without | of these spoiled | spin without, with | changes |
+| scenario | | lost without | saved | not lost without | spoiled | spin without, with | changes |
 |---|---|---|---|---|---|---|---|
 """
 
 
 def page(found: Population) -> str:
-    """The page of a population."""
+    """Return the page of a population."""
     lines = find_study(STUDY).read_text(encoding="utf-8").splitlines()
     factors = "\n".join(lines[lines.index("[factors]") : lines.index("[design]") - 1])
     head = _HEAD.format(
@@ -88,15 +92,15 @@ def page(found: Population) -> str:
 
 
 def comparison_page(text: str, found: ComparisonPopulation | None) -> str:
-    """The page on chassis control with the table of a comparison in its place.
+    """Return the page on chassis control with the table of a comparison in its place.
 
     Args:
         text: The page.
-        found: What came of the comparison; None where none is stored.
+        found: Results of the comparison; None if none is stored.
     """
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END)
-    lines = ["None belongs to the package yet; `tools/renew_population.py --comparison` makes one."]
+    lines = ["The package stores no comparison yet; `tools/renew_population.py --comparison` makes one."]
     return f"{before}{BEGIN}" + "\n".join(lines if found is None else _comparison(found)) + f"\n{END}{after}"
 
 
@@ -114,9 +118,9 @@ def _comparison(found: ComparisonPopulation) -> list[str]:
         lines.append(_row(scenario.replace("_", " "), [str(effect.lower) for effect in own]))
     totals = [found.total(name) for name in names]
     lines.append(_row("**all scenarios**", [str(total.lower) for total in totals]))
-    lines.append(_row("of the lost without control, saved", [str(total.saved) for total in totals]))
-    lines.append(_row("of the fine without control, spoiled", [str(total.spoiled) for total in totals]))
-    return [*lines, "", "![Shares of the population by scenario and controller](pictures/comparison_population.png)"]
+    lines.append(_row("lost without control, saved", [str(total.saved) for total in totals]))
+    lines.append(_row("not lost without control, spoiled", [str(total.spoiled) for total in totals]))
+    return [*lines, "", "![Proportions of the population by scenario and controller](pictures/comparison_population.png)"]
 
 
 def _row(head: str, cells: Iterable[str]) -> str:
@@ -153,9 +157,9 @@ def _number(value: float) -> str:
 
 
 def main() -> None:
-    """Entry point."""
+    """Run the tool."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--comparison", action="store_true", help="of controllers, in place of the paper's claims")
+    parser.add_argument("--comparison", action="store_true", help="compare controllers instead of checking the paper's claims")
     parser.add_argument(
         "-o", "--output", type=Path, metavar="DIR", help="default: build/population or build/comparison"
     )
