@@ -1,7 +1,7 @@
 """Write the table of claims into docs/claims.md: `python tools/make_claims_table.py`; a test holds it to that.
 
-What is said of the nominal run is what `not_reproduced.toml` lists, which another test holds to the runs; the
-shares are those of the population that is stored with the package.
+The column of the nominal run follows `not_reproduced.toml`, which another test compares with the runs. The proportions
+are those of the stored population.
 """
 
 from __future__ import annotations
