@@ -28,7 +28,7 @@ SLOWEST_MPS: Final = 5.0
 LARGEST_SIDESLIP_RAD: Final = np.radians(8.0)
 """Slower samples, and samples with a larger sideslip angle, do not count."""
 _HEAD: Final = (
-    "| | | peak sideslip angle | error, RMS | error, peak | filter std | speed error, RMS | speed error, peak | NEES | NIS |",
+    "| | | peak sideslip | error, RMS | error, peak | filter std | speed error, RMS | error, peak | NEES | NIS |",
     "|---|---|---|---|---|---|---|---|---|---|",
     "| | | deg | deg | deg | deg | % | % | of 1 | of 2 |",
 )

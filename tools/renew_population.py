@@ -120,7 +120,7 @@ def _comparison(found: ComparisonPopulation) -> list[str]:
     lines.append(_row("**all scenarios**", [str(total.lower) for total in totals]))
     lines.append(_row("lost without control, saved", [str(total.saved) for total in totals]))
     lines.append(_row("not lost without control, spoiled", [str(total.spoiled) for total in totals]))
-    return [*lines, "", "![Proportions of the population by scenario and controller](pictures/comparison_population.png)"]
+    return [*lines, "", "![Proportions by scenario and controller](pictures/comparison_population.png)"]
 
 
 def _row(head: str, cells: Iterable[str]) -> str:
@@ -159,7 +159,7 @@ def _number(value: float) -> str:
 def main() -> None:
     """Run the tool."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--comparison", action="store_true", help="compare controllers instead of checking the paper's claims")
+    parser.add_argument("--comparison", action="store_true", help="compare controllers, not claims")
     parser.add_argument(
         "-o", "--output", type=Path, metavar="DIR", help="default: build/population or build/comparison"
     )
