@@ -25,8 +25,8 @@ from activesteer.analysis.figures import BY_KIND, style, time_histories, time_pa
 from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.analysis.linear_plots import driver_loops_figure
+from activesteer.display_units import DisplayUnit, Quantity, quantity_of
 from activesteer.plotting import new_figure
-from activesteer.quantities import DisplayUnit, Quantity, quantity_of
 from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
 from activesteer.simulation.preparation import prepared

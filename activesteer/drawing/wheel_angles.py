@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from activesteer.conventions import CORNERS, Array
-from activesteer.quantities import quantity_of
+from activesteer.display_units import quantity_of
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint
 

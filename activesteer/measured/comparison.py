@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from activesteer.analysis.corridor import TIME_TOLERANCE_S, corridor
 from activesteer.analysis.series import rms
 from activesteer.conventions import Array
+from activesteer.display_units import quantity_of
 from activesteer.errors import RecordingError
 from activesteer.measured.alignment import time_shift
-from activesteer.quantities import quantity_of
 from activesteer.recording import Recording
 
 STANDARDS: Final = {

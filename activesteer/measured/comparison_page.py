@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Final
 
 from activesteer.conventions import RUN_COLOURS, Array
+from activesteer.display_units import quantity_of
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
 from activesteer.measured.comparison import STANDARDS, Compared, Comparison, assumptions, words
 from activesteer.pages import Page, Section, Table, failed, passed, render_page
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
-from activesteer.quantities import quantity_of
 
 _EDGE: Final = "#9bbbd4"
 

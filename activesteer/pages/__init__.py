@@ -9,8 +9,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.display_units import parameter_title, typeset
 from activesteer.pages.model import Page, Section, Table, Text, failed, passed
-from activesteer.quantities import parameter_title, typeset
 from activesteer.version import __version__
 
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, Final, NamedTuple, Protocol
 
+from activesteer.display_units import quantity_of
 from activesteer.maneuver import Maneuver
-from activesteer.quantities import quantity_of
 from activesteer.road.footprint import Footprint
 from activesteer.simulation.appearance import scene_of
 from activesteer.simulation.closed_loop import ClosedLoop

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from activesteer.display_units import parameter_title, typeset
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder, write_text
 from activesteer.pages import Page, Section, Table, Text, failed, passed, render_page
 from activesteer.plotting import as_svg, draw
-from activesteer.quantities import parameter_title, typeset
 from activesteer.standards.examination import Examination
 from activesteer.standards.standard import Findings
 

@@ -11,10 +11,10 @@ import numpy as np
 from activesteer.analysis.frequency_response import INPUT, FrequencyResponse, HIGHEST_Hz, LOWEST_Hz, frequency_response
 from activesteer.analysis.random_response import RandomResponse, random_response
 from activesteer.conventions import Array
+from activesteer.display_units import DisplayUnit, display_unit
 from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.quantities import DisplayUnit, display_unit
 from activesteer.standards.page_parts import metrics_table, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
 from activesteer.standards.steering_angle import steering_wheel_at

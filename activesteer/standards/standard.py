@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 
 from activesteer.conventions import CURVE_STEP_S, Array
+from activesteer.display_units import quantity_of
 from activesteer.errors import ManeuverError, RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Picture
-from activesteer.quantities import quantity_of
 from activesteer.resources import DEFAULT_DRIVER
 
 if TYPE_CHECKING:

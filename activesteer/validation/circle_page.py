@@ -8,11 +8,11 @@ import numpy as np
 from markupsafe import Markup
 
 from activesteer.conventions import RUN_COLOURS, Array
+from activesteer.display_units import typeset
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder, write_text
 from activesteer.pages import Page, Section, Table, failed, passed, render_page
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
-from activesteer.quantities import typeset
 from activesteer.validation.measured_circle import CircleResult
 
 

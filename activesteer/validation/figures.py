@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from activesteer.display_units import quantity_of
 from activesteer.plotting import Area, Curve, Panel, Picture
-from activesteer.quantities import quantity_of
 from activesteer.validation.kinematics import Curves
 from activesteer.validation.our_runs import QUANTITIES, RMS_TOLERANCE, traces
 from activesteer.validation.reference import Table

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from typing import Final
 
-from activesteer.quantities import ESTIMATED
+from activesteer.display_units import ESTIMATED
 from activesteer.signals import Channel, Estimate, numbers_of
 
 ESTIMATE_CHANNELS: Final = tuple(

@@ -16,8 +16,8 @@ from activesteer.analysis.report.groups import Group, Run
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.analysis.track import front_axle, path_distance
 from activesteer.conventions import CORNERS, Array
+from activesteer.display_units import ESTIMATED, MEASURED, Quantity, quantity_of
 from activesteer.errors import RecordingError
-from activesteer.quantities import ESTIMATED, MEASURED, Quantity, quantity_of
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M, Course
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from activesteer.quantities import display_unit, typeset
+from activesteer.display_units import display_unit, typeset
 from activesteer.recording import Recording
 
 

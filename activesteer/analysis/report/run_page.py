@@ -24,10 +24,10 @@ from activesteer.analysis.report.tables import (
     metric_titles,
     verdict_counts,
 )
+from activesteer.display_units import typeset
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
 from activesteer.pages import render
-from activesteer.quantities import typeset
 from activesteer.recording import Recording
 
 TITLE: Final = "activesteer report"

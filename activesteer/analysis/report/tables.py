@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict
 from activesteer.analysis.report.groups import Group, Run, entry
+from activesteer.display_units import parameter_label, typeset
 from activesteer.metric_table import recorded_metric
-from activesteer.quantities import parameter_label, typeset
 
 
 class Cell(NamedTuple):

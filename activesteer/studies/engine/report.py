@@ -14,11 +14,11 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from activesteer.conventions import Array, run_looks
+from activesteer.display_units import parameter_label
 from activesteer.errors import StudyError
 from activesteer.files import write_text
 from activesteer.metric_table import recorded_metric
 from activesteer.pages import render
-from activesteer.quantities import parameter_label
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
 from activesteer.studies.engine.run_task import CURVE

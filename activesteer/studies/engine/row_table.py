@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import pyarrow as pa
 
-from activesteer.quantities import unit_of
+from activesteer.display_units import unit_of
 from activesteer.studies.engine.run_task import CURVE, Row
 
 IDENTITY: Final = ("run", "run_id", "sample", "maneuver", "vehicle", "controller")
