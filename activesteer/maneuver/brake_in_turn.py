@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
@@ -15,31 +15,11 @@ from activesteer.signals import Setpoint
 
 
 @dataclass(frozen=True)
-class TurnInput:
+class TurnInput(StepInput):
     """The steering wheel at the entry of the turn."""
 
-    OVERRULED: ClassVar = {"lateral_acceleration_mps2": {"steering_wheel_rad": None}}
-
-    start_s: Annotated[float, Range(0.0)] = 0.5
-    """Time at which the steering wheel begins to turn [s]."""
     rate_radps: Annotated[float, Range(0.1, 50.0)] = math.radians(60.0)
     """Steering wheel rate [rad/s]."""
-    steering_wheel_rad: Annotated[float, Range(-15.0, 15.0)] | None = None
-    """Angle that is then held, left positive [rad]. Default: found by a search."""
-    lateral_acceleration_mps2: Annotated[float, Range(-12.0, 12.0)] | None = None
-    """Steady-state lateral acceleration of the car without control that the search reaches, left positive [m/s2]."""
-
-    def __post_init__(self) -> None:
-        """Check the keys. If both angle and lateral acceleration are given, a search has found the angle.
-
-        Raises:
-            ManeuverError: neither is given.
-        """
-        if self.steering_wheel_rad is None and self.lateral_acceleration_mps2 is None:
-            raise ManeuverError(
-                "steering_wheel_deg (the angle to hold) or lateral_acceleration_mps2 (which the car without control "
-                "reaches) is needed"
-            )
 
 
 @dataclass(frozen=True)

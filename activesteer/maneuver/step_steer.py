@@ -32,6 +32,18 @@ class StepInput:
     lateral_acceleration_mps2: Annotated[float, Range(-12.0, 12.0)] | None = None
     """Steady-state lateral acceleration of the car without control that the search reaches, left positive [m/s2]."""
 
+    def __post_init__(self) -> None:
+        """Check that amplitude or lateral acceleration is given; with both, a search has found the amplitude.
+
+        Raises:
+            ManeuverError: neither is given.
+        """
+        if self.steering_wheel_rad is None and self.lateral_acceleration_mps2 is None:
+            raise ManeuverError(
+                "steering_wheel_deg (the amplitude) or lateral_acceleration_g (which the car without control reaches) "
+                "is needed"
+            )
+
 
 @dataclass(frozen=True, kw_only=True)
 class StepSteer(Maneuver):
@@ -41,18 +53,12 @@ class StepSteer(Maneuver):
     """The step."""
 
     def __post_init__(self) -> None:
-        """Check the keys. If both amplitude and lateral acceleration are given, a search has found the amplitude.
+        """Check that the step starts before the end of the run.
 
         Raises:
-            ManeuverError: neither is given, or the step starts after the end of the run.
+            ManeuverError: it does not.
         """
         step = self.steer
-        if step.steering_wheel_rad is None and step.lateral_acceleration_mps2 is None:
-            raise ManeuverError(
-                "steering_wheel_deg (the amplitude) or lateral_acceleration_g (which the car without control reaches) "
-                "is needed",
-                key="steer",
-            )
         if step.start_s >= self.duration_s:
             raise ManeuverError(
                 f"is {step.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)",
