@@ -58,8 +58,8 @@ def _measured(car: Car) -> str:
 
 def _open(rows: list[str]) -> str:
     if not rows:
-        return "The table gave every value that a rule would have given.\n"
-    head = "Not given by the table, taken by a rule. Replace what you know: the key is that of the table.\n\n"
+        return "The table gives all values, so that no rule was used.\n"
+    head = "Values by rules, because the table lacks them. Replace what you know, by these keys of the table.\n\n"
     return head + "| Key | Value | Rule |\n|---|---|---|\n" + "\n".join(rows) + "\n"
 
 

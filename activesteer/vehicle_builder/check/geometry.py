@@ -73,7 +73,7 @@ def _mirror(model: mujoco.MjModel, points: dict[str, Array]) -> Iterator[Finding
             other = points.get(_OPPOSITE[name[:2]] + name[2:])
             if other is None or np.abs(other - _MIRRORED * point).max() > _MIRROR_M:
                 wrong.append(name)
-    yield _any("right side is the left one with y negated", wrong, "edit both sides; see docs/suspension.md")
+    yield _any("right side mirrors the left side", wrong, "edit both sides; see docs/suspension.md")
     unlike = []
     for index in range(model.nbody):
         name = model.body(index).name
@@ -91,7 +91,7 @@ def _mirror(model: mujoco.MjModel, points: dict[str, Array]) -> Iterator[Finding
                 model.tendon_lengthspring[index], model.tendon_lengthspring[other], rtol=1e-9
             ):
                 unlike.append(name)
-    yield _any("masses, springs and bushings alike on both sides", unlike, "edit both sides, or the class of both")
+    yield _any("equal masses, springs and bushings on both sides", unlike, "edit both sides, or the class of both")
 
 
 def _any(what: str, wrong: list[str], advice: str) -> Finding:
@@ -188,7 +188,8 @@ def _reach(points: dict[str, Array]) -> Iterator[Finding]:
             elif point[1] > centre[1] + 0.05:
                 outside.append(f"{name} ({1e3 * (point[1] - centre[1]):.0f} mm)")
     yield _any("points within 1.2 m of their wheel", far, "front and rear exchanged, or a point in another unit?")
-    yield _any("points not outside of the wheel's middle", outside, "check y: it is further out than the tyre's middle")
+    advice = "check y: the point is further out than the middle of the tyre"
+    yield _any("points not outside the middle of the wheel", outside, advice)
 
 
 def _firmness(model: mujoco.MjModel, corner: str) -> Iterator[Finding]:
@@ -199,5 +200,5 @@ def _firmness(model: mujoco.MjModel, corner: str) -> Iterator[Finding]:
     except ModelError as reason:
         yield Finding("geometry", what, "error", "no", "", str(reason))
         return
-    advice = "two links do nearly the same: look for parallel links in one plane, or points that coincide"
+    advice = "two links constrain nearly the same direction: look for parallel links in one plane, or coincident points"
     yield judged("geometry", what, motion.firmness, "", Usual(0.03, 1.0, 1e-3), advice)

@@ -53,16 +53,16 @@ def moving(result: KcResult) -> Iterator[Finding]:
     front, rear = result["front", "ride_frequency"], result["rear", "ride_frequency"]
     yield judged(
         "riding", "rear over front ride frequency", rear / front, "", Usual(1.0, 1.4, 0.4, 3.0),
-        "a rear a little faster than the front pitches least after a bump (Olley): change the springs of one axle",
+        "the car pitches least after a bump if the rear is slightly faster (Olley): change the springs of one axle",
     )  # fmt: skip
     yield from (finding for finding in _metrics(result) if finding.topic == "kinematics")
     yield _sign(result)
     yield from (finding for finding in _metrics(result) if finding.topic == "steering")
     known = result.measured.parameters.steering.ratio
     yield judged(
-        "steering", "ratio in the vehicle file, against the measured one",
+        "steering", "ratio in the vehicle file, against the measured ratio",
         100.0 * (known / result["front", "steering_ratio"] - 1.0), "%", Usual(-2.0, 2.0, -100.0, 100.0),
-        "write the measured one into [steering]: controllers and driver rely on it",
+        "write the measured ratio into [steering]: controllers and driver rely on it",
     )  # fmt: skip
 
 
@@ -81,10 +81,10 @@ def _sign(result: KcResult) -> Finding:
     turned = sweep.steer_rad[-1, :2] - sweep.steer_rad[sweep.zero, :2]
     good = bool((turned > 0.0).all()) and float(sweep.x[-1]) > 0.0
     degrees = ", ".join(f"{math.degrees(angle):.1f}" for angle in np.asarray(turned))
-    advice = "" if good else "turn the axis of the joint `rack` round: its positive travel has to steer left"
+    advice = "" if good else "reverse the axis of the joint `rack`: its positive travel has to steer left"
     return Finding(
         "steering",
-        "left turn of the steering wheel turns left",
+        "left turn of the steering wheel steers left",
         "ok" if good else "error",
         f"{degrees} deg",
         "",

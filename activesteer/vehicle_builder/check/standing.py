@@ -57,7 +57,7 @@ def _loads(load_N: np.ndarray, mass_kg: float) -> Iterator[Finding]:
         difference = 100.0 * abs(load_N[left] - load_N[right]) / load_N[left : right + 1].mean()
         yield judged(
             "standing", f"{axle} wheel loads, left against right", difference, "%", Usual(0.0, 0.1, 0.0, 2.0),
-            "left and right differ: mass off the middle, or points, springs or bushings of one side edited alone",
+            "left and right differ: is the mass off the middle, or was only one side edited?",
         )  # fmt: skip
 
 
@@ -75,7 +75,7 @@ def _height(vehicle: Vehicle) -> Iterator[Finding]:
             now = (turn @ (data.xpos[wheel] - data.xpos[chassis]))[2]
             travel += 500.0 * float(now - (design.xpos[wheel, 2] - design.xpos[chassis, 2]))
         advice = (
-            "the springs carry it at another height than the hardpoints were given for: change springlength "
+            "the springs carry the car at another height than that of the hardpoints: change springlength "
             "(docs/suspension.md), or make the car from its table again, which trims it"
         )
         yield judged(
@@ -89,9 +89,7 @@ def _height(vehicle: Vehicle) -> Iterator[Finding]:
     w, x, y, z = data.qpos[3:7]
     pitch = math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))))
     roll = math.degrees(2.0 * math.atan2(x, w))
-    advice = (
-        "the wheel centres of both axles are at heights that the tyres' loaded radii do not have: check z and the tyres"
-    )
+    advice = "the heights of the wheel centres differ from the loaded radii of the tyres: check z and the tyres"
     yield judged("standing", "pitch, positive nose down", pitch, "deg", Usual(-0.7, 0.7, -4.0, 4.0), advice)
     yield judged("standing", "roll", roll, "deg", Usual(-0.01, 0.01, -1.0, 1.0), "left and right differ")
 
@@ -136,7 +134,7 @@ def _tyres(car: Car, load_N: np.ndarray) -> Iterator[Finding]:
         yield judged(
             "tyres", f"{axle} highest valid load over the static load", maximum / float(load), "",
             Usual(1.8, 10.0, 1.05, 100.0),
-            "in a turn the outer tyre carries up to twice its load; beyond the file's range forces stay at the limit",
+            "in a turn the outer tyre carries up to twice its load; beyond its range the forces stay constant",
         )  # fmt: skip
 
 
@@ -170,7 +168,7 @@ def _controllers_view(car: Car, mass_kg: float, yaw_inertia: float) -> Iterator[
     for what, known, real in (("mass", track.mass_kg, mass_kg), ("yaw inertia", track.yaw_inertia_kgm2, yaw_inertia)):
         off = 100.0 * (known / real - 1.0)
         yield judged(
-            "standing", f"{what} that controllers know, against the model's", off, "%", Usual(-2.0, 2.0),
+            "standing", f"{what} that controllers know, against that of the model", off, "%", Usual(-2.0, 2.0),
             "run `activesteer identify`, which writes [single_track]",
         )  # fmt: skip
 
@@ -189,5 +187,5 @@ def _stays(vehicle: Vehicle) -> Iterator[Finding]:
     words = "yes" if good else f"no: {speed:.3g} m/s, rad/s"
     yield Finding(
         "standing", "stands still for 0.5 s", "ok" if good else "error", words, "",
-        "" if good else "a part without stiffness or damping, or one of a stiffness that the step cannot follow",
+        "" if good else "look for a part without stiffness or damping, or with a stiffness too large for the time step",
     )  # fmt: skip

@@ -23,7 +23,7 @@ NO_PREDICTION_MPS = math.sqrt(120_000.0 * 1.5 * 2.5 / (1400.0 * 1.0))
 
 
 def setup(*, gains: ControllerParameters | None = None, **car: float) -> ControllerSetup:
-    """What a controller is made from."""
+    """Input from which a controller is made."""
     return ControllerSetup(
         single_track=replace(CAR, **car),
         gains=gains or ControllerParameters(),
@@ -33,12 +33,12 @@ def setup(*, gains: ControllerParameters | None = None, **car: float) -> Control
 
 
 def steering(front_steer_rad: float) -> DriverCommand:
-    """A driver who does nothing but steer."""
+    """Command of a driver who only steers."""
     return DriverCommand(16.0 * front_steer_rad, front_steer_demand_rad=front_steer_rad)
 
 
 def measured(yaw_rate_radps: float, speed_mps: float = 25.0) -> Measurement:
-    """A car that yaws."""
+    """Measurement of a yawing car."""
     return Measurement(
         time_s=0.0,
         speed_mps=speed_mps,
@@ -55,5 +55,5 @@ def measured(yaw_rate_radps: float, speed_mps: float = 25.0) -> Measurement:
 def held(
     controller: Controller, command: DriverCommand, measurement: Measurement, steps: int = 1000
 ) -> ActuatorCommand:
-    """What a controller answers in the end to messages that do not change."""
+    """Last answer of a controller to constant messages."""
     return [controller.step(command, measurement) for _ in range(steps)][-1]

@@ -1,4 +1,4 @@
-"""Stability control by single brakes: which wheel, how much, and when not."""
+"""Stability control by single brakes: wheels, torques and limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Controllers by name and from a user's file, and what is said when they are wrong."""
+"""Controllers by name and from a user's file, and the messages for wrong ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Steering and brakes together: who does what is wished, and what happens where one of them cannot."""
+"""Steering and brakes together: the allocation, and its behaviour after failures."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_small_errors_are_left_to_the_steering_which_does_what_the_state_feedbac
 
 
 def spinning(side: float, yaw_rate_radps: float = 0.6):
-    """A car whose wheels are at their limits and which turns on."""
+    """A car that keeps turning with its wheels at their limits."""
     most_rad = math.radians(3.0)
     return measured(side * yaw_rate_radps, SPEED_MPS)._replace(
         rear_steer_rad=side * most_rad, superposition_rad=-side * most_rad

@@ -1,4 +1,4 @@
-"""The quadratic programmes of `mpc` and `integrated`, against the sums and forces that they stand for."""
+"""The quadratic programmes of `mpc` and `integrated`, against their cost sums and forces."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def known():
 
 
 def driven(p, z, angles):
-    """Cost of driving on with angles in blocks, and yaw rate and rear slip angle at the calls looked at."""
+    """Cost of driving with angles in blocks, and yaw rate and rear slip angle at the checked calls."""
     a, b = model(CAR, p, LAG_S, INTERVAL_S, SPEED_MPS, 0.8, 0.6)
     given = dict(zip((*STATES, *GIVEN), z, strict=True))
     before = np.array([given["superposition_before"], given["rear_before"]])

@@ -38,7 +38,7 @@ def test_prediction_in_time_is_the_transfer_function(speed_mps, rng):
 
 
 def test_prediction_of_a_ramp_is_the_continuous_response():
-    """Against the continuous system, which knows nothing of steps: held inputs are half a step late."""
+    """Compare with the continuous system: inputs held over a step are half a step late."""
     gain, lead_s, lag_s = MODEL.rear_prediction(22.22)
     time_s = np.arange(0.0, 0.5, 0.001)
     front_rad: Any = np.minimum(0.4 * time_s, 0.03)
@@ -127,7 +127,7 @@ def test_integral_does_not_wind_up_while_the_limit_is_active(side):
 
 
 def test_integral_can_leave_a_limit_that_the_prediction_holds():
-    """Prediction alone is over the limit; the corrector must be able to pull the angle back."""
+    """The prediction alone exceeds the limit; the corrector must be able to pull the angle back."""
     block = controller(prediction_gain=1.0, proportional_gain_s=0.0, integral_gain=1.0)
     # Slow car, left: the prediction is far to the right, the car yaws too much, so the corrector turns left.
     steer = held(block, steering(0.1), measured(0.5, speed_mps=5.0), steps=3000)

@@ -1,4 +1,4 @@
-"""What controllers know of the steering servos: the cars have them so, and the controllers keep to it."""
+"""Steering servos as controllers know them: equal to those of the cars, and respected by the controllers."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ GAIN, LIMIT_RAD, SPEED_MPS = 0.5, RearSteerParameters().limit_rad, 25.0
 
 
 class Knows:
-    """An estimator that knows the sideslip."""
+    """An estimator with a known sideslip angle."""
 
     def __init__(self, sideslip_rad: float) -> None:
         self.sideslip_rad = sideslip_rad

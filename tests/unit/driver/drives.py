@@ -11,7 +11,7 @@ DRIVE = Drive(ENGINE)
 
 
 def parameters(**changed: float) -> DriverParameters:
-    """A driver of round numbers."""
+    """Parameters of a driver, in round numbers."""
     round_numbers = DriverParameters(
         preview_s=1.3,
         reaction_delay_s=0.2,

@@ -1,4 +1,4 @@
-"""The driver on a circle, with a car that needs more steering than geometry says."""
+"""The driver on a circle, with a car that needs more than the Ackermann angle."""
 
 from __future__ import annotations
 

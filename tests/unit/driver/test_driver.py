@@ -21,13 +21,13 @@ def driver() -> OpenLoopDriver:
 
 
 def at(speed_mps: float, faster_mps: float = 0.0) -> Measurement:
-    """A car whose front wheels turn faster than it rolls."""
+    """Measurement of a car whose front wheels spin."""
     front, rear = (speed_mps + faster_mps) / RADIUS_M, speed_mps / RADIUS_M
     return Measurement(0.0, speed_mps, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (front, front, rear, rear))
 
 
 def drive(block: SpeedHold, wanted_mps: float, speed_mps: float, drag_N: float, steps: int) -> list[float]:
-    """Speeds of a point mass that the block drives."""
+    """Speeds of a point mass driven by the block."""
     speeds = []
     for _ in range(steps):
         torque = block.step(wanted_mps, at(speed_mps))

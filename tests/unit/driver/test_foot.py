@@ -1,4 +1,4 @@
-"""The foot of a driver whose wheels spin: where it starts, how far it comes back, and what it forgets."""
+"""The foot of a driver whose wheels spin: start, return and reset."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The preview driver on a linear single-track car of the test's own."""
+"""The preview driver with a linear single-track car."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def command_of(block: PathPreviewDriver, motion: Motion, path: Path = STRAIGHT) 
 
 
 def answer_to(block: PathPreviewDriver, motion: Motion, seconds: float) -> list[float]:
-    """Steering wheel angles while the driver sees the same all the time."""
+    """Steering wheel angles for a constant view of the road."""
     return [command_of(block, motion).steering_wheel_demand_rad for _ in range(round(seconds / TIMESTEP_S))]
 
 

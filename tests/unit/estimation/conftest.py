@@ -1,4 +1,4 @@
-"""What the tests of this folder share."""
+"""Fixtures of the tests of this folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def slalom():
 
 @pytest.fixture(scope="session")
 def make():
-    """Makes estimators of the compact with production sensors."""
+    """Function that makes estimators of the compact with production sensors."""
 
     def made(interval_s=0.001, **overrides):
         return resolve("straight_line", overrides=PRODUCTION | overrides).controller_setup(interval_s).estimator()

@@ -1,4 +1,4 @@
-"""Drives whose sensors' words are kept, for the tests of this folder."""
+"""Drives with their measurements, for the tests of this folder."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Drive(NamedTuple):
     """A drive.
 
     Attributes:
-        recording: What was recorded.
-        said: What the sensors said in each step, and before the recording while the car settled.
+        recording: The recording.
+        said: Measurements of each step, including the settling before the recording.
     """
 
     recording: Recording
@@ -27,7 +27,7 @@ class Drive(NamedTuple):
 
 
 def drive(maneuver: str, **overrides: Any) -> Drive:
-    """Drives the compact with production sensors, observed."""
+    """Drive the compact with production sensors and an observer."""
     said: list[Measurement] = []
 
     class Listening:
@@ -44,13 +44,13 @@ def drive(maneuver: str, **overrides: Any) -> Drive:
 
 
 def estimates(estimator: Estimator, said: Iterable[Measurement]) -> dict[str, np.ndarray]:
-    """What an estimator makes of it, by member of `Estimate`."""
+    """Estimates for measurements, by field of `Estimate`."""
     rows = np.array([estimator.step(measurement) for measurement in said])
     return dict(zip(Estimate._fields, rows.T, strict=True))
 
 
 def rolling(speed_mps: float, spins: Iterable[float] | None = None, **others: Any) -> Measurement:
-    """A car that rolls straight ahead, its wheels with a radius of 0.3077 m."""
+    """Measurement of a car that rolls straight ahead on wheels of 0.3077 m radius."""
     spin = speed_mps / 0.3077
     zero = {name: 0.0 for name in Measurement._fields[:8]}
     wheels = tuple(spins) if spins is not None else (spin, spin, spin, spin)

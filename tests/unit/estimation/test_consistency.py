@@ -1,4 +1,4 @@
-"""The filter's errors are as large as its covariance says: in its own model exactly, in the multibody car nearly.
+"""The errors of the filter match its covariance: exactly in its own model, nearly in the multibody car.
 
 Source: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, section 5.4 (NEES,
 NIS and their bounds by the chi-square distribution).
@@ -37,7 +37,7 @@ RUNS, STEPS, INTERVAL_S, SPEED_MPS = 40, 150, 0.01, 25.0
 
 
 def bounds(freedom: int, samples: int) -> tuple[float, float]:
-    """Where the mean of so many squared errors lies with 95 %."""
+    """95 % interval of the mean of `samples` squared errors."""
     low, high = chi2.ppf([0.025, 0.975], freedom * samples) / samples
     return low, high
 
@@ -51,7 +51,7 @@ def known_and_tyres():
 
 
 def drift(known, memory, state, duration_s, rng):
-    """What the filter takes for unknown, drawn: as `kalman_filter` describes it."""
+    """Draw the unknowns of the filter, as described in `kalman_filter`."""
     front_rad, rear_rad = slip_angles.py_func(known, memory, state, SPEED_MPS)
     for place, mean, size, time_s in (
         (FRONT_ERROR, 0.0, known.slip_angle_std_rad + known.slip_angle_fraction * abs(front_rad), known.slip_angle_s),
@@ -67,20 +67,20 @@ def drift(known, memory, state, duration_s, rng):
 
 
 def force_stds_N(known, tyres, memory, state):
-    """Standard deviations of what is wrong with both axles' forces [N]."""
+    """Standard deviations of the force errors of both axles [N]."""
     return known.force_std_N + known.force_fraction * np.abs(forces_of(known, tyres, memory, state))
 
 
 def white(known, rng):
-    """Errors over a step [s] and at its end [-], in turn and relative to their size, as the filter takes them: white,
-    with as much power as those that stay for a time."""
+    """Yield relative errors over a step [s] and at its end [-] in turn, as the filter assumes them: white, with the
+    power of lasting errors."""
     while True:
         yield math.sqrt(2.0 * known.force_s * INTERVAL_S) * rng.standard_normal(2)
         yield math.sqrt(1.0 + 2.0 * known.force_s / INTERVAL_S) * rng.standard_normal(2)
 
 
 def lasting(known, rng):
-    """The same as they are meant: each stays for `force_s`, in the motion and in what is measured alike."""
+    """Yield the same errors as intended: each lasts for `force_s`, in motion and measurement alike."""
     error, kept = rng.standard_normal(2), math.exp(-INTERVAL_S / known.force_s)
     while True:
         yield INTERVAL_S * error
@@ -89,7 +89,8 @@ def lasting(known, rng):
 
 
 def one_run(known, tyres, rng: np.random.Generator, kind):
-    """NEES of the motion at the end, and mean NIS, of a car that is the filter's own model but for errors of a kind."""
+    """Return the final NEES of the motion and the mean NIS, for a car that is the filter's model with errors of a
+    kind."""
     true, memory = np.zeros(1, MEMORY)[0], np.zeros(1, MEMORY)[0]
     true["speed_mps"] = memory["speed_mps"] = SPEED_MPS
     begin(known, memory)
@@ -158,7 +159,7 @@ def test_wrong_force_of_one_axle_moves_lateral_speed_and_yaw_rate_together(known
 
 @pytest.mark.slow
 def test_errors_in_other_cars_than_the_known_one_are_those_of_its_covariance(rng):
-    """Each a car of its own: mass, tyres, friction of the road, offsets of the sensors."""
+    """Each run has its own car: mass, tyres, friction of the road, offsets of the sensors."""
     squared = []
     for seed in range(6):
         run = simulate(

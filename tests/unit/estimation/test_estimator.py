@@ -1,4 +1,4 @@
-"""Speed, sideslip and friction from what the sensors say: how near to the truth, and from nothing but the sensors."""
+"""Speed, sideslip and friction from the sensors: accuracy, and independence of other inputs."""
 
 from __future__ import annotations
 

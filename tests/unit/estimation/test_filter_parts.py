@@ -1,4 +1,4 @@
-"""Parts of the estimator by themselves: knowledge of car and sensors, wheels, brush model, stated errors."""
+"""Single parts of the estimator: knowledge of car and sensors, wheels, brush model, stated errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Braking in a turn as it is asked of the driver."""
+"""Setpoints of braking in a turn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Constant radius: curvature and speed that are asked of the driver."""
+"""Setpoints of the constant radius: curvature and speed."""
 
 from __future__ import annotations
 

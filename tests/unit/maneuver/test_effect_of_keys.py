@@ -1,4 +1,4 @@
-"""Every key of a manoeuvre does something, or says which other key takes its effect away."""
+"""Every key of a manoeuvre has an effect, or names the key that makes it ineffective."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NUMBERS = (0.0, 0.05, 0.3, 0.7, 1.0, 1.7, 3.1, 5.0, 12.0, 33.0, 61.0)
 
 
 def seen(maneuver: Maneuver) -> str:
-    """All that driver and wheels will meet: setpoints over time, friction where the car drives, path, lanes, cones."""
+    """All inputs of driver and wheels: setpoints over time, friction along the way, path, lanes, cones."""
     times = np.linspace(0.0, maneuver.duration_s, 300)
     search = maneuver.search
     if search is not None:
@@ -46,7 +46,7 @@ def _inside(area: Any, x: float, y: float) -> bool:
 
 
 def candidates(maneuver: str, key: str) -> Iterator[Any]:
-    """Values that the key may have."""
+    """Possible values of a key."""
     try:
         resolve(maneuver, overrides={key: "?"})
     except ActiveSteerError as error:

@@ -1,4 +1,4 @@
-"""A user's own path, from a list or a CSV, and what is said of one that cannot be driven."""
+"""A user's own path, from a list or a CSV, and the messages for impossible ones."""
 
 from __future__ import annotations
 

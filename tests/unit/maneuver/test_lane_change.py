@@ -1,4 +1,4 @@
-"""The double lane change: the path through the lanes, and what is said of wrong ones."""
+"""The double lane change: the path through the lanes, and the messages for wrong ones."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def course(lane: dict[str, Any]) -> Course:
 
 
 def least_distance_m(course: Course, width_m: float) -> float:
-    """Least distance between the car's sides, at axles 1.3 m from its centre, and the edges of the lanes."""
+    """Smallest distance of the car's sides, at axles 1.3 m from its centre, from the edges of the lanes."""
     path = course.path
     s = np.arange(0.0, path.length_m, 0.02)
     x, y = PathSearch(path).at(s)

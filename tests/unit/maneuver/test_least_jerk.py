@@ -1,4 +1,4 @@
-"""The smoothest way through bounds: against what is known in closed form, and against its own optimality."""
+"""The smoothest path through bounds, against closed forms and its optimality."""
 
 from __future__ import annotations
 

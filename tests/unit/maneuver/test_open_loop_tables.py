@@ -1,4 +1,4 @@
-"""Open loop from CSV files: steering wheel or rack, torques of the wheels."""
+"""Open loop from CSV files: steering wheel or rack, wheel torques."""
 
 from __future__ import annotations
 
@@ -72,7 +72,8 @@ def test_every_car_with_a_rack_takes_rack_positions() -> None:
 
 
 def test_torques_of_the_wheels_drive_and_brake_one_by_one(tmp_path: Path) -> None:
-    """Rear left alone is driven, front right braked: torque over radius each, at once, and the car turns right."""
+    """With drive at the rear left and brake at the front right, the forces are torque over radius and the car turns
+    right."""
     torques = "time_s,rl_drive_Nm,fr_brake_Nm\n0,0,0\n0.2,0,0\n0.21,200,300\n"
     run = simulate(write(tmp_path, 'drive_csv = "torque.csv"\n', torque=torques), vehicle="sedan")
     assert run["rl_drive_torque_Nm"][-1] == pytest.approx(200.0, rel=1e-6)

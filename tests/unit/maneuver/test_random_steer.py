@@ -1,4 +1,4 @@
-"""Random steering: its band, its size, and that a seed says which it is."""
+"""Random steering: its band, its size and its seed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The manoeuvres that come with the package: those of the paper as it says, all long enough to be evaluated."""
+"""The manoeuvres of the package: values of the paper, and sufficient lengths for the evaluation."""
 
 from __future__ import annotations
 
@@ -91,6 +91,6 @@ def test_the_snow_of_the_mu_jump_gives_less_than_the_turn_asks_for_and_the_dry_r
 
 @pytest.mark.parametrize("name", list_maneuvers())
 def test_road_is_stated(name: str) -> None:
-    """What "dry" means is no default of the program: every file says its friction, for the whole road or by side."""
+    """Every file gives its friction, for the whole road or for each side; the program has no default for "dry"."""
     road = tomllib.loads(find_maneuver(name).read_text(encoding="utf-8")).get("road", {})
     assert "mu" in road or {"mu_left", "mu_right"} <= road.keys()

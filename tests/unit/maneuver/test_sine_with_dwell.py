@@ -1,4 +1,4 @@
-"""The sine with dwell as it is asked of the driver."""
+"""Setpoints of the sine with dwell."""
 
 from __future__ import annotations
 

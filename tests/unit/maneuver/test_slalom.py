@@ -1,4 +1,4 @@
-"""The slalom: a path round the cones, and what is said of wrong ones."""
+"""The slalom: a path past the cones, and the messages for wrong ones."""
 
 from __future__ import annotations
 

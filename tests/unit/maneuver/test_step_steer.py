@@ -1,4 +1,4 @@
-"""The step steer as it is asked of the driver."""
+"""Setpoints of the step steer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Braking straight ahead as it is asked of the driver."""
+"""Setpoints of braking straight ahead."""
 
 from __future__ import annotations
 

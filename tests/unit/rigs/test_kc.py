@@ -36,7 +36,7 @@ def test_the_compact_meets_its_targets_but_for_what_is_judged() -> None:
 
 
 def test_dry_friction_takes_no_part() -> None:
-    """It pushes as far one way as the other: the rig gives the mean of both directions of a sweep."""
+    """Friction acts equally in both directions: the rig gives the mean of both directions of a sweep."""
     rough = kinematics_compliance("compact", {"friction.front_damper_N": 400.0, "friction.rack_N": 1000.0})
     assert rough.to_json() == compact().to_json()
 
@@ -135,7 +135,7 @@ def test_every_target_of_the_compact_has_a_source() -> None:
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_steering_axis_is_found_from_two_poses(side: float) -> None:
-    """A wheel turned about a line that is known."""
+    """A wheel is turned about a known line."""
     direction = np.array([-math.tan(0.12), -side * math.tan(0.2), 1.0])
     direction /= np.linalg.norm(direction)
     ground = np.array([0.03, side * 0.70, 0.0])
@@ -168,7 +168,7 @@ def test_an_override_that_is_no_part_of_the_car_is_explained() -> None:
 
 
 def test_a_heavier_body_sinks_no_wheel_but_loads_it() -> None:
-    """Overrides reach the rig: the static loads follow the mass, the links' kinematics stay nearly the same."""
+    """Overrides reach the rig: the static loads follow the mass, and the kinematics of the links hardly change."""
     heavy = kinematics_compliance("compact", {"factors.mass": 1.1})
     light = compact()
     assert heavy["car", "mass"] == pytest.approx(1.1 * light["car", "mass"], abs=1.0)

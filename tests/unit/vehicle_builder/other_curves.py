@@ -1,4 +1,4 @@
-"""Curves of an axle as no car has them, with a value in every field."""
+"""Unusual curves of an axle, with a value in every field."""
 
 from __future__ import annotations
 
@@ -31,5 +31,5 @@ def other_axle(*, steered: bool) -> AxleCurves:
 
 
 def other_curves() -> Curves:
-    """Both axles."""
+    """Curves of both axles."""
     return Curves(other_axle(steered=True), other_axle(steered=False))

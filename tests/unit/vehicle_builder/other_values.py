@@ -1,4 +1,4 @@
-"""The same parameters with every value changed, whatever fields there are."""
+"""Parameters with every value changed."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _WHOLE: Final = {"curves": other_curves()}
 
 
 def all_changed(cls: type, given: Any) -> Any:
-    """A dataclass of which no field, down to the last table, is as it was; arguments as of `other_values`."""
+    """Return a dataclass with every field changed, down to the last table; arguments as in `other_values`."""
     return cls(**other_values(cls, given))
 
 
 def other_values(cls: type, given: Any) -> dict[str, Any]:
-    """Another value for each field, which need not go together.
+    """Return another value for each field; they need not be consistent.
 
     Args:
         cls: The dataclass.

@@ -1,4 +1,4 @@
-"""Tables that the tests of the vehicle builder share, and changes of them."""
+"""Tables for the tests of the vehicle builder, and changes of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ WISHBONE: Final = TABLES / "wishbone.csv"
 
 
 def changed(table: Path, folder: Path, *changes: tuple[str, str]) -> Path:
-    """A copy of a table in which texts are replaced; each must occur."""
+    """Write a copy of a table with texts replaced; each text must occur."""
     text = table.read_text(encoding="utf-8")
     for old, new in changes:
         assert old in text, old

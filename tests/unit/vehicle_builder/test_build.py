@@ -1,4 +1,4 @@
-"""Cars made from tables: the compact again, other suspensions, and what is asked for is what they have."""
+"""Cars made from tables: the compact again, other suspensions, and the values of their tables."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ def compact() -> KcResult:
 @pytest.mark.parametrize("sweep", ["parallel_travel", "opposite_travel", "parallel_kinematic", "lateral_in_phase",
                                    "longitudinal_patch", "aligning_in_phase", "steering_rolling"])  # fmt: skip
 def test_the_compacts_hardpoints_give_the_compacts_toe_and_camber(sweep: str) -> None:
-    """Within 0.01 deg over +-80 mm and full lock: spring forces and wheel angles were found anew, not copied."""
+    """Within 0.01 deg over +-80 mm and full lock: spring forces and wheel angles come from a new trim, not from a
+    copy."""
     for angle in ("toe_rad", "camber_rad"):
         one, two = (getattr(result.curves[sweep], angle) for result in (compact(), again()))
         assert np.degrees(np.abs(one - two)).max() < 0.01, angle
@@ -85,7 +86,7 @@ def test_a_wheel_rate_a_ratio_and_static_angles_are_met(tmp_path: Path) -> None:
 
 
 def test_an_anti_roll_bar_adds_the_roll_stiffness_that_is_asked_for(tmp_path: Path) -> None:
-    """Within 5 %: tyres rigid, and the wheel rate's change with load is in the axle's roll stiffness as well."""
+    """Within 5 %, because the roll stiffness includes the change of the wheel rate with load; tyres rigid."""
     stiffness = []
     for number, bars in enumerate(((0, 0), (26000, 14000))):
         table = changed(
@@ -142,7 +143,7 @@ def test_every_suspension_stands_and_has_one_way_to_travel(tmp_path: Path, rear:
 
 
 def test_front_arm_geometry_is_chronos(tmp_path: Path) -> None:
-    """Its generic sedan, front tie rod as there: an independent calculation of bump steer gives -35.95 deg/m."""
+    """Chrono's generic sedan with its front tie rod: an independent calculation of bump steer gives -35.95 deg/m."""
     table = changed(
         WISHBONE, tmp_path, ("front.tie_rod_inner,   -200, 392,  320", "front.tie_rod_inner,   -200, 392,  296"),
         ("front.tie_rod_outer,   -150, 708,  296", "front.tie_rod_outer,   -150, 742,  296"),

@@ -1,4 +1,4 @@
-"""What the check says of good cars, and of cars with one thing wrong."""
+"""Findings for good cars, and for cars with one error."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def compact() -> CheckReport:
 
 @pytest.fixture(scope="module")
 def good() -> Path:
-    """Folder of a car to be damaged in copies."""
+    """Folder of a good car."""
     return new_vehicle("car", COMPACT, Path(tempfile.mkdtemp()) / "car").folder
 
 
 @pytest.fixture
 def damaged(good: Path, tmp_path: Path) -> Damage:
-    """Checks a copy of the car in which one text of a file is another one."""
+    """Check a copy of the car with one text of a file replaced."""
 
     def check(file: str, *changes: tuple[str, str]) -> CheckReport:
         folder = tmp_path / "car"
@@ -66,7 +66,7 @@ def test_values_are_those_of_the_rig_and_of_the_standing_car() -> None:
 def test_every_line_that_is_not_ok_says_what_to_do(damaged: Damage) -> None:
     report = damaged("car.toml", (r"ratio = 15.83", "ratio = 12"))
     bad = [finding for finding in report.findings if finding.level != "ok"]
-    assert [finding.what for finding in bad] == ["ratio in the vehicle file, against the measured one"]
+    assert [finding.what for finding in bad] == ["ratio in the vehicle file, against the measured ratio"]
     assert all(finding.advice for finding in bad)
     assert "activesteer" not in bad[0].value
     assert bad[0].advice in report.table()
@@ -75,13 +75,13 @@ def test_every_line_that_is_not_ok_says_what_to_do(damaged: Damage) -> None:
 def test_a_point_on_the_wrong_side(damaged: Damage) -> None:
     report = damaged("front_axle.xml", (r'("fl_lca_front_inner" pos="-0.015) 0.365', r"\1 -0.365"))
     assert report["points on the side of their wheel"].value == "no: fl_lca_front_inner"
-    assert report["right side is the left one with y negated"].level == "error"
+    assert report["right side mirrors the left side"].level == "error"
 
 
 def test_one_side_edited_alone(damaged: Damage) -> None:
     report = damaged("front_axle.xml", (r'("fl_lca_front_inner" pos="-0.015 0.365) 0.2055', r"\1 0.2155"))
     assert report["points on the side of their wheel"].level == "ok"
-    assert report["right side is the left one with y negated"].value == "no: fl_lca_front_inner"
+    assert report["right side mirrors the left side"].value == "no: fl_lca_front_inner"
     assert report["left against right in travel"].level == "error"
 
 
@@ -134,7 +134,7 @@ def test_springs_of_the_wrong_length(damaged: Damage) -> None:
 
 def test_a_rack_that_steers_the_wrong_way(damaged: Damage) -> None:
     report = damaged("car.xml", (r'axis="0 -1 0" range', 'axis="0 1 0" range'))
-    assert report["left turn of the steering wheel turns left"].level == "error"
+    assert report["left turn of the steering wheel steers left"].level == "error"
     assert report["steering ratio"].level == "error"
 
 
@@ -174,7 +174,7 @@ def test_a_tyre_that_is_too_small(damaged: Damage, tmp_path: Path) -> None:
         "car.xml", (r'(name="chassis">\s+<freejoint.*/>\s+<!--.*-->\s+<inertial pos="[^"]*" mass=)"1269"', r'\1"2600"')
     )
     assert report["front highest valid load over the static load"].level == "warning"
-    assert report["mass that controllers know, against the model's"].level == "warning"
+    assert report["mass that controllers know, against that of the model"].level == "warning"
 
 
 def test_a_car_that_does_not_exist(tmp_path: Path) -> None:

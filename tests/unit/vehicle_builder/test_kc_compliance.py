@@ -15,7 +15,7 @@ INERTIA = np.diag([35.0, 35.0, 0.9, 0.26, 0.4])
 
 
 def test_what_no_test_moves_is_stiff_but_not_faster_than_a_step_can_tell() -> None:
-    """Rigid but for 0.1 mm/kN of side force: that stays, and the wheel swings at 320 Hz at most."""
+    """A compliance of 0.1 mm/kN under side force is kept, and the wheel oscillates at 320 Hz at most."""
     force = np.linspace(-4000.0, 4000.0, 17)
     moved: dict[str, Array | None] = {name: np.zeros(17) for name in COORDINATES}
     pushed = Load(

@@ -1,4 +1,4 @@
-"""Tables of a K&C rig: names, units, signs and sides of a laboratory, hysteresis, and what cannot be."""
+"""Tables of a K&C rig: names, units, signs and sides of a laboratory, hysteresis, and impossible values."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_names_and_signs_of_a_laboratory_are_translated(tmp_path: Path) -> None:
 
 
 def test_the_right_wheel_is_the_left_one_in_a_mirror(tmp_path: Path) -> None:
-    """A force to the left pushes the left wheel outwards and the right one inwards."""
+    """A force to the left pushes the left wheel outwards and the right wheel inwards."""
     axle(tmp_path)
     force = np.linspace(-3000.0, 3000.0, 13)
     sides = {"left_centre_outwards [mm]": 1e-4 * force, "right_centre_outwards [mm]": -1e-4 * force}

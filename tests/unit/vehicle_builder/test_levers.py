@@ -1,4 +1,4 @@
-"""Springs on arms that have no body: the tendon is the spring, in every position of the arm."""
+"""Springs on arms without a body: the tendon has the length of the spring in every position of the arm."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def points(foot: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def lengths(made: Mount, foot: np.ndarray, angle_rad: float) -> tuple[float, float]:
-    """Length of the real spring and of the tendon when the arm has turned."""
+    """Lengths of spring and tendon after a rotation of the arm."""
     turn = Rotation.from_rotvec(angle_rad * (REAR - FRONT) / np.linalg.norm(REAR - FRONT))
     moved, outer = FRONT + turn.apply(foot - FRONT), FRONT + turn.apply(OUTER - FRONT)
     assert made.start_m is not None

@@ -1,4 +1,4 @@
-"""Tables: both ways of writing them, and everything that can be wrong said at once."""
+"""Tables: both formats, and all errors at once."""
 
 from __future__ import annotations
 

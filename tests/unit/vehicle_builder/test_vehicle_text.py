@@ -1,4 +1,4 @@
-"""A vehicle file that is written says all that was given: no table, no key is left behind."""
+"""A written vehicle file contains all given values, with all tables and keys."""
 
 from __future__ import annotations
 
