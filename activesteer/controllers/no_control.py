@@ -1,4 +1,4 @@
-"""The car without active steering; only the desired yaw rate is computed, for comparison."""
+"""No control; only the desired yaw rate is computed, for comparison."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from activesteer.theory.single_track import SingleTrack
 
 
 class NoControl:
-    """No superposed and no rear angle."""
+    """The car without active steering."""
 
     reads = ("desired_yaw_rate",)
 
