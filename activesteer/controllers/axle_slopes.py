@@ -43,8 +43,8 @@ class Axle(NamedTuple):
 class AxleSlopes:
     """Side force curves of both axles.
 
-    The curve F is that of a tyre under its static load. On a road of friction mu it is mu F(alpha / mu), with the same
-    slope at zero slip angle.
+    F is the curve of a tyre under its static load. On a road of friction mu the curve is mu F(alpha / mu), with the
+    same slope at zero slip angle.
 
     Attributes:
         loads_N: Static load of one wheel of each axle [N].

@@ -117,8 +117,8 @@ class IntegratedParameters:
     ahead_s: _Lag
     """Time ahead for which the rates of the actuators limit the angles [s]."""
     side_difference_Pa: Annotated[float, Range(0.0, 1e8)]
-    """Brake pressure difference between the sides, beyond the one that the anti-lock system leaves to the driver, for
-    a car without errors [Pa]."""
+    """Brake pressure difference between the sides for a car without errors, in addition to the difference that the
+    anti-lock system leaves to the driver [Pa]."""
     side_yaw_rate_radps: _Scale
     """Yaw rate error at which this pressure difference is zero [rad/s]."""
     side_sideslip_rad: _Scale

@@ -5,9 +5,9 @@ The car follows the driver within an envelope from which it can be steered back:
     |r| <= mu g / v                  no more yaw rate than the friction can hold
     |alpha_H| <= alpha_peak(mu)      the rear axle below the slip angle of its largest force
 
-The model is that of `lqr`. For an axle that slides, C alpha becomes s C_0 alpha + C_0 e, where s is the present ratio
-of force to slip angle, constant over the horizon: an axle that is steered back loses force in proportion to its slip
-angle. With the tangent, steering would have no effect.
+The controller uses the model of `lqr`. For an axle that slides, C alpha becomes s C_0 alpha + C_0 e, where s is the
+present ratio of force to slip angle, constant over the horizon: an axle that is steered back loses force in proportion
+to its slip angle. With the tangent, steering would have no effect.
 
 In every call the programme
 
@@ -56,8 +56,8 @@ _BLOCKS: Final = (1, 2, 3, 6, 12)
 _CHECKED_STEPS: Final = (2, 4, 7, 10, 13, 19, 25)
 """Steps at which the envelope holds."""
 _SLACK_WEIGHT: Final = 1e7
-"""Cost of leaving the envelope by a rad/s or a rad, squared: a hundred times that of a yaw rate error over the whole
-horizon."""
+"""Cost of leaving the envelope by a rad/s or a rad, squared: a hundred times the cost of a yaw rate error over the
+whole horizon."""
 
 
 class Problem(NamedTuple):

@@ -12,8 +12,8 @@ from activesteer.conventions import Array
 from activesteer.errors import ControllerError, not_installed
 
 Solve = Callable[[Array, Array, Array, Array, Array], Array]
-"""Function from H, f, A, lower and upper to the x that minimises x' H x / 2 + f' x; the bounds are first those of x,
-then those of A x."""
+"""Function from H, f, A, lower and upper to the x that minimises x' H x / 2 + f' x; first the bounds of x,
+then the bounds of A x."""
 
 
 def solver() -> Solve:

@@ -71,7 +71,7 @@ class Variant:
         return CONTROLLERS[self.system].from_vehicle(replace(setup, gains=self.gains_in(setup)))
 
     def gains_in(self, setup: ControllerSetup) -> ControllerParameters:
-        """Return the gains of a car with those of the variant in their places.
+        """Merge the gains of the variant into the gains of a car.
 
         Raises:
             ControllerError: an override names a gain of the variant and would have no effect.

@@ -145,7 +145,7 @@ def _start(forces: Array, wanted: Array, weight: Array) -> Array:
 
 
 def _wanted(load: Load) -> Array:
-    """Return the motion less that of the compliance in series; nan if not measured; shape (n, 5)."""
+    """Return the motion without the motion of the compliance in series; nan if not measured; shape (n, 5)."""
     moved = [np.full(len(load.x), np.nan) if (row := load.moved[name]) is None else row for name in COORDINATES]
     return np.stack(moved, axis=1) - np.outer(load.x, load.direction) @ load.beside.T
 

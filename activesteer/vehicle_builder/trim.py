@@ -1,4 +1,4 @@
-"""Trim: let the car stand, and adjust it until height, weight, ride and steering are those of the table.
+"""Trim: let the car stand, and adjust it until height, weight, ride and steering match the table.
 
 The load on an axle follows from the centre of gravity, so the force of each spring is independent of the others: a
 wheel that stands t too high in its arch (bump) needs a force larger by (wheel rate / motion ratio) t.
@@ -170,7 +170,7 @@ def _first_guess(
     if axle_trim.curves is None:
         axle_trim.wheel_x_rad, axle_trim.wheel_z_rad = -axle.camber_rad, -axle.toe_rad
     if axle.kind.strut and axle.table.anti_roll_bar_Nmprad is not None:
-        # The bar acts along the strut, whose travel is smaller than that of the wheel.
+        # The bar acts along the strut, whose travel is smaller than the wheel travel.
         axle.anti_roll_bar_Npm /= damper**2
     bump, rebound = axle.table.bump_stop_m, axle.table.rebound_stop_m
     axle_trim.bump_stop_m = log.take(f"{axle.name}.bump_stop_m", bump, _STOPS_M[0] * damper, "35 mm at the wheel", "m")

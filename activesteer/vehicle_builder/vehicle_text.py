@@ -17,7 +17,8 @@ from activesteer.vehicle_builder.hardware import hardware_tables, in_degrees
 from activesteer.vehicle_builder.trimmed import Trimmed
 
 _LEFT_OF_STIFFNESS: Final = {"front": 0.6, "rear": 1.05}
-"""Effective cornering stiffness of an axle over that of its tyres, in the compact: compliance and roll steer."""
+"""Ratio of the effective cornering stiffness of an axle to the stiffness of its tyres, in the compact: compliance and
+roll steer."""
 _REMARKS: Final = {
     "dampers.front": "Compression positive.",
     "curves.front": (

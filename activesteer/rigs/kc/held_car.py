@@ -1,8 +1,8 @@
 """The car with its chassis held and its wheels on pads: equilibrium by Newton's method on the forces at rest.
 
-The model is that of the simulations. The search leaves out the six coordinates of the chassis and the rotation of the
-wheels. The chassis is held 1 m above its standing position, so that the tyre forces vanish and pads replace them. Each
-pad holds the height of its wheel, pushes straight up at the contact point, and applies a given horizontal force or
+The rig uses the model of the simulations. The search leaves out the six coordinates of the chassis and the rotation of
+the wheels. The chassis is held 1 m above its standing position, so that the tyre forces vanish and pads replace them.
+Each pad holds the height of its wheel, pushes straight up at the contact point, and applies a given horizontal force or
 moment. A wheel is fastened to its pad, which can also pull.
 
 The wheel is rigid, with its loaded radius in the standing car: the rig measures the suspension. Joint limits are

@@ -128,7 +128,7 @@ def _contact(axle: Axle, end: int) -> float:
 def roll_centre_height(axle: Axle) -> float:
     """Height over the road at which the normal to the contact point's path meets the middle of the car.
 
-    The path is that of parallel travel within 15 mm, links and springs loaded (ISO 8855: kinematic roll centre).
+    The path belongs to parallel travel within 15 mm, with loaded links and springs (ISO 8855: kinematic roll centre).
     """
     sweep = axle.sweep("parallel_travel")
     slopes = axle.slope("parallel_travel", sweep.contact_m[..., 1], over=sweep.contact_m[..., 2])
