@@ -76,7 +76,7 @@ KINDS: Final = {
     "stuck": "an actuator stays where it is, a brake at its torque, a sensor at its last reading",
     "runaway": "an actuator runs to its stop, a brake to its strength, a sensor reads the end of its range",
     "float": "a steering actuator is cut from its drive and moves freely",
-    "offset": "the demand of an actuator, or the reading of a sensor, is off",
+    "offset": "the demand of an actuator, or the reading of a sensor, has an offset",
     "reversed": "demand or reading has the opposite sign",
     "delayed": "demand or reading comes late",
     "dropout": "demand or reading is missing and taken for zero",
@@ -140,10 +140,12 @@ class Fault:
             )
         if self.kind == "float" and self.part in SENSORS:
             raise ManeuverError(
-                "a sensor has nothing that could move freely; a broken wire is a dropout", key="kind", value=self.kind
+                "a sensor cannot move freely; use dropout for a broken wire", key="kind", value=self.kind
             )
         if self.kind in ("float", "reversed") and self._is_brake:
-            raise ManeuverError("a brake can do neither; a dropout leaves it open", key="kind", value=self.kind)
+            raise ManeuverError(
+                "a brake cannot float or be reversed; use dropout to leave it open", key="kind", value=self.kind
+            )
         if self.end_s is not None and self.end_s <= self.start_s:
             raise ManeuverError(
                 f"is {self.end_s:g} s; the fault begins at {self.start_s:g} s (start_s)", key="end_s", value=self.end_s

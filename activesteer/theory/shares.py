@@ -37,7 +37,7 @@ def wilson_interval(passed: int, number: int) -> tuple[float, float]:
     Source: E. B. Wilson, Journal of the American Statistical Association 22 (1927), 209-212.
     """
     if not 0 <= passed <= number:
-        raise ParameterError(f"{passed} of {number} is no share", value=(passed, number))
+        raise ParameterError(f"{passed} of {number} is not a share", value=(passed, number))
     if number == 0:
         return 0.0, 1.0
     from scipy.stats import binomtest  # noqa: PLC0415 - slow to import

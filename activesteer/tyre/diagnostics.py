@@ -68,7 +68,7 @@ def _missing(params: TyreParameters) -> Iterator[tuple[str, str]]:
     unknown = sorted(key for section, key in params.unused if section != "MDI_HEADER" and key not in _BOOKKEEPING)
     if unknown:
         names = ", ".join(unknown)
-        yield f"no formula here uses {names}", "the file asks for something that is not modelled, or misspells a key"
+        yield f"no formula here uses {names}", "the file has a feature that is not modelled, or a misspelt key"
     motorcycle = [key for key in ("MC_CONTOUR_A", "MC_CONTOUR_B") if params[key] != 0.0]
     if motorcycle:
         yield (
@@ -202,7 +202,7 @@ def _asymmetry(params: TyreParameters) -> Iterator[tuple[str, str]]:
     if abs(force) > STRAIGHT_AHEAD_FRACTION * nominal:
         angle = math.degrees(abs(force) / stiffness) if stiffness else math.inf
         yield (
-            f"{force:.0f} N of side force straight ahead at the nominal load, worth {angle:.2f} deg of slip angle",
+            f"{force:.0f} N of side force straight ahead at the nominal load, as from {angle:.2f} deg of slip angle",
             "ply steer and conicity; a car with the same file on both sides pulls, so mirror it (TYRESIDE)",
         )
     high = min(params["ALPMAX"], -params["ALPMIN"], 0.5)

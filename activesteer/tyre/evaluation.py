@@ -177,7 +177,7 @@ class MagicFormula:
             if not np.isfinite(inputs[:, place]).all():
                 raise ParameterError(f"{np.count_nonzero(~np.isfinite(column))} values are not finite", key=name)
         if self.parameters.version == _MF52 and inputs[:, -1].any():
-            raise ParameterError("is not zero, but MF 5.2 knows no turn slip; use a 6.x tyre", key="turn_slip_1pm")
+            raise ParameterError("is not zero, but MF 5.2 has no turn slip; use a 6.x tyre", key="turn_slip_1pm")
         forces = np.empty((len(inputs), len(FORCE_COLUMNS)))
         flags = np.empty(len(inputs), dtype=np.int64)
         evaluate_rows(self._tyre, inputs, forces, flags)

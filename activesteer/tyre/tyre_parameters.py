@@ -148,7 +148,9 @@ def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
     """Return every coefficient: the given value, the default, or the quantity that replaces it."""
     for key, value in given.items():
         if key not in BY_NAME:
-            raise ParameterError(f"no tyre coefficient; {nearest_names(key, BY_NAME)}", file=source, key=key, value=key)
+            raise ParameterError(
+                f"is not a tyre coefficient; {nearest_names(key, BY_NAME)}", file=source, key=key, value=key
+            )
         if not math.isfinite(value):
             raise ParameterError(f"is {value}; must be finite", file=source, key=key, value=value)
     missing = [

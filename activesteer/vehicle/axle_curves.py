@@ -87,7 +87,7 @@ class AxleCurves:
         least = float(np.linalg.eigvalsh(_scaled(self.stiffness_matrix())).min())
         if least <= 0.0:
             raise ParameterError(
-                "gives way without a force: the matrix is not positive definite "
+                "does not hold the wheel: the matrix is not positive definite "
                 f"(least eigenvalue {least:.3g} N/m with rotations at 0.3 m)",
                 key="stiffness",
             )
@@ -134,7 +134,7 @@ def _check_curves(curves: AxleCurves, over: str, names: tuple[str, ...]) -> None
     if not (np.diff(points) > 0.0).all():
         raise ParameterError("the points do not increase", key=over)
     if not points[0] < 0.0 < points[-1]:
-        raise ParameterError(f"runs from {points[0]:g} to {points[-1]:g} m; 0 has to lie inside", key=over)
+        raise ParameterError(f"runs from {points[0]:g} to {points[-1]:g} m; it must contain 0", key=over)
     for name in names:
         if len(getattr(curves, name)) != len(points):
             raise ParameterError(f"{len(getattr(curves, name))} values for {len(points)} points of {over}", key=name)
@@ -156,9 +156,9 @@ class Curves:
             ParameterError: the rack does not steer the front axle, or it steers the rear axle.
         """
         if self.front is not None and not self.front.is_steered:
-            raise ParameterError("the rack has to steer the front wheels: curves over rack_m are needed", key="front")
+            raise ParameterError("the rack must steer the front wheels: curves over rack_m are needed", key="front")
         if self.rear is not None and self.rear.is_steered:
-            raise ParameterError("the rack steers the front wheels alone", key="rear.rack_m")
+            raise ParameterError("the rack steers the front wheels only", key="rear.rack_m")
 
     def axle(self, corner: str) -> AxleCurves | None:
         """Return the curves of a corner's axle."""

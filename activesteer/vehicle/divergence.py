@@ -62,4 +62,4 @@ def raise_if_diverged(model: mujoco.MjModel, data: mujoco.MjData, commands: Arra
         raise SimulationDiverged(f"the speed is {speed_mps:g} m/s at {data.time:.3f} s")
     for name, live in engine_arrays(data).items():
         if not np.isfinite(live).all():
-            raise SimulationDiverged(f"what is recorded of {name} is not finite at {data.time:.3f} s", value=name)
+            raise SimulationDiverged(f"the recorded {name} is not finite at {data.time:.3f} s", value=name)

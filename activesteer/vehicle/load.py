@@ -46,7 +46,7 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
     if scale <= 0.0:
         minimum = 1.0 - 1.0 / fraction
         raise ModelError(
-            f"{factors.mass:g} leaves nothing of the chassis; more than {minimum:.2f} is needed",
+            f"{factors.mass:g} leaves no mass for the chassis; more than {minimum:.2f} is needed",
             key="factors.mass",
             value=factors.mass,
         )

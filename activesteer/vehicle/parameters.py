@@ -21,8 +21,8 @@ Positive = Annotated[float, Range(1e-12)]
 NotNegative = Annotated[float, Range(0.0)]
 Fraction = Annotated[float, Range(0.0, 1.0)]
 _MASS_HINT: Final = (
-    "load.payload_kg loads the car, factors.mass scales it; single_track.mass_kg is only what controllers and driver "
-    "believe of it"
+    "load.payload_kg loads the car, factors.mass scales it; single_track.mass_kg is only the mass that "
+    "controllers and driver assume"
 )
 _GRAVITY_HINT: Final = (
     "load.cg_height_change_m and cg_forward_change_m move the empty car's centre of gravity, load.payload_position_m "
@@ -259,7 +259,7 @@ class VehicleParameters:
         "payload_kg": _MASS_HINT,
         "cg_height_change_m": _GRAVITY_HINT,
         **dict.fromkeys(("roof_kg", "roof_load_kg"), "load.roof_kg loads the roof, at load.roof_height_m"),
-        **dict.fromkeys(("fuel", "fuel_kg"), "load.fuel_kg is fuel beside that in the model"),
+        **dict.fromkeys(("fuel", "fuel_kg"), "load.fuel_kg is fuel in addition to that in the model"),
         **dict.fromkeys(("springs", "spring_rate", "spring_stiffness"), "factors.spring_rate scales the springs"),
         **dict.fromkeys(("mu", "grip"), "road.mu is the road's, factors.tyre_friction scales the tyres"),
     }

@@ -82,12 +82,12 @@ def toe_link_map(model: mujoco.MjModel, corner: str, link: str, limit_rad: float
     else:
         raise ModelError(
             f"the tendon {link!r} steers its wheel by {np.degrees(minimum):.2g} deg at most; "
-            f"{np.degrees(limit_rad):.3g} deg are asked for (rear_actuator.limit_deg)"
+            f"{np.degrees(limit_rad):.3g} deg are demanded (rear_actuator.limit_deg)"
         )
     ways = [_fit(angles, travels), _fit(travels, angles)]
     for coefficients, x, y in zip(ways, (angles, travels), (travels, angles), strict=True):
         if np.abs(evaluated(coefficients, x) - y).max() > _FIT * np.ptp(y):
-            raise ModelError(f"the tendon {link!r}: steer angle over length is no smooth curve up to the limit")
+            raise ModelError(f"the tendon {link!r}: steer angle over length is not a smooth curve up to the limit")
     ends = np.abs(evaluated(ways[0], np.array([-limit_rad, limit_rad])))
     return ToeLinkMap(ways[0], ways[1], float(ends.max()))
 

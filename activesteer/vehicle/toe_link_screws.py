@@ -57,7 +57,7 @@ def fit_screws(spec: mujoco.MjSpec, actuator: RearActuator) -> None:
         name = f"{corner}_steer"
         for part in (spec.sensor(f"{name}_angle"), spec.actuator(name), spec.joint(name)):
             if part is None:
-                raise ModelError(f"the model has no rear steering hinge {name!r} for the screws to take the place of")
+                raise ModelError(f"the model has no rear steering hinge {name!r} that the screws could replace")
             spec.delete(part)
         stiffness = np.asarray(link.stiffness, dtype=np.float64)
         if stiffness[0] <= 0.0 or stiffness[1:].any():

@@ -111,14 +111,14 @@ def parse(text: str, source: str) -> Syntax:
             match = _SECTION.match(line)
             if not match:
                 what = repr(line[:60]) if entries else "this"
-                raise TyreFileError(f"{what} is no section, expected [NAME]", file=source, line=count)
+                raise TyreFileError(f"{what} is not a section, expected [NAME]", file=source, line=count)
             section = match.group(1).upper()
             continue
         key, equals, rest = (part.strip() for part in line.partition("="))
         if equals:
             if not _KEY.match(key):
                 what = repr(key[:60]) if entries else "this"
-                raise TyreFileError(f"{what} is no key, expected KEY = value", file=source, line=count)
+                raise TyreFileError(f"{what} is not a key, expected KEY = value", file=source, line=count)
             value = _value(rest)
             if isinstance(value, float) and abs(value) > MAX_NUMBER:
                 raise TyreFileError(
