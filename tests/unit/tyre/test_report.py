@@ -71,7 +71,7 @@ def test_an_ordinary_tyre_has_nothing_unusual() -> None:
         ({"PKX1": 2.0}, "slip stiffness over load is 2.0"),
         ({"QDZ1": 0.5}, "pneumatic trail"),
         ({"LATERAL_STIFFNESS": 2e4}, "lateral relaxation length"),
-        ({"PVY1": 0.1}, "of side force straight ahead at the nominal load, worth"),
+        ({"PVY1": 0.1}, "of side force straight ahead at the nominal load, as from"),
         ({"PVY1": 0.1}, "between left and right"),
         ({"PEY1": 1.5}, "E_y exceeds 1 between"),
         ({"REX1": 1.5}, "E_xalpha exceeds 1 between"),
