@@ -1,15 +1,15 @@
-// The plots of the report. Each group of runs has plots over one time axis, linked, and a track with the same instant
-// marked. Data: the JSON in #data, as `curves.plots` makes it.
+// The plots of the report. Each group of runs has linked plots over one time axis, and a track that marks the same
+// instant. Data: the JSON in #data, from `curves.plots`.
 "use strict";
 (() => {
   const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
-  // Colours are those of the stylesheet, light or dark; looked up anew when that changes.
+  // Colours of the stylesheet, light or dark; read again when the scheme changes.
   const PAINTS = ["quiet", "grid", "lane", "cone", "struck", "path", ...Array.from({ length: 6 }, (_, i) => `run-${i}`)];
   const paint = {};
   const mix = () => { const style = getComputedStyle(document.documentElement); for (const name of PAINTS) paint[name] = style.getPropertyValue(`--${name}`).trim(); };
   mix();
   const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
-  // Cars and cones are drawn in their true size, but a cone with no less than this [px]; cars at instants this far apart [px].
+  // Least size of a cone [px], otherwise cones and cars have their true size; distance between drawn cars [px].
   const LEAST_CONE = 2, CARS_APART = 110;
   // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
   const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 118, PRINTED_TRACK_HEIGHT = 190;
@@ -21,13 +21,13 @@
     made.append(...children);
     return made;
   };
-  // Axis labels with a real minus sign, and without the digits that floating point leaves.
+  // Axis labels with a real minus sign and without rounding errors.
   const labels = (unit) => (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit));
   const axis = (size, unit = "") => ({ values: labels(unit), stroke: () => paint.quiet, font: FONT, size, gap: 4, grid: { stroke: () => paint.grid, width: 1 }, ticks: { show: false } });
   const shown = (number) => (number == null ? "–" : number.toFixed(Math.abs(number) < 10 ? 2 : Math.abs(number) < 1000 ? 1 : 0).replace("-", "−"));
 
   const dashed = (run, width) => run.dashes.map((length) => length * width);
-  // Later runs lie over earlier ones: thinner and dashed, they let them be seen.
+  // Later runs lie over earlier ones; thinner and dashed, they leave these visible.
   const lineWidth = (run) => Math.max(1.5, 2.6 - 0.4 * run);
 
   // Limits of a vertical axis, with some room, and no closer than `least`.
@@ -52,7 +52,7 @@
       this.zoom(null);
     }
 
-    // Colour of a run; pale while another one is pointed at.
+    // Colour of a run; pale while the pointer is on another run.
     colour(run) {
       return paint[`run-${this.data.runs[run].place}`] + (this.focus == null || this.focus === run ? "" : "2e");
     }
@@ -130,7 +130,7 @@
       if (i == null || u.cursor.left < 0) { if (this.track) this.track.at(null); return; }
       values.append(`${this.time[i].toFixed(2)} s`);
       panel.series.forEach((series, k) => {
-        // Of each run the first curve: what is desired beside it is not told.
+        // The value of the first curve of each run; desired values are not shown.
         if (panel.series.findIndex((other) => other.run === series.run) !== k || !this.visible[series.run]) return;
         values.append(" ", element("span", { style: `--run: var(--run-${this.data.runs[series.run].place})` }, shown(series.values[i])));
       });
@@ -149,7 +149,7 @@
       for (const mark of this.data.marks) {
         const x = u.valToPos(mark.time_s, "x", true);
         ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
-        // A text that would run into the one before it is left out.
+        // A text that would overlap the one before it is left out.
         if (u.panel !== this.data.panels[0] || x < free) continue;
         ctx.fillText(mark.text, x + 3 * devicePixelRatio, bbox.top);
         free = x + ctx.measureText(mark.text).width + 6 * devicePixelRatio;
@@ -178,7 +178,7 @@
     repaint() { for (const plot of this.plots) plot.redraw(false); if (this.track) this.track.redraw(); }
   }
 
-  // The road from above. uPlot gives axes and zoom; what lies in them is drawn here.
+  // The road from above. uPlot gives axes and zoom; this class draws the content.
   class Track {
     constructor(group, data) {
       this.group = group;
@@ -187,7 +187,7 @@
       const title = [element("b", {}, "Track of the front axle centre"), note];
       const finite = (key) => data.tracks.flatMap((track) => track[key]).filter((value) => value != null);
       this.limits = data.view || { x: this.ends(finite("x")), y: this.ends(finite("y")) };
-      // A course and a long track fill the width; what is as wide as long stands beside two plots.
+      // A course and a long track fill the width; a square track stands beside two plots.
       const span = ([low, high]) => high - low;
       this.tall = !data.view && span(this.limits.x) < 3 * span(this.limits.y);
       const [holder] = group.figure(title, this.tall ? "tall" : "wide", "Tracks from above, with lanes, cones and cars");
@@ -303,7 +303,7 @@
       ctx.restore();
     }
 
-    // Instants at which cars are drawn: as far apart on the screen as not to hide each other.
+    // Instants at which cars are drawn, so far apart that they do not hide each other.
     along({ x, y }, draw) {
       const apart = CARS_APART * devicePixelRatio;
       let from = null;
@@ -325,7 +325,7 @@
       ].map((at) => at.toFixed(1)).join(" ")).join("L")}Z`;
     }
 
-    // Where the cars are at the instant under the cursor of the plots over time.
+    // Places of the cars at the instant under the cursor of the plots over time.
     at(i) { this.instant = i; this.place(); }
 
     place() {
@@ -338,7 +338,7 @@
       });
     }
 
-    // The other way round: the instant at which a car is nearest to the cursor.
+    // Conversely, the instant at which a car is nearest to the cursor.
     nearest(u) {
       const { left, top } = u.cursor;
       if (left == null || left < 0) return;

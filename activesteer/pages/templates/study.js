@@ -1,5 +1,5 @@
 "use strict";
-// Draws a study from the JSON in #data. Every picture is an SVG with axes and units; nothing is fetched.
+// Draws a study from the JSON in #data. Every picture is an SVG with axes and units; the script fetches nothing.
 const data = JSON.parse(document.getElementById("data").textContent);
 const colourOf = data.places.map((place) => `var(--run-${place})`);
 const at = (id) => document.getElementById(id);
@@ -168,7 +168,7 @@ function tableOf(parent, header, lines) {
 }
 
 function replayLine(command) {
-  if (!command) return document.createTextNode("the manoeuvre or vehicle has no file of its own");
+  if (!command) return document.createTextNode("the manoeuvre or the vehicle has no file");
   const box = document.createElement("span"), button = html(box, "button", "copy");
   const line = html(box, "code", ` ${command}`);
   line.className = "line";
@@ -194,27 +194,27 @@ function draw() {
   histogram(at("distribution"), metric, found, 640, 320);
   tableOf(at("quantiles"), ["controller", ...["5 %", "median", "95 %"].map((text) => withUnit(text, metric.unit))],
     data.controllers.map((name, c) => [name, ...(found.quantiles[c] || [null, null, null]).map(number)]));
-  at("shown").textContent = data.all > data.rows.run.length ? `Points are ${data.rows.run.length} of ${data.all} runs; all else is of all runs.` : "";
+  at("shown").textContent = data.all > data.rows.run.length ? `Points are ${data.rows.run.length} of ${data.all} runs; everything else uses all runs.` : "";
   for (const factor of data.factors) scatter(at("scatter"), factor, rows.map((i) => ({ x: data.rows.factors[factor.key][i], y: values[i], c: data.rows.controller[i], run: data.rows.run[i] })), metricAxis(metric));
   if (found.paired.some((pair) => pair)) {
     at("paired-part").hidden = false;
     const first = new Map();
     for (const i of rows) if (data.rows.controller[i] === 0) first.set(data.rows.sample[i], values[i]);
     const pairs = rows.filter((i) => data.rows.controller[i] > 0 && values[i] !== null && first.get(data.rows.sample[i]) != null);
-    for (const factor of data.factors) scatter(at("paired"), factor, pairs.map((i) => ({ x: data.rows.factors[factor.key][i], y: values[i] - first.get(data.rows.sample[i]), c: data.rows.controller[i], run: data.rows.run[i] })), `difference to ${data.controllers[0]}: ${metricAxis(metric)}`);
-    tableOf(at("paired-table"), [`difference to ${data.controllers[0]}`, ...["5 %", "median", "95 %"].map((text) => withUnit(text, metric.unit)), "smaller in magnitude [%]"],
+    for (const factor of data.factors) scatter(at("paired"), factor, pairs.map((i) => ({ x: data.rows.factors[factor.key][i], y: values[i] - first.get(data.rows.sample[i]), c: data.rows.controller[i], run: data.rows.run[i] })), `difference from ${data.controllers[0]}: ${metricAxis(metric)}`);
+    tableOf(at("paired-table"), [`difference from ${data.controllers[0]}`, ...["5 %", "median", "95 %"].map((text) => withUnit(text, metric.unit)), "smaller in magnitude [%]"],
       found.paired.map((pair, n) => [data.controllers[n + 1], ...(pair ? [...pair.quantiles.map(number), short(100 * pair.smaller)] : ["-", "-", "-", "-"])]));
   }
   if (found.heat) { at("heat-part").hidden = false; heat(at("heat"), metric, found, keyed); }
   if (found.indices.length) {
     at("indices-part").hidden = false;
-    // One scale, so that controllers can be compared.
+    // All controllers have the same scale, so that they can be compared.
     const ends = found.indices.flat().flatMap(([, , value, confidence]) => [value - (confidence || 0), value + (confidence || 0)]);
     const scale = [Math.min(...ends, 0), Math.max(...ends, 0)];
     found.indices.forEach((part, c) => { if (part.length) bars(at("indices"), c, part, metric, scale); });
   }
   parallel(at("parallel"), metric, rows);
-  tableOf(at("extremes"), ["controller", "run", metricAxis(metric), "to drive and replay it"],
+  tableOf(at("extremes"), ["controller", "run", metricAxis(metric), "command to drive and replay it"],
     found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [data.controllers[c], String(run), short(value), replayLine(command)])));
   for (const other of data.metrics) if (data.by_group[group][other.name]) histogram(at("all"), other, data.by_group[group][other.name], 300, 190);
 }
@@ -227,7 +227,7 @@ data.controllers.forEach((name, c) => {
   colour.style.background = colourOf[c];
   at("legend").append(name);
 });
-// A metric that the manoeuvre has: the one that is shown, where it has that, or the one that is mostly asked for.
+// Select a metric that the manoeuvre has: the shown one, else the most common one.
 function choose() {
   const has = data.by_group[Number(at("group").value)];
   if (has[at("metric").value]) return;

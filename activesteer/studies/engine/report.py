@@ -1,4 +1,4 @@
-"""One page that shows a study: distributions, scatter and paired differences, sensitivities, worst and best runs."""
+"""The page of a study: distributions, scatter and paired differences, sensitivities, worst and best runs."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from activesteer.studies.engine.store import Store
 from activesteer.studies.engine.study_file import StudyFile, read_study
 
 _SHOWN_ROWS: Final = 3000
-"""Runs whose points the page holds; whatever is counted or averaged is so over all of them."""
+"""Most runs whose points the page holds; counts and means are over all runs."""
 _BINS: Final = 40
 _EXTREMES: Final = 5
 _MAX_INDICES: Final = 400
-"""Sets of indices that are computed: each takes some hundredths of a second."""
+"""Most sets of indices; each takes some hundredths of a second."""
 
 Places = NDArray[np.int64]
 Group = tuple[str, str]
@@ -39,10 +39,10 @@ Group = tuple[str, str]
 
 
 def write_report(folder: str | os.PathLike[str]) -> Path:
-    """Writes report.html into a study's folder, from the rows that there are.
+    """Write report.html into a study's folder from its finished runs.
 
     Args:
-        folder: Of the study.
+        folder: Folder of the study.
 
     Returns:
         The page.
@@ -67,7 +67,7 @@ def write_report(folder: str | os.PathLike[str]) -> Path:
 
 
 def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
-    """Everything that the page draws, as JSON values in the units that are shown."""
+    """Return the content of the page as JSON values, in units for display."""
     others = (*IDENTITY, *OUTCOME, *study.keys)
     metrics = [name for name in table.column_names if name not in others and not name.startswith(CURVE)]
     values = {name: table[name].to_numpy(zero_copy_only=False).astype(np.float64) for name in metrics}
@@ -97,20 +97,20 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
 
 
 def _codes(column: pa.ChunkedArray) -> tuple[list[str], Places]:
-    """The different texts of a column in the order in which they occur, and the place of each row's in them."""
+    """Return the different texts of a column in order of occurrence, and the index of each row's text."""
     encoded = column.combine_chunks().dictionary_encode()
     return encoded.dictionary.to_pylist(), encoded.indices.to_numpy()
 
 
 def _shown_rows(table: pa.Table) -> Places:
-    """Rows of evenly spread samples, whole, so that paired runs stay together."""
+    """Return the rows of evenly spread, complete samples, so that paired runs stay together."""
     samples = table["sample"].to_numpy()
     every = -(-table.num_rows // _SHOWN_ROWS)
     return np.flatnonzero(samples % every == 0)
 
 
 _RELATIVE: Final = {"times": ", relative", "plus": ", change"}
-"""What is said of values that are relative to the files, by `Factor.nominal`."""
+"""Note on values that are relative to the files, by `Factor.nominal`."""
 
 
 def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, Any]:
@@ -127,7 +127,7 @@ def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, An
 def _of_group(
     study: StudyFile, table: pa.Table, values: Mapping[str, Array], who: Mapping[str, Any], group: tuple[int, int]
 ) -> dict[str, Any]:
-    """What is computed from all rows of a manoeuvre with a vehicle, by metric."""
+    """Return the results of all rows of a manoeuvre with a vehicle, by metric."""
     inside = (who["maneuver"][1] == group[0]) & (who["vehicle"][1] == group[1])
     controllers = who["controller"][0]
     rows = [np.flatnonzero(inside & (who["controller"][1] == place)) for place in range(len(controllers))]
@@ -164,7 +164,7 @@ def _of_group(
 def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
     together = np.concatenate(parts)
     low, high = float(together.min()), float(together.max())
-    # The page holds five digits: what differs by less is one value to it.
+    # The page holds five digits; values that differ by less are one value.
     if high - low <= 1e-3 * max(abs(low), abs(high), 1e-300):
         low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
     edges = np.linspace(low, high, min(_BINS, max(5, int(np.sqrt(max(map(len, parts)))) + 1)) + 1)
@@ -172,9 +172,9 @@ def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
 
 
 def _paired(pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array]) -> list[Any]:
-    """Of each controller but the first: 5, 50 and 95 % of its difference to the first in the same sample.
+    """Return the 5, 50 and 95 % quantiles of each controller's difference from the first in the same sample.
 
-    `smaller` is the share of the samples in which it is smaller in magnitude.
+    `smaller` is the share of the samples in which its value is smaller in magnitude.
     """
     found: list[Any] = []
     for (first, second), part in zip(pairs, parts[1:], strict=False):
@@ -190,7 +190,7 @@ def _paired(pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array]) -> l
 
 
 def _heat(study: StudyFile, table: pa.Table, rows: Sequence[Places], parts: Sequence[Array]) -> dict[str, Any] | None:
-    """Means over the first two grids, controller by controller."""
+    """Return the means over the first two grids, by controller."""
     grids = [factor for factor in study.factors if factor.kind == "grid"]
     if len(grids) != 2:
         return None
@@ -211,7 +211,7 @@ def _heat(study: StudyFile, table: pa.Table, rows: Sequence[Places], parts: Sequ
 
 
 def _indices(study: StudyFile, points: Sequence[Mapping[str, Any]], parts: Sequence[Array]) -> list[list[Any]]:
-    """Of each controller, its indices as [factor, name, value, confidence, spread]."""
+    """Return the indices of each controller as [factor, name, value, confidence, spread]."""
     found = [
         [
             [index.factor, index.name, *_json(np.array([index.value, index.confidence, index.spread]))]
@@ -223,7 +223,7 @@ def _indices(study: StudyFile, points: Sequence[Mapping[str, Any]], parts: Seque
 
 
 def _extremes(values: FactorValues, table: pa.Table, rows: Places, part: Array) -> list[list[Any]]:
-    """The runs with the largest and the smallest magnitudes: run, value, and the line that drives it again."""
+    """Return the runs with the largest and the smallest magnitudes: run, value, and its command line."""
     good = np.flatnonzero(np.isfinite(part))
     if len(good) > 2 * _EXTREMES:
         good = good[np.argpartition(np.abs(part[good]), (_EXTREMES - 1, len(good) - _EXTREMES))]
@@ -236,7 +236,7 @@ def _extremes(values: FactorValues, table: pa.Table, rows: Places, part: Array) 
 
 
 def _command(factor_values: FactorValues, row: Mapping[str, Any]) -> str:
-    """The command line that drives a run again and replays it; empty where its manoeuvre or vehicle has no file."""
+    """Return the command line that drives and replays a run; empty if its manoeuvre or vehicle has no file."""
     study = factor_values.study
     given = {}
     place = {}
@@ -255,5 +255,5 @@ def _command(factor_values: FactorValues, row: Mapping[str, Any]) -> str:
 
 
 def _json(column: Array) -> list[float | None]:
-    """Numbers as the page holds them: five digits, and null where there is none."""
+    """Return numbers for the page: five digits, and None for a value that is not finite."""
     return [float(f"{value:.5g}") if np.isfinite(value) else None for value in column.tolist()]
