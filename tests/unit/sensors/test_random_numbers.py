@@ -45,3 +45,16 @@ def test_inertial_sensors_of_production_are_those_of_their_data_sheet():
     rate = sensors.yaw_rate
     in_degps = [math.degrees(rate.amount(word)) for word in ("noise", "limit", "quantum")]
     assert in_degps == pytest.approx([0.1, 300.0, 1.0 / 100.0])
+
+
+def test_pulse_wheel_that_turns_back_right_at_an_edge_says_a_finite_speed():
+    # Half a tooth forwards ends on an edge; a quarter back passes it again in the same instant.
+    per_tooth = 2.0 * math.pi / (0.001 * TEETH)
+    forwards = next(
+        speed
+        for speed in (np.nextafter(0.5 * per_tooth, side) for side in (0.0, 0.5 * per_tooth, math.inf))
+        if speed * 0.001 * TEETH / (2.0 * math.pi) == 0.5
+    )
+    said = said_of("wheel_speed", [forwards, -0.5 * forwards, 0.0, 0.0], teeth=TEETH, sample_time_s=0.001)
+    assert np.isfinite(said).all()
+    assert np.abs(said).max() <= per_tooth
