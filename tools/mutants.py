@@ -100,7 +100,7 @@ ROOMS: Final = {
     ),
 }
 
-OTHER_NAMES: Final = {"native_guide": "axle_of_curves", "native_screws": "toe_link_screw", "advance": "filter_parts"}
+OTHER_NAMES: Final = {"native_guide": "curve_axle", "native_curve_axle": "curve_axle", "native_screws": "toe_link_screw", "advance": "filter_parts"}
 """Files whose tests are called otherwise."""
 
 _ARITHMETIC: Final = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Mod_Mul", "FloorDiv_Mul", "Sub_Mul")
@@ -221,7 +221,7 @@ def commands(mutant: Mutant, *, wide: bool) -> list[str]:
     stem, room = OTHER_NAMES.get(stem := Path(mutant.file).stem, stem), ROOMS[mutant.room]
     pytest = f"{sys.executable} -m pytest -x -q -p no:cacheprovider -m 'not slow'"
     plain = f"env NUMBA_DISABLE_JIT=1 {pytest} -W ignore::RuntimeWarning"
-    own = f"**/test_{stem}.py **/test_{stem}_*.py {room.near}"
+    own = f"**/test_{stem}.py {room.near}"
     wanted = [(plain, room.plain), (pytest, own), (pytest, room.wide if wide else "")]
     return [f"{start} {' '.join(found)}" for start, patterns in wanted if (found := tests_of(patterns))]
 

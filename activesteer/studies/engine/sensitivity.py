@@ -21,8 +21,9 @@ MAX_SAMPLES: Final = 16384
 """Rows that are enough: more move the indices less than their confidence intervals are wide."""
 _MAX_RBD_SAMPLES: Final = 4096
 _RBD_RESAMPLES: Final = 30
-_MIN_SAMPLES: Final = 40
-"""With fewer, RBD-FAST has no meaning."""
+_MIN_SAMPLES: Final = 42
+"""RBD-FAST compares 2 * 10 harmonics, also in each half of the samples that its confidence interval draws: a half needs
+more than 20."""
 
 
 class Index(NamedTuple):
