@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pyarrow as pa
 import pytest
 
@@ -51,3 +53,11 @@ def test_a_run_id_has_16_digits_and_differs_with_whatever_decides_the_run():
     assert len(set(ids)) == len(ids)
     assert all(len(bytes.fromhex(each)) == 8 for each in ids)
     assert run_id(resolve("step_steer"), "ars", 0, 0.001) == ids[0]
+
+
+def test_a_run_id_differs_with_the_content_of_a_file_that_the_run_was_made_from():
+    given = resolve("step_steer")
+    assert given.files
+    for name, content in given.files.items():
+        changed = replace(given, files={**given.files, name: content + b"\n"})
+        assert run_id(changed, "ars", 0, 0.001) != run_id(given, "ars", 0, 0.001), name
