@@ -14,7 +14,7 @@ from activesteer.errors import ControllerError
 from activesteer.resources import find_controller_variant
 from activesteer.scenario import resolve
 from tests.raising import raises
-from tests.unit.controllers.cars import setup
+from tests.unit.controllers.cars import measured, setup, steering
 
 WITH_FILE = [name for name, kind in CONTROLLERS.items() if hasattr(kind, "gains")]
 SCALE = {"controllers.lqr.rear_scale_deg": 1.0}
@@ -69,3 +69,14 @@ def test_copy_of_a_file_has_its_own_gains(copy_of):
 def test_unknown_system_is_answered_with_the_known_ones(copy_of):
     with raises(ControllerError, key="system", value="lqg"):
         read_variant(copy_of("lqr", 'system = "lqr"', 'system = "lqg"'))
+
+
+def test_observer_can_be_the_system_of_a_variant(tmp_path):
+    path = tmp_path / "snow.toml"
+    path.write_text('system = "observer"\n[estimator]\nfriction = 0.3\n', encoding="utf-8")
+    known = resolve("straight_line").controller_setup(0.005)
+    observer = load_controller(path, known)
+    assert type(observer) is CONTROLLERS["observer"]
+    estimate = observer.step(steering(0.0), measured(0.0)).estimate
+    assert estimate is not None
+    assert estimate.friction == pytest.approx(0.3, abs=0.01)
