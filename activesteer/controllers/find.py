@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, Final, Protocol
 
+import numpy as np
+
 from activesteer.config import Range
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
@@ -60,11 +62,17 @@ class _ControllerKind(Kind):
         if torques is not NO_BRAKES and not _are_torques(torques):
             needed = f"four finite torques of at most {_MAX_TORQUE_NM:g} Nm, fl fr rl rr, are needed"
             raise self.fail(name, f"{said} brake_torque_demand_Nm = {shown(torques)}; {needed}", torques)
-        if command.estimate is not None and not isinstance(command.estimate, Estimate):
+        if command.estimate is not None and not _is_estimate(command.estimate):
             problem = f"{said} estimate = {shown(command.estimate)}; an activesteer.Estimate is needed"
             raise self.fail(name, problem, command.estimate, Estimate)
         # A list or an array is allowed, but the native step takes a tuple.
         return command if isinstance(torques, tuple) else command._replace(brake_torque_demand_Nm=tuple(torques))
+
+
+def _is_estimate(given: Any) -> bool:
+    real = float, int, np.floating, np.integer
+    numbers = isinstance(given, Estimate) and all(isinstance(value, real) for value in given)
+    return numbers and len([float(value) for value in given]) == len(Estimate._fields)
 
 
 def _are_torques(torques: Any) -> bool:

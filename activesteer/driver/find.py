@@ -19,6 +19,7 @@ from activesteer.signals import DriverCommand, WheelTorques, new_message
 _MAX_ANGLE_RAD: Final = 50.0
 """Largest angle of a command; a larger one is taken for a mistake, such as degrees [rad]."""
 _FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
+_GEARS: Final = (-1, 0, 1)
 _MAX_TORQUE_NM: Final = 1e6
 """Largest torque of a command: more than any car has [N m]."""
 
@@ -33,6 +34,8 @@ class _DriverKind(Kind):
         if torques is not None and not _are_torques(torques):
             needed = "an activesteer.signals.WheelTorques of finite numbers is needed"
             raise self.fail(name, f"{said} wheel_torques = {shown(torques)}; {needed}", torques)
+        if command.gear not in _GEARS:
+            raise self.fail(name, f"{said} gear = {shown(command.gear)}; -1, 0 or 1 is needed", command.gear, _GEARS)
         angle = command.steering_wheel_demand_rad / setup.steering_ratio
         if math.isnan(front):
             return new_message(DriverCommand, (*command[:_FRONT_STEER], angle, *command[_FRONT_STEER + 1 :]))
@@ -85,8 +88,10 @@ def is_driver_file(given: Any) -> bool:
 
 def _are_torques(torques: Any) -> bool:
     try:
-        return isinstance(torques, WheelTorques) and all(
-            len(values) == 4 and all(abs(value) <= _MAX_TORQUE_NM for value in values) for values in torques
+        return (
+            isinstance(torques, WheelTorques)
+            and len(torques) == len(WheelTorques._fields)
+            and all(len(values) == 4 and all(abs(value) <= _MAX_TORQUE_NM for value in values) for values in torques)
         )
     except TypeError:
         return False

@@ -16,8 +16,10 @@ import numpy as np
 from activesteer.config import Range
 from activesteer.errors import ActiveSteerError, shown
 
-_USUAL: Final = frozenset({float, int, bool, np.float64})
+_USUAL: Final = frozenset({float, bool, np.float64})
 """Types of nearly all numbers in a command; numbers of other types take the slow check."""
+_LIMITED: Final = _USUAL | {int}
+"""Types of nearly all numbers with a range, which keeps a whole number within the range of float64."""
 _LIBRARIES: Final = tuple({sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")})
 """Folders of code that no user wrote."""
 
@@ -48,14 +50,14 @@ class Kind:
     unchecked: tuple[str, ...] = ()
     data: Callable[[], list[str]] = list
     _places: tuple[tuple[int, float, float], ...] = field(init=False)
-    _numbers: Callable[[Any], tuple[Any, ...]] = field(init=False, compare=False)
+    _unlimited: Callable[[Any], tuple[Any, ...]] = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         """Look up the places of the fields, which are checked in every step."""
         fields = self.result._fields
         object.__setattr__(self, "_places", tuple((fields.index(key), *limits) for key, limits in self.ranges.items()))
-        numbers = (place for place, key in enumerate(fields) if key not in self.unchecked)
-        object.__setattr__(self, "_numbers", itemgetter(*numbers))
+        unlimited = (i for i, key in enumerate(fields) if key not in self.unchecked and key not in self.ranges)
+        object.__setattr__(self, "_unlimited", itemgetter(*unlimited))
 
     def names(self) -> list[str]:
         """Names of all blocks in the package."""
@@ -91,9 +93,12 @@ class Kind:
         Raises:
             ActiveSteerError: of the type `error`: it is not a command, or a value is not a number or out of its range.
         """
-        if not self._is_usual(command):
-            command = self._check(command, name, said)
-        return self.completed(command, name, setup, said)
+        try:
+            if not self._is_usual(command):
+                command = self._check(command, name, said)
+            return self.completed(command, name, setup, said)
+        except (ArithmeticError, TypeError, ValueError) as reason:  # such as a whole number beyond all floats
+            raise self.fail(name, f"{said} {shown(command)}; {in_one_line(reason)}", command) from reason
 
     def completed(self, command: Any, name: str, setup: Any, said: str) -> Any:
         """Check and complete the fields other than plain numbers; see `checked`."""
@@ -103,11 +108,12 @@ class Kind:
         if (
             command.__class__ is not self.result
             or len(command) != len(self.result._fields)
-            or not _USUAL.issuperset(map(type, self._numbers(command)))
+            or not _USUAL.issuperset(map(type, self._unlimited(command)))
         ):
             return False
-        for index, low, high in self._places:  # noqa: SIM110 - a generator takes longer than the rest of the check
-            if not low <= command[index] <= high:
+        for index, low, high in self._places:
+            value = command[index]
+            if value.__class__ not in _LIMITED or not low <= value <= high:
                 return False
         return True
 
@@ -121,7 +127,10 @@ class Kind:
                 continue
             if not isinstance(value, (float, int, np.number, np.bool_)):
                 needed = "a number is needed"
-            elif limits is None or limits.low <= value <= limits.high:
+            elif limits is None:
+                float(value)  # a whole number may be too large
+                continue
+            elif limits.low <= value <= limits.high:
                 continue
             elif key.endswith("_rad"):
                 needed = (

@@ -19,7 +19,7 @@ from activesteer.controllers import find_controller
 from activesteer.driver import find_driver
 from activesteer.errors import ControllerError, DriverError
 from activesteer.scenario import resolve
-from activesteer.signals import WheelTorques
+from activesteer.signals import WheelTorques, new_message
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
 
@@ -350,6 +350,27 @@ def test_error_in_the_step_of_a_driver_is_answered_with_its_line(write):
     with raises(DriverError, cause=ZeroDivisionError, key=f"driver {path}:Mine") as refused:
         simulate("step_steer", driver=f"{path}:Mine", overrides=SHORT)
     assert "mine.py, line 5" in refused.value.problem
+
+
+def test_a_subclass_of_a_command_is_accepted():
+    class Own(ActuatorCommand):
+        pass
+
+    class Steers:
+        def step(self, *_: Any) -> ActuatorCommand:
+            return Own(0.01, 0.0)
+
+    assert (simulate("step_steer", Steers, overrides=SHORT)["rear_steer_demand_rad"] == 0.01).all()
+
+
+@pytest.mark.parametrize("length", [0, 9, 11])
+def test_a_command_of_another_length_is_answered(length):
+    class Short:
+        def step(self, *_: Any) -> ActuatorCommand:
+            return new_message(ActuatorCommand, (0.0,) * length)
+
+    with raises(ControllerError):
+        simulate("step_steer", Short, overrides=SHORT)
 
 
 def test_torques_of_the_wheels_are_checked():

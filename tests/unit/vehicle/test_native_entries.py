@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.errors import ActiveSteerError, ControllerError, DriverError, ParameterError
 from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, WheelTorques, new_message
+from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.channels import RawRows
 from tests.unit.vehicle.cars import standing
@@ -77,6 +78,27 @@ def test_malformed_commands_are_refused_or_carried_out() -> None:
     assert COUNT // 2 < refused < COUNT
     vehicle.restore_state(state)
     assert vehicle.step(DriverCommand(), ActuatorCommand())[0].speed_mps == pytest.approx(20.0, abs=0.1)
+
+
+def test_malformed_commands_of_a_simulation_are_refused_and_change_nothing() -> None:
+    rng, simulation = random.Random(27), Simulation("step_steer", "observer", overrides={"settle_s": 0.2})
+    given = 0
+    while given < COUNT // 5:
+        driver, actuator = rng.choice(
+            ((command(rng, DriverCommand), None), (None, command(rng, ActuatorCommand)), (None, wrong_estimate(rng)))
+        )
+        before = simulation.loop.step_count
+        try:
+            simulation.step(driver, actuator)
+        except (DriverError, ControllerError):
+            given += 1
+            assert simulation.loop.step_count == before
+    assert simulation.truth["speed_mps"] == pytest.approx(80.0 / 3.6, abs=1.0)
+    simulation.recording()
+
+
+def wrong_estimate(rng: random.Random) -> ActuatorCommand:
+    return ActuatorCommand(estimate=of_any_length(rng, Estimate))
 
 
 @pytest.mark.parametrize("kind", [DriverCommand, ActuatorCommand])
