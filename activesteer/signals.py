@@ -9,6 +9,7 @@ are derived from them; see `numbers_of` and `native_messages`.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, Protocol, TypeAlias, TypeVar, cast, get_type_hints
@@ -80,8 +81,9 @@ class Number(NamedTuple):
     recorded: Recorded | None
 
 
+@functools.cache
 def numbers_of(message: type[tuple[Any, ...]]) -> tuple[Number, ...]:
-    """Numbers of a message, in the order of its fields.
+    """Return the numbers of a message, in the order of its fields.
 
     Args:
         message: A message class. Fields of type float, int or bool hold one number; `PerWheel` holds four. Fields of
@@ -100,8 +102,9 @@ def numbers_of(message: type[tuple[Any, ...]]) -> tuple[Number, ...]:
     return tuple(numbers)
 
 
+@functools.cache
 def widths_of(message: type[tuple[Any, ...]]) -> tuple[int, ...]:
-    """How many numbers each field of a message holds; see `numbers_of`."""
+    """Return how many numbers each field of a message holds; see `numbers_of`."""
     fields = [number.field for number in numbers_of(message)]
     return tuple(fields.count(field) for field in get_type_hints(message))
 

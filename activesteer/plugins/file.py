@@ -95,7 +95,7 @@ def from_file(text: str, kind: Kind) -> FromFile:
 
 
 def is_user_module(name: str) -> bool:
-    """Whether a module was loaded from a user's file, or from beside it."""
+    """Return whether a module was loaded from a user's file, or from beside it."""
     return name.startswith(_USER_MODULE) or _Neighbours.loaded(name)
 
 
@@ -123,7 +123,7 @@ class _Neighbours:
 
     @classmethod
     def loaded(cls, name: str) -> bool:
-        """Whether a module in use was found here."""
+        """Return whether a module in use was found here."""
         file = getattr(sys.modules.get(name), "__file__", None) or ""
         top = name.partition(".")[0]
         return any(top in names and Path(folder) in Path(file).parents for folder, names in cls.folders.items())

@@ -64,7 +64,7 @@ class Kind:
         return [*self.built_in, *self.data()]
 
     def is_data(self, given: Any) -> bool:
-        """Whether a block is given as data: by the name of a data file, or by its path."""
+        """Return whether a block is given as data: by the name of a data file, or by its path."""
         return isinstance(given, (str, os.PathLike)) and (os.fspath(given).endswith(".toml") or given in self.data())
 
     def fail(self, name: str, problem: str, value: Any = None, allowed: Any = None) -> ActiveSteerError:

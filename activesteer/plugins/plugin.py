@@ -50,7 +50,7 @@ class Plugin:
 
     @property
     def uses_truth(self) -> bool:
-        """Whether the block requests the truth, by an attribute of this name."""
+        """Flag by which a block requests the truth: its attribute of this name."""
         return bool(getattr(self.origin, "uses_truth", False))
 
     def make(self, setup: Any) -> Any:
@@ -174,7 +174,7 @@ def find(given: Any, kind: Kind) -> Plugin:
 
 
 def is_instance(given: Any) -> bool:
-    """Whether something is a block, not a class or function that creates one."""
+    """Return whether something is a block, not a class or function that creates one."""
     return not isinstance(given, type) and callable(getattr(given, "step", None))
 
 

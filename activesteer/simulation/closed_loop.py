@@ -110,7 +110,7 @@ class ClosedLoop(Uncopyable):
         self.motion, self.step_count = vehicle.motion(), 0
         self.commands = DriverCommand(front_steer_demand_rad=0.0), ActuatorCommand()
         self.faults, self._fault_list = Faults(vehicle), ()
-        self._drive(lambda _: settling, self.driver, self.controller, steps, None)
+        self.drive(steps, setpoint_at=lambda _: settling)
         if (estimate := self.commands[1].estimate) is not None:
             vehicle.record_estimate(estimate)
         vehicle.rebase()
@@ -162,20 +162,17 @@ class ClosedLoop(Uncopyable):
             self.drive(steps, recorder, driver, controller)
 
     def drive(
-        self, steps: int, recorder: Recorder | None, driver: Driver | None, controller: Controller | None
-    ) -> None:
-        """Drive some steps inside `in_use`; see `advance`."""
-        self._drive(self.maneuver.setpoint, driver or self.driver, controller or self.controller, steps, recorder)
-
-    def _drive(
         self,
-        setpoint_at: Callable[[float], Setpoint],
-        driver: Driver,
-        controller: Controller,
         steps: int,
-        recorder: Recorder | None,
+        recorder: Recorder | None = None,
+        driver: Driver | None = None,
+        controller: Controller | None = None,
+        setpoint_at: Callable[[float], Setpoint] | None = None,
     ) -> None:
+        """Drive some steps inside `in_use`, with the manoeuvre's setpoints by default; see `advance`."""
         vehicle, timestep_s = self.vehicle, self.vehicle.timestep_s
+        driver, controller = driver or self.driver, controller or self.controller
+        setpoint_at = setpoint_at or self.maneuver.setpoint
         vehicle.follow_model()
         with engine_warnings_held():
             (driver_command, actuator_command), measurement, motion = self.commands, self.measurement, self.motion
@@ -234,7 +231,7 @@ class ClosedLoop(Uncopyable):
 
 
 def _is_sound(state: LoopState) -> bool:
-    """Whether the parts of a state are what they must be; the vehicle checks its own part."""
+    """Return whether the parts of a state have the right types; the vehicle checks its own part."""
     commands = state.commands if isinstance(state.commands, tuple) else ()
     return (
         isinstance(state.faults, tuple)

@@ -69,7 +69,7 @@ class ControlUnit:
 
     @property
     def uses_truth(self) -> bool:
-        """Whether the controller gets the truth instead of the sensors' signals."""
+        """Flag of a controller that gets the truth instead of the sensors' signals."""
         return self._truth is not None
 
     def read_truth_of(self, vehicle: Vehicle) -> None:

@@ -123,6 +123,7 @@ class Recorder(Uncopyable):
     def _rewind(self) -> None:
         """Direct the next row to the start of the tape, and the next pose behind the kept ones."""
         tape, kept = self._tape, self._kept
+        self.tape.memory = self._raw, kept
         pose = self._poses_before(self._taken) - self._poses_before(self._first)
         tape["position"] = kept.positions_m.ctypes.data + pose * kept.positions_m.strides[0]
         tape["quaternion"] = kept.quaternions.ctypes.data + pose * kept.quaternions.strides[0]

@@ -135,7 +135,7 @@ class Simulation:
 
     @property
     def done(self) -> bool:
-        """Whether the manoeuvre has been driven to its end."""
+        """True at the end of the manoeuvre."""
         return self.loop.step_count >= self.steps
 
     @property

@@ -63,7 +63,7 @@ def _all_finite(address, size):
 
 @inlined
 def _sense(bindings):
-    """Whether the state is sane, and the fields of `Measurement` and of `Motion`."""
+    """Return whether the state is sane, and the fields of `Measurement` and of `Motion`."""
     s = carray(f64_pointer(bindings.sensordata), (bindings.sizes[0],))
     yaw_rate = carray(f64_pointer(bindings.qvel), (bindings.n_dofs,))[YAW_DOF]
     speed = s[bindings.velocimeter]

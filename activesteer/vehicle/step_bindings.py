@@ -83,12 +83,14 @@ class Tape:
             `rows`, `pose_every`: rows recorded so far, and rows between two poses. `position`, `quaternion`: addresses
             of the next poses.
         address: Address of the record.
+        memory: Owner of the memory that the addresses point to.
     """
 
     def __init__(self) -> None:
         """Create a tape without room."""
         self.record = np.zeros(1, TAPE)
         self.address = self.record.ctypes.data
+        self.memory: Any = None
 
 
 def bind_step(

@@ -159,7 +159,7 @@ class ChannelMap:
         return out
 
     def _checked(self, inputs: Array, out: Array) -> int:
-        """The number of rows of the arrays that `take` and `compute` write."""
+        """Check the arrays that `take` and `compute` write, and return their number of rows."""
         count = len(out) if isinstance(out, np.ndarray) and out.ndim else 0
         for name, array, width in (("out", out, len(self.channels)), ("inputs", inputs, len(self._inputs))):
             if not _is_matrix(array, count, width) or array.shape[1] != width or array.strides[0] != array.itemsize:
@@ -168,7 +168,7 @@ class ChannelMap:
 
 
 def _is_matrix(array: object, rows: int, columns: int) -> bool:
-    """Whether an array holds this many rows, and at least this many columns, of writable float64."""
+    """Return whether an array holds this many rows, and at least this many columns, of writable float64."""
     return (
         isinstance(array, np.ndarray)
         and array.dtype == np.float64
@@ -184,7 +184,7 @@ def _form(array: object) -> str:
 
 
 def _widths(wanted: list[tuple[int, Values]], inputs: Iterable[Column]) -> list[int]:
-    """How many columns of each array of `RawRows` compiled code reads."""
+    """Return how many columns of each array of `RawRows` compiled code reads."""
     columns = [*inputs, *(value for _, value in wanted if isinstance(value, Column))]
     for _, value in wanted:
         if isinstance(value, AxialForce):
