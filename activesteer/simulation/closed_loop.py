@@ -171,7 +171,8 @@ class ClosedLoop(Uncopyable):
     ) -> None:
         """Drive some steps inside `in_use`, with the manoeuvre's setpoints by default; see `advance`."""
         vehicle, timestep_s = self.vehicle, self.vehicle.timestep_s
-        driver, controller = driver or self.driver, controller or self.controller
+        driving: Driver = driver or self.driver
+        steering: Controller = controller or self.controller
         setpoint_at = setpoint_at or self.maneuver.setpoint
         vehicle.follow_model()
         with engine_warnings_held():
@@ -182,11 +183,11 @@ class ClosedLoop(Uncopyable):
                     self.step_count, self.step_count + steps
                 ):
                     stretch = range(first, last)
-                    unit = told_by_sensor(controller, vehicle.parameters.steering.ratio) if angle_fails else controller
+                    unit = told_by_sensor(steering, vehicle.parameters.steering.ratio) if angle_fails else steering
                     for block in (stretch,) if recorder is None else recorder.blocks(stretch):
                         for step in block:
                             setpoint = setpoint_at(step * timestep_s)
-                            driver_command = driver.step(setpoint, measurement, motion)
+                            driver_command = driving.step(setpoint, measurement, motion)
                             actuator_command = unit.step(driver_command, measurement)
                             measurement, motion = step_car(driver_command, actuator_command)
             finally:
