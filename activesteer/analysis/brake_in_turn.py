@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
 
@@ -27,18 +26,11 @@ MIN_YAW_RATE_RADPS: Final = math.radians(0.5)
 """Smallest yaw rate before the brake of a car that turns [rad/s]."""
 
 KEY_METRICS: Final = (
-    KeyMetric("yaw_rate_deviation_after_1000ms_radps", 1e-3),
-    KeyMetric("path_deviation_after_1000ms_m", 0.01),
-    KeyMetric("yaw_rate_after_1000ms_radps", 1e-3),
-    KeyMetric("yaw_rate_peak_abs_radps", 1e-3),
-    KeyMetric("sideslip_peak_abs_rad", 2e-4),
-    KeyMetric("mean_deceleration_mps2", 0.02),
-    KeyMetric("ay_begin_mps2", 0.02),
-    KeyMetric("radius_begin_m", 0.01),
-    KeyMetric("speed_begin_mps", 0.02),
-    KeyMetric("speed_end_mps", 0.02),
-)
-"""Key metrics, the most telling first, with their tolerances [SI]."""
+    "yaw_rate_deviation_after_1000ms_radps", "path_deviation_after_1000ms_m", "yaw_rate_after_1000ms_radps",
+    "yaw_rate_peak_abs_radps", "sideslip_peak_abs_rad", "mean_deceleration_mps2", "ay_begin_mps2", "radius_begin_m",
+    "speed_begin_mps", "speed_end_mps",
+)  # fmt: skip
+"""Key metrics, the most telling first."""
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
@@ -19,18 +18,10 @@ MIN_LOAD_N: Final = 100.0
 """Vertical load below which the force ratio of a tyre does not count [N]."""
 
 KEY_METRICS: Final = (
-    KeyMetric("yaw_rate_peak_abs_radps", 1e-3),
-    KeyMetric("yaw_rate_rms_radps", 1e-3),
-    KeyMetric("ay_peak_abs_mps2", 0.02),
-    KeyMetric("ay_rms_mps2", 0.02),
-    KeyMetric("sideslip_peak_abs_rad", 2e-4),
-    KeyMetric("sideslip_rms_rad", 2e-4),
-    KeyMetric("roll_peak_abs_rad", 2e-4),
-    KeyMetric("roll_rms_rad", 2e-4),
-    KeyMetric("steering_wheel_peak_abs_rad", 2e-4),
-    KeyMetric("speed_end_mps", 0.02),
-)
-"""Key metrics, the most telling first, with their tolerances [SI]."""
+    "yaw_rate_peak_abs_radps", "yaw_rate_rms_radps", "ay_peak_abs_mps2", "ay_rms_mps2", "sideslip_peak_abs_rad",
+    "sideslip_rms_rad", "roll_peak_abs_rad", "roll_rms_rad", "steering_wheel_peak_abs_rad", "speed_end_mps",
+)  # fmt: skip
+"""Key metrics, the most telling first."""
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:

@@ -21,7 +21,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.series import timestep
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import Array
@@ -38,18 +37,11 @@ MIN_SPEED_MPS: Final = 1.0
 """Least speed at which curvature is evaluated [m/s]."""
 
 KEY_METRICS: Final = (
-    KeyMetric("understeer_gradient_radpmps2", 1e-5),
-    KeyMetric("characteristic_speed_mps", 0.02),
-    KeyMetric("steer_gradient_radpmps2", 1e-5),
-    KeyMetric("ackermann_gradient_radpmps2", 1e-5),
-    KeyMetric("roll_gradient_radpmps2", 1e-5),
-    KeyMetric("sideslip_gradient_radpmps2", 1e-5),
-    KeyMetric("front_slip_gradient_radpmps2", 1e-5),
-    KeyMetric("rear_slip_gradient_radpmps2", 1e-5),
-    KeyMetric("linear_range_mps2", 0.02),
-    KeyMetric("limit_acceleration_mps2", 0.02),
-)
-"""Key metrics, the most telling first, with their tolerances [SI]."""
+    "understeer_gradient_radpmps2", "characteristic_speed_mps", "steer_gradient_radpmps2",
+    "ackermann_gradient_radpmps2", "roll_gradient_radpmps2", "sideslip_gradient_radpmps2",
+    "front_slip_gradient_radpmps2", "rear_slip_gradient_radpmps2", "linear_range_mps2", "limit_acceleration_mps2",
+)  # fmt: skip
+"""Key metrics, the most telling first."""
 
 
 class CarGeometry(NamedTuple):

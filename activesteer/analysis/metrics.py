@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 from activesteer.analysis import (
@@ -16,10 +16,9 @@ from activesteer.analysis import (
     step_response,
     straight_braking,
 )
-from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
 from activesteer.errors import RecordingError, nearest_names
-from activesteer.metric_table import metric
+from activesteer.metric_table import Metric, metric
 
 
 class Evaluation(NamedTuple):
@@ -31,24 +30,28 @@ class Evaluation(NamedTuple):
     """
 
     metrics: Callable[[RecordingLike], dict[str, float]]
-    key_metrics: tuple[KeyMetric, ...]
+    key_metrics: tuple[Metric, ...]
 
 
-_GENERAL: Final = Evaluation(general.metrics, general.KEY_METRICS)
+def _evaluation(metrics: Callable[[RecordingLike], dict[str, float]], key_metrics: Sequence[str]) -> Evaluation:
+    return Evaluation(metrics, tuple(map(metric, key_metrics)))
+
+
+_GENERAL: Final = _evaluation(general.metrics, general.KEY_METRICS)
 EVALUATIONS: Final[dict[str, Evaluation]] = {
-    "step_steer": Evaluation(step_response.metrics, step_response.KEY_METRICS),
+    "step_steer": _evaluation(step_response.metrics, step_response.KEY_METRICS),
     "open_loop": _GENERAL,
     "random_steer": _GENERAL,
-    "slowly_increasing_steer": Evaluation(slow_ramp.metrics, slow_ramp.KEY_METRICS),
-    "constant_radius": Evaluation(handling.metrics, handling.KEY_METRICS),
-    "sine_sweep": Evaluation(frequency_response.metrics, frequency_response.KEY_METRICS),
-    "sine_with_dwell": Evaluation(sine_with_dwell.metrics, sine_with_dwell.KEY_METRICS),
-    "lane_change": Evaluation(path_following.metrics, path_following.LANE_CHANGE_KEY_METRICS),
-    "slalom": Evaluation(path_following.metrics, path_following.SLALOM_KEY_METRICS),
-    "follow_path": Evaluation(path_following.metrics, path_following.PATH_KEY_METRICS),
-    "brake_in_turn": Evaluation(brake_in_turn.metrics, brake_in_turn.KEY_METRICS),
-    "straight_braking": Evaluation(straight_braking.metrics, straight_braking.KEY_METRICS),
-    "measured": Evaluation(general.measured_metrics, general.KEY_METRICS),
+    "slowly_increasing_steer": _evaluation(slow_ramp.metrics, slow_ramp.KEY_METRICS),
+    "constant_radius": _evaluation(handling.metrics, handling.KEY_METRICS),
+    "sine_sweep": _evaluation(frequency_response.metrics, frequency_response.KEY_METRICS),
+    "sine_with_dwell": _evaluation(sine_with_dwell.metrics, sine_with_dwell.KEY_METRICS),
+    "lane_change": _evaluation(path_following.metrics, path_following.LANE_CHANGE_KEY_METRICS),
+    "slalom": _evaluation(path_following.metrics, path_following.SLALOM_KEY_METRICS),
+    "follow_path": _evaluation(path_following.metrics, path_following.PATH_KEY_METRICS),
+    "brake_in_turn": _evaluation(brake_in_turn.metrics, brake_in_turn.KEY_METRICS),
+    "straight_braking": _evaluation(straight_braking.metrics, straight_braking.KEY_METRICS),
+    "measured": _evaluation(general.measured_metrics, general.KEY_METRICS),
 }
 """Kind of manoeuvre -> its evaluation."""
 

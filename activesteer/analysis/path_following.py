@@ -14,7 +14,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from activesteer.analysis import lanes, track
-from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.series import Array, lag, largest_rate, rate_rms, rms, timestep
 from activesteer.analysis.source import RecordingLike, maneuver_kind, read_course, read_footprint
 from activesteer.conventions import CORNERS
@@ -31,46 +30,25 @@ OSCILLATING: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2")
 """Channels whose root mean squares within and after the gates are metrics."""
 
 PATH_KEY_METRICS: Final = (
-    KeyMetric("track_deviation_max_m", 0.01),
-    KeyMetric("track_deviation_rms_m", 0.01),
-    KeyMetric("sideslip_peak_abs_rad", 2e-4),
-    KeyMetric("yaw_rate_peak_abs_radps", 1e-3),
-    KeyMetric("ay_peak_abs_mps2", 0.02),
-    KeyMetric("roll_peak_abs_rad", 2e-4),
-    KeyMetric("steering_wheel_peak_abs_rad", 2e-4),
-    KeyMetric("tyre_use_max", 0.01),
-    KeyMetric("speed_loss_mps", 0.02),
-    KeyMetric("speed_end_mps", 0.02),
-)
-"""Key metrics of a path without gates, the most telling first, with their tolerances [SI]."""
+    "track_deviation_max_m", "track_deviation_rms_m", "sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps",
+    "ay_peak_abs_mps2", "roll_peak_abs_rad", "steering_wheel_peak_abs_rad", "tyre_use_max", "speed_loss_mps",
+    "speed_end_mps",
+)  # fmt: skip
+"""Key metrics of a path without gates, the most telling first."""
 
 LANE_CHANGE_KEY_METRICS: Final = (
-    KeyMetric("lane_overstep_m", 0.01),
-    KeyMetric("cones_hit", 0.0),
-    KeyMetric("track_deviation_max_m", 0.01),
-    KeyMetric("sideslip_peak_abs_rad", 2e-4),
-    KeyMetric("yaw_rate_peak_abs_radps", 1e-3),
-    KeyMetric("ay_peak_abs_mps2", 0.02),
-    KeyMetric("yaw_rate_after_gates_rms_radps", 1e-3),
-    KeyMetric("sideslip_after_gates_rms_rad", 2e-4),
-    KeyMetric("steering_wheel_peak_abs_rad", 2e-4),
-    KeyMetric("speed_loss_mps", 0.02),
-)
-"""Key metrics of a lane change, the most telling first, with their tolerances [SI]."""
+    "lane_overstep_m", "cones_hit", "track_deviation_max_m", "sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps",
+    "ay_peak_abs_mps2", "yaw_rate_after_gates_rms_radps", "sideslip_after_gates_rms_rad",
+    "steering_wheel_peak_abs_rad", "speed_loss_mps",
+)  # fmt: skip
+"""Key metrics of a lane change, the most telling first."""
 
 SLALOM_KEY_METRICS: Final = (
-    KeyMetric("track_amplitude_m", 0.01),
-    KeyMetric("cone_distance_mean_m", 0.01),
-    KeyMetric("cones_hit", 0.0),
-    KeyMetric("cones_missed", 0.0),
-    KeyMetric("sideslip_peak_abs_rad", 2e-4),
-    KeyMetric("yaw_rate_peak_abs_radps", 1e-3),
-    KeyMetric("ay_peak_abs_mps2", 0.02),
-    KeyMetric("yaw_rate_after_gates_rms_radps", 1e-3),
-    KeyMetric("steering_wheel_peak_abs_rad", 2e-4),
-    KeyMetric("speed_loss_mps", 0.02),
-)
-"""Key metrics of a slalom, the most telling first, with their tolerances [SI]."""
+    "track_amplitude_m", "cone_distance_mean_m", "cones_hit", "cones_missed", "sideslip_peak_abs_rad",
+    "yaw_rate_peak_abs_radps", "ay_peak_abs_mps2", "yaw_rate_after_gates_rms_radps", "steering_wheel_peak_abs_rad",
+    "speed_loss_mps",
+)  # fmt: skip
+"""Key metrics of a slalom, the most telling first."""
 
 
 class PathFollowing(NamedTuple):

@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.filters import low_pass
-from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.series import crossing_time, timestep
 from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.zeroing import THRESHOLD_RAD, offset, zeroing_range
@@ -49,18 +48,11 @@ PEAKS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("ro
 """Channels whose largest magnitude is a metric: name and unit suffix."""
 
 KEY_METRICS: Final = (
-    KeyMetric("yaw_rate_after_1000ms_share", 0.01),
-    KeyMetric("yaw_rate_after_1750ms_share", 0.01),
-    KeyMetric("lateral_displacement_m", 0.01),
-    KeyMetric("sideslip_peak_abs_rad", 2e-4),
-    KeyMetric("yaw_rate_peak_abs_radps", 1e-3),
-    KeyMetric("yaw_rate_reversal_peak_radps", 1e-3),
-    KeyMetric("ay_peak_abs_mps2", 0.02),
-    KeyMetric("roll_peak_abs_rad", 2e-4),
-    KeyMetric("steering_wheel_peak_abs_rad", 2e-4),
-    KeyMetric("speed_end_mps", 0.02),
-)
-"""Key metrics, the most telling first, with their tolerances [SI]."""
+    "yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", "lateral_displacement_m", "sideslip_peak_abs_rad",
+    "yaw_rate_peak_abs_radps", "yaw_rate_reversal_peak_radps", "ay_peak_abs_mps2", "roll_peak_abs_rad",
+    "steering_wheel_peak_abs_rad", "speed_end_mps",
+)  # fmt: skip
+"""Key metrics, the most telling first."""
 
 
 class Steering(NamedTuple):

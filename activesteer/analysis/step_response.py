@@ -13,7 +13,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.series import crossing_time, largest_rate, step_response, timestep
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
@@ -25,18 +24,11 @@ MIN_STEP_RAD: Final = math.radians(0.5)
 """Smallest final steering wheel angle that counts as a step [rad]."""
 
 KEY_METRICS: Final = (
-    KeyMetric("yaw_rate_response_time_s", 0.005),
-    KeyMetric("yaw_rate_peak_radps", 1e-3),
-    KeyMetric("yaw_rate_overshoot", 0.01),
-    KeyMetric("yaw_rate_steady_state_radps", 1e-3),
-    KeyMetric("ay_response_time_s", 0.005),
-    KeyMetric("ay_overshoot", 0.01),
-    KeyMetric("sideslip_peak_rad", 2e-4),
-    KeyMetric("sideslip_steady_state_rad", 2e-4),
-    KeyMetric("roll_peak_rad", 2e-4),
-    KeyMetric("tb_srad", 2e-5),
-)
-"""Key metrics, the most telling first, with their tolerances [SI]."""
+    "yaw_rate_response_time_s", "yaw_rate_peak_radps", "yaw_rate_overshoot", "yaw_rate_steady_state_radps",
+    "ay_response_time_s", "ay_overshoot", "sideslip_peak_rad", "sideslip_steady_state_rad", "roll_peak_rad",
+    "tb_srad",
+)  # fmt: skip
+"""Key metrics, the most telling first."""
 
 
 class Signal(NamedTuple):

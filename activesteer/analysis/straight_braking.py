@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import RecordingError
@@ -20,18 +19,11 @@ SLIPS_FROM_MPS: Final = 15.0 / 3.6
 """Speed above which no wheel shall lock [m/s]; UN R13-H, annex 6 has the same speed."""
 
 KEY_METRICS: Final = (
-    KeyMetric("stopping_distance_m", 0.01),
-    KeyMetric("mean_deceleration_mps2", 0.02),
-    KeyMetric("braking_efficiency", 0.01),
-    KeyMetric("wheel_slip_max", 0.01),
-    KeyMetric("brake_pressure_peak_Pa", 1e4),
-    KeyMetric("yaw_rate_peak_abs_radps", 1e-3),
-    KeyMetric("lateral_deviation_max_m", 0.01),
-    KeyMetric("steering_wheel_peak_abs_rad", 2e-4),
-    KeyMetric("speed_begin_mps", 0.02),
-    KeyMetric("braking_begin_time_s", 0.005),
-)
-"""Key metrics, the most telling first, with their tolerances [SI]."""
+    "stopping_distance_m", "mean_deceleration_mps2", "braking_efficiency", "wheel_slip_max",
+    "brake_pressure_peak_Pa", "yaw_rate_peak_abs_radps", "lateral_deviation_max_m", "steering_wheel_peak_abs_rad",
+    "speed_begin_mps", "braking_begin_time_s",
+)  # fmt: skip
+"""Key metrics, the most telling first."""
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:

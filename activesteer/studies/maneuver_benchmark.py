@@ -16,11 +16,10 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS
-from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.metrics import EVALUATIONS, evaluation_of
 from activesteer.errors import ActiveSteerError, RecordingError
 from activesteer.files import json_text, read_text, write_text
-from activesteer.metric_table import recorded_metric
+from activesteer.metric_table import Metric, recorded_metric
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
 from activesteer.simulation.amplitude_store import searched_anew
@@ -164,12 +163,12 @@ def drifts(benchmark: Benchmark, baseline: Baseline) -> list[Drift]:
 
 
 def _differences(
-    run: tuple[str, str], before: Mapping[str, float], after: Mapping[str, float], declared: Mapping[str, KeyMetric]
+    run: tuple[str, str], before: Mapping[str, float], after: Mapping[str, float], declared: Mapping[str, Metric]
 ) -> list[Drift]:
     found = []
     for name in dict.fromkeys((*before, *after)):
         old, new = before.get(name), after.get(name)
-        metric = declared.get(name, KeyMetric(name, 0.0))
+        metric = declared.get(name) or recorded_metric(name)
         tolerance = metric.tolerance_of(old) if old is not None and math.isfinite(old) else metric.tolerance
         if old is None or new is None or not _alike(old, new, tolerance):
             found.append(Drift(*run, name, old, new, tolerance))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from activesteer.analysis import general, step_response
-from activesteer.analysis.key_metric import KeyMetric
 from activesteer.analysis.metrics import EVALUATIONS, metrics
 from activesteer.conventions import CORNERS
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.maneuver.kinds import KINDS
+from activesteer.metric_table import METRICS
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun, step_steer
 
@@ -60,10 +60,10 @@ def test_a_kind_has_ten_different_key_metrics(kind):
 
 
 def test_the_tolerance_of_a_key_metric_grows_with_its_value():
-    metric = KeyMetric("ay_peak_abs_mps2", 0.02)
+    metric = METRICS["ay_peak_abs_mps2"]
     assert metric.tolerance_of(0.5) == 0.02
     assert metric.tolerance_of(-8.0) == pytest.approx(0.08)
-    assert KeyMetric("cones_hit", 0.0).tolerance_of(300.0) == 0.0
+    assert METRICS["cones_hit"].tolerance_of(300.0) == 0.0
 
 
 def test_peaks_and_root_mean_squares_of_a_sine():
