@@ -1,4 +1,4 @@
-"""The workers of a Dask cluster, behind the interface of `workers.Workers`."""
+"""Workers of a Dask cluster, behind the interface of `workers.Workers`."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from activesteer.errors import StudyError, not_installed
 
 _CONNECT_S: Final = 10
 _WORKERS_S: Final = 30
-"""How long the first worker of a cluster is waited for [s]."""
+"""Time to wait for the first worker of a cluster [s]."""
 _TASKS_A_WORKER: Final = 4
 _SAME: Final = ("distributed", "dask", "cloudpickle", "msgpack")
-"""Packages of which client, scheduler and workers need the same version."""
+"""Packages whose versions must agree between client, scheduler and workers."""
 
 
 class DaskCluster:
-    """A cluster, reached by its client.
+    """A cluster, accessed through its client.
 
-    Workers may come and go. One thread of a worker does a task at a time (see `task_queue`), so a worker is best
-    started with one thread.
+    Workers may join and leave. One thread of a worker does one task at a time (see `task_queue`), so start a worker
+    with one thread.
 
     Attributes:
-        in_flight: How many tasks the cluster should have at a time.
+        in_flight: Number of tasks that the cluster should have at a time.
     """
 
     def __init__(self, client: Any) -> None:
-        """Looks at the cluster; the client stays the caller's.
+        """Check the cluster. The client still belongs to the caller.
 
         Args:
             client: A `distributed.Client`.
@@ -56,11 +56,11 @@ class DaskCluster:
         return self._executor.submit(function, *arguments)
 
     def died(self, error: BaseException) -> bool:
-        """The scheduler reports a task that several workers died of, and cancels one that it lost."""
+        """Return True for the error of a task that killed several workers or that the scheduler lost."""
         return type(error).__name__ == "KilledWorker" or isinstance(error, CancelledError)
 
     def replace(self) -> None:
-        """The cluster replaces its workers itself; whether it is still there is looked at here.
+        """Check that the scheduler still exists; the cluster replaces its workers itself.
 
         Raises:
             StudyError: the scheduler is gone.
@@ -74,7 +74,7 @@ class DaskCluster:
         self._count()
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """See `Workers`; one worker of a machine goes first, so that kernels are compiled once."""
+        """See `Workers`. One worker of each machine goes first, so that kernels are compiled once."""
         hosts: dict[str, list[str]] = {}
         for address in self._client.nthreads():
             hosts.setdefault(address.rpartition(":")[0], []).append(address)
@@ -89,23 +89,23 @@ class DaskCluster:
         return ""
 
     def close(self, *, abandon: bool) -> None:
-        """Takes back what has not begun."""
-        with contextlib.suppress(Exception):  # where the cluster is gone there is nothing to take back
+        """Cancel the tasks that have not begun."""
+        with contextlib.suppress(Exception):  # without a cluster there is nothing to cancel
             self._executor.shutdown(wait=not abandon, cancel_futures=True)
 
 
 @contextlib.contextmanager
 def connected(scheduler: str) -> Iterator[Any]:
-    """A client of a running scheduler.
+    """Yield a client of a running scheduler.
 
     Args:
-        scheduler: Its address, as tcp://host:8786, or the scheduler file that it wrote.
+        scheduler: Its address, such as tcp://host:8786, or the scheduler file that it wrote.
 
     Yields:
         The client.
 
     Raises:
-        StudyError: it cannot be reached, or `distributed` is not installed.
+        StudyError: the scheduler cannot be reached, or `distributed` is not installed.
     """
     try:
         from distributed import Client  # noqa: PLC0415 - an extra
@@ -121,7 +121,7 @@ def connected(scheduler: str) -> Iterator[Any]:
         )
     try:
         client = Client(**where, timeout=_CONNECT_S)
-    except Exception as reason:  # whatever the network, the address or the file has against it
+    except Exception as reason:  # any error of the network, the address or the file
         raise StudyError(
             f"cannot be reached: {_line(reason)}", key=f"--scheduler {scheduler}", value=scheduler
         ) from reason
@@ -130,7 +130,7 @@ def connected(scheduler: str) -> Iterator[Any]:
 
 
 def _compare_versions(found: dict[str, Any]) -> None:
-    """Client, scheduler and workers must speak the same language; of activesteer itself, the workers are asked."""
+    """Check that client, scheduler and workers have the same versions; ask the workers for that of activesteer."""
     here = found["client"]
     others = {"the scheduler": found["scheduler"]} | {f"worker {key}": value for key, value in found["workers"].items()}
     for who, theirs in others.items():

@@ -1,8 +1,8 @@
-"""On which factor an outcome depends most, by regression: for samples whose design allows no Sobol' indices.
+"""The factor that an outcome depends on most, by regression, for samples whose design allows no Sobol' indices.
 
-The outcome, yes or no, is fitted by least squares with every factor and its square, so that a factor is found too whose
-middle is best. A factor counts where leaving it out makes the fit worse by more than chance does (F test, 5 % for all
-factors together, Bonferroni). Interactions are not looked for.
+The outcome, yes or no, is fitted by least squares with every factor and its square, so that a factor with its optimum
+in the middle is found too. A factor counts if leaving it out worsens the fit by more than chance (F test, 5 % for all
+factors together, Bonferroni). Interactions are not examined.
 
 Source: A. Saltelli et al., Global Sensitivity Analysis (2008), section 1.2.5, on regression of Monte Carlo samples.
 """
@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 SIGNIFICANCE: Final = 0.05
 """Probability at which chance alone would name a factor."""
 _SAMPLES_PER_COEFFICIENT: Final = 3
-"""With fewer nothing is said: the factors of a short Sobol' sequence are correlated with each other's squares."""
+"""Smallest number of samples: in a short Sobol' sequence the factors correlate with each other's squares."""
 
 
 class Dependence(NamedTuple):
-    """The factor that explains most.
+    """The factor that explains most of an outcome.
 
     Attributes:
         factor: Its key.
-        explained: Fraction of the outcome's variance that is lost without it, 0 to 1.
-        direction: 1 where more of it makes the outcome more frequent, -1 where less does, 0 where its middle or its
-            ends do.
+        explained: Fraction of the outcome's variance that is lost without the factor, 0 to 1.
+        direction: 1 if a larger factor makes the outcome more frequent, -1 if a smaller one does, 0 if the middle or
+            the ends of its range do.
     """
 
     factor: str
@@ -39,14 +39,14 @@ class Dependence(NamedTuple):
 def strongest(
     factors: Mapping[str, Sequence[float] | NDArray[np.float64]], outcome: Sequence[bool] | NDArray[np.bool_]
 ) -> Dependence | None:
-    """The factor that an outcome depends on most.
+    """Return the factor that an outcome depends on most.
 
     Args:
         factors: Key -> value in every sample.
-        outcome: Whether it came about in every sample.
+        outcome: Whether the outcome occurred, for every sample.
 
     Returns:
-        The factor; None where none is significant, or there are too few samples to say.
+        The factor; None if none is significant or there are too few samples.
     """
     happened = np.asarray(outcome, dtype=np.float64)
     if happened.size == 0:
@@ -68,14 +68,14 @@ def strongest(
         chance = float(f_distribution.sf(0.5 * lost / max(left / spare, 1e-300), 2, spare))
         if chance * len(columns) < SIGNIFICANCE:
             linear, square = coefficients[1 + 2 * place], coefficients[2 + 2 * place]
-            # Over a uniform sample x spans 3.5 and x^2 3 standard units: the larger change counts.
+            # Over a uniform sample, x spans 3.5 and x^2 3 standard units: the larger change counts.
             direction = int(np.sign(linear)) if abs(linear) * 3.46 > abs(square) * 3.0 else 0
             found.append(Dependence(key, lost / total, direction))
     return max(found, key=lambda dependence: dependence.explained, default=None)
 
 
 def _fit(columns: Sequence[NDArray[np.float64]], outcome: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-    """Sum of squares that is left, and the coefficients: constant, then each column and its square."""
+    """Return the residual sum of squares and the coefficients: constant, then each column and its square."""
     design = np.column_stack([np.ones_like(outcome), *(part for x in columns for part in (x, x * x))])
     coefficients = np.asarray(np.linalg.lstsq(design, outcome, rcond=None)[0], dtype=np.float64)
     return float(np.sum((outcome - design @ coefficients) ** 2)), coefficients

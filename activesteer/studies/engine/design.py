@@ -1,4 +1,4 @@
-"""Which combinations of the factors' values are driven: a grid, a list of cases, or a sample."""
+"""Design of a study: the combinations of factor values as a grid, a list of cases, or a sample."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ class DesignTable:
     """The table [design] of a study file."""
 
     kind: str = ""
-    """One of `DESIGNS`; by itself `list` where cases are given, `grid` where every factor is one, else `sobol`."""
+    """One of `DESIGNS`. Default: `list` if there are cases, `grid` if every factor is a grid, else `sobol`."""
     samples: Annotated[int, Range(1, MAX_SAMPLES)] = 0
-    """Size of the sample; of `saltelli` the base sample (D + 2 runs each), of `morris` trajectories (D + 1 each)."""
+    """Size of the sample; for `saltelli` the base sample (D + 2 runs each), for `morris` trajectories (D + 1 each)."""
     paired: bool = True
     """Whether all controllers are driven with the same sample."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Combinations, as columns: a million of them take little memory.
+    """Combinations, stored as columns so that a million of them need little memory.
 
     Attributes:
-        columns: Key -> value in every combination; a case of a list that does not name a key has None there.
+        columns: Key -> value in every combination; None for a key that a case of a list does not name.
     """
 
     columns: dict[str, list[Value]]
@@ -54,22 +54,22 @@ class Samples:
         return self.count
 
     def __getitem__(self, number: int) -> dict[str, Value]:
-        """One combination as overrides."""
+        """Return one combination as overrides."""
         return {key: value for key, values in self.columns.items() if (value := values[number]) is not None}
 
 
 def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: int = 0) -> Samples:
-    """The combinations of a design.
+    """Return the combinations of a design.
 
-    The factors that are a grid are crossed with each other and with the sample of the rest, so that each of their
-    values meets the same sample.
+    Grid factors are crossed with each other and with the sample of the other factors, so that each grid value meets the
+    same sample.
 
     Args:
-        factors: What is varied.
+        factors: Factors of the study.
         kind: One of `DESIGNS` but `list`.
-        count: Size of the sample; without meaning for a grid.
-        seed: Of the random numbers.
-        stream: Which of several independent samples of the same seed.
+        count: Size of the sample; unused for a grid.
+        seed: Seed of the random numbers.
+        stream: Number of the independent sample with this seed.
 
     Returns:
         The combinations.
@@ -99,14 +99,14 @@ def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: in
 
 
 def _unit_sample(kind: str, dimensions: int, count: int, seed: list[int]) -> NDArray[np.float64]:
-    """Points of the unit cube, shape (points, dimensions)."""
+    """Return points of the unit cube, shape (points, dimensions)."""
     rng = np.random.default_rng(seed)
     if kind == "random":
         return rng.random((count, dimensions))
     if kind == "latin_hypercube":
         return qmc.LatinHypercube(dimensions, rng=rng).random(count)
     if kind == "sobol":
-        # The whole power of 2 is drawn, since a sequence cut short is balanced all the same as far as it goes.
+        # Draw a whole power of 2 and cut it: the part is as balanced as the sequence up to there.
         return qmc.Sobol(dimensions, rng=rng).random_base2(math.ceil(math.log2(count)))[:count]
     problem = {
         "num_vars": dimensions,
@@ -124,23 +124,23 @@ def _unit_sample(kind: str, dimensions: int, count: int, seed: list[int]) -> NDA
 
 
 def cases(given: Iterable[Mapping[str, Any]]) -> Samples:
-    """A list of cases, each naming the keys that it sets."""
+    """Return the combinations of a list of cases, each with the keys that it sets."""
     rows = list(given)
     keys = dict.fromkeys(key for row in rows for key in row)
     return Samples({key: [row.get(key) for row in rows] for key in keys}, len(rows))
 
 
 def read_cases(path: Path) -> Samples:
-    """A list of cases from a CSV file: its header holds the keys, an empty cell leaves a key as it is.
+    """Read a list of cases from a CSV file. Its header holds the keys; an empty cell leaves a key unchanged.
 
     Args:
         path: The file.
 
     Returns:
-        The cases; a cell is a number or true or false where it can be read as one, else a text.
+        The cases; a cell becomes a number or a truth value if possible, and otherwise a text.
 
     Raises:
-        StudyError: the file cannot be read, has no rows, or a row of another length.
+        StudyError: the file cannot be read, has no rows, or has a row of another length.
     """
 
     def fail(problem: str, line: int, key: str | None = None) -> StudyError:
@@ -168,19 +168,19 @@ def read_cases(path: Path) -> Samples:
 
 
 def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool, source: Source) -> DesignTable:
-    """The design with its kind chosen and everything about it checked.
+    """Return the checked design with its kind chosen.
 
     Args:
-        table: What the study file says.
-        factors: What is varied.
-        has_cases: Whether a list of cases is given.
-        source: For error messages.
+        table: The table [design] of the study file.
+        factors: Factors of the study.
+        has_cases: Whether the study has a list of cases.
+        source: Source of the study, for error messages.
 
     Returns:
         The design.
 
     Raises:
-        ActiveSteerError: parts of it do not belong together.
+        ActiveSteerError: parts of the design contradict each other.
     """
     all_grids = all(factor.kind == "grid" for factor in factors)
     kind = table.kind or ("list" if has_cases else "grid" if all_grids else "sobol")

@@ -1,4 +1,4 @@
-"""What a sample's values are in a manoeuvre with a vehicle: as they are, or relative to what the files say."""
+"""Values of a sample for a manoeuvre and a vehicle: absolute, or relative to the files."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from activesteer.studies.engine.study_file import StudyFile
 
 
 def label_of(item: FileOrTable) -> str:
-    """The name that a manoeuvre, vehicle or controller has in the result."""
+    """Return the name of a manoeuvre, vehicle or controller in the results."""
     if isinstance(item, Mapping):
         return str(item.get("name") or "table")
-    # Only before the parameters: the value of one may hold a colon, too.
+    # Look only before the parameters: a parameter's value may contain a colon too.
     named, mark, parameters = str(item).partition("?")
     path, colon, class_name = named.rpartition(":")
     if colon:
@@ -24,20 +24,20 @@ def label_of(item: FileOrTable) -> str:
 
 
 class FactorValues:
-    """Turns the values of a sample into overrides; each pair of manoeuvre and vehicle is resolved once.
+    """Conversion of sample values to overrides; each pair of manoeuvre and vehicle is resolved once.
 
     Attributes:
         study: The study.
     """
 
     def __init__(self, study: StudyFile) -> None:
-        """Takes a study.
+        """Prepare the conversion for a study.
 
         Args:
             study: The study.
 
         Raises:
-            StudyError: a factor is for a manoeuvre, or for a value of another factor, that the study does not have.
+            StudyError: a factor names a manoeuvre, or a value of another factor, that the study does not have.
         """
         self.study = study
         self._factors = {factor.key: factor for factor in study.factors}
@@ -58,18 +58,18 @@ class FactorValues:
                     raise study.source.fail(place, f"{shown(value)} is no value of that factor", value)
 
     def overrides(self, maneuver: int, vehicle: int, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The overrides of a run.
+        """Return the overrides of a run.
 
         Args:
             maneuver: Number of the manoeuvre in the study.
             vehicle: Number of the vehicle.
-            values: Key -> value of the sample; None where it is as the files have it.
+            values: Key -> value of the sample; None for a key that keeps the value of the files.
 
         Returns:
-            Dotted key -> value, of the keys that are varied in this manoeuvre.
+            Dotted key -> value, for the keys that vary in this manoeuvre.
 
         Raises:
-            ActiveSteerError: a key does not exist, or a value that others are relative to is no number.
+            ActiveSteerError: a key does not exist, or a relative factor refers to a value that is no number.
         """
         label = label_of(self.study.maneuvers[maneuver])
         found = {}
@@ -87,7 +87,7 @@ class FactorValues:
         return found
 
     def _nominal_of(self, maneuver: int, vehicle: int) -> dict[str, Any]:
-        """Values of the files, by key, of the factors that are relative."""
+        """Return the values of the files for the relative factors, by key."""
         place = maneuver, vehicle
         if place not in self._nominal:
             study = self.study

@@ -1,4 +1,4 @@
-"""What a study varies: a key of the manoeuvre or of the vehicle, and the values that it takes."""
+"""Factors of a study: keys of manoeuvre or vehicle and the values that they take."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from activesteer.config import Source
 from activesteer.errors import nearest_names, shown
 
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
-"""The one of these keys that a factor's table must have."""
+"""Kinds of factors; a factor's table has exactly one of these keys."""
 _OPTIONS: Final = {"choice": ("weights",), "normal": ("truncate",)}
 _ANYWHERE: Final = ("nominal", "maneuvers", "when")
-"""Keys that may stand beside any of them."""
+"""Keys that every kind allows."""
 NOMINAL: Final = ("times", "plus")
-"""How a factor may be relative to what the files say."""
+"""Ways in which a factor may be relative to the value of the files."""
 _DEFAULT_TRUNCATION: Final = 3.0
-"""Where a normal distribution is cut off by itself, in standard deviations."""
+"""Default truncation of a normal distribution, in standard deviations."""
 
 Value = Any
 """A number, a text, true or false, or a list of these."""
@@ -30,20 +30,20 @@ Value = Any
 
 @dataclass(frozen=True)
 class Factor:
-    """A key and its values.
+    """A factor: a key and its values.
 
     Attributes:
         key: Dotted key, as for `--set`.
         kind: One of `KINDS`.
-        values: Those of a grid or a choice.
+        values: Values of a grid or a choice.
         weights: Probability of each value of a choice.
         low: Lower end of a range.
         high: Upper end of a range.
-        mean: Of a normal distribution before it is truncated.
-        deviation: Standard deviation of that.
-        nominal: One of `NOMINAL` where the values are factors on what the files say, or are added to it; else empty.
-        maneuvers: Names of the manoeuvres in which it is varied; all where empty.
-        when: Values of other factors with which it is varied; all where empty.
+        mean: Mean of a normal distribution before truncation.
+        deviation: Standard deviation of a normal distribution before truncation.
+        nominal: One of `NOMINAL` if the values multiply the value of the files or are added to it; else empty.
+        maneuvers: Names of the manoeuvres in which the factor varies; empty for all.
+        when: Values of other factors with which the factor varies; empty for all.
     """
 
     key: str
@@ -59,13 +59,13 @@ class Factor:
     when: Mapping[str, Value] = field(default_factory=dict)
 
     def from_unit(self, unit: NDArray[np.float64]) -> list[Value]:
-        """Values at cumulative probabilities: what turns a sample of the unit cube into one of the study.
+        """Convert a sample of the unit cube to values of the factor.
 
         Args:
             unit: Probabilities, 0 to 1, shape (n,).
 
         Returns:
-            As many values.
+            Values at these cumulative probabilities, shape (n,).
         """
         if self.kind in ("grid", "choice"):
             weights = self.weights or [1.0] * len(self.values)
@@ -83,11 +83,11 @@ class Factor:
 
     @property
     def extremes(self) -> tuple[Value, ...]:
-        """Values that all others lie between, or all of them where they have no order."""
+        """Return the extreme values, or all values if they have no order."""
         return self.values or (self.low, self.high)
 
     def to_table(self) -> dict[str, Any]:
-        """The table that `read_factor` takes."""
+        """Return the factor as the table that `read_factor` takes."""
         table: dict[str, Any] = {self.kind: list(self.values) or [self.low, self.high]}
         if self.weights:
             table["weights"] = list(self.weights)
@@ -103,17 +103,17 @@ class Factor:
 
 
 def read_factor(key: str, table: object, source: Source) -> Factor:
-    """A factor from its table in a study file.
+    """Read a factor from its table in a study file.
 
     Args:
         key: The key that is varied.
         table: `{ grid = [70, 80] }`, `{ choice = ["a", "b"], weights = [1, 2] }`, `{ uniform = [low, high] }`,
-            `{ log_uniform = [low, high] }` or `{ normal = [mean, deviation], truncate = [low, high] }`; a normal
-            distribution is cut off at three standard deviations where no bounds are given. With `nominal = "times"`
-            the values are factors on what the files say, with `nominal = "plus"` they are added to it; with
-            `maneuvers = ["slalom"]` the key is varied in these only, and with
-            `when = { "sensors.preset" = "production" }` where another factor has that value.
-        source: For error messages.
+            `{ log_uniform = [low, high] }` or `{ normal = [mean, deviation], truncate = [low, high] }`. Without bounds,
+            a normal distribution is truncated at three standard deviations. With `nominal = "times"` the values
+            multiply the value of the files, with `nominal = "plus"` they are added to it. With `maneuvers = ["slalom"]` the key
+            varies in these manoeuvres only, with `when = { "sensors.preset" = "production" }` only where another factor
+            has that value.
+        source: Source of the study, for error messages.
 
     Returns:
         The factor.
@@ -150,7 +150,7 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
 
 
 def _read(key: str, kind: str, table: Mapping[str, Any], source: Source) -> Factor:
-    """The factor of a table whose keys belong together, as far as its values go."""
+    """Return the factor of a table whose keys are consistent, after checking its values."""
     where = ("factors", key)
     given = table[kind]
     if kind in ("grid", "choice"):

@@ -1,4 +1,4 @@
-"""All runs of a study, in their order, and whether its keys mean what they say, before anything is driven."""
+"""Plan of a study: all runs in their order, with every key checked before anything is driven."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from activesteer.studies.engine.run_settings import Request, Settings, present_i
 from activesteer.studies.engine.study_file import StudyFile
 
 _LABELS: Final = ("name", "title")
-"""Keys of manoeuvres and vehicles that only words depend on."""
+"""Keys of manoeuvres and vehicles that affect texts only."""
 
 
 class Plan:
-    """The runs: for each manoeuvre and vehicle every sample, and for each sample every controller.
+    """The runs of a study: for each manoeuvre and vehicle every sample, and for each sample every controller.
 
     Attributes:
         study: The study.
-        settings: What all runs share.
-        samples: The combinations of factors, one set for all controllers or one for each.
+        settings: Settings that all runs share.
+        samples: Combinations of factors: one set for all controllers, or one for each.
         digest: Hash of everything that decides the result of the study.
     """
 
     def __init__(self, study: StudyFile, folder: Path | None = None) -> None:
-        """Checks the study and lays its runs out.
+        """Check the study and enumerate its runs.
 
         Args:
             study: The study.
-            folder: Where recordings go, where some are kept.
+            folder: Folder of the recordings, if some are kept.
 
         Raises:
             ActiveSteerError: a manoeuvre, vehicle or controller is not found or wrong; a key does not exist, changes
@@ -81,13 +81,13 @@ class Plan:
         return len(shared.maneuvers) * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
 
     def _named(self) -> Iterator[tuple[int, int, dict[str, Any]]]:
-        """Numbers of manoeuvre and vehicle and overrides, with every combination of texts that may be driven."""
+        """Return indices of manoeuvre and vehicle with overrides, for every combination of texts that may be driven."""
         study = self.study
         places = list(itertools.product(range(len(study.maneuvers)), range(len(study.vehicles))))
         for samples in self.samples:
             columns = {key: values for key, values in samples.columns.items() if _has_text(values)}
             rows: Iterable[tuple[Any, ...]] = dict.fromkeys(zip(*columns.values(), strict=True))
-            if study.tune is not None:  # which combines values as the search goes
+            if study.tune is not None:  # a search combines values as it proceeds
                 columns = {factor.key: factor.values for factor in study.factors if _has_text(factor.values)}
                 rows = itertools.product(*columns.values())
             for row in rows if columns else ():
@@ -96,7 +96,7 @@ class Plan:
                     yield *place, study.overrides | self._values.overrides(*place, sample)
 
     def request(self, run: int) -> Request:
-        """A run by its number."""
+        """Return a run by its number."""
         shared = self.settings
         place, controller = divmod(run, len(shared.controllers))
         place, sample = divmod(place, len(self.samples[0]))
@@ -105,10 +105,10 @@ class Plan:
         return self.request_with(run, sample, (maneuver, vehicle, controller), samples[sample])
 
     def request_with(self, run: int, sample: int, place: tuple[int, int, int], factors: dict[str, Any]) -> Request:
-        """A run with values of its own.
+        """Return a run with values of its own.
 
         Args:
-            run: Its number.
+            run: Number of the run.
             sample: Number of the values.
             place: Numbers of manoeuvre, vehicle and controller.
             factors: The values.
@@ -117,7 +117,7 @@ class Plan:
         return Request(run, sample, *place, factors, overrides)
 
     def requests(self, runs: Iterable[int]) -> list[Request]:
-        """Several runs by their numbers."""
+        """Return several runs by their numbers."""
         return [self.request(run) for run in runs]
 
 
@@ -126,7 +126,7 @@ def _has_text(values: Iterable[Any]) -> bool:
 
 
 def _labelled(study: StudyFile, key: str, items: Sequence[Any]) -> tuple[tuple[str, Any], ...]:
-    """Every item with the name that it has in the result: without folders, so that it is the same on every machine."""
+    """Return every item with its name in the results: without folders, so that it is the same on every machine."""
     labels = [label_of(item) for item in items]
     for label in labels:
         if labels.count(label) > 1:
@@ -135,7 +135,7 @@ def _labelled(study: StudyFile, key: str, items: Sequence[Any]) -> tuple[tuple[s
 
 
 def _check(study: StudyFile, samples: Sequence[Samples], factor_values: FactorValues) -> None:
-    """Every key exists in every manoeuvre and vehicle, allows its extreme values, and changes something."""
+    """Check that every key exists in every manoeuvre and vehicle, allows its extreme values, and has an effect."""
     if study.claims and not set(SYSTEMS) <= set(study.controllers):
         raise study.source.fail(("claims",), f"needs the controllers {', '.join(SYSTEMS)}")
     first = samples[0][0] if len(samples[0]) else {}
@@ -179,7 +179,7 @@ def _resolved(
 def _described(
     factor_values: FactorValues, place: tuple[int, int], samples: Samples, key: str, values: Sequence[Any]
 ) -> list[dict[str, Any]]:
-    """What a run depends on at each value of a key, the others being as in the first sample where that is possible."""
+    """Return the inputs of a run at each value of a key, with the other keys as in the first sample if possible."""
     study = factor_values.study
     needed = next((factor.when for factor in study.factors if factor.key == key), {})
     first, cases = {**samples[0], **needed}, study.case_list
@@ -192,11 +192,11 @@ def _described(
     except ActiveSteerError:
         if not whole:
             raise
-        return whole  # the keys of a case may go together: alone, one of them makes no sense
+        return whole  # the keys of a case may depend on each other: one alone may be invalid
 
 
 def _check_curves(study: StudyFile, scenario: Scenario) -> None:
-    """Every channel of which curves are kept is recorded."""
+    """Check that every channel in `curves` is recorded."""
     if not study.curves:
         return
     known = [channel.name for channel in scenario.car.on(scenario.maneuver.road).channels.channels]
@@ -208,7 +208,7 @@ def _check_curves(study: StudyFile, scenario: Scenario) -> None:
 
 
 def _extremes(study: StudyFile, samples: Sequence[Samples]) -> dict[str, list[Any]]:
-    """Key -> values that all others lie between, or all of them where they have no order; None where it is not set."""
+    """Return key -> extreme values, or all values if they have no order; None where a key is not set."""
     if study.case_list is None:
         return {factor.key: list(factor.extremes) for factor in study.factors}
     found: dict[str, list[Any]] = {}
@@ -218,12 +218,12 @@ def _extremes(study: StudyFile, samples: Sequence[Samples]) -> dict[str, list[An
         different = {str(value): value for value in present}
         found[key] = sorted({min(present), max(present)}) if numbers else list(different.values())
         if len(present) < len(column):
-            found[key].append(None)  # there it is as the files have it
+            found[key].append(None)  # without a value, the key keeps the value of the files
     return found
 
 
 def _leaves(scenario: Scenario) -> dict[str, Any]:
-    """Everything that a run depends on, by dotted key."""
+    """Return everything that a run depends on, by dotted key."""
     return dict(_walk(describe(scenario) | {"overrides": {}, "files": scenario.files}, ""))
 
 
@@ -243,7 +243,7 @@ def _differing(a: Mapping[str, Any], b: Mapping[str, Any]) -> set[str]:
 
 
 def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
-    """Whether a value takes part in any of the runs: gains need their controller, the view of a path needs a path."""
+    """Return True if a value affects any run: gains need their controller, the preview of a path needs a path."""
     part, first, *rest = [*leaf.split("."), "", ""]
     follows_path = scenario.maneuver.course is not None
     if part == "files":
@@ -253,7 +253,7 @@ def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
     others = [name for name in controllers if name != "none"]
     if part == "vehicle" and first == "controllers":
         return any(rest[0] in keys_read(name) for name in others)
-    if part == "vehicle" and first == "single_track" and rest[0] != "mass_kg":  # which the speed hold knows too
+    if part == "vehicle" and first == "single_track" and rest[0] != "mass_kg":  # the speed controller uses it too
         return bool(others) or follows_path or scenario.maneuver.settling_setpoint().curvature_demand_1pm is not None
     if part == "driver":
         return not scenario.driver.plugin.ours or follows_path or first.startswith("speed_")
@@ -261,15 +261,15 @@ def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
 
 
 def task_size(runs: int, controllers: int, in_flight: int) -> int:
-    """How many runs a task has: 8 to 64, enough tasks that all workers end together, and whole samples.
+    """Return the number of runs per task: 8 to 64, whole samples, and enough tasks for all workers to end together.
 
     Args:
         runs: Runs of the study.
         controllers: Runs of a sample.
-        in_flight: Tasks that the workers have at a time.
+        in_flight: Number of tasks that the workers have at a time.
 
     Returns:
-        Runs a task; fewer than 8 only where the study is small.
+        Runs per task; fewer than 8 only if the study is small.
     """
     wanted = int(np.clip(runs // (8 * in_flight), 8, 64))
     if runs < 8 * in_flight:

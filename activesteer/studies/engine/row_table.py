@@ -1,4 +1,4 @@
-"""Rows of runs as tables: columns and their types and units, parts that are joined."""
+"""Rows of runs as tables: columns with types and units, and the joining of parts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from activesteer.display_units import unit_of
 from activesteer.studies.engine.run_task import CURVE, Row
 
 IDENTITY: Final = ("run", "run_id", "sample", "maneuver", "vehicle", "controller")
-"""Columns that say which run a row is of; the factors follow them."""
+"""Columns that identify the run of a row; the factors follow them."""
 OUTCOME: Final = ("status", "error")
 """Columns behind the factors; the metrics follow them."""
 _TYPES: Final = {"run": pa.int64(), "sample": pa.int64()} | dict.fromkeys(
@@ -21,11 +21,11 @@ _TYPES: Final = {"run": pa.int64(), "sample": pa.int64()} | dict.fromkeys(
 
 
 def table_of(rows: Sequence[Row], factors: Sequence[str]) -> pa.Table:
-    """Rows as a table, a unit with each column.
+    """Return rows as a table, with a unit for each column.
 
     Args:
         rows: The rows.
-        factors: Keys that are varied: the columns between identity and outcome.
+        factors: Varied keys: the columns between identity and outcome.
     """
     names = dict.fromkeys([*IDENTITY, *factors, *OUTCOME, *(name for row in rows for name in row)])
     columns = {}
@@ -44,7 +44,7 @@ def table_of(rows: Sequence[Row], factors: Sequence[str]) -> pa.Table:
 
 
 def joined_schema(schemas: Iterable[pa.Schema]) -> pa.Schema:
-    """The columns of all parts; a factor that is whole numbers in one and not in another becomes a float."""
+    """Return the columns of all parts; a factor with whole numbers in some parts only becomes a float."""
     fields: dict[str, pa.Field] = {}
     for schema in schemas:
         for field in schema:
@@ -54,7 +54,7 @@ def joined_schema(schemas: Iterable[pa.Schema]) -> pa.Schema:
 
 
 def _factor_column(values: Sequence[Any]) -> pa.Array:
-    """Numbers, texts or truth values; anything else as JSON."""
+    """Return a column of numbers, texts or truth values; anything else is written as JSON."""
     try:
         numbers = any(isinstance(value, float) for value in values)
         plain = [float(value) if numbers and value is not None else value for value in values]
@@ -75,7 +75,7 @@ def _common(a: pa.DataType, b: pa.DataType) -> pa.DataType:
 
 
 def fitted(table: pa.Table, schema: pa.Schema) -> pa.Table:
-    """The table with the columns of the schema; those that it lacks are empty."""
+    """Return the table with the columns of the schema; missing columns are empty."""
     present = set(table.column_names)
     columns = [
         table[field.name].cast(field.type) if field.name in present else pa.nulls(len(table), field.type)
@@ -85,7 +85,7 @@ def fitted(table: pa.Table, schema: pa.Schema) -> pa.Table:
 
 
 def batched(tables: Iterable[pa.Table], rows: int) -> Iterator[pa.Table]:
-    """The same rows in tables of equal length, so that the file does not depend on how the work was divided."""
+    """Return the rows in tables of equal length, so that the file does not depend on the division of the work."""
     waiting: list[pa.Table] = []
     count = 0
     for table in tables:

@@ -1,4 +1,4 @@
-"""What decides a run's result, as a hash: the content of all files, the controller's source, overrides, versions."""
+"""Identity of a run: a hash of all its files, the controller's source, overrides and versions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _DECIDING: Final = (
 
 
 def digest(value: Any) -> str:
-    """Hash of JSON values, and of bytes among them."""
+    """Return the hash of JSON values that may contain bytes."""
     return hashlib.sha256(json.dumps(value, sort_keys=True, default=_of_bytes).encode()).hexdigest()
 
 
@@ -36,7 +36,7 @@ def _of_bytes(value: object) -> str:
 
 @functools.cache
 def source_digest() -> str:
-    """Hash of the package's sources as far as a result depends on them: a version number does not follow every edit."""
+    """Return the hash of the sources that results depend on; the version number does not change with every edit."""
     package = Path(activesteer.__file__).parent
     found = {}
     for part in _DECIDING:
@@ -48,7 +48,7 @@ def source_digest() -> str:
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """What runs here: activesteer, its sources, and what it rests on."""
+    """Return the versions of activesteer, its sources and its dependencies."""
     found = {"activesteer": __version__, "source": source_digest(), "python": platform.python_version()}
     for package in ("mujoco", "numpy", "scipy", "numba"):
         try:
@@ -59,29 +59,29 @@ def versions() -> dict[str, str]:
 
 
 def deciding_versions() -> dict[str, str]:
-    """Those that a run's id depends on."""
+    """Return the versions that the identity of a run depends on."""
     return {key: versions()[key] for key in ("activesteer", "source", "mujoco")}
 
 
 def files_digest(scenario: Scenario) -> str:
-    """Hash of the content of all files that a scenario was made from."""
+    """Return the hash of the content of all files of a scenario."""
     return digest(scenario.files)
 
 
 def controller_digest(controller: str) -> str:
-    """Hash of a controller: its name and parameters, and the source where it is a user's own."""
+    """Return the hash of a controller: its name, its parameters, and the source of a user's own controller."""
     path, _, name = controller.partition(":")
     source = read_variant(controller).files if is_variant(controller) else source_of(controller)
     return digest({"name": f"{Path(path).name}:{name}", "source": source})
 
 
 def run_id(scenario: Scenario, controller: str, seed: int, timestep_s: float) -> str:
-    """Identity of a run: the same where, and only where, everything is that decides its result.
+    """Return the identity of a run: equal if and only if everything that decides the result is equal.
 
     Args:
         scenario: Manoeuvre and car with all overrides applied, not yet prepared.
         controller: Name or file of the controller.
-        seed: Of the study.
+        seed: Seed of the study.
         timestep_s: Step of the simulation [s].
 
     Returns:

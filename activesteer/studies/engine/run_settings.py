@@ -1,4 +1,4 @@
-"""What all runs of a study share, what says which run it is, and whether a machine can make them."""
+"""Settings that all runs of a study share, requests for single runs, and the check of a machine."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ _VERSION: Final = "version of "
 
 @dataclass(frozen=True)
 class Settings:
-    """What all runs of a study share; small, because it travels with every task.
+    """Settings that all runs of a study share; small, because every task carries them.
 
     Attributes:
         maneuvers: Label and name, path or table of each manoeuvre.
-        vehicles: The same of each vehicle.
+        vehicles: Label and name, path or table of each vehicle.
         controllers: Label and name or file of each controller.
-        driver: Name, path or table of who drives, or his code.
-        overrides: What is the same in all runs.
-        seed: Of the study.
+        driver: Name, path or table of the driver, or a driver class.
+        overrides: Overrides of all runs.
+        seed: Seed of the study.
         timestep_s: Step of the simulation [s].
-        metrics: Patterns of the metrics that are kept; all where empty.
+        metrics: Patterns of the metrics to keep; empty for all.
         recordings: `none`, `failed`, `all`, or n for every n-th sample.
-        folder: Where recordings go.
+        folder: Folder of the recordings.
         claims: Whether the paper's claims are checked for every sample.
-        curves: Channels that are kept of every run that was driven to its end.
-        named: Numbers of manoeuvre and vehicle and overrides, one for each combination of factors that are text: they
-            may name other files.
-        expected: Hash of the files of each pair of manoeuvre and vehicle, with each combination of texts, of each
-            controller, and the versions, as the study began with them.
+        curves: Channels to keep of every complete run.
+        named: Indices of manoeuvre and vehicle with overrides, one for each combination of text factors, which may name
+            other files.
+        expected: Hashes at the start of the study: of the files of each pair of manoeuvre and vehicle with each
+            combination of texts, of each controller, and of the versions.
     """
 
     maneuvers: tuple[tuple[str, FileOrTable], ...]
@@ -58,16 +58,16 @@ class Settings:
 
 
 class Request(NamedTuple):
-    """One run.
+    """Request for one run.
 
     Attributes:
-        run: Its number in the study.
+        run: Number of the run in the study.
         sample: Number of the combination of factors.
-        maneuver: Number of the manoeuvre.
-        vehicle: Number of the vehicle.
-        controller: Number of the controller.
+        maneuver: Index of the manoeuvre.
+        vehicle: Index of the vehicle.
+        controller: Index of the controller.
         factors: Values of the factors.
-        overrides: What they, and what is the same in all runs, are here.
+        overrides: Overrides from the factors and from the settings.
     """
 
     run: int
@@ -80,10 +80,10 @@ class Request(NamedTuple):
 
 
 def present_inputs(settings: Settings) -> dict[str, str]:
-    """The hashes of `Settings.expected`, of what is found here.
+    """Return the hashes of `Settings.expected` for the files on this machine.
 
     Raises:
-        ActiveSteerError: something is not found.
+        ActiveSteerError: a file or a controller is not found.
     """
     found = {f"{_VERSION}{key}": value for key, value in deciding_versions().items()}
     places = itertools.product(range(len(settings.maneuvers)), range(len(settings.vehicles)))
@@ -96,12 +96,12 @@ def present_inputs(settings: Settings) -> dict[str, str]:
 
 
 def scenario_of(settings: Settings, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> Scenario:
-    """What is driven for these numbers of a manoeuvre and a vehicle."""
+    """Return the scenario for these indices of manoeuvre and vehicle."""
     return resolve(settings.maneuvers[maneuver][1], settings.vehicles[vehicle][1], overrides, settings.driver)
 
 
 def files_key(settings: Settings, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> str:
-    """The key of the files in `Settings.expected`."""
+    """Return the key of these files in `Settings.expected`."""
     texts = [
         f"{key} = {value}"
         for key, value in sorted(overrides.items())
@@ -112,7 +112,7 @@ def files_key(settings: Settings, maneuver: int, vehicle: int, overrides: dict[s
 
 
 def differences(settings: Settings) -> str:
-    """What is not here as the study began with it, in words; empty where all is."""
+    """Return the differences from the start of the study in words; empty if there are none."""
     try:
         here = present_inputs(settings)
     except ActiveSteerError as error:
@@ -126,27 +126,27 @@ def differences(settings: Settings) -> str:
 
 
 def prepare(workers: Workers, settings: Settings) -> None:
-    """Gets workers ready, each machine once.
+    """Prepare the workers, once per machine.
 
     Args:
-        workers: Who makes the runs.
+        workers: Workers that make the runs.
         settings: What all runs of the study share.
 
     Raises:
-        StudyError: one of them cannot make the runs.
+        StudyError: a machine cannot make the runs.
     """
     if problem := workers.everywhere(prepare_worker, settings):
         raise StudyError(problem)
 
 
 def prepare_worker(settings: Settings) -> str:
-    """Compiles what is compiled, and looks whether this machine can make the runs.
+    """Compile the native code and check that this machine can make the runs.
 
     Args:
         settings: What all runs of the study share.
 
     Returns:
-        What stands against it, in words; nothing where all is well.
+        The obstacles in words; empty if there are none.
     """
     if problem := differences(settings):
         return problem

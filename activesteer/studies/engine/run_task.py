@@ -1,4 +1,4 @@
-"""What a worker does: a few runs after each other, each of which becomes a row of the result."""
+"""Task of a worker: a few runs, each of which becomes a row of the results."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from activesteer.studies.engine.run_identity import digest, files_digest, run_id
 from activesteer.studies.engine.run_settings import Request, Settings, differences, files_key, scenario_of
 
 _ERROR_CHARACTERS: Final = 500
-"""What a row keeps of an error's text."""
+"""Largest length of an error message in a row."""
 CLAIM: Final = "claim_"
-"""What the name of a column begins with that says whether a claim holds for the sample."""
+"""Prefix of the columns that say whether a claim holds for the sample."""
 CURVE: Final = "curve_"
-"""What the name of a column begins with that holds a channel over time."""
+"""Prefix of the columns that hold a channel over time."""
 
 
 class Status(StrEnum):
@@ -38,25 +38,25 @@ class Status(StrEnum):
 
     OK = "ok"
     UNEVALUATED = "unevaluated"
-    """It was driven to its end, but there are no metrics; `error` says why."""
+    """The run is complete but has no metrics; `error` says why."""
     FAILED = "failed"
-    """It could not be begun, or ended early."""
+    """The run could not start, or ended early."""
     CRASHED = "crashed"
-    """The process died that drove it, every time."""
+    """The process of the run died every time."""
 
 
 Row = dict[str, Any]
 
 
 def drive(settings: Settings, requests: Sequence[Request]) -> list[Row]:
-    """Makes some runs.
+    """Make some runs.
 
     Args:
         settings: What all runs of the study share.
-        requests: The runs; those of one sample stand together, so that what must be found by driving is found once.
+        requests: The runs, grouped by sample, so that a search by driving is made once per sample.
 
     Returns:
-        A row for each.
+        A row for each run.
     """
     if problem := _problem(digest({"expected": settings.expected}), settings):
         return [failed_row(settings, request, Status.FAILED, problem) for request in requests]
@@ -71,8 +71,8 @@ def drive(settings: Settings, requests: Sequence[Request]) -> list[Row]:
 
 
 def _give_memory_back() -> None:
-    """What is free goes back to the machine; glibc keeps it in pieces, of which a worker would touch ever more."""
-    with contextlib.suppress(OSError, AttributeError, TypeError):  # of other C libraries
+    """Return free memory to the system; glibc would keep it in pieces, and a worker would use more and more."""
+    with contextlib.suppress(OSError, AttributeError, TypeError):  # other C libraries have no such function
         ctypes.CDLL(None).malloc_trim(0)
 
 
@@ -80,7 +80,7 @@ _seen: dict[str, str] = {}
 
 
 def _problem(key: str, settings: Settings) -> str:
-    """Whether this worker has what the study began with; looked at once a process."""
+    """Check once per process that this worker has the files and versions of the start of the study."""
     if key not in _seen:
         _seen[key] = differences(settings)
     return _seen[key]
@@ -91,7 +91,7 @@ def _same_drive(a: Request, b: Request) -> bool:
 
 
 def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
-    """The runs of one sample: the same car on the same road with one controller after the other."""
+    """Make the runs of one sample: the same car on the same road with one controller after the other."""
     first = requests[0]
     place = first.maneuver, first.vehicle, first.overrides
     try:
@@ -120,7 +120,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
 
 
 def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, controller: str) -> Recording | None:
-    """Makes one run and fills its row; what it recorded, where it came to its end."""
+    """Make one run and fill its row; return the recording of a complete run."""
     path = _recording_path(settings, request)
     every = settings.recordings
     keeps = every == "all" or (isinstance(every, int) and request.sample % every == 0)
@@ -153,7 +153,7 @@ def _recording_path(settings: Settings, request: Request) -> Path | None:
 
 
 def recording_name(run: int, maneuver: str, controller: str) -> str:
-    """Name of the file of a run's recording."""
+    """Return the file name of a run's recording."""
     return f"{run:07d}-{maneuver}-{file_word(controller)}.mcap"
 
 
@@ -163,7 +163,7 @@ def _is_kept(patterns: tuple[str, ...], name: str) -> bool:
 
 
 def _claims(maneuver: str, recordings: Mapping[str, Recording]) -> dict[str, float]:
-    """Column -> 1 where a claim of the paper holds for the sample, else 0; empty where a run is missing."""
+    """Return column -> 1 if a claim of the paper holds for the sample, else 0; empty if a run is missing."""
     try:
         claims = SCENARIOS[maneuver](recordings)
     except (KeyError, ActiveSteerError):
@@ -173,7 +173,7 @@ def _claims(maneuver: str, recordings: Mapping[str, Recording]) -> dict[str, flo
 
 
 def failed_row(settings: Settings, request: Request, status: Status, problem: str) -> Row:
-    """The row of a run that was not driven to its end."""
+    """Return the row of an incomplete run."""
     return _row(settings, request) | {"status": status.value, "error": problem}
 
 

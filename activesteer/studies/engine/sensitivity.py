@@ -1,4 +1,4 @@
-"""Which factor a metric depends on: Sobol' and Morris indices by SALib, with confidence.
+"""Sensitivity of a metric to the factors: Sobol' and Morris indices by SALib, with confidence intervals.
 
 A Saltelli design gives first-order and total indices (Saltelli et al. 2010), a Morris design mean and spread of
 elementary effects (Campolongo et al. 2007), and any other sample the first-order indices by RBD-FAST (Tarantola et al.
@@ -18,12 +18,12 @@ from activesteer.studies.engine.design import FOR_INDICES, MORRIS_LEVELS
 from activesteer.studies.engine.factors import Factor
 
 MAX_SAMPLES: Final = 16384
-"""Rows that are enough: more move the indices less than their confidence intervals are wide."""
+"""Largest number of rows used: more rows change the indices by less than their confidence intervals."""
 _MAX_RBD_SAMPLES: Final = 4096
 _RBD_RESAMPLES: Final = 30
 _MIN_SAMPLES: Final = 42
-"""RBD-FAST compares 2 * 10 harmonics, also in each half of the samples that its confidence interval draws: a half needs
-more than 20."""
+"""Smallest number of rows for RBD-FAST: it compares 2 * 10 harmonics, also in each half of the samples that its
+confidence interval draws, so a half needs more than 20."""
 
 
 class Index(NamedTuple):
@@ -47,17 +47,17 @@ class Index(NamedTuple):
 def indices(
     kind: str, factors: Sequence[Factor], columns: Mapping[str, Sequence[object]], values: NDArray[np.float64]
 ) -> list[Index]:
-    """Indices of one metric, of one controller, in one manoeuvre with one vehicle.
+    """Return the indices of one metric of one controller in one manoeuvre with one vehicle.
 
     Args:
         kind: Kind of the design.
-        factors: What is varied.
+        factors: Factors of the study.
         columns: Values of the factors by key, in the order of the design.
-        values: The metric, in the same order; nan where a run has none.
+        values: The metric in the same order; nan if a run has none.
 
     Returns:
-        The indices; none where the design or the values allow none: a grid or a list, runs that failed in a design that
-        needs all of them, a metric that does not vary.
+        The indices. Empty if the design or the values allow none: a grid or a list, failed runs in a design that needs
+        all of them, or a metric that does not vary.
 
     Raises:
         StudyError: SALib is not installed.
@@ -70,7 +70,7 @@ def indices(
         return []
     keys = [factor.key for factor in factors]
     points = np.column_stack([np.asarray(columns[key], dtype=np.float64) for key in keys])
-    # Over the whole range of each factor, so that those of different units can be compared.
+    # Scale to the whole range of each factor, so that factors of different units can be compared.
     unit = (points - [factor.low for factor in factors]) / [factor.high - factor.low for factor in factors]
     problem = {"num_vars": len(keys), "names": keys, "bounds": [[0.0, 1.0]] * len(keys)}
     try:
@@ -88,7 +88,7 @@ def _computed(
     if kind == "saltelli":
         block = len(keys) + 2
         used = values[: block * (1 << ((len(values) // block).bit_length() - 1))]
-        # The estimators are made for a metric around zero.
+        # The estimators assume a metric around zero.
         found = sobol.analyze(problem, (used - used.mean()) / used.std(), calc_second_order=False, seed=0)
         return [
             Index(key, name, float(found[name][place]), float(found[f"{name}_conf"][place]))

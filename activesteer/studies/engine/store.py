@@ -1,12 +1,12 @@
-"""The folder of a study: what it is, which runs are done, and in the end all of them in one file.
+"""Folder of a study: the study, the finished runs, and finally all of them in one file.
 
-    DIR/study.toml         the study as it is run, with absolute paths
+    DIR/study.toml         the study as it runs, with absolute paths
     DIR/environment.json   hash of everything that decides the result, versions, machine
     DIR/parts/             FIRST-LAST.parquet of each finished task, until all are joined
-    DIR/results.parquet    one row a run
-    DIR/recordings/        what is kept of the runs
+    DIR/results.parquet    one row per run
+    DIR/recordings/        recordings that are kept
 
-A file is written aside and renamed, so that it is there as a whole or not at all.
+Files are written under another name and renamed, so that they appear completely or not at all.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from activesteer.studies.engine.run_task import Row
 
 try:
     import fcntl
-except ImportError:  # there is none on Windows
+except ImportError:  # not available on Windows
     fcntl = None
 
 RESULTS: Final = "results.parquet"
@@ -38,14 +38,14 @@ _ROW_GROUP: Final = 65536
 
 
 class Progress(NamedTuple):
-    """How far a study is.
+    """Progress of a study.
 
     Attributes:
         total: Runs of the study.
         done: Runs that have a row.
-        by_status: How they ended: status -> number.
-        errors: The most frequent errors and their numbers.
-        running: Whether a process is at work on it.
+        by_status: Status -> number of runs.
+        errors: The most frequent errors, with their numbers.
+        running: Whether a process works on the study.
     """
 
     total: int
@@ -55,7 +55,7 @@ class Progress(NamedTuple):
     running: bool
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return the progress as JSON values."""
         return {**self._asdict(), "missing": self.total - self.done}
 
 
@@ -63,11 +63,11 @@ class Store:
     """A study's folder, held by one process at a time."""
 
     def __init__(self, folder: Path, factors: Sequence[str]) -> None:
-        """Opens nothing; see `opened`.
+        """Prepare the store; `opened` opens it.
 
         Args:
             folder: The folder.
-            factors: Keys that are varied: the columns between identity and outcome.
+            factors: Varied keys: the columns between identity and outcome.
         """
         self.folder = folder
         self._factors = tuple(factors)
@@ -75,11 +75,11 @@ class Store:
 
     @contextlib.contextmanager
     def opened(self, study_toml: str, identity: str, total: int) -> Iterator[Store]:
-        """Makes the folder, or goes on with the study that is in it.
+        """Make the folder, or resume the study in it.
 
         Args:
-            study_toml: The study as it is run.
-            identity: Hash of everything that decides its result.
+            study_toml: The study as it runs.
+            identity: Hash of everything that decides the results.
             total: Number of its runs.
 
         Raises:
@@ -96,12 +96,12 @@ class Store:
                     raise StudyError(f"{self.folder} holds results, but not what they are of; use a new folder")
                 write_text(self.folder / "study.toml", study_toml, StudyError)
                 write_text(path, json.dumps(about, indent=2) + "\n", StudyError)
-            for left in self._parts.glob(".*"):  # of a process that was killed while it wrote
+            for left in self._parts.glob(".*"):  # left by a process that was killed while writing
                 left.unlink(missing_ok=True)
             yield self
 
     def missing(self, total: int) -> list[range]:
-        """Runs that have no row yet, as ranges of their numbers."""
+        """Return the runs without a row, as ranges of their numbers."""
         if (self.folder / RESULTS).exists():
             return []
         found, begin = [], 0
@@ -112,7 +112,7 @@ class Store:
         return [*found, range(begin, total)] if begin < total else found
 
     def write(self, rows: Sequence[Row]) -> None:
-        """Keeps the rows of a finished task, which are of consecutive runs.
+        """Store the rows of a finished task, which belong to consecutive runs.
 
         Raises:
             StudyError: they cannot be written.
@@ -122,7 +122,7 @@ class Store:
             pq.write_table(table_of(rows, self._factors), path)
 
     def join(self) -> Path:
-        """Makes one file of all parts, in the order of the runs; the parts are deleted.
+        """Join all parts to one file in the order of the runs, and delete the parts.
 
         Returns:
             The file.
@@ -141,7 +141,7 @@ class Store:
         return target
 
     def read(self) -> pa.Table:
-        """All rows so far, in the order of the runs.
+        """Return all rows so far, in the order of the runs.
 
         Raises:
             StudyError: a file cannot be read.
@@ -153,7 +153,7 @@ class Store:
         return pa.concat_tables([schema.empty_table(), *(fitted(table, schema) for table in _tables(paths))])
 
     def progress(self) -> Progress:
-        """How far the study is.
+        """Return the progress of the study.
 
         Raises:
             StudyError: a file cannot be read.
@@ -183,10 +183,10 @@ class Store:
 
 
 def read_environment(folder: Path) -> dict[str, Any]:
-    """What a study's folder says of itself.
+    """Return the description in a study's folder.
 
     Raises:
-        StudyError: there is no study in it, or it cannot be read.
+        StudyError: the folder has no study, or it cannot be read.
     """
     path = folder / "environment.json"
     if not path.is_file():
@@ -239,7 +239,7 @@ def _refusing(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Holds the folder; where the file system knows no locks, nobody is kept out."""
+    """Lock the folder; on a file system without locks, do nothing."""
     with writing(path, StudyError):
         file = path.open("w")
     with file:

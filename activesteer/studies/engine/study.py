@@ -1,4 +1,4 @@
-"""A study from its file to its table: many runs, spread over workers, that can be interrupted and gone on with."""
+"""A study from its file to its table: many runs on several workers, interruptible and resumable."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ _logger: Final = logging.getLogger(__name__)
 
 
 class StudyProgress(NamedTuple):
-    """How far it is; given to whoever watches.
+    """Progress of a study, for a callback.
 
     Attributes:
         done: Runs with a row.
         total: Runs of the study.
-        failed: Runs, of those made now, that did not come to their end.
-        here: Runs made since the study was begun or gone on with.
+        failed: Runs of this call that are incomplete.
+        here: Runs made by this call.
     """
 
     done: int
@@ -55,28 +55,28 @@ def study(
     limit: int | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> pa.Table:
-    """Drives a study, or what is missing of it.
+    """Drive a study, or its missing runs.
 
-    With more than one job the runs are made in processes of their own, started afresh: a script that calls this needs
-    the usual `if __name__ == "__main__":`.
+    With more than one job, the runs are made in newly started processes: a script that calls this function needs
+    `if __name__ == "__main__":`.
 
     Args:
-        study_file: Name or path of a study file, its table, or what was read of it.
-        output: Folder of the study; it is gone on with where it is there. Without one nothing is kept.
-        jobs: Number of processes; that of the processors where not given. With 1 all runs are made in this process.
+        study_file: Name or path of a study file, its table, or a study that was read before.
+        output: Folder of the study; an existing study is resumed. Without a folder, nothing is stored.
+        jobs: Number of processes; default: the number of processors. With 1, this process makes all runs.
         client: A `distributed.Client` whose cluster makes the runs.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
-        workers: Workers that make the runs of several studies, instead.
-        limit: Most runs to make now; the rest is left for another time.
+        workers: Workers shared by several studies, instead.
+        limit: Largest number of runs to make now.
         progress: Called after every task.
 
     Returns:
-        One row a run, in the order of the study: identity, factors, `status`, `error`, metrics. The unit of a column is
-        in its field's metadata.
+        One row per run, in the order of the study: identity, factors, `status`, `error`, metrics. The field of a column
+        has its unit as metadata.
 
     Raises:
         ActiveSteerError: an input is wrong, the folder cannot be written or holds another study, or the workers cannot
-            be reached. A run that fails ends nothing: it is a row.
+            be reached. A failed run is a row and raises nothing.
 
     Example:
         >>> from activesteer import study
@@ -93,13 +93,13 @@ def study(
         if output is None:
             output = stack.enter_context(tempfile.TemporaryDirectory(prefix="activesteer-study-"))
         folder = Path(output).absolute()
-        # Wrong addresses are reported before, what is wrong with the study before a process is started.
+        # Report wrong addresses first, and errors of the study before a process is started.
         plan = Plan(parsed, folder / RECORDINGS)
         store = stack.enter_context(Store(folder, parsed.keys).opened(parsed.to_toml(), plan.digest, len(plan)))
         missing = store.missing(len(plan))
         if missing:
             workers = workers or stack.enter_context(workers_for(jobs, client=client, scheduler=scheduler))
-            # What would go wrong in every run is found out before the first of them.
+            # Find errors that would occur in every run before the first one.
             prepare(workers, plan.settings)
             _drive_all(plan, store, workers, missing, limit, progress)
         if not store.missing(len(plan)):
@@ -136,7 +136,7 @@ def _drive_all(
     for requests, made, error in queue.outcomes(tasks):
         rows = made
         if error is not None and len(requests) > 1:
-            # Run by run, so that only the guilty one is lost.
+            # Drive run by run, so that only the run that kills its worker is lost.
             for request in requests:
                 queue.add_alone([request], drive, plan.settings, [request])
             continue
@@ -151,7 +151,7 @@ def _drive_all(
 
 
 def _tasks(plan: Plan, missing: Iterable[range], size: int, limit: int | None) -> Iterator[list[Request]]:
-    """Runs in groups that end at multiples of the size, so that a sample stays together."""
+    """Yield groups of runs that end at multiples of the size, so that a sample stays together."""
     left = len(plan) if limit is None else limit
     for span in missing:
         begin = span.start

@@ -1,4 +1,4 @@
-"""A study file: what is driven, by whom, with which cars, what is varied, and what is kept of it."""
+"""Study files: manoeuvres, drivers, cars, factors, and the results to keep."""
 
 from __future__ import annotations
 
@@ -27,31 +27,31 @@ _SEARCHES: Final = {
     "tune": "it says what is to be made small",
     "fit": "it says which channels are compared, and how noisy they are",
 }
-"""Tables of those who choose the factors' values themselves and need no sample; what to say where one is missing."""
+"""Tables of searches, which choose the factor values themselves; each with a hint for a missing table."""
 _KEPT: Final = ("none", "failed", "all")
 
 
 @dataclass(frozen=True)
 class StudyFile:
-    """A study as its file says, with every path absolute.
+    """A study as in its file, with absolute paths.
 
     Attributes:
         maneuvers: Names, paths or tables of manoeuvres.
         controllers: Names or files of controllers.
         vehicles: Names, paths or tables of vehicles.
-        driver: Name, path or table of who drives, or his code.
-        overrides: What is the same in all runs: dotted key -> value.
-        factors: What is varied.
-        design: In which combinations.
-        case_list: The cases of a list; None for other designs.
-        seed: Of the samples.
-        metrics: Patterns of the metrics that are kept, as `yaw_rate_*`; all of them where empty.
-        recordings: `none`, `failed`, `all`, or a number n: those of every n-th sample.
-        curves: Channels that are kept of every run, every `conventions.CURVE_STEP_S`.
-        claims: Whether the paper's claims are checked for every sample; needs its three systems.
+        driver: Name, path or table of the driver, or a driver class.
+        overrides: Overrides of all runs: dotted key -> value.
+        factors: Varied keys.
+        design: Design of the combinations.
+        case_list: Cases of a list design; None for other designs.
+        seed: Seed of the samples.
+        metrics: Patterns of the metrics to keep, such as `yaw_rate_*`; empty for all.
+        recordings: `none`, `failed`, `all`, or a number n for every n-th sample.
+        curves: Channels to keep of every run, every `conventions.CURVE_STEP_S`.
+        claims: Whether to check the paper's claims for every sample; this needs its three systems.
         timestep_s: Step of engine, driver and controller [s].
-        tune: The table [tune], as it is; see `tuning`.
-        fit: The table [fit], as it is; see `measured.fit_file`.
+        tune: The table [tune], unparsed; see `tuning`.
+        fit: The table [fit], unparsed; see `measured.fit_file`.
         title: One line for the report.
         source: For error messages.
     """
@@ -76,21 +76,21 @@ class StudyFile:
     source: Source = Source("study")
 
     def samples(self) -> tuple[Samples, ...]:
-        """The combinations: one set for all controllers where they are paired, else one for each."""
+        """Return the combinations: one set for all controllers if they are paired, else one for each."""
         if self.case_list is not None:
             return (self.case_list,)
-        # A grid is the same for everybody anyway.
+        # A grid is the same for all controllers anyway.
         streams = 1 if self.design.paired or self.design.kind == "grid" else len(self.controllers)
         count = self.design.samples
         return tuple(draw(self.factors, self.design.kind, count, self.seed, stream) for stream in range(streams))
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """What is varied, in the order of the file."""
+        """Varied keys, in the order of the file."""
         return tuple(self.case_list.columns) if self.case_list else tuple(factor.key for factor in self.factors)
 
     def to_table(self) -> dict[str, Any]:
-        """The study as the table of a study file."""
+        """Return the study as the table of a study file."""
         table: dict[str, Any] = {
             "title": self.title,
             "maneuvers": list(self.maneuvers),
@@ -117,7 +117,7 @@ class StudyFile:
         return table | {"design": design}
 
     def to_toml(self) -> str:
-        """The study as the text of a study file."""
+        """Return the study as the text of a study file."""
         table = self.to_table()
         lines = [f"{key} = {toml_value(value)}" for key, value in table.items() if not isinstance(value, dict)]
         for name, inner in table.items():
@@ -131,18 +131,18 @@ class StudyFile:
 
 
 def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
-    """Reads a study file and checks what can be checked without looking at manoeuvres and vehicles.
+    """Read a study file and check everything that needs neither manoeuvres nor vehicles.
 
     Args:
-        given: Name of a study that comes with the package, path, or table. Relative paths inside a file start at its
-            folder, those of a table at the working directory.
-        search: `tune` or `fit`, where the study must have that table.
+        given: Name of a study of the package, a path, or a table. Relative paths in a file start at its folder, those
+            in a table at the working directory.
+        search: `tune` or `fit` if the study must have that table.
 
     Returns:
         The study.
 
     Raises:
-        StudyError: it cannot be read, or a key or value is wrong.
+        StudyError: the study cannot be read, or a key or value is wrong.
     """
     if isinstance(given, StudyFile):
         return given
@@ -189,11 +189,11 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
 
 
 class _WrongValueError(Exception):
-    """What is needed in place of a value."""
+    """Return the expected form of a value, in words."""
 
 
 def _varied(table: Mapping[str, Any], folder: Path, source: Source) -> dict[str, Any]:
-    """Factors, design and cases, which must fit each other."""
+    """Return factors, design and cases, checked for consistency."""
     parts = []
     for key in ("factors", "design"):
         if not isinstance(part := table.get(key, {}), Mapping):
@@ -261,7 +261,7 @@ def _items(value: object, kinds: tuple[type, ...]) -> list[Any]:
 
 
 def _located(item: FileOrTable, folder: Path) -> FileOrTable:
-    """A name as it is, a path made absolute: from the study file's folder."""
+    """Return a name unchanged, and a path as absolute, from the study file's folder."""
     if isinstance(item, Mapping):
         return item
     text = os.fspath(item)
@@ -270,7 +270,7 @@ def _located(item: FileOrTable, folder: Path) -> FileOrTable:
 
 
 def _located_code(item: Any, folder: Path) -> Any:
-    """The same of what may be `my_file.py:MyController?gain=2` too."""
+    """Return the same for a specification such as `my_file.py:MyController?gain=2`."""
     name, mark, parameters = ("", "", "") if isinstance(item, Mapping) else item.partition("?")
     path, colon, class_name = name.rpartition(":")
     if not colon:

@@ -1,7 +1,7 @@
-"""Tasks for workers, and what becomes of them.
+"""Tasks for workers and their outcomes.
 
-`TaskQueue` hands tasks out and gives their results back as they come. A worker that dies takes only the tasks with it
-that it had; they are done again, and a task that kills its worker every time is given up.
+`TaskQueue` distributes tasks and returns their results as they arrive. If a worker dies, only its own tasks are lost
+and repeated. A task that kills its worker every time is given up.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from activesteer.errors import StudyError
 from activesteer.studies.engine.workers import Workers, workers_for
 
 _ATTEMPTS: Final = 3
-"""How often a task is begun before it counts as the one that kills its worker; the last time it is alone."""
+"""Number of attempts before a task counts as the one that kills its worker; the last attempt runs alone."""
 _engine: Final = threading.RLock()
-"""The engine's callbacks belong to the process: of a worker's threads, one does a task at a time."""
+"""MuJoCo's callbacks belong to the process, so one thread of a worker does one task at a time."""
 
 
 class WorkerDied(StudyError):  # noqa: N818 - an event, named as one
-    """A task's worker died every time that the task was tried."""
+    """The worker of a task died at every attempt."""
 
 
 class Outcome(NamedTuple):
-    """What became of a task.
+    """Outcome of a task.
 
     Attributes:
-        key: What the task was called.
-        value: What its function returned.
-        error: What it raised instead.
+        key: Key of the task.
+        value: Result of its function.
+        error: Error that it raised instead.
     """
 
     key: Any
@@ -40,10 +40,10 @@ class Outcome(NamedTuple):
     error: BaseException | None
 
     def result(self) -> Any:
-        """The value.
+        """Return the result.
 
         Raises:
-            BaseException: what the task raised.
+            BaseException: the error of the task.
         """
         if self.error is not None:
             raise self.error
@@ -58,13 +58,13 @@ class _Task(NamedTuple):
 
 
 class TaskQueue:
-    """Tasks that wait, tasks that are being done, and the results of those that are finished."""
+    """Waiting tasks, running tasks, and the results of finished tasks."""
 
     def __init__(self, workers: Workers) -> None:
-        """Begins empty.
+        """Make an empty queue.
 
         Args:
-            workers: Who does them.
+            workers: Workers that do the tasks.
         """
         self._workers = workers
         self._waiting: deque[_Task] = deque()
@@ -72,26 +72,26 @@ class TaskQueue:
         self._running: dict[Future[Any], _Task] = {}
 
     def add(self, key: Any, function: Callable[..., Any], *arguments: Any) -> None:
-        """Puts a task at the end.
+        """Append a task.
 
         Args:
-            key: What to call it in its outcome.
-            function: A function of a module, so that it pickles.
+            key: Key of the task in its outcome.
+            function: Function of a module, so that it can be pickled.
             arguments: Its arguments.
         """
         self._waiting.append(_Task(key, function, arguments))
 
     def add_alone(self, key: Any, function: Callable[..., Any], *arguments: Any) -> None:
-        """Puts a task among those that may kill their worker: it is tried once, with no other beside it."""
+        """Append a task that may kill its worker: it is tried once, with no other task beside it."""
         self._suspects.append(_Task(key, function, arguments, _ATTEMPTS - 1))
 
     def outcomes(self, more: Iterator[tuple[Any, ...]] | None = None) -> Iterator[Outcome]:
-        """Does the tasks and gives what became of each, in the order in which they end.
+        """Do the tasks and yield their outcomes, in the order in which they end.
 
-        Whoever iterates may add tasks meanwhile.
+        The caller may add tasks while iterating.
 
         Args:
-            more: Further tasks, as arguments of `add`, taken only when there is room for them.
+            more: Further tasks, as arguments of `add`, taken only if there is room for them.
 
         Yields:
             An outcome for every task.
@@ -122,8 +122,7 @@ class TaskQueue:
 
     def _fill(self, more: Iterator[tuple[Any, ...]]) -> None:
         while len(self._running) < self._workers.in_flight:
-            # A task that may kill its worker is tried once more among others, and then alone, so that no other task is
-            # taken for the guilty one.
+            # Try a task that may kill its worker once more among others, and then alone: no other task is blamed for it.
             if self._suspects:
                 alone = self._suspects[0].attempts + 1 == _ATTEMPTS
                 if alone and self._running:
@@ -156,23 +155,23 @@ def in_parallel(
     scheduler: str | None = None,
     workers: Workers | None = None,
 ) -> list[Any]:
-    """Calls a function with each set of arguments, spread over processes.
+    """Call a function with each set of arguments, in several processes.
 
     Args:
-        function: A function of a module, so that it pickles.
-        arguments: Its arguments, one tuple a call.
-        jobs: Number of processes; that of the processors where not given. With 1 all is done in this process.
-        report: Called after each call with the place of its arguments and how many calls are done.
-        scheduler: Address of a Dask scheduler, or its scheduler file, that calls it instead.
-        workers: Who calls it instead; they stay with whoever gave them.
+        function: Function of a module, so that it can be pickled.
+        arguments: Arguments, one tuple per call.
+        jobs: Number of processes; default: the number of processors. With 1, this process makes all calls.
+        report: Called after each call with the index of its arguments and the number of finished calls.
+        scheduler: Address of a Dask scheduler, or its scheduler file, to use instead.
+        workers: Workers to use instead; they still belong to the caller.
 
     Returns:
-        What it returned, in the order of the arguments.
+        The results, in the order of the arguments.
 
     Raises:
         ParameterError: fewer than one job.
         StudyError: see `workers_for`.
-        BaseException: what a call raised.
+        BaseException: the error of a call.
     """
     results: dict[int, Any] = {}
     with workers_for(jobs, scheduler=scheduler) if workers is None else contextlib.nullcontext(workers) as crew:

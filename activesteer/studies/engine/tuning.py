@@ -1,4 +1,4 @@
-"""Finds values of a study's factors that make objectives small, by Optuna; resumable, spread over workers."""
+"""Tuning: values of a study's factors that minimise objectives, by Optuna; resumable, with several workers."""
 
 from __future__ import annotations
 
@@ -29,35 +29,35 @@ _VIOLATION: Final = "violation"
 
 @dataclass(frozen=True)
 class Term:
-    """A metric of one run, as a part of an objective or as what a constraint looks at."""
+    """A metric of one run, in an objective or a constraint."""
 
     metric: str
-    """Its name; `claims_failed` is the number of the paper's claims that fail, where the study checks them."""
+    """Name of the metric; `claims_failed` is the number of the paper's claims that fail, if the study checks them."""
     controller: str
-    """Of which run."""
+    """Controller of the run."""
     maneuver: str = ""
-    """Of which manoeuvre; may be left out where there is one."""
+    """Manoeuvre of the run; may be left out if there is only one."""
     relative_to: str = ""
-    """Another controller: the magnitude is taken relative to that of its run."""
+    """Another controller; the magnitude is divided by that of its run."""
     weight: float = 1.0
-    """Factor, negative where more is better."""
+    """Weight; negative if a larger value is better."""
     limit: Annotated[float, Range(0.0)] = 1e12
-    """A larger magnitude counts as this."""
+    """Upper bound of the magnitude."""
 
 
 @dataclass(frozen=True)
 class Objective:
-    """A sum that is made small."""
+    """A sum to be minimised."""
 
     name: str
-    """What to call it."""
+    """Name of the objective."""
     terms: tuple[Term, ...]
-    """What is added up, as magnitudes times their weights."""
+    """Terms of the sum: magnitudes times their weights."""
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """A bound that must be kept."""
+    """A bound that must not be exceeded."""
 
     metric: str
     """See `Term`."""
@@ -76,22 +76,22 @@ class TuneTable:
     """The table [tune] of a study file."""
 
     objectives: tuple[Objective, ...]
-    """One, or several of which the Pareto front is found."""
+    """One objective, or several, for which the Pareto front is found."""
     constraints: tuple[Constraint, ...] = ()
-    """What must be kept."""
+    """Constraints."""
     trials: Annotated[int, Range(1, 1_000_000)] = 100
-    """How many sets are tried."""
+    """Number of sets to try."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A set that was tried.
+    """A set of values that was tried.
 
     Attributes:
-        number: Its number.
+        number: Number of the set.
         values: Factor -> value.
         objectives: Objective -> value.
-        violation: By how much constraints are broken; 0 where all are kept.
+        violation: Size of the violation of the constraints; 0 if there is none.
     """
 
     number: int
@@ -102,13 +102,13 @@ class Trial:
 
 @dataclass(frozen=True)
 class Tuning:
-    """What came of it.
+    """Result of a tuning.
 
     Attributes:
-        done: Sets that were tried, in all.
-        failed: Those of which a run failed.
-        front: Sets of which no other is better in every objective; with one objective, the best.
-        trials: All that could be judged.
+        done: Number of all sets that were tried.
+        failed: Number of sets with a failed run.
+        front: Sets that no other set beats in every objective; with one objective, the best set.
+        trials: All sets that could be judged.
     """
 
     done: int
@@ -127,16 +127,16 @@ def tune(
     scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Tuning:
-    """Tries sets of a study's factors, each in all its manoeuvres with all its controllers, and goes after the best.
+    """Search for the best set of a study's factors, driving each set in all manoeuvres with all controllers.
 
     Args:
         study_file: Name or path of a study file with a table [tune], or its table.
-        output: Folder; a search that is there is gone on with.
-        trials: Sets to have tried in the end; what the file says where not given.
-        jobs: Number of processes; that of the processors where not given.
+        output: Folder; a search found there is resumed.
+        trials: Total number of sets; default: the number in the file.
+        jobs: Number of processes; default: the number of processors.
         client: A `distributed.Client` whose cluster makes the runs.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
-        progress: Called after every set with how many are done, and how many there will be.
+        progress: Called after every set with the number of finished sets and the total.
 
     Returns:
         The best sets.
@@ -161,7 +161,7 @@ def tune(
     storage = JournalStorage(journal.JournalFileBackend(path, lock_obj=journal.JournalFileOpenLock(path)))
     directions: list[Any] = ["minimize"] * len(table.objectives)
     made = optuna.create_study(storage=storage, study_name="tune", load_if_exists=True, directions=directions)
-    for left in made.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):  # of a killed process
+    for left in made.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):  # left by a killed process
         made.tell(left.number, state=optuna.trial.TrialState.FAIL)
     begun = len(made.trials)
     made.sampler = optuna.samplers.TPESampler(seed=study.seed + begun, constant_liar=True)
@@ -213,7 +213,7 @@ def _table(study: StudyFile) -> TuneTable:
 
 
 def _parts(table: TuneTable) -> Iterator[tuple[tuple[str, ...], Term | Constraint]]:
-    """Everything that looks at a metric, and the keys that lead to it."""
+    """Return all terms and constraints, with the keys that lead to them."""
     for number, objective in enumerate(table.objectives):
         for place, term in enumerate(objective.terms):
             yield ("tune", "objectives", str(number), "terms", str(place)), term
@@ -222,7 +222,7 @@ def _parts(table: TuneTable) -> Iterator[tuple[tuple[str, ...], Term | Constrain
 
 
 def _check_metrics(study: StudyFile, table: TuneTable, rows: Sequence[Row]) -> None:
-    """Every metric is one that the runs have; which those are shows only in the first set of which none failed."""
+    """Check that the runs have every metric; the first set without a failure shows their names."""
     for place, part in _parts(table):
         for row in _rows_of(part.controller, part.maneuver, rows):
             if part.metric not in row:
@@ -256,7 +256,7 @@ def _requests(plan: Plan, number: int, values: dict[str, Any]) -> list[Request]:
 
 
 def _judged(table: TuneTable, rows: Sequence[Row]) -> tuple[list[float] | None, float]:
-    """Objectives and by how much constraints are broken; no objectives where a run lacks a metric."""
+    """Return the objectives and the violation of the constraints; no objectives if a run lacks a metric."""
     values = [sum(_value(term, rows) for term in objective.terms) for objective in table.objectives]
     broken = 0.0
     for constraint in table.constraints:
@@ -276,7 +276,7 @@ def _value(term: Term, rows: Sequence[Row]) -> float:
 
 
 def _found(metric: str, controller: str, maneuver: str, rows: Sequence[Row]) -> list[float]:
-    """A metric of every vehicle."""
+    """Return a metric for every vehicle."""
     return [float(row.get(metric, math.nan)) for row in _rows_of(controller, maneuver, rows)]
 
 

@@ -1,4 +1,4 @@
-"""Who does the work: this process, processes of this machine, or a Dask cluster, all behind one small interface."""
+"""Workers behind one interface: this process, processes of this machine, or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -17,48 +17,48 @@ from activesteer.errors import ParameterError
 from activesteer.studies.engine import dask_cluster
 
 _BLAS_THREADS: Final = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""Where the BLAS of numpy and scipy look for their number of threads as they are loaded."""
+"""Environment variables from which the BLAS of numpy and scipy take their number of threads when loaded."""
 _MOST_JOBS: Final = 16
 """Number of processes that is allowed on a machine with few processors; four times the processors on a larger one."""
 
 
 class Workers(Protocol):
-    """Something that does tasks.
+    """Workers that do tasks.
 
     Attributes:
-        in_flight: How many tasks it should have at a time, so that nobody waits.
+        in_flight: Number of tasks to submit at a time, so that no worker waits.
     """
 
     in_flight: int
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Begins a task; both function and arguments must pickle."""
+        """Start a task; the function and its arguments must be picklable."""
         ...
 
     def died(self, error: BaseException) -> bool:
-        """Whether an error says that a worker died, not that the task failed."""
+        """Return True if an error means that a worker died, not that the task failed."""
         ...
 
     def replace(self) -> None:
-        """Makes new workers in place of dead ones."""
+        """Replace dead workers."""
         ...
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """Calls a function once on every machine before its workers begin; what one of them has to say against it."""
+        """Call a function once on every machine before its workers start; return the first objection."""
         ...
 
     def close(self, *, abandon: bool) -> None:
-        """Ends the workers; where abandoned, without waiting for what they do."""
+        """End the workers; if abandoned, without waiting for their tasks."""
         ...
 
 
 class ThisProcess:
-    """Does every task at once, here."""
+    """This process, which does every task immediately."""
 
     in_flight = 1
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Does the task and returns a finished future."""
+        """Do the task and return a finished future."""
         future: Future[Any] = Future()
         try:
             future.set_result(function(*arguments))
@@ -67,31 +67,31 @@ class ThisProcess:
         return future
 
     def died(self, error: BaseException) -> bool:
-        """Never: a death would be ours."""
+        """Return False: the worker is this process."""
         return False
 
     def replace(self) -> None:
-        """Nothing to replace."""
+        """Do nothing."""
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
         """See `Workers`."""
         return check(*arguments)
 
     def close(self, *, abandon: bool) -> None:
-        """Nothing to end."""
+        """Do nothing."""
 
 
 class LocalProcesses:
-    """Processes that share nothing with this one, started afresh: the engine's callbacks belong to a process."""
+    """Newly started processes that share nothing with this one, because MuJoCo's callbacks belong to a process."""
 
     def __init__(self, count: int) -> None:
-        """Starts none yet: the pool starts them as tasks come.
+        """Prepare the pool, which starts processes as tasks arrive.
 
         Args:
-            count: How many.
+            count: Number of processes.
         """
         self._count = count
-        self.in_flight = count + 1  # one waits, so that nobody does
+        self.in_flight = count + 1  # one task waits, so that no process does
         self._pool = self._new_pool()
 
     def _new_pool(self) -> ProcessPoolExecutor:
@@ -99,13 +99,13 @@ class LocalProcesses:
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """See `Workers`."""
-        # Processes are started here, as they are needed. They never see a Ctrl-C, not even while they start: what is
-        # blocked here stays blocked there.
+        # The pool starts processes here when it needs them. They never receive Ctrl-C, not even while starting: signals
+        # that are blocked here stay blocked there.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             with _one_thread_each():
                 return self._pool.submit(function, *arguments)
-        except BrokenExecutor as error:  # noticed before the futures that it breaks were looked at
+        except BrokenExecutor as error:  # found before the broken futures were inspected
             future: Future[Any] = Future()
             future.set_exception(error)
             return future
@@ -117,12 +117,12 @@ class LocalProcesses:
         return isinstance(error, BrokenExecutor)
 
     def replace(self) -> None:
-        """A pool ends with the first of its processes that dies, so it is the pool that is replaced."""
+        """Replace the pool, which ends with the first of its processes that dies."""
         self._pool.shutdown(wait=False, cancel_futures=True)
         self._pool = self._new_pool()
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """See `Workers`; it is this machine, so it is called here."""
+        """See `Workers`; the function is called here, on this machine."""
         return check(*arguments)
 
     def close(self, *, abandon: bool) -> None:
@@ -135,10 +135,10 @@ class LocalProcesses:
 
 @contextlib.contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Processes that start in here solve linear equations in one thread, unless the environment says how many.
+    """Let processes started inside solve linear equations in one thread, unless the environment sets the number.
 
-    There is a process for each processor already, and the equations of a run are small: BLAS would wait for threads
-    longer than it calculates, which makes a run a tenth slower.
+    There is already a process for each processor, and the equations of a run are small: threads of BLAS would wait
+    longer than they calculate, which makes a run a tenth slower.
     """
     missing = [name for name in _BLAS_THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(missing, "1"))
@@ -150,7 +150,7 @@ def _one_thread_each() -> Iterator[None]:
 
 
 def _begin_worker() -> None:
-    """No worker outlives the process that gives it work, however that ends."""
+    """End this worker when the process that gives it work ends."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
@@ -163,11 +163,11 @@ def _end_with(sentinel: int) -> None:
 
 @contextlib.contextmanager
 def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str | None = None) -> Iterator[Workers]:
-    """The workers that the arguments name; where the body ends early, what they do is abandoned.
+    """Yield the workers that the arguments name; if the body fails, their tasks are abandoned.
 
     Args:
-        jobs: Processes of this machine, as many as there are processors for us where not given; with 1 the work is done
-            in this process.
+        jobs: Number of processes of this machine; default: the number of available processors. With 1, this process
+            does the work.
         client: A `distributed.Client` instead.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
 
