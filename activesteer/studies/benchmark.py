@@ -1,4 +1,4 @@
-"""Where the time of a step goes. All figures come from one run, interleaved, so that their ratios mean something."""
+"""Time of a step and its parts. All values come from one run, interleaved, so that their ratios are meaningful."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
 
 _ROUNDS: Final = 5
-"""Every figure is the best of this many rounds: what disturbs a machine only ever makes it slower."""
+"""Rounds; the best one counts, because a disturbance only makes a machine slower."""
 _CALLS: Final = 5000
 _CONTROLLER: Final = "ars"
-"""The most costly of the built-in controllers."""
+"""The most expensive of the paper's controllers."""
 _FAMILY: Final = {"estimator_lqr_us": "lqr", "integrated_us": "integrated", "mpc_us": "mpc"}
-"""What controllers with an estimator cost, and which they are; all but the first need a solver that is an extra."""
+"""Metric of a controller with an estimator -> controller; all but the first need a solver from an extra."""
 _GIVEN: Final = "given_"
-"""What the stages are called in which the commands of such a controller are given: a car whose actuators move costs the
-engine more than one whose actuators rest."""
+"""Prefix of the stages that replay the commands of such a controller: a car with moving actuators costs the engine
+more than one with resting actuators."""
 _RUNS_PER_PROCESS: Final = 4
 
 
 def bench(rounds: int = _ROUNDS) -> dict[str, float]:
-    """Measures one step at several stages, and the blocks of the loop one by one.
+    """Measure one step at several stages, and the blocks of the loop one by one.
 
     Args:
         rounds: How often everything is measured; the best counts.
@@ -120,10 +120,10 @@ def _per_step_us(function: Callable[[], object], steps: int) -> float:
 
 
 def _bare(scenario: Scenario) -> float:
-    """The engine alone: same model, same start, no callbacks.
+    """Return the time of the engine alone: same model, same start, no callbacks.
 
-    What the callbacks would apply at the start is applied as a constant force, so that the car stays near where it is:
-    falling, with its springs at their stops, it would be another problem for the engine's solver.
+    The force of the callbacks at the start is applied as a constant, so that the car stays near its place. A falling
+    car, with its springs at their stops, would be another problem for the engine's solver.
     """
     simulation = ClosedLoop(scenario, _CONTROLLER)
     model, data, steps = simulation.vehicle.model, simulation.vehicle.data, simulation.steps
@@ -145,7 +145,7 @@ def _plant(scenario: Scenario) -> float:
 
 
 class _KeptInputs:
-    """A run whose inputs of the engine are kept."""
+    """A run with the recorded inputs of the engine."""
 
     def __init__(self, scenario: Scenario) -> None:
         simulation = ClosedLoop(scenario, _CONTROLLER)
@@ -157,7 +157,7 @@ class _KeptInputs:
             inputs[:] = self.vehicle.data.ctrl
 
     def replay_us(self) -> float:
-        """Microseconds of the engine alone in each step of the same drive, all in one native call."""
+        """Return the time of the engine alone per step of the same drive [us], all in one native call."""
         self.vehicle.restore_state(self._start)
         return _per_step_us(lambda: self.vehicle.replay(self._inputs), len(self._inputs))
 
@@ -168,7 +168,7 @@ def _repeat(step: Callable[..., object], model: mujoco.MjModel, data: mujoco.MjD
 
 
 def _asked(scenario: Scenario, controller: str) -> list[ActuatorCommand]:
-    """What a controller asks for in each step, without its estimates."""
+    """Return the commands of a controller in each step, without its estimates."""
     simulation, asked = ClosedLoop(scenario, controller), []
     for _ in range(simulation.steps):
         simulation.advance(1)
@@ -177,7 +177,7 @@ def _asked(scenario: Scenario, controller: str) -> list[ActuatorCommand]:
 
 
 class _Given:
-    """Asks for what was asked for."""
+    """Controller that replays commands."""
 
     def __init__(self, asked: Sequence[ActuatorCommand]) -> None:
         self._next = iter(asked).__next__
@@ -198,7 +198,7 @@ def _closed_loop(scenario: Scenario, controller: str = _CONTROLLER, given: _Give
 
 
 def _in_threads(scenario: Scenario, count: int) -> float:
-    """Microseconds per step of all simulations together, each in a thread of its own."""
+    """Return the time per step of all simulations together [us], each in a thread of its own."""
     simulations = [ClosedLoop(scenario, _CONTROLLER) for _ in range(count)]
     recorders = [Recorder(simulation.vehicle, simulation.steps) for simulation in simulations]
     pairs = zip(simulations, recorders, strict=True)
@@ -217,7 +217,7 @@ def _in_threads(scenario: Scenario, count: int) -> float:
 
 def _runs_per_min() -> float:
     processes = os.cpu_count() or 1
-    # Spawned: a process with threads, as ours by now is, is not to be forked.
+    # Spawn the processes: a process with threads, as ours is by now, must not be forked.
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
         # The first runs load the compiled code and search the amplitude.
         list(pool.map(_step_steers, [1] * processes))
@@ -233,7 +233,7 @@ def _step_steers(count: int) -> None:
 
 
 def _with_file(scenario: Scenario, path: Path) -> float:
-    """The run as the command line makes it, less what a run of no length costs: building, settling, opening."""
+    """Return the time per step of a run as on the command line [us], without building, settling and opening."""
     simulation = Simulation(scenario, _CONTROLLER)
     with simulation.recorded_to(path):
         start = time.perf_counter()
@@ -242,13 +242,13 @@ def _with_file(scenario: Scenario, path: Path) -> float:
 
 
 def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
-    """What the tyres cost: one evaluation of the front tyre, and all four in the engine.
+    """Measure the cost of the tyres: one evaluation of the front tyre, and all four in the engine.
 
     Args:
         rounds: How often everything is measured; the best counts.
 
     Returns:
-        What `activesteer.tyre.benchmark` measures, and `four_tyres_us`: microseconds that four tyres with contact,
+        The results of `activesteer.tyre.benchmark`, and `four_tyres_us`: microseconds that four tyres with contact,
         relaxation and the application of their forces add to the engine's passive forces, in the same state.
     """
     scenario = resolve("straight_line")
@@ -266,7 +266,7 @@ def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
 
 
 def _blocks(scenario: Scenario) -> dict[str, float]:
-    """Each block of the loop on its own, in the order of the data; rows are written by the vehicle."""
+    """Measure each block of the loop on its own, in the order of the data; the vehicle writes the rows."""
     simulation = ClosedLoop(scenario, _CONTROLLER)
     maneuver, driver, controller, vehicle = (
         simulation.maneuver,

@@ -1,4 +1,4 @@
-"""What sensors, brakes and anti-lock system cost in a step: their native code alone, fed with a stop once driven."""
+"""Cost of sensors, brakes and anti-lock system in a step: their native code alone, fed with a recorded stop."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ class DrivenStop:
     """A stop from 100 km/h with a working anti-lock system and the sensors of production cars."""
 
     def __init__(self) -> None:
-        """Drives it."""
+        """Drive the stop."""
         scenario = resolve(_STOP, overrides=_PRODUCTION)
         recording = run_scenario(scenario)
         speeds = [recording[f"{corner}_wheel_speed_radps"] for corner in CORNERS]
         scalars = [recording[name] for name in _SCALARS]
         self._rows = np.column_stack([recording.time_s, *scalars, *speeds, recording["brake_pedal"]])
-        # As it stands at the beginning of the recording, so that the brakes decide as they did.
+        # Use the state at the beginning of the recording, so that the brakes decide as they did.
         self._vehicle = ClosedLoop(scenario).vehicle
         self.anti_lock_fraction = self._drive()[1] / len(self._rows)
 
     def _drive(self) -> tuple[float, int]:
-        """Duration of the work [s], and in how many steps the anti-lock system holds pressure back."""
+        """Return the duration of the work [s] and the number of steps with pressure reduced by the anti-lock system."""
         (setup, state), sensors = self._vehicle.brakes, self._vehicle.sensors
         assert sensors is not None
         work = (
@@ -51,25 +51,25 @@ class DrivenStop:
         return time.perf_counter() - start, held
 
     def step_us(self) -> float:
-        """Microseconds of sensors, brakes and anti-lock system together in a step of the stop."""
+        """Return the time of sensors, brakes and anti-lock system together in a step of the stop [us]."""
         return 1e6 * self._drive()[0] / len(self._rows)
 
 
 @compiled
 def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
-    """The part of each step that `native_step.step` has of sensors and brakes.
+    """Do the part of `native_step.step` that belongs to sensors and brakes.
 
     Args:
-        rows: Of each step the true members of `Measurement` without the pressures, one behind the other, and the pedal.
-        chains: See `SensorBlock`; so the next one.
-        memory: Likewise.
+        rows: True values of `Measurement` in each step, without the pressures, and the pedal.
+        chains: See `SensorBlock`.
+        memory: See `SensorBlock`.
         radii_m: See `measured`.
         timestep_s: Step [s].
         setup: A `BRAKE_SETUP`.
         state: Its `BRAKE_STATE`.
 
     Returns:
-        In how many steps the anti-lock system holds pressure back.
+        Number of steps in which the anti-lock system reduces pressure.
     """
     asked_Nm, held = np.zeros(4), 0
     for row in rows:

@@ -122,7 +122,7 @@ class TaskQueue:
 
     def _fill(self, more: Iterator[tuple[Any, ...]]) -> None:
         while len(self._running) < self._workers.in_flight:
-            # Try a task that may kill its worker once more among others, and then alone: no other task is blamed for it.
+            # Try a task that may kill its worker once more among others, and then alone, so that no other is blamed.
             if self._suspects:
                 alone = self._suspects[0].attempts + 1 == _ATTEMPTS
                 if alone and self._running:

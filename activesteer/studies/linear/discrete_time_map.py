@@ -1,4 +1,4 @@
-"""One step of the engine as a function that can be differentiated, and the steady state that it repeats."""
+"""One step of the engine as a differentiable function, and the steady state of that function."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from activesteer.vehicle import Vehicle
 from activesteer.vehicle.local_state import LocalState
 
 INPUTS: Final = ("steering_wheel_rad", "rear_steer_rad", "superposition_rad")
-"""What is demanded of steering wheel [rad], rear steering [rad], and superposition at the road wheel [rad]."""
+"""Demands: steering wheel [rad], rear steering [rad], and superposition at the road wheel [rad]."""
 OUTPUTS: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 """Channels of a recording that are the outputs."""
 ACTUATORS: Final = ("rear_steer_rad", "superposition_rad")
-"""Channels that say where the actuators of a controller are."""
+"""Channels of the positions of a controller's actuators."""
 
 _DIFFERENCE: Final = 1e-6
 """Step of the central differences [m, rad, m/s, rad/s]: eigenvalues agree between 1e-7 and 1e-4 to four digits."""
 _TORQUE_DIFFERENCE_Nm: Final = 1.0
 _TRIM_ITERATIONS: Final = 10
 _TRIM_TOLERANCE: Final = 1e-11
-"""Largest change of the state over a step that counts as none [m, rad, m/s, rad/s]; rounding leaves 1e-14."""
+"""Largest change of a steady state over a step [m, rad, m/s, rad/s]; rounding leaves 1e-14."""
 _SOLVER_TOLERANCE: Final = 1e-14
-"""Of the engine's own solver, where a car needs it: its error of 1e-8 would be divided by the small difference here."""
+"""Tolerance of MuJoCo's own solver, if a car needs it: an error of 1e-8 would be divided by the small difference."""
 
 
 class DiscreteTimeMap:
@@ -41,7 +41,7 @@ class DiscreteTimeMap:
         self._columns = [names.index(name) for name in (*OUTPUTS, *ACTUATORS)]
 
     def __call__(self, x: Array, u: Array, more_torque_Nm: float = 0.0) -> Array:
-        """The state after the step, as a difference from the reference."""
+        """Return the state after the step, as a difference from the reference."""
         self.local.write(x)
         steering_wheel, rear, added = (float(value) for value in u)
         command = DriverCommand(steering_wheel, self.torque_Nm + more_torque_Nm)
@@ -49,7 +49,7 @@ class DiscreteTimeMap:
         return self.local.read()
 
     def trim(self, speed_mps: float) -> None:
-        """Makes steady driving straight on the reference, with its drive torque.
+        """Make steady straight driving the reference, with its drive torque.
 
         Raises:
             ModelError: there is none.
@@ -64,7 +64,7 @@ class DiscreteTimeMap:
             if np.abs(residual).max() < _TRIM_TOLERANCE:
                 return
             jacobian = self.derivatives("x")[0] - np.eye(size)
-            # The speed is given; in its place stands the torque that holds it.
+            # The speed is given; the torque that holds it is the unknown in its place.
             torque = _TORQUE_DIFFERENCE_Nm
             jacobian[:, speed] = (self(np.zeros(size), rest, torque) - self(np.zeros(size), rest, -torque)) / (
                 2 * torque
@@ -87,10 +87,10 @@ class DiscreteTimeMap:
         self.local.take_reference()
 
     def derivatives(self, of: str) -> tuple[Array, Array]:
-        """Derivatives of the state after the step, and of the outputs before it.
+        """Return the derivatives of the state after the step and of the outputs before it.
 
         Args:
-            of: `x` or `u`, by what to differentiate.
+            of: Variable to differentiate by, `x` or `u`.
 
         Returns:
             Shapes (n, m) and (len(OUTPUTS) + len(ACTUATORS), m), m being the size of x or u.

@@ -1,12 +1,12 @@
 """Driver, controller and car as one linear loop: crossover frequency, phase margin, damping.
 
-The loop is put together from the linearised car (`linearisation`), the controller's linear form with its corrector
-fully active (`controllers.linear_form`), and the driver's: his law about a straight path, decided every 10 ms, a
-reaction delay of whole decisions, which he knows, and the lag of his arms. One period of 10 ms, which is ten steps of
-the engine, becomes one matrix; nothing is approximated but the motion, which is small.
+The loop consists of the linearised car (`linearisation`), the controller's linear form with its corrector fully active
+(`controllers.linear_form`), and the driver: his control law about a straight path, decided every 10 ms, a reaction
+delay of whole decisions, which he knows, and the lag of his arms. One period of 10 ms, ten steps of the engine,
+becomes one matrix. The only approximation is that the motion is small.
 
-The loop is opened at the steering wheel, between the driver's arms and the car. Crossover frequency and phase margin
-are those of what comes back there. Its damping is that of the oscillation that is seen after a small step of the path.
+The loop is opened at the steering wheel, between the driver's arms and the car, for the crossover frequency and the
+phase margin. The damping is that of the oscillation after a small step of the path.
 
 Source: D. T. McRuer and E. S. Krendel, Mathematical Models of Human Pilot Behavior, AGARDograph 188 (1974).
 """
@@ -36,26 +36,26 @@ from activesteer.studies.linear.small_step import DURATION_S, STEP_M, damping_of
 from activesteer.theory.single_track import SingleTrack
 
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0)
-"""Speeds at which the loop is looked at by itself [km/h]."""
+"""Default speeds [km/h]."""
 FREQUENCIES_RADPS: Final = np.geomspace(0.2, 60.0, 300)
 """Frequencies of the response [rad/s]."""
 _NOTICED: Final = 0.05
-"""Share of the largest part that an oscillation must have in a step to be seen."""
+"""Smallest amplitude of a visible oscillation in a step, as a fraction of the largest part."""
 
 
 @dataclass(frozen=True)
 class DriverLoop:
     """The loop over one period of the driver, from one decision to the next.
 
-    Opened at the steering wheel: x[k+1] = A x[k] + B w, where w are the angles that the car has at the steering wheel
-    in the steps of the period; those that the driver gives it are C x[k]. What he knows of his decisions stays in A.
+    Opened at the steering wheel: x[k+1] = A x[k] + B w, where w are the car's steering wheel angles in the steps of the
+    period; the angles from the driver are C x[k]. His knowledge of his own decisions stays in A.
 
     Attributes:
         a: System matrix of the open loop, shape (n, n).
-        b: What each step's angle does, shape (n, m) with m steps in a period.
-        c: The angle in each step, shape (m, n).
+        b: Input matrix of the angle in each step, shape (n, m) with m steps in a period.
+        c: Output matrix of the angle in each step, shape (m, n).
         closed: System matrix of the closed loop, shape (n, n).
-        offset: Place of the lateral offset from the path in the state.
+        offset: Index of the lateral offset from the path in the state.
         timestep_s: Time between two steps [s].
     """
 
@@ -68,12 +68,12 @@ class DriverLoop:
 
     @cached_property
     def response(self) -> NDArray[np.complexfloating]:
-        """What comes back of an angle at `FREQUENCIES_RADPS`, complex; at -1 is the limit of stability."""
+        """Return the return ratio at `FREQUENCIES_RADPS`, complex; -1 is the limit of stability."""
         from scipy.linalg import schur, solve_triangular  # noqa: PLC0415 - slow to import
 
         steps = len(self.c)
         z = np.exp(1j * self.timestep_s * np.outer(FREQUENCIES_RADPS, np.arange(steps + 1)))
-        # Triangular, the system is solved at once for each frequency.
+        # In triangular form, the system is solved at once for each frequency.
         found: Any = schur(self.a, output="complex")
         triangle, turned = found
         forced, seen = z[:, :steps] @ (turned.conj().T @ self.b).T, self.c @ turned
@@ -81,16 +81,16 @@ class DriverLoop:
         answers = [
             seen @ solve_triangular(at[-1] * unit - triangle, force) for at, force in zip(z, forced, strict=True)
         ]
-        # Of the angle within a period, the part at the frequency itself.
+        # Take the part of the angle within a period that is at the frequency itself.
         return np.asarray(-np.mean(z[:, :steps].conj() * answers, axis=1), dtype=np.complex128)
 
     def crossover(self) -> tuple[float, float]:
-        """Crossover frequency [rad/s] and phase margin [rad]; the smaller margin where the gain passes 1 several times.
+        """Return crossover frequency [rad/s] and phase margin [rad]; the smallest margin if there are several crossovers.
 
-        nan where it passes it nowhere.
+        Both are nan if the gain never crosses 1.
         """
         gain, phase = np.log(np.abs(self.response)), np.unwrap(np.angle(self.response))
-        # Integrators and a delay: the phase begins between -pi and -2 pi, as near to -pi as it can be.
+        # With integrators and a delay, the phase begins between -pi and -2 pi, as close to -pi as possible.
         phase -= 2.0 * math.pi * round((phase[0] + math.pi) / (2.0 * math.pi))
         found = []
         for place in np.flatnonzero((gain[:-1] > 0.0) & (gain[1:] <= 0.0)):
@@ -102,9 +102,9 @@ class DriverLoop:
         return float(frequency), float(margin)
 
     def damping(self) -> tuple[float, float]:
-        """Damping ratio [-] and natural frequency [rad/s] of the oscillation with the largest part in a small step.
+        """Return damping ratio [-] and natural frequency [rad/s] of the largest oscillation in a small step.
 
-        1, and that of the largest part, where no oscillation has one that is seen.
+        If no oscillation is visible, the result is 1 and the natural frequency of the largest part.
         """
         from scipy.linalg import eig  # noqa: PLC0415 - slow to import
 
@@ -117,7 +117,7 @@ class DriverLoop:
         return float(-s.real / abs(s)), float(abs(s))
 
     def step(self) -> tuple[Array, Array]:
-        """Time [s] and lateral position of the car [m] at each decision, after a step of the path by `STEP_M`."""
+        """Return time [s] and lateral position [m] at each decision, after a step of the path by `STEP_M`."""
         state = np.zeros(len(self.closed))
         state[self.offset] = -STEP_M
         period_s = len(self.c) * self.timestep_s
@@ -131,13 +131,13 @@ class DriverLoop:
 def driver_loop(
     car: LinearCar, controller: LinearController, driver: DriverParameters, gains: SteeringGains, steering_ratio: float
 ) -> DriverLoop:
-    """Puts the loop together.
+    """Assemble the loop.
 
     Args:
         car: The linearised car.
         controller: The controller at its speed, with the car's step.
         driver: The driver.
-        gains: What he steers at that speed.
+        gains: Gains of the driver at that speed.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
     """
     steps = round(PREVIEW_INTERVAL_S / car.timestep_s)
@@ -149,7 +149,7 @@ def driver_loop(
     yaw_rate, sideslip = (
         np.pad(car.c[OUTPUTS.index(name)], (0, size - n)) for name in ("yaw_rate_radps", "sideslip_rad")
     )
-    # What the arms do first in a step, as the driver comes before controller and car.
+    # The arms act first in a step, because the driver comes before controller and car.
     arms = np.eye(size)
     lag_s = driver.neuromuscular_lag_s
     moved = -math.expm1(-car.timestep_s / lag_s) if lag_s > 0.0 else 1.0
@@ -169,7 +169,7 @@ def driver_loop(
     rest[heading] += car.timestep_s * yaw_rate
     rest[offset] += car.timestep_s * car.speed_mps * sideslip
     rest[offset, heading] += car.timestep_s * car.speed_mps
-    # The decisions move up by one; the new one comes in at the beginning of the period.
+    # The decisions move up by one; the new one enters at the beginning of the period.
     decides = np.eye(size)
     decides[newest:] = np.eye(size, k=-1)[newest:]
     ahead_s = PREVIEW_INTERVAL_S * np.arange(len(gains.per_path_radpm))
@@ -179,7 +179,7 @@ def driver_loop(
     decided[heading] = -car.speed_mps * (gains.per_path_radpm @ ahead_s)
     decides[newest] = decided
     closed = np.linalg.matrix_power(rest @ arms, steps) @ decides
-    # Opened: the car has the angle w in place of that of the arms.
+    # In the open loop, the car has the angle w instead of that of the arms.
     given = rest[:, wheel].copy()
     given[wheel] = 0.0
     rest[:, wheel] -= given
@@ -192,13 +192,13 @@ def driver_loop(
 
 @dataclass(frozen=True)
 class LoopAtSpeed:
-    """A loop at one speed with one controller, and what a run of the full car says of it.
+    """A loop at one speed with one controller, and the same in a run of the full car.
 
     Attributes:
         speed_kmh: Speed [km/h].
         controller: The controller.
         loop: The linear loop.
-        run: A small step of the path in a run, friction of the rack and tolerance band included.
+        run: A run with a small step of the path, including the friction of the rack and the tolerance band.
     """
 
     speed_kmh: float
@@ -208,17 +208,17 @@ class LoopAtSpeed:
 
     @property
     def damping_in_run(self) -> float:
-        """Damping ratio that is seen after the small step in the run."""
+        """Damping ratio after the small step in the run."""
         return damping_of(self.run.time_s, self.run["y_m"])[0]
 
     @property
     def step_difference_m(self) -> float:
-        """How far the linear car and that of the run are apart at most after the small step [m]."""
+        """Largest distance between the linear car and the car of the run after the small step [m]."""
         time_s, y_m = self.loop.step()
         return float(np.abs(np.interp(time_s, self.run.time_s, self.run["y_m"]) - y_m).max())
 
     def to_json(self) -> dict[str, Any]:
-        """Its figures."""
+        """Return the values of the loop."""
         crossover_radps, margin_rad = self.loop.crossover()
         damping, natural_radps = self.loop.damping()
         return {
@@ -241,7 +241,7 @@ def driver_loops(
     speeds_kmh: Sequence[float] = SPEEDS_KMH,
     overrides: Mapping[str, Any] | None = None,
 ) -> list[LoopAtSpeed]:
-    """The loop with every controller at every speed.
+    """Return the loop with every controller at every speed.
 
     Args:
         driver: Name, path or table of a driver.
@@ -251,7 +251,7 @@ def driver_loops(
         overrides: Dotted key -> value, of vehicle and driver.
 
     Raises:
-        DriverError: the driver is code of a user's own, which has no linear form.
+        DriverError: the driver is a user's own class, which has no linear form.
         ActiveSteerError: an input is wrong.
     """
     scenario = resolve("straight_line", vehicle, overrides, driver)

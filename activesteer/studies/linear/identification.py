@@ -1,9 +1,9 @@
-"""Identification of a car by driving it: steady-state handling after ISO 4138, and the single-track model that fits it.
+"""Identification of a car by driving it: steady-state handling (ISO 4138) and the matching single-track model.
 
-Slowly increasing steer at 80 and at 100 km/h and a circle of 100 m. Mass, yaw inertia and axle distances are those of
-the model at static ride. Axle stiffnesses and characteristic speed come from the two tests at constant speed and are
-effective ones: they belong to the driver's angle (steering wheel over overall ratio), so they contain roll steer,
-compliance and the column. They are those of the range from 0.5 to 2 m/s2.
+The tests are slowly increasing steer at 80 and 100 km/h and a circle of 100 m. Mass, yaw inertia and axle distances are
+those of the model at static ride. Axle stiffnesses and characteristic speed come from the two tests at constant speed,
+from 0.5 to 2 m/s2. They are effective values for the driver's angle (steering wheel angle over overall ratio), so they
+contain roll steer, compliance and the column.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ CLASS_BANDS: Final = {
     "characteristic_speed_mps": (77.0, 93.0, "computed for axle stiffnesses of 80-110 and 120-155 kN/rad"),
     "roll_gradient_radpmps2": (3.9, 6.4, "computed for a roll stiffness of 95 to 60 kNm/rad"),
 }
-"""What is expected of a car of the compact class: metric -> low, high (in the unit shown), source."""
+"""Usual values of the compact class: metric -> low, high (in display units), source."""
 
 
 @dataclass(frozen=True)
 class Identification:
-    """What was found.
+    """Result of an identification.
 
     Attributes:
         vehicle: Name of the vehicle.
         tests: Name of a test -> steady-state handling in it.
-        single_track: The single-track model that fits.
+        single_track: The matching single-track model.
     """
 
     vehicle: str
@@ -60,7 +60,7 @@ class Identification:
     single_track: SingleTrackParameters
 
     def table(self) -> str:
-        """Both as text: a column per test, then the keys of [single_track]."""
+        """Return both as text: a column per test, then the keys of [single_track]."""
         shown = comparison({name: handling._asdict() for name, handling in self.tests.items()})
         keys = "\n".join(f"{key} = {value}" for key, value in single_track_lines(self.single_track).items())
         return f"{shown}\n\n[single_track]\n{keys}"
@@ -92,19 +92,19 @@ def identify(
     overrides: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
-    """Drives the tests and evaluates them.
+    """Drive the tests and evaluate them.
 
     Args:
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value, for the vehicle (`factors.mass`) or the road (`road.mu`).
-        progress: Called with the name of every test before it is driven.
+        progress: Called with the name of every test before its drive.
 
     Returns:
         Steady-state handling and the single-track model.
 
     Raises:
-        ActiveSteerError: an input is wrong, or the car cannot be driven so.
-        ModelError: the car oversteers; it has no characteristic speed.
+        ActiveSteerError: an input is wrong, or the car cannot drive the tests.
+        ModelError: the car oversteers and has no characteristic speed.
     """
     scenarios = {
         name: resolve("slowly_increasing_steer", vehicle, {**(overrides or {}), "speed_kmh": speed})
@@ -124,7 +124,7 @@ def identify(
 
 
 def single_track_lines(parameters: SingleTrackParameters) -> dict[str, str]:
-    """Keys and values of the table [single_track] in a vehicle file, rounded to what the tests can tell."""
+    """Return keys and values of the table [single_track], rounded to the resolution of the tests."""
     p = parameters
     lines = {
         "mass_kg": f"{p.mass_kg:.1f}",
@@ -140,13 +140,13 @@ def single_track_lines(parameters: SingleTrackParameters) -> dict[str, str]:
 
 
 def write_single_track(vehicle_file: Path, result: Identification, command: str, date: str) -> None:
-    """Writes the single-track model into a vehicle file; everything else in it stays.
+    """Write the single-track model into a vehicle file, and keep everything else in it.
 
     Args:
         vehicle_file: The file, as from `resources.find_vehicle`.
-        result: What was identified.
+        result: Result of the identification.
         command: Command that identified it, kept in a comment.
-        date: Its date, as 2026-11-21, kept there too.
+        date: Date of the identification, such as 2026-11-21, kept in the comment.
 
     Raises:
         ParameterError: the file cannot be read or written, or has no table [single_track].
@@ -157,7 +157,7 @@ def write_single_track(vehicle_file: Path, result: Identification, command: str,
 def single_track_response(
     recording: RecordingLike, parameters: SingleTrackParameters, steering_ratio: float
 ) -> dict[str, NDArray[np.float64]]:
-    """What the linear single-track model does with the steering of a run, to stand beside the multibody car.
+    """Return the response of the linear single-track model to the steering of a run, for comparison.
 
     Args:
         recording: A run at constant speed that begins straight ahead.

@@ -1,4 +1,4 @@
-"""The car linearised about driving straight on: state space, modes, and how they change with speed.
+"""The car linearised about straight driving: state space, modes, and their change with speed.
 
 Method:
 
@@ -6,17 +6,17 @@ Method:
    at which, at the given speed, the state without its cyclic coordinates (`LocalState`) repeats itself exactly.
 2. One whole step, tyres, servos and constraints included, is differentiated by central differences of that state and
    of the demands of the actuators: x[k+1] = A x[k] + B u[k], and the recorded channels y[k] = C x[k] + D u[k].
-   (`mujoco.mjd_transitionFD` would miss forces: it leaves out the passive callback when it perturbs activations, in
-   which the deflection of the tyres' carcass is kept.)
+   (`mujoco.mjd_transitionFD` would miss forces: it skips the passive callback when it perturbs activations, which
+   hold the deflection of the tyres' carcass.)
 3. Continuous time: the eigenvalues z of A become s = ln(z)/h, and the input matrix is inverted for an input held over a
    step, mode by mode: the result agrees with the engine's own step at every sample.
-4. Reduction: modes slower than a cut-off are kept, of those without influence from the inputs on the outputs (heave,
-   pitch, speed) none. Of the faster modes the static part is kept, in D, so that the gain at rest is exact.
+4. Reduction: modes below a cut-off frequency are kept, except those without influence from the inputs on the outputs
+   (heave, pitch, speed). The static part of the faster modes is kept in D, so that the gain at rest is exact.
 
-Validity: small motions about straight driving on a level, even road. Dampers enter with the mean of the slopes of
-their curves on both sides of rest, friction of their seals as the road's vibration leaves it at small speeds. Friction
-of the rack is left out: about a point of rest it would hold the rack by its elasticity, while the rack of a steered car
-slides. So are friction and play of screws in the toe links.
+Validity: small motions about straight driving on a level, even road. Dampers enter with the mean slope of their curves
+on both sides of rest, and the friction of their seals as the vibration of the road leaves it at small speeds. The
+friction of the rack is left out: about a point of rest it would hold the rack by its elasticity, while the rack of a
+steered car slides. The friction and play of screws in the toe links are left out too.
 """
 
 from __future__ import annotations
@@ -45,17 +45,17 @@ if TYPE_CHECKING:
 CUT_OFF_HZ: Final = 30.0
 """Natural frequency above which a mode is replaced by its static part [Hz]."""
 MIN_SPEED_MPS: Final = 3.0
-"""Below this the standstill behaviour of the tyres fades in and speed is no parameter any more [m/s]."""
+"""Lowest speed: below it the standstill behaviour of the tyres fades in [m/s]."""
 
 _SETTLE_S: Final = 1.0
 _NO_INFLUENCE: Final = 1e-8
-"""Fraction of a mode in every gain of the car below which it does not appear in the state space; symmetric modes have
-1e-12, the least of the lateral ones 1e-4."""
+"""Smallest fraction of a mode in any gain of the car for which the state space contains it; symmetric modes have 1e-12,
+the least of the lateral ones 1e-4."""
 
 
 @dataclass(frozen=True)
 class LinearCar:
-    """The car about straight driving, as the engine steps it.
+    """The discrete-time car about straight driving.
 
     Attributes:
         speed_mps: Speed [m/s].
@@ -66,7 +66,7 @@ class LinearCar:
         b: Input matrix, shape (n, len(INPUTS)).
         c: Output matrix, shape (len(OUTPUTS), n).
         d: Feed-through, shape (len(OUTPUTS), len(INPUTS)).
-        actuators: Where rear steering and superposition are, of the state: shape (len(ACTUATORS), n).
+        actuators: Output matrix of the positions of rear steering and superposition, shape (len(ACTUATORS), n).
     """
 
     speed_mps: float
@@ -80,11 +80,11 @@ class LinearCar:
     actuators: Array
 
     def modes(self) -> list[Mode]:
-        """All modes, by natural frequency; of a conjugate pair the one with positive imaginary part."""
+        """Return all modes by natural frequency; of a conjugate pair, the mode with positive imaginary part."""
         return find_modes(self.a, self.states, self.timestep_s)
 
     def state_space(self, cut_off_Hz: float = CUT_OFF_HZ) -> control.StateSpace:
-        """The lateral motion in continuous time.
+        """Return the lateral motion in continuous time.
 
         Args:
             cut_off_Hz: Natural frequency above which modes are replaced by their static part [Hz].
@@ -99,10 +99,10 @@ class LinearCar:
         discrete = np.array([np.exp(mode.eigenvalue_1ps * self.timestep_s) for mode in modes])
         outputs = np.array([self.c @ mode.shape for mode in modes])
         inputs = np.array([mode.left @ self.b for mode in modes])
-        # A pair adds its own part and the conjugate: twice the real part.
+        # A conjugate pair contributes twice the real part.
         twice = np.array([2.0 if mode.eigenvalue_1ps.imag > 0.0 else 1.0 for mode in modes])
         gains = np.real(twice[:, None, None] * outputs[:, :, None] * (inputs / (1.0 - discrete)[:, None])[:, None, :])
-        # Where a gain nearly vanishes, as in sideslip at some speed, the largest part of a mode is what counts.
+        # If a gain nearly vanishes, as for sideslip at some speed, the largest part of a mode counts.
         fraction = (np.abs(gains) / np.abs(gains).max(axis=0)).max(axis=(1, 2))
         kept = [
             index
@@ -147,7 +147,7 @@ class LinearCar:
 
 
 def _identifier(name: str, taken: Sequence[str]) -> str:
-    """A mode's name as a state's name, numbered where an earlier mode has the same."""
+    """Return the name of a mode as the name of a state, numbered if an earlier mode has the same name."""
     base = re.sub(r"\W+", "_", name)
     used = {re.sub(r"_(re|im)$", "", other) for other in taken}
     return next(name for name in (base, *(f"{base}_{number}" for number in range(2, 99))) if name not in used)
@@ -160,7 +160,7 @@ def linearise(
     *,
     cut_off_Hz: float = CUT_OFF_HZ,
 ) -> control.StateSpace:
-    """The lateral motion of a car, linearised about driving straight on.
+    """Return the lateral motion of a car, linearised about straight driving.
 
     Args:
         vehicle: Name, path, or table of a vehicle.
@@ -190,14 +190,14 @@ def linearise(
 def linear_car(
     vehicle: FileOrTable = "compact", speed_mps: float = 80.0 / 3.6, overrides: Mapping[str, Any] | None = None
 ) -> LinearCar:
-    """The same before it is reduced, with all modes; see `linearise`."""
+    """Return the car before reduction, with all modes; see `linearise`."""
     return linear_cars(vehicle, [speed_mps], overrides)[0]
 
 
 def linear_cars(
     vehicle: FileOrTable, speeds_mps: Sequence[float], overrides: Mapping[str, Any] | None = None
 ) -> list[LinearCar]:
-    """The car linearised at several speeds; see `linearise`."""
+    """Return the car linearised at several speeds; see `linearise`."""
     return [_linearised(vehicle, float(speed), overrides) for speed in speeds_mps]
 
 
@@ -230,7 +230,7 @@ def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, 
 
 
 def linear_response(recording: RecordingLike, system: control.StateSpace) -> dict[str, Array]:
-    """What the linear car does with the demands of a run, to stand beside the full one.
+    """Return the response of the linear car to the demands of a run, for comparison.
 
     Args:
         recording: A run at the speed of the linear car that begins straight ahead.
@@ -253,7 +253,7 @@ def linear_response(recording: RecordingLike, system: control.StateSpace) -> dic
 
 
 def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> str:
-    """Modes as text: name, natural frequency, damping ratio, eigenvalue, and the parts that take part.
+    """Return modes as text: name, natural frequency, damping ratio, eigenvalue, and the participating parts.
 
     Args:
         modes: Modes, as from `LinearCar.modes`.

@@ -1,21 +1,20 @@
-"""How far the loops of a controller are from instability: gain, phase, delay and disk margins over speed.
+"""Stability margins of a controller's loops: gain, phase, delay and disk margins over speed.
 
-The loop goes from the demand of an actuator through the linearised car (`linearisation`: servo, suspensions, tyres),
+The loop runs from the demand of an actuator through the linearised car (`linearisation`: servo, suspensions, tyres),
 the sensors (bandwidth, delay), the control unit (its interval, the bus) and the controller back to the demand. It is
-opened at one actuator while the other stays closed, and at both at once: a bus delays the demands of both, and a
-controller that moves both actuators can bear less of that than either margin says. The controller enters with its
-linear form (`controllers.linear_form`) where it has one, its corrector fully active, and otherwise with its answers to
-small pulses (`controllers.response`).
+opened at one actuator while the other stays closed, and at both at once: a bus delays both demands, and a controller
+that moves both actuators tolerates less of that than either margin suggests. The controller enters with its linear form
+(`controllers.linear_form`), its corrector fully active, or otherwise with its responses to small pulses
+(`controllers.response`).
 
-What is sampled and held for N calls of the controller enters as the mean of the N held values: a delay of (N - 1) / 2
-calls and the loss of gain that belongs to it; so do commands, held for N steps of the simulation. Samples and calls
-begin together, as in a run. What samples fold down from above half their rate is left out.
-
+A sample held for N calls of the controller enters as the mean of the N held values: a delay of (N - 1) / 2 calls and
+the corresponding loss of gain; so does a command held for N steps of the simulation. Samples and calls begin together,
+as in a run. Aliasing from above half the sampling rate is left out.
 The disk margin is alpha of the balanced disk, 1 / max |S - 1/2|, S being the sensitivity of the opened loop: the loop
 stays stable for every gain from (2 - alpha) / (2 + alpha) to its inverse together with every phase within
 2 atan(alpha / 2). 0.5 are 4.4 dB and 28 deg at once.
 
-Gain, phase and delay margins are those of `control.stability_margins`; `control.disk_margins` takes no frequency
+`control.stability_margins` gives gain, phase and delay margins; `control.disk_margins` accepts no frequency
 response. Source: P. Seiler, A. Packard, P. Gahinet, An introduction to disk margins, IEEE Control Systems Magazine 40
 (5), 2020.
 """
@@ -44,29 +43,29 @@ from activesteer.studies.linear.discrete_time_map import OUTPUTS
 from activesteer.studies.linear.linearisation import LinearCar, linear_cars
 
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
-"""Speeds at which the loops are looked at by themselves [km/h]."""
+"""Default speeds [km/h]."""
 FREQUENCIES_RADPS: Final = np.geomspace(0.05, 300.0, 800)
-"""Frequencies at which they are [rad/s]: from a hundredth of the car's natural frequency to beyond its suspensions'."""
+"""Frequencies [rad/s]: from a hundredth of the car's natural frequency to beyond those of its suspensions."""
 LOOPS: Final = ("rear", "superposition")
-"""Where a loop is opened; the order of the demands."""
+"""Points at which a loop is opened, in the order of the demands."""
 BOTH: Final = "both"
-"""What is said of both, where gain, phase or delay change by the same in both."""
+"""Name of the loop in which gain, phase or delay change by the same in both demands."""
 
 _SENSORS: Final = ("yaw_rate", "ay", "rear_steer", "superposition")
-"""Sensors that belong to `SIGNALS`."""
+"""Sensors of `SIGNALS`."""
 
 Response = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of one loop; nan where there is none, as the gain margin of a loop that never turns by half.
+    """Margins of one loop; nan if a margin does not exist, such as the gain margin of a loop above -180 deg.
 
     Attributes:
-        gain_dB: Factor on the gain, up or down, whichever is less, that makes the loop marginal [dB].
-        phase_rad: Least phase that does [rad].
-        delay_s: Least delay that does [s].
-        disk: alpha of the balanced disk [-]; 0 where the closed loop is unstable.
+        gain_dB: Smallest factor on the gain, up or down, that makes the loop marginal [dB].
+        phase_rad: Smallest phase that makes it marginal [rad].
+        delay_s: Smallest delay that makes it marginal [s].
+        disk: alpha of the balanced disk [-]; 0 if the closed loop is unstable.
     """
 
     gain_dB: float
@@ -76,12 +75,12 @@ class Margins:
 
 
 def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) -> Margins:
-    """Margins of a loop from its frequency response.
+    """Return the margins of a loop from its frequency response.
 
     Args:
-        loop: L, of which 1 + L = 0 is the limit of stability, shape (m,).
-        frequencies_radps: Its frequencies, rising, shape (m,) [rad/s].
-        stable: Whether the closed loop is; where it is not, there are no margins.
+        loop: Loop gain L, with 1 + L = 0 at the limit of stability, shape (m,).
+        frequencies_radps: Frequencies, ascending, shape (m,) [rad/s].
+        stable: Whether the closed loop is stable; an unstable one has no margins.
     """
     if not stable:
         return Margins(math.nan, math.nan, math.nan, 0.0)
@@ -101,7 +100,7 @@ def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) ->
 
 
 def weakest(margins: Sequence[Margins]) -> Margins:
-    """The smallest of each; where one loop is unstable, there are none."""
+    """Return the smallest of each margin; if one loop is unstable, there are none."""
     if unstable := [each for each in margins if each.disk == 0.0]:
         return unstable[0]
     return Margins(*(float(np.fmin.reduce(values)) for values in zip(*map(astuple, margins), strict=True)))
@@ -114,7 +113,7 @@ def _least(values: Array) -> float:
 def round_trip(
     car: LinearCar, answer: Callable[[Array], Response], scenario: Scenario, unit_s: float, frequencies_radps: Array
 ) -> Response:
-    """What comes back of the demands: M, u = M u closing the loops.
+    """Return the return ratio M of the demands; the closed loop is u = M u.
 
     Args:
         car: The linearised car.
@@ -124,7 +123,7 @@ def round_trip(
         frequencies_radps: Frequencies, shape (m,) [rad/s].
 
     Returns:
-        Shape (m, 2, 2), in the order of `LOOPS`.
+        Return ratio, shape (m, 2, 2), in the order of `LOOPS`.
     """
     h, config = car.timestep_s, scenario.car.config
     back = np.exp(-1j * frequencies_radps * h)  # one step
@@ -132,7 +131,7 @@ def round_trip(
         (1.0 / back)[:, None, None] * np.eye(len(car.a)) - car.a, np.asarray(car.b[:, 1:], dtype=np.complex128)
     )
     rows = {name: car.c[index] for index, name in enumerate(OUTPUTS)}
-    # The accelerometer leans with the body. All but the yaw rate are what they were at the beginning of the step.
+    # The accelerometer rolls with the body. All signals but the yaw rate are those of the beginning of the step.
     leaning = rows["ay_mps2"] + GRAVITY_MPS2 * rows["roll_rad"]
     through = car.d[OUTPUTS.index("ay_mps2"), 1:]
     motion = np.stack([row @ states for row in (rows["yaw_rate_radps"], leaning, *car.actuators)], axis=1)
@@ -150,19 +149,19 @@ def _held(steps: int, back: Response) -> Response:
 
 
 def _calls(sensor: Sensor, unit_s: float) -> int:
-    """For how many calls of the control unit a sample is held."""
+    """Return the number of calls of the control unit for which a sample is held."""
     return max(1, round((sensor.sample_time_s or 0.0) / unit_s))
 
 
 def _sensed(sensor: Sensor, step_s: float, back: Response, every: int) -> Response:
-    """Frequency response of a sensor: bandwidth, samples, delay; see `sensors.signal_chain`."""
+    """Return the frequency response of a sensor: bandwidth, samples, delay; see `sensors.signal_chain`."""
     share = -math.expm1(-2.0 * math.pi * sensor.bandwidth_Hz * step_s) if sensor.bandwidth_Hz else 1.0
     samples = _held(_calls(sensor, every * step_s), back**every)
     return share / (1.0 - (1.0 - share) * back) * samples * back ** round((sensor.delay_s or 0.0) / step_s)
 
 
 def opened(returned: Response, loop: str) -> Response:
-    """The loop opened at one demand, the other closed: L, of which 1 + L = 0 is the limit.
+    """Return the loop gain L opened at one demand with the other closed; 1 + L = 0 is the limit of stability.
 
     Args:
         returned: As from `round_trip`.
@@ -175,7 +174,7 @@ def opened(returned: Response, loop: str) -> Response:
 
 
 def opened_at_both(returned: Response) -> tuple[Response, Response]:
-    """The loops that one factor f on both demands meets: det(1 - f M) = 0 where 1 + f L = 0, -L an eigenvalue of M.
+    """Return the loops of a common factor f on both demands: det(1 - f M) = 0 where 1 + f L = 0, -L an eigenvalue of M.
 
     Args:
         returned: As from `round_trip`.
@@ -188,11 +187,11 @@ def opened_at_both(returned: Response) -> tuple[Response, Response]:
 
 
 def is_stable(returned: Response) -> bool:
-    """Whether all loops closed are stable, where all that is in them is: det(1 - M) never goes round 0 (Nyquist)."""
+    """Return True if the closed loops are stable, given stable parts: det(1 - M) never encircles 0 (Nyquist)."""
     determinant = np.linalg.det(np.eye(2) - returned)
     turned = np.unwrap(np.angle(determinant))
-    # From the lowest frequency to the highest an unstable real pole turns it by half a turn, a pair by a whole one, an
-    # integrator in a stable loop by a quarter.
+    # From the lowest frequency to the highest, an unstable real pole turns it by half a revolution, a pair by a whole
+    # and an integrator in a stable loop by a quarter.
     return bool(abs(turned[-1] - turned[0]) < 0.75 * math.pi)
 
 
@@ -202,10 +201,10 @@ class LoopMargins:
 
     Attributes:
         controller: The controller.
-        loop: Where it is opened: one of `LOOPS`, or `BOTH`.
+        loop: Point at which the loop is opened: one of `LOOPS`, or `BOTH`.
         speed_kmh: Speed [km/h].
-        margins: What was found.
-        factors: Of many cars, what is varied in that of the smallest disk margin: key -> value.
+        margins: The margins.
+        factors: Factors of the car with the smallest disk margin, if there are many cars: key -> value.
     """
 
     controller: str
@@ -215,7 +214,7 @@ class LoopMargins:
     factors: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """Its figures."""
+        """Return the values of the margins."""
         return {
             "controller": self.controller,
             "loop": self.loop,
@@ -234,9 +233,9 @@ def loop_margins(
     speeds_kmh: Sequence[float] = SPEEDS_KMH,
     overrides: Mapping[str, Any] | None = None,
 ) -> list[LoopMargins]:
-    """Margins of every loop of every controller at every speed; an actuator that a controller leaves alone has none.
+    """Return the margins of every loop of every controller at every speed; an unused actuator has none.
 
-    Where a controller moves both actuators, those of both together are the last.
+    If a controller uses both actuators, the margins of both together come last.
 
     Args:
         controllers: As for `simulate`.
@@ -253,7 +252,7 @@ def loop_margins(
 
 
 def straight_on(speed_mps: float) -> dict[str, Any]:
-    """The table of a manoeuvre at a speed in which nobody steers [m/s]."""
+    """Return the table of a manoeuvre at a constant speed without steering [m/s]."""
     return {"kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0}
 
 
@@ -263,13 +262,13 @@ def margins_of_cars(
     speeds_kmh: Sequence[float],
     cars: Iterable[Mapping[str, Any]],
 ) -> Iterator[list[LoopMargins]]:
-    """The same of several cars, one after the other; a controller that knows the same of them is looked at once.
+    """Yield the margins of several cars; a controller that knows the same about two cars is evaluated once.
 
     Args:
         controllers: As for `simulate`.
         vehicle: Name, path, or table of a vehicle.
         speeds_kmh: Speeds [km/h].
-        cars: Overrides of each: dotted key -> value.
+        cars: Overrides of each car: dotted key -> value.
 
     Raises:
         ControllerError: a controller has no linear form.
@@ -308,7 +307,7 @@ def _of_loops(controller: str, speed_kmh: float, returned: Response) -> list[Loo
 
 
 def _rolling(scenario: Scenario) -> Measurement:
-    """What ideal sensors say of the car that rolls straight on, all that moves to a side taken as zero."""
+    """Return the measurement of ideal sensors for straight rolling, with all lateral values zero."""
     rolling = ClosedLoop(replace(scenario, car=replace(scenario.car, config=_ideal(scenario)))).measurement
     left, right = rolling.wheel_speed_radps[::2], rolling.wheel_speed_radps[1::2]
     front, rear = (0.5 * (a + b) for a, b in zip(left, right, strict=True))
@@ -317,7 +316,7 @@ def _rolling(scenario: Scenario) -> Measurement:
 
 
 def _fully_active(setup: ControllerSetup) -> ControllerSetup:
-    """The same with correctors that act at all errors."""
+    """Return the parameters with correctors that act on all errors."""
     gains = setup.gains
     acting = {
         name: replace(system, corrector=replace(system.corrector, deadband_start_radps=0.0, deadband_end_radps=0.0))
@@ -334,7 +333,7 @@ def _ideal(scenario: Scenario) -> Any:
 def _answer(
     given: Any, name: str, scenario: Scenario, setup: ControllerSetup, made: Controller
 ) -> Callable[[Array], Response]:
-    """The controller's frequency response, demands per measurement."""
+    """Return the controller's frequency response, demands per measurement."""
     rolling = _rolling(scenario)
     if not has_linear_form(given):
         return _answer_to_samples(scenario.car.config.sensors.all(), made, rolling, setup.timestep_s, name)
@@ -353,7 +352,7 @@ def _answer(
 def _answer_to_samples(
     sensors: Mapping[str, Sensor], made: Controller, rolling: Measurement, unit_s: float, name: str
 ) -> Callable[[Array], Response]:
-    """The frequency response of a controller that is known by its answers to samples."""
+    """Return the frequency response of a controller from its responses to samples."""
     calls = [_calls(sensors[sensor], unit_s) for sensor in _SENSORS]
     ages = [math.ceil((sensors[sensor].delay_s or 0.0) / unit_s - 1e-9) for sensor in _SENSORS]
     held = {signal: (count, age % count) for signal, count, age in zip(SIGNALS, calls, ages, strict=True)}
@@ -361,7 +360,7 @@ def _answer_to_samples(
 
     def response(frequencies_radps: Array) -> Response:
         back = np.exp(-1j * frequencies_radps * unit_s)
-        # Of an answer to samples that are held, what belongs to the hold is in the sensor already.
+        # In a response to held samples, the effect of the hold already belongs to the sensor.
         holds = np.stack([count * _held(count, back) for count in calls], axis=1)
         return to_samples(frequencies_radps) / holds[:, None, :]
 

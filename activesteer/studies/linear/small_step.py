@@ -1,4 +1,4 @@
-"""How well driver and car hold a path together: the damping of what is left of a small step of the path."""
+"""Damping of driver and car after a small step of the path."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from activesteer.scenario import FileOrTable
 from activesteer.simulation.runner import simulate
 
 STEP_M: Final = 0.5
-"""How far beside the car the path begins [m]: it asks for some 1.6 m/s2 of lateral acceleration, where tyres are
-linear, and moves the steering wheel further than what the friction of the rack can hide."""
+"""Offset of the path beside the car [m]. It needs about 1.6 m/s2 of lateral acceleration, where tyres are linear, and
+moves the steering wheel further than the friction of the rack can hide."""
 _CLOSE: Final = 0.1
-"""Share of the step that may be left at the end; the friction of the rack hides some."""
+"""Fraction of the step that may remain at the end; the friction of the rack hides some."""
 DURATION_S: Final = 7.0
 """Length of the run [s]."""
 _SPACING_M: Final = 15.0
 _FIT_INTERVAL_S: Final = 0.01
-"""Distance of the samples that are fitted [s]."""
+"""Sampling interval of the fit [s]."""
 
 
 def small_step(
@@ -34,14 +34,14 @@ def small_step(
     overrides: Mapping[str, Any] | None = None,
     driver: Any = DEFAULT_DRIVER,
 ) -> RecordingLike:
-    """The run from which the damping is read: a straight path that begins `STEP_M` to the left of the car.
+    """Return the run for the damping: a straight path that begins `STEP_M` to the left of the car.
 
     Args:
         speed_mps: Speed [m/s].
-        controller: See `simulate`; so are the others.
+        controller: See `simulate`.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value.
-        driver: Who drives.
+        driver: The driver.
     """
     x_m = np.arange(0.0, speed_mps * (DURATION_S + 6.0), _SPACING_M)
     path = {"x_m": x_m.tolist(), "y_m": [STEP_M] * len(x_m)}
@@ -56,21 +56,21 @@ def small_step(
 
 
 def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
-    """Damping ratio and natural frequency of the oscillation about the path, behind the first crossing of it.
+    """Return damping ratio and natural frequency of the oscillation about the path, after its first crossing.
 
-    The decaying oscillation that fits it best, least squares, which is what the logarithmic decrement gives where one
-    decrement is like the next; the friction of the rack makes those of small amplitudes smaller.
+    They belong to the decaying oscillation that fits best by least squares. This equals the logarithmic decrement if
+    all decrements are alike; the friction of the rack makes those of small amplitudes smaller.
 
     Args:
         time_s: Time since the beginning of a small step [s], equidistant, shape (n,).
-        y_m: Lateral position of the car's centre of gravity [m]; the path is `STEP_M` to the left of where it began.
+        y_m: Lateral position of the centre of gravity [m]; the path is `STEP_M` to the left of its start.
 
     Returns:
-        Damping ratio [-], below 0 where the oscillation grows, and natural frequency [rad/s]; 1 and nan where the car
-        comes to the path without crossing it.
+        Damping ratio [-], negative for a growing oscillation, and natural frequency [rad/s]; 1 and nan if the car
+        reaches the path without crossing it.
 
     Raises:
-        StudyError: the car does not come to the path.
+        StudyError: the car does not reach the path.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 

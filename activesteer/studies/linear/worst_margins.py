@@ -1,7 +1,7 @@
-"""The smallest margins of a controller over many cars, none of which is the one that it knows.
+"""Smallest margins of a controller over many cars, none of which is the car that it knows.
 
-What a study varies of the car is varied in the plant; controllers go on knowing the car as its files say, but for what
-the study changes under `controllers` or `single_track`.
+A study varies the plant. Controllers keep the car of the files, except for keys under `controllers` or `single_track`
+that the study varies.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ def worst_margins(
     jobs: int | None = None,
     scheduler: str | None = None,
 ) -> list[LoopMargins]:
-    """The smallest margins of every loop at every speed over the samples of a study.
+    """Return the smallest margins of every loop at every speed over the samples of a study.
 
     Args:
-        study_file: Its factors, without those that are for some of its manoeuvres only, its design and its overrides;
-            what it drives with which cars and controllers has no part in it.
+        study_file: Study with factors, design and overrides. Factors for single manoeuvres are left out; manoeuvres,
+            cars and controllers of the study have no effect.
         controllers: As for `simulate`.
         vehicle: Name, path, or table of a vehicle.
         speeds_kmh: Speeds [km/h].
-        overrides: Dotted key -> value, of none that the study varies.
-        progress: Called whenever some samples are done.
-        jobs: Number of processes; that of the processors where not given. With more than one, controllers must pickle.
-        scheduler: Address of a Dask scheduler, or its scheduler file, that does all of it instead.
+        overrides: Dotted key -> value, of no key that the study varies.
+        progress: Called after each group of samples.
+        jobs: Number of processes; default: the number of processors. With more than one, controllers must be picklable.
+        scheduler: Address of a Dask scheduler, or its scheduler file, to use instead.
 
     Returns:
-        Each margin the smallest of all samples; `factors` are those of the smallest disk margin.
+        The smallest of each margin over all samples; `factors` are those of the smallest disk margin.
 
     Raises:
         ControllerError: a controller has no linear form.
@@ -66,7 +66,7 @@ def worst_margins(
     plan = Plan(study)
     requests = plan.requests(range(0, len(plan), len(study.controllers)))
     with workers_for(jobs, scheduler=scheduler) as workers:
-        # Cars that are looked at together share what the controller answers.
+        # Cars that are evaluated together share the controller's response.
         cars, size = [request.overrides for request in requests], task_size(len(requests), 1, workers.in_flight)
         parts = [cars[start : start + size] for start in range(0, len(cars), size)]
         looked_at = 0
