@@ -110,10 +110,9 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
         table: `{ grid = [70, 80] }`, `{ choice = ["a", "b"], weights = [1, 2] }`, `{ uniform = [low, high] }`,
             `{ log_uniform = [low, high] }` or `{ normal = [mean, deviation], truncate = [low, high] }`. Without bounds,
             a normal distribution is truncated at three standard deviations. With `nominal = "times"` the values
-            multiply the value of the files, with `nominal = "plus"` they are added to it. With `maneuvers = ["slalom"]` the key
-            varies in these manoeuvres only, with `when = { "sensors.preset" = "production" }` only where another factor
-            has that value.
-        source: Source of the study, for error messages.
+            multiply the value of the files, with `nominal = "plus"` they are added to it. With
+            `maneuvers = ["slalom"]` the key varies in these manoeuvres only, with
+            `when = { "sensors.preset" = "production" }` only where another factor has that value.
 
     Returns:
         The factor.

@@ -34,7 +34,7 @@ CURVE: Final = "curve_"
 
 
 class Status(StrEnum):
-    """How a run ended."""
+    """Status of a run."""
 
     OK = "ok"
     UNEVALUATED = "unevaluated"

@@ -85,7 +85,7 @@ class DriverLoop:
         return np.asarray(-np.mean(z[:, :steps].conj() * answers, axis=1), dtype=np.complex128)
 
     def crossover(self) -> tuple[float, float]:
-        """Return crossover frequency [rad/s] and phase margin [rad]; the smallest margin if there are several crossovers.
+        """Return crossover frequency [rad/s] and phase margin [rad]; the smallest margin of several crossovers.
 
         Both are nan if the gain never crosses 1.
         """

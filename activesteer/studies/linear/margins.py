@@ -10,6 +10,7 @@ that moves both actuators tolerates less of that than either margin suggests. Th
 A sample held for N calls of the controller enters as the mean of the N held values: a delay of (N - 1) / 2 calls and
 the corresponding loss of gain; so does a command held for N steps of the simulation. Samples and calls begin together,
 as in a run. Aliasing from above half the sampling rate is left out.
+
 The disk margin is alpha of the balanced disk, 1 / max |S - 1/2|, S being the sensitivity of the opened loop: the loop
 stays stable for every gain from (2 - alpha) / (2 + alpha) to its inverse together with every phase within
 2 atan(alpha / 2). 0.5 are 4.4 dB and 28 deg at once.
@@ -191,7 +192,7 @@ def is_stable(returned: Response) -> bool:
     determinant = np.linalg.det(np.eye(2) - returned)
     turned = np.unwrap(np.angle(determinant))
     # From the lowest frequency to the highest, an unstable real pole turns it by half a revolution, a pair by a whole
-    # and an integrator in a stable loop by a quarter.
+    # one, and an integrator in a stable loop by a quarter.
     return bool(abs(turned[-1] - turned[0]) < 0.75 * math.pi)
 
 

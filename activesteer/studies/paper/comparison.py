@@ -1,7 +1,7 @@
-"""Any controllers side by side: the paper's five scenarios and five harder ones, behind the sensors of production cars.
+"""Comparison of controllers in the paper's five scenarios and five harder ones, with the sensors of production cars.
 
-All drive the same scenarios; what is compared are the metrics of their recordings, under the names that they have
-there.
+All controllers drive the same scenarios. The comparison uses the metrics of their recordings under their recorded
+names.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ CASES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "brake_in_turn": ("brake_in_turn", {}),
     "mu_jump": ("mu_jump", {}),
 }
-"""Scenario -> manoeuvre and what is otherwise than in its file."""
+"""Scenario -> manoeuvre and its overrides."""
 _STEP: Final = ("yaw_rate_response_time_s", "ay_response_time_s", "yaw_rate_overshoot", "sideslip_peak_rad")
 _ALONG_PATH: Final = ("sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps", "steering_wheel_peak_abs_rad")
 _ENTRY: Final = ("entry_speed_min_mps", "entry_speed_mps", "entry_speed_max_mps")
@@ -56,29 +56,29 @@ SHOWN: Final[dict[str, tuple[str, ...]]] = {
     ),
     "mu_jump": (*_ALONG_PATH, "track_deviation_max_m"),
 }
-"""Scenario -> metrics that are printed and drawn; those of all are in the JSON."""
+"""Scenario -> metrics that are printed and drawn; the JSON has all metrics."""
 SENSORS: Final = {"sensors.preset": "production", "sensors.seed": 1}
-"""What all of them see the car through."""
+"""Sensors of all controllers."""
 ENTRY_SEEDS: Final = (1, 2, 3)
-"""Sensors with which the highest entry speed of the severe lane change is looked for."""
+"""Seeds of the sensors for the highest entry speed of the severe lane change."""
 ENTRY_DRIVER: Final = "expert"
-"""Who drives there, as in ISO 3888-2: the default driver leaves its lanes at every speed, whatever the controller."""
+"""Driver of the severe lane change, as in ISO 3888-2: the default driver leaves its lanes at every speed."""
 ENTRY_LINE: Final = {"lane.margin_m": 0.15}
-"""How far his line keeps from the cones, the middle one of those in the test of ISO 3888-2."""
+"""Distance of his line from the cones, the middle one of the distances in the test of ISO 3888-2."""
 _LANE_CHANGE: Final = "severe_lane_change"
 _LABEL: Final = 41
 _COLUMN: Final = 7
-"""Widths of the table: that of a label, and the least of a number."""
+"""Widths of the table: of a label, and the least of a number."""
 
 
 class Row(NamedTuple):
-    """One number of the table.
+    """One value of the table.
 
     Attributes:
         scenario: A name of `CASES`.
         controller: The controller.
         metric: Name of the metric in the recording.
-        value: SI, nan where the run does not define it.
+        value: Value [SI]; nan if the run does not define it.
     """
 
     scenario: str
@@ -89,13 +89,13 @@ class Row(NamedTuple):
 
 @dataclass
 class Comparison:
-    """What came of it.
+    """Result of a comparison.
 
     Attributes:
-        controllers: What was compared, in the order given.
-        rows: Every metric of every run that got to its end.
+        controllers: The compared controllers, in the order given.
+        rows: Every metric of every complete run.
         files: The recordings.
-        failures: (scenario, controller) -> why that run ended early.
+        failures: (scenario, controller) -> reason why that run ended early.
     """
 
     controllers: tuple[str, ...]
@@ -104,7 +104,7 @@ class Comparison:
     failures: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def shown(self) -> list[tuple[str, str, dict[str, float]]]:
-        """Scenario, metric and its value by controller, for the metrics of `SHOWN`."""
+        """Yield scenario, metric and its value by controller, for the metrics of `SHOWN`."""
         known = {(row.scenario, row.metric, row.controller): row.value for row in self.rows}
         found = []
         for scenario, metrics in SHOWN.items():
@@ -116,11 +116,11 @@ class Comparison:
 
     @property
     def targets(self) -> list[Target]:
-        """What became of what the controllers beyond the paper's are asked for."""
+        """Return the verdicts on the targets of the controllers beyond the paper's."""
         return targets(self.controllers, self.rows)
 
     def to_text(self) -> str:
-        """The metrics of `SHOWN` as a table, and the targets."""
+        """Return the metrics of `SHOWN` as a table, and the targets."""
         columns = [max(_COLUMN, len(name) + 1) for name in self.controllers]
         heads = "".join(f"{name:>{width}}" for name, width in zip(self.controllers, columns, strict=True))
         lines, before = [" " * _LABEL + heads], ""
@@ -136,7 +136,7 @@ class Comparison:
         return "\n".join([*lines, *(["", targets_text(self.targets)] if self.targets else [])])
 
     def to_json(self) -> dict[str, Any]:
-        """All numbers."""
+        """Return all values."""
         return {
             "table": [row._asdict() for row in self.rows],
             "targets": [target._asdict() for target in self.targets],
@@ -153,20 +153,20 @@ def compare(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Drives `CASES` with every controller, and looks for their entry speeds in the severe lane change.
+    """Drive `CASES` with every controller and find their entry speeds in the severe lane change.
 
-    `entry_speed_mps` is the middle one over `ENTRY_SEEDS`; `entry_speed_min_mps` and `entry_speed_max_mps` are its
-    spread.
+    `entry_speed_mps` is the median over `ENTRY_SEEDS`; `entry_speed_min_mps` and `entry_speed_max_mps` are the
+    extremes.
 
     Args:
         controllers: As for `simulate`.
-        folder: Where the recordings go, as SCENARIO-CONTROLLER.mcap; made where it does not exist.
+        folder: Folder of the recordings SCENARIO-CONTROLLER.mcap; it is made if it does not exist.
         vehicle: Name, path, or table of a vehicle.
-        jobs: Number of processes; that of the processors where not given.
+        jobs: Number of processes; default: the number of processors.
         progress: Called after every run.
 
     Raises:
-        ActiveSteerError: an input is wrong. A run that fails ends no other run; it is named in `failures`.
+        ActiveSteerError: an input is wrong. A failed run stops no other run; `failures` names it.
     """
     labels = {find_controller(given).label: given for given in controllers}
     if len(labels) < len(controllers):

@@ -1,7 +1,7 @@
-"""Any controllers side by side over a population: the same cars, roads, drivers and sensors for all of them.
+"""Comparison of controllers over a population with the same cars, roads, drivers and sensors for all.
 
-It is the study `population` without the gains, which only the paper's systems have, and behind the sensors of
-production cars, of which every sample has others.
+The study is `population` without the gains, which only the paper's systems have, and with the sensors of production
+cars, a different one for every sample.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from activesteer.studies.paper.comparison_targets import NONE, REFERENCES, asked
 from activesteer.studies.paper.population import STEERING_EFFORT, effects, population_study
 
 SCENARIOS: Final = tuple(name for name in CASES if name not in ("severe_lane_change", "split_mu_braking"))
-"""Those of the comparison but two: one is compared by entry speed, in the other sideslip is not what matters."""
+"""Scenarios of the comparison except two: one is compared by entry speed, in the other sideslip is not decisive."""
 STORED: Final = "comparison/summary.json"
-"""What is kept with the package of its own one, below the folder of the study files."""
+"""File of the comparison that the package stores, below the folder of the study files."""
 _PRESET: Final = "sensors.preset"
 _SEED: Final = "sensors.seed"
 
@@ -48,13 +48,12 @@ def comparison_study(
     seed: int | None = None,
     vehicle: FileOrTable | None = None,
 ) -> StudyFile:
-    """The study that is driven.
+    """Return the study to drive.
 
     Args:
-        controllers: As for `simulate`; with `none` and `REFERENCES`, which the others are compared with.
-        samples: Number of samples, that of the study `population` where not given.
-        seed: Of the sample, likewise.
-        vehicle: Name, path or table of a vehicle, likewise.
+        controllers: As for `simulate`; they must include `none` and `REFERENCES`, with which the others are compared.
+        seed: Seed of the sample; same default.
+        vehicle: Name, path or table of a vehicle; same default.
 
     Raises:
         ActiveSteerError: an input is wrong.
@@ -104,7 +103,7 @@ def compare_population(
     scheduler: str | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> ComparisonPopulation:
-    """Drives the controllers over a population; see `comparison_study` and `study` for the arguments.
+    """Drive the controllers over a population; see `comparison_study` and `study` for the arguments.
 
     Raises:
         ActiveSteerError: an input is wrong, or the folder holds another study.
@@ -115,7 +114,7 @@ def compare_population(
 
 
 def summarise(table: pa.Table, planned: StudyFile) -> ComparisonPopulation:
-    """Counts what the runs say.
+    """Count the results of the runs.
 
     Args:
         table: The study's table, or as much of it as there is.
@@ -138,13 +137,13 @@ def summarise(table: pa.Table, planned: StudyFile) -> ComparisonPopulation:
 
 
 def store_comparison(found: ComparisonPopulation) -> Path:
-    """Keeps what came of a comparison with the package, without the medians of all metrics.
+    """Store the results of a comparison with the package, without the medians of all metrics.
 
     Returns:
         The file.
 
     Raises:
-        StudyError: it cannot be written.
+        StudyError: the file cannot be written.
     """
     path = studies_dir() / STORED
     make_folder(path.parent, StudyError)
@@ -152,7 +151,7 @@ def store_comparison(found: ComparisonPopulation) -> Path:
 
 
 def stored_comparison() -> ComparisonPopulation | None:
-    """The comparison that belongs to the package; None where there is none.
+    """Return the comparison that the package stores; None if there is none.
 
     Raises:
         StudyError: it cannot be read.
@@ -178,10 +177,9 @@ def _effect(found: SystemEffect, lower: Mapping[tuple[str, str], Share]) -> Effe
 
 
 def _lower(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> dict[tuple[str, str], Share]:
-    """Scenario and controller -> samples in which its peak of the sideslip is the lowest.
+    """Return scenario and controller -> samples in which its peak sideslip angle is the lowest.
 
-    A run that did not come to its end has no peak: it is lower than nothing, and everything is lower than it.
-    """
+    An incomplete run has no peak: it is never the lowest, and every other run counts as lower.
     peaks: dict[tuple[str, int], dict[str, float]] = {}
     for row in rows:
         found = next((abs(row[name]) for name in SIDESLIP_PEAKS if row.get(name) is not None), math.inf)

@@ -1,4 +1,4 @@
-"""What came of controllers side by side over a population: shares, what is said of them, and the targets."""
+"""Results of a comparison of controllers over a population: proportions, effects and targets."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ TOTAL: Final = "all scenarios"
 
 @dataclass(frozen=True)
 class Share:
-    """How many of some runs something holds for.
+    """Number of runs with a property.
 
     Attributes:
-        count: In which it does.
-        number: Of how many.
+        count: Runs with the property.
+        number: All runs.
     """
 
     count: int
     number: int
 
     def __add__(self, other: Share) -> Share:
-        """Both together."""
+        """Return the proportion of both sets together."""
         return Share(self.count + other.count, self.number + other.number)
 
     @property
     def share(self) -> float:
-        """The share; nan of none."""
+        """The proportion; nan without runs."""
         return self.count / self.number if self.number else math.nan
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values, with the 95 % interval (Wilson)."""
+        """Return JSON values, with the 95 % interval (Wilson)."""
         low, high = wilson_interval(self.count, self.number)
         return {**asdict(self), "share": finite(self.share), "low": low, "high": high}
 
     def __str__(self) -> str:
-        """In percent, with the interval."""
+        """Return the proportion in percent, with the interval."""
         if not self.number:
             return "-"
         low, high = wilson_interval(self.count, self.number)
@@ -61,18 +61,18 @@ class Share:
 
 @dataclass(frozen=True)
 class Effect:
-    """What a controller does in a scenario, against the same samples without control.
+    """Effect of a controller in a scenario, relative to the same samples without control.
 
     Attributes:
         scenario: The scenario.
         controller: The controller.
-        lower: Samples in which the peak of the sideslip is lower than the lowest of `REFERENCES`; of no samples where
-            the controller is one of them.
-        saved: Samples in which the car is kept, of those in which it is lost without control; see `loss.is_lost`.
-        spoiled: Samples in which it is lost, of those in which it is not without control.
-        sideslip_change_rad: By how much the peak of the sideslip is larger, median [rad].
-        steering_change_rad: The same of the root mean square of the steering wheel angle, which is the driver's effort;
-            nan where he follows a table [rad].
+        lower: Samples with a lower peak sideslip angle than the lowest of `REFERENCES`; no samples if the controller is
+            one of `REFERENCES`.
+        saved: Samples in which the car is not lost, of those in which it is lost without control; see `is_lost`.
+        spoiled: Samples in which the car is lost, of those in which it is not lost without control.
+        sideslip_change_rad: Median change of the peak sideslip angle [rad].
+        steering_change_rad: Median change of the root mean square of the steering wheel angle, the driver's effort; nan
+            if he follows a table [rad].
     """
 
     scenario: str
@@ -84,7 +84,7 @@ class Effect:
     steering_change_rad: float
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return JSON values."""
         return {
             field.name: value.to_json() if isinstance(value := getattr(self, field.name), Share) else finite(value)
             for field in fields(self)
@@ -92,7 +92,7 @@ class Effect:
 
     @classmethod
     def from_json(cls, table: Mapping[str, Any]) -> Effect:
-        """The effect that `to_json` was made of."""
+        """Return the effect from the JSON values of `to_json`."""
         read: dict[str, Any] = {key: math.nan if value is None else value for key, value in table.items()}
         read |= {key: Share(read[key]["count"], read[key]["number"]) for key in ("lower", "saved", "spoiled")}
         return cls(**read)
@@ -100,16 +100,16 @@ class Effect:
 
 @dataclass(frozen=True)
 class ComparisonPopulation:
-    """What came of it.
+    """Results of a comparison over a population.
 
     Attributes:
         samples: Number of samples.
-        seed: Of the sample.
-        vehicle: The car that the samples are variations of.
-        versions: What it was driven with.
-        controllers: What was compared, in the order given.
-        failed: Runs that did not come to their end; each counts as lost.
-        effects: Scenario by scenario, in the order of the controllers, of all but `none`.
+        seed: Seed of the sample.
+        vehicle: The car of which the samples are variations.
+        versions: Versions of the software that drove it.
+        controllers: The compared controllers, in the order given.
+        failed: Number of incomplete runs; each counts as lost.
+        effects: Effects by scenario, in the order of the controllers, without `none`.
         table: Median of every metric over the samples.
     """
 
@@ -123,11 +123,11 @@ class ComparisonPopulation:
     table: tuple[Row, ...]
 
     def of(self, controller: str) -> list[Effect]:
-        """What a controller does, scenario by scenario."""
+        """Return the effects of a controller by scenario."""
         return [effect for effect in self.effects if effect.controller == controller]
 
     def total(self, controller: str) -> Effect:
-        """What a controller does in all scenarios together."""
+        """Return the effect of a controller in all scenarios together."""
         nothing, own = Share(0, 0), self.of(controller)
         lower, saved, spoiled = (
             sum((getattr(effect, name) for effect in own), nothing) for name in ("lower", "saved", "spoiled")
@@ -136,7 +136,7 @@ class ComparisonPopulation:
 
     @property
     def targets(self) -> list[Target]:
-        """What became of what the controllers beyond the paper's are asked for, in all scenarios together."""
+        """Return the verdicts on the targets of the controllers beyond the paper's, in all scenarios together."""
         found = []
         for name in asked(self.controllers):
             total = self.total(name)
@@ -149,7 +149,7 @@ class ComparisonPopulation:
         return found
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return JSON values."""
         return {
             "samples": self.samples,
             "seed": self.seed,
@@ -165,10 +165,10 @@ class ComparisonPopulation:
 
     @classmethod
     def from_json(cls, table: Mapping[str, Any]) -> ComparisonPopulation:
-        """The population that `to_json` was made of.
+        """Return the population from the JSON values of `to_json`.
 
         Raises:
-            StudyError: it was not.
+            StudyError: the values are no such population.
         """
         try:
             read = {
@@ -184,7 +184,7 @@ class ComparisonPopulation:
             raise StudyError(f"the stored comparison is damaged: {reason}") from reason
 
     def to_text(self) -> str:
-        """Shares for a terminal, and the targets."""
+        """Return the proportions and the targets as text."""
         lines = [
             f"{self.samples} samples of {self.vehicle}, seed {self.seed}; median changes against {NONE}",
             "",

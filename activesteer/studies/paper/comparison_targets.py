@@ -1,6 +1,6 @@
-"""What a controller beyond the paper's is asked for: against the car by itself, and against the paper's and the brakes.
+"""Targets of a controller beyond the paper's, relative to no control, to the paper's systems and to the brakes.
 
-The targets stood before any of these controllers was tuned.
+The targets were set before any of these controllers was tuned.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from activesteer.metric_table import metric
 
 NONE: Final = "none"
 REFERENCES: Final = ("ars", "afs", "esc")
-"""What the others are measured by: the paper's two systems, and what cars have by law."""
+"""Reference controllers: the paper's two systems, and the system that the law requires."""
 LOWER_SHARE: Final = 0.8
-"""Share of a population in which the peak of the sideslip is to be lower than the lowest of `REFERENCES`."""
+"""Smallest proportion of a population with a lower peak sideslip angle than the lowest of `REFERENCES`."""
 SPOILED_SHARE: Final = 0.01
-"""Largest share of the runs that are fine without control which may be lost with it."""
+"""Largest proportion of runs that are lost with a controller, of those that are not lost without control."""
 
 
 class Target(NamedTuple):
-    """A target and what became of it.
+    """Verdict on a target.
 
     Attributes:
-        controller: Who is asked.
-        text: What for, and the number that came of it.
-        passed: Whether it is met.
+        controller: The controller.
+        text: The target and the result.
+        passed: Whether the target is met.
     """
 
     controller: str
@@ -35,15 +35,15 @@ class Target(NamedTuple):
 
 
 class _Rule(NamedTuple):
-    """A bound of the size of a metric.
+    """A bound on the magnitude of a metric.
 
     Attributes:
-        scenario: Where.
-        metric: What.
-        than: Controller whose value is the bound; none where the bound is `factor` itself.
-        factor: Part of that value.
+        scenario: The scenario.
+        metric: The metric.
+        than: Controller whose value sets the bound; empty if the bound is `factor` itself.
+        factor: Factor on that value.
         above: Whether it is a lower bound.
-        strict: Whether the bound itself is out.
+        strict: Whether the bound itself is excluded.
     """
 
     scenario: str
@@ -54,10 +54,10 @@ class _Rule(NamedTuple):
     strict: bool = False
 
     def judged(self, controller: str, values: Mapping[str, float]) -> Target | None:
-        """What became of it, a failure where a value was looked for and not found; None where it was not looked for.
+        """Return the verdict: failed if the value was sought and not found, None if it was not sought.
 
         Args:
-            controller: Who is asked.
+            controller: The controller.
             values: Controller -> value of the metric.
         """
         if not values:
@@ -82,7 +82,7 @@ _RULES: Final = (
     _Rule("step_steer", "ay_response_time_s", NONE),
     _Rule("step_steer", "sideslip_peak_rad", NONE),
     _Rule("slalom", "track_amplitude_m", NONE, strict=True),
-    # As much as cars with such systems gain.
+    # Cars with such systems gain as much.
     _Rule("split_mu_braking", "stopping_distance_m", "esc", 0.94),
     _Rule("split_mu_braking", "lateral_deviation_max_m", "esc"),
     _Rule("severe_lane_change", "entry_speed_mps", NONE, above=True, strict=True),
@@ -90,16 +90,16 @@ _RULES: Final = (
 
 
 def asked(controllers: Iterable[str]) -> list[str]:
-    """Those of some controllers that targets are for."""
+    """Return the controllers that have targets."""
     return [name for name in controllers if name not in (NONE, *REFERENCES)]
 
 
 def targets(controllers: Sequence[str], rows: Iterable[Any]) -> list[Target]:
-    """Judges the nominal runs.
+    """Judge the nominal runs.
 
     Args:
-        controllers: What was compared.
-        rows: `scenario`, `controller`, `metric`, `value` of each number.
+        controllers: The compared controllers.
+        rows: `scenario`, `controller`, `metric` and `value` of each number.
     """
     known: dict[tuple[str, str], dict[str, float]] = {}
     for row in rows:
@@ -111,12 +111,12 @@ def targets(controllers: Sequence[str], rows: Iterable[Any]) -> list[Target]:
 
 
 def short(value: float) -> str:
-    """A number with three digits; a hyphen where there is none."""
+    """Return a number with three digits, or a hyphen for nan."""
     return "-" if math.isnan(value) else f"{value:.3g}"
 
 
 def targets_text(found: Sequence[Target]) -> str:
-    """A line for each target."""
+    """Return a line for each target."""
     width = max((len(target.controller) for target in found), default=0) + 2
     return "\n".join(
         f"{target.controller:{width}}{'passed' if target.passed else 'FAILED'}  {target.text}" for target in found

@@ -1,8 +1,8 @@
-"""How fast each car gets through a course: entry speeds by bisection, and a map over speed and line that checks them.
+"""Highest entry speeds of a course by bisection, and a map over speed and line that checks them.
 
-A car gets through where its whole body keeps to the lanes, or, in a slalom, where it passes every cone on the right
-side and hits none. Bisection assumes that a car which gets through at one speed gets through at every lower one. The
-map does not: it is driven cell by cell, and `Envelope.exceptions` are its cells that speak against the assumption.
+A car completes a lane change if its whole body stays in the lanes, and a slalom if it passes every cone on the right
+side and hits none. Bisection assumes that a car that succeeds at one speed succeeds at every lower one. The map does
+not: it is driven cell by cell, and `Envelope.exceptions` are the cells that contradict the assumption.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from activesteer.studies.engine.study import study
 from activesteer.studies.engine.task_queue import in_parallel
 
 RANGE_KMH: Final = (40.0, 160.0)
-"""Where the entry speed is looked for [km/h]."""
+"""Range of the entry speed [km/h]."""
 RESOLUTION_KMH: Final = 1.0
-"""How exactly it is found [km/h]."""
+"""Resolution of the entry speed [km/h]."""
 _AFTER_S: Final = 4.0
-"""How long a run goes on behind the last gate [s]: metrics look at 3 s of it."""
+"""Time after the last gate [s]: metrics use 3 s of it."""
 _NONE: Final = "none"
 
 
 class Line(NamedTuple):
-    """What a map varies beside the speed.
+    """Second axis of a map, beside the speed.
 
     Attributes:
         key: Key of the manoeuvre.
-        label: What it is.
-        values: What is driven where nothing else is asked for [m].
-        kept: Metrics of a run -> whether it got through.
+        label: Its name.
+        values: Default values [m].
+        kept: Metrics of a run -> whether the car succeeded.
     """
 
     key: str
@@ -78,10 +78,10 @@ _METRICS: Final = ("stays_in_lanes", "lane_overstep_m", "cones_*", "*_peak_abs_*
 
 
 def line_of(scenario: Scenario) -> Line:
-    """The second axis of a scenario's map.
+    """Return the second axis of a scenario's map.
 
     Raises:
-        ParameterError: its manoeuvre has no lanes and no cones.
+        ParameterError: the manoeuvre has no lanes and no cones.
     """
     name, kind = scenario.maneuver.name, scenario.maneuver.kind
     if kind not in LINES:
@@ -95,7 +95,7 @@ def line_of(scenario: Scenario) -> Line:
 
 
 class State(StrEnum):
-    """What becomes of the cars of a cell."""
+    """Outcomes of the cars in a cell."""
 
     NOBODY = "nobody is lost"
     NONE_ONLY = "only the car without control is lost"
@@ -105,15 +105,15 @@ class State(StrEnum):
 
 @dataclass(frozen=True)
 class Envelope:
-    """What came out.
+    """Result of an envelope.
 
     Attributes:
         maneuver: Name of the manoeuvre.
-        line: What the map varies beside the speed.
+        line: Second axis of the map.
         nominal: Speed [km/h] and line [m] of the manoeuvre.
-        entry_speeds: For each driver and controller `driver`, `controller` and `entry_speed_kmh`: the highest one, on
-            the line of the manoeuvre; None where the car does not get through at the lowest speed that was tried, and
-            the highest speed where it gets through at every one.
+        entry_speeds: `driver`, `controller` and `entry_speed_kmh` for each driver and controller: the highest speed on
+            the line of the manoeuvre. None if the car fails at the lowest speed that was tried; the highest speed if it
+            succeeds at every one.
         rows: The map: `driver`, `controller`, `speed_kmh`, `line_m`, `kept`, and metrics of the run.
     """
 
@@ -125,11 +125,11 @@ class Envelope:
 
     @property
     def drivers(self) -> list[str]:
-        """Who drove."""
+        """Drivers of the map."""
         return list(dict.fromkeys(entry["driver"] for entry in self.entry_speeds))
 
     def cells(self, driver: str) -> dict[tuple[float, float], State]:
-        """Speed [km/h] and line [m] -> what becomes of the cars there."""
+        """Return speed [km/h] and line [m] -> outcomes of the cars."""
         kept: dict[tuple[float, float], dict[str, bool]] = {}
         for row in self.rows:
             if row["driver"] == driver:
@@ -137,7 +137,7 @@ class Envelope:
         return {place: _state(cars) for place, cars in kept.items()}
 
     def kept_by(self, driver: str, place: tuple[float, float]) -> list[str]:
-        """Controllers whose car gets through."""
+        """Return the controllers whose car succeeds."""
         wanted = (driver, *place)
         return [
             row["controller"]
@@ -147,7 +147,7 @@ class Envelope:
 
     @property
     def exceptions(self) -> list[dict[str, Any]]:
-        """Pairs of neighbouring cells of which the faster one is kept and the slower one is not."""
+        """Return pairs of neighbouring cells in which the faster car succeeds and the slower one fails."""
         found = []
         for row, faster in self._neighbours():
             if faster["kept"] and not row["kept"]:
@@ -165,7 +165,7 @@ class Envelope:
             yield from pairwise(sorted(column, key=lambda row: row["speed_kmh"]))
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return JSON values."""
         cells = [
             {"driver": driver, "speed_kmh": speed, "line_m": line, "state": state.value}
             for driver in self.drivers
@@ -205,21 +205,21 @@ def envelope(
     scheduler: str | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Envelope:
-    """Looks for entry speeds and drives the map.
+    """Find the entry speeds and drive the map.
 
     Args:
         maneuver: Name, path, or table of a lane change or a slalom.
         controllers: Controllers, as for `simulate`.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value; neither speed nor duration nor line.
-        drivers: Who drives; a map for each.
-        speeds_kmh: Speeds of the map [km/h]; from 30 below that of the manoeuvre to 30 above where not given.
-        lines_m: Values of the line of the map [m]; those of `LINES` where not given.
-        output: Folder for the studies of the maps, which can be gone on with, each below the names of the manoeuvre
-            and of who drives; they are not kept where not given.
-        jobs: Number of processes; that of the processors where not given.
-        scheduler: Address of a Dask scheduler, or its scheduler file, that does all of it instead.
-        progress: Called with what is done, how many runs or searches are, and how many there are.
+        drivers: The drivers; each gets a map.
+        speeds_kmh: Speeds of the map [km/h]; default: from 30 below to 30 above that of the manoeuvre.
+        lines_m: Values of the line of the map [m]; default: those of `LINES`.
+        output: Folder for the studies of the maps, which can be resumed, each below the names of manoeuvre and driver.
+            Without a folder, they are not stored.
+        jobs: Number of processes; default: the number of processors.
+        scheduler: Address of a Dask scheduler, or its scheduler file, to use instead.
+        progress: Called with the current item, the number of finished runs or searches, and the total.
 
     Returns:
         The envelope.
@@ -283,8 +283,8 @@ def _map_row(driver: str, line: Line, row: Mapping[str, Any]) -> dict[str, Any]:
     place = {"driver": driver, "controller": row["controller"], "speed_kmh": row["speed_kmh"], "line_m": row[line.key]}
     told = {*place, line.key}
     metrics = {name: value for name, value in row.items() if isinstance(value, float) and name not in told}
-    # Where the engine gave up a run, or the last gate was not reached, the car did not get through. Any other failure
-    # says nothing of the car.
+    # If the engine gave up a run, or the car did not reach the last gate, the car failed. Any other failure says
+    # nothing about the car.
     status, diverged = row["status"], f"{row['error']}".startswith(SimulationDiverged.__name__)
     if status == Status.CRASHED or (status == Status.FAILED and not diverged):
         where = f"{driver}, {row['controller']}, {row['speed_kmh']:g} km/h, {line.key} = {row[line.key]:g}"
@@ -300,19 +300,19 @@ def entry_speed(
     driver: FileOrTable,
     controller: str,
 ) -> float | None:
-    """The highest speed at which a car gets through, by bisection.
+    """Return the highest speed at which a car succeeds, by bisection.
 
     Args:
         maneuver: Name, path, or table of a lane change or a slalom.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value; neither speed nor duration.
-        line: The manoeuvre's, of `LINES`.
-        driver: Who drives.
+        line: Line of the manoeuvre, of `LINES`.
+        driver: The driver.
         controller: As for `simulate`.
 
     Returns:
-        To `RESOLUTION_KMH` below the lowest speed at which it does not [km/h]; None where it does at none of
-        `RANGE_KMH`, the upper end where it does at all.
+        The speed [km/h], within `RESOLUTION_KMH` below the lowest speed at which the car fails; None if it fails at
+        every speed of `RANGE_KMH`, the upper end if it succeeds at every one.
 
     Raises:
         ActiveSteerError: an input is wrong.

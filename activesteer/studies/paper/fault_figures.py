@@ -1,4 +1,4 @@
-"""The figures that are found for a fault: names that lists and pages need without what finds them."""
+"""Names of the values of a fault, apart from the code that calculates them."""
 
 from __future__ import annotations
 
@@ -8,4 +8,4 @@ FIGURES: Final = (
     "yaw_rate_change_radps", "ay_change_mps2", "lateral_offset_1s_m", "lateral_offset_1s_driver_m",
     "steering_correction_rad", "fault_tolerant_time_s",
 )  # fmt: skip
-"""What is said of a fault; see `FaultMap`."""
+"""Values of a fault; see `FaultMap`."""

@@ -1,8 +1,8 @@
-"""The fault map: what each fault does to the car, at several speeds, in several situations, and how long it may last.
+"""Fault map: the effect of each fault at several speeds in several situations, and its tolerated duration.
 
-Every cell is driven three times and more from one state: the car in order; with the fault, the hands fixed (steering
-wheel and pedals do what they did in the car in order); with the fault and the driver. The fault-tolerant time is the
-longest time for which the fault may last, hands fixed, before the part obeys again, without a limit being broken.
+Every cell is driven at least three times from one state: without a fault; with the fault and hands fixed (steering
+wheel and pedals move as without the fault); and with the fault and the driver. The fault-tolerant time is the longest
+duration of the fault, hands fixed, without exceeding a limit.
 """
 
 from __future__ import annotations
@@ -31,26 +31,26 @@ from activesteer.studies.paper.fault_figures import FIGURES
 from activesteer.studies.paper.fault_situations import LANE_M, PRESETS, SITUATIONS, path_of
 
 OFFSET_AT_S: Final = 1.0
-"""How long after the beginning of a fault the lateral offset is taken [s]."""
+"""Time after the beginning of a fault at which the lateral offset is taken [s]."""
 _RESOLUTION_S: Final = 0.005
-"""To this the fault-tolerant time is found [s]."""
+"""Resolution of the fault-tolerant time [s]."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a fault may do; set by the user, the defaults are assumptions.
+    """Limits for the effect of a fault, set by the user; the defaults are assumptions.
 
-    What drivers control lies, in the literature, near steps of 2 to 5 deg/s of yaw rate and 1 m/s2.
+    The literature gives steps of 2 to 5 deg/s of yaw rate and 1 m/s2 as controllable by drivers.
     """
 
     yaw_rate_radps: Annotated[float, Range(1e-4, 10.0)] = math.radians(3.0)
-    """Greatest change of the yaw rate [rad/s]."""
+    """Largest change of the yaw rate [rad/s]."""
     ay_mps2: Annotated[float, Range(1e-3, 20.0)] = 1.0
-    """Greatest change of the lateral acceleration [m/s2]."""
+    """Largest change of the lateral acceleration [m/s2]."""
     lateral_offset_m: Annotated[float, Range(1e-3, 20.0)] | None = None
-    """Greatest lateral offset after 1 s [m]; to the edge of a lane of 3.5 m, for a car in its middle, if not given."""
+    """Largest lateral offset after 1 s [m]; default: to the edge of a lane of 3.5 m, for a car in its middle."""
     window_s: Annotated[float, Range(OFFSET_AT_S, 10.0)] = 2.0
-    """How long after the beginning of a fault is looked at [s]."""
+    """Evaluated time after the beginning of a fault [s]."""
 
 
 _ALL_KINDS: Final = (
@@ -62,22 +62,22 @@ _TOLD: Final = ("yaw_rate_sensor:stuck", "yaw_rate_sensor:offset=2degps", "yaw_r
 
 
 def usual_faults(controller: str) -> tuple[str, ...]:
-    """The faults of a map where none are given: of what a controller moves, and of what it hears."""
+    """Return the default faults of a map: of the actuators and sensors that a controller uses."""
     known = {"ars": (*_REAR, *_TOLD), "afs": (*_FRONT, *_TOLD)}
     return known.get(system_of(controller), (*_REAR, *_FRONT, *_TOLD))
 
 
 @dataclass(frozen=True)
 class FaultMap:
-    """What came out.
+    """Result of a fault map.
 
     Attributes:
         limits: The limits.
-        rows: One for each fault, speed and situation: `fault`, `speed_kmh`, `situation`, `yaw_rate_change_radps`,
-            `ay_change_mps2`, `lateral_offset_1s_m` (left positive; these with the hands fixed),
-            `lateral_offset_1s_driver_m`, `steering_correction_rad` (greatest change of the driver's steering wheel
-            angle), `fault_tolerant_time_s` (None where the limits hold for as long as is looked).
-            What did not come to its end has nan, and `error`.
+        rows: A row for each fault, speed and situation: `fault`, `speed_kmh`, `situation`, `yaw_rate_change_radps`,
+            `ay_change_mps2`, `lateral_offset_1s_m` (left positive; these three with hands fixed),
+            `lateral_offset_1s_driver_m`, `steering_correction_rad` (largest change of the driver's steering wheel
+            angle), `fault_tolerant_time_s` (None if no limit is exceeded within the evaluated time). An incomplete run
+            has nan and `error`.
     """
 
     limits: Limits
@@ -99,27 +99,27 @@ def fault_map(
     workers: Workers | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> FaultMap:
-    """Drives every fault at every speed in every situation.
+    """Drive every fault at every speed in every situation.
 
     Args:
         controller: The controller, as for `simulate`.
         vehicle: The vehicle.
-        overrides: Dotted key -> value, as `road.mu`.
-        faults: Faults without a time, as `rear:offset=1deg`; those of the controller's actuators where not given.
+        overrides: Dotted key -> value, such as `road.mu`.
+        faults: Faults without a time, such as `rear:offset=1deg`; default: those of the controller's actuators.
         speeds_kmh: Speeds [km/h].
         situations: Names of `SITUATIONS`.
-        limits: What a fault may do.
-        driver: Who drives.
-        jobs: Processes; as many as there are processors where not given.
-        scheduler: Address of a Dask scheduler, or its scheduler file, that drives them instead.
-        workers: Who drives them instead; they stay with whoever gave them.
-        progress: Called after every pair of speed and situation with how many are done, and how many there are.
+        limits: Limits for the effect of a fault.
+        driver: The driver.
+        jobs: Number of processes; default: the number of processors.
+        scheduler: Address of a Dask scheduler, or its scheduler file, to use instead.
+        workers: Workers to use instead; they still belong to the caller.
+        progress: Called after every pair of speed and situation with the number of finished pairs and the total.
 
     Returns:
         The map.
 
     Raises:
-        ActiveSteerError: an input is wrong, or the car in order cannot be driven so.
+        ActiveSteerError: an input is wrong, or the car without a fault cannot drive a situation.
     """
     limits = Limits() if limits is None else limits
     chosen = {text: _fault(text) for text in faults or usual_faults(str(controller))}
@@ -154,7 +154,7 @@ def _cell(
     situation: str,
     speed_kmh: float,
 ) -> list[dict[str, Any]]:
-    """All faults at one speed in one situation."""
+    """Drive all faults at one speed in one situation."""
     begin_s = SITUATIONS[situation].fault_s(speed_kmh / 3.6)
     table = path_of(situation, speed_kmh / 3.6, begin_s + limits.window_s)
     scenario = resolve(table, vehicle, overrides, driver)
@@ -171,7 +171,7 @@ def _cell(
 
 
 class _Motion(NamedTuple):
-    """What a run's judgement looks at, from the beginning of the fault on, shape (n,) each."""
+    """Evaluated signals of a run from the beginning of the fault, shape (n,) each."""
 
     x_m: Array
     y_m: Array
@@ -182,7 +182,7 @@ class _Motion(NamedTuple):
 
 
 class _Keeps:
-    """A driver who is listened to."""
+    """Driver whose commands are recorded."""
 
     def __init__(self, driver: Any) -> None:
         self._driver = driver
@@ -194,7 +194,7 @@ class _Keeps:
 
 
 class _HandsFixed:
-    """Does what was done in the car in order."""
+    """Driver that replays the commands of the car without a fault."""
 
     def __init__(self, said: Sequence[DriverCommand]) -> None:
         self._next = iter(said)
@@ -204,7 +204,7 @@ class _HandsFixed:
 
 
 class _Runs:
-    """All runs of a cell, from one state shortly before the faults begin."""
+    """The runs of a cell, from one state shortly before the faults begin."""
 
     def __init__(self, loop: ClosedLoop, begin_s: float, lead_s: float) -> None:
         self.loop, self.begin_s = loop, begin_s
@@ -217,11 +217,11 @@ class _Runs:
         self._said = driver.said
 
     def hands_fixed(self, fault: Fault) -> _Motion:
-        """The motion with a fault, driver as in the car in order."""
+        """Return the motion with a fault and hands fixed."""
         return self._again(fault, _HandsFixed(self._said))
 
     def with_driver(self, fault: Fault) -> _Motion:
-        """The motion with a fault that the driver answers."""
+        """Return the motion with a fault and a responding driver."""
         return self._again(fault, None)
 
     def _again(self, fault: Fault, driver: Any) -> _Motion:
@@ -242,7 +242,7 @@ class _Runs:
 
 
 def _judged(runs: _Runs, fault: Fault, limits: Limits) -> dict[str, Any]:
-    """The figures of a fault; nan where the run did not come to its end."""
+    """Return the values of a fault; nan for an incomplete run."""
     try:
         fixed = runs.hands_fixed(fault)
         driven = runs.with_driver(fault)
@@ -263,7 +263,7 @@ def _judged(runs: _Runs, fault: Fault, limits: Limits) -> dict[str, Any]:
 
 
 def _offset_m(runs: _Runs, motion: _Motion) -> float:
-    """Distance across the path of the car in order, one second after the fault, left positive [m]."""
+    """Return the lateral offset from the path without the fault, one second after its beginning, left positive [m]."""
     row, good = round(OFFSET_AT_S / runs.timestep_s) - 1, runs.in_order
     yaw = good.yaw_rad[row]
     across = math.cos(yaw) * (motion.y_m[row] - good.y_m[row]) - math.sin(yaw) * (motion.x_m[row] - good.x_m[row])
@@ -271,7 +271,7 @@ def _offset_m(runs: _Runs, motion: _Motion) -> float:
 
 
 def _first_broken_s(runs: _Runs, motion: _Motion, limits: Limits) -> float | None:
-    """When a limit is first broken, after the beginning of the fault; None where none is [s]."""
+    """Return the time from the beginning of the fault until a limit is exceeded [s]; None if none is."""
     good = runs.in_order
     broken = np.abs(motion.yaw_rate_radps - good.yaw_rate_radps) > limits.yaw_rate_radps
     broken |= np.abs(motion.ay_mps2 - good.ay_mps2) > limits.ay_mps2
@@ -282,9 +282,9 @@ def _first_broken_s(runs: _Runs, motion: _Motion, limits: Limits) -> float | Non
 
 
 def _tolerant_s(runs: _Runs, fault: Fault, limits: Limits, broken_s: float) -> float:
-    """By bisection: no longer than the time at which the lasting fault breaks a limit.
+    """Find the time by bisection, below the time at which the lasting fault exceeds a limit.
 
-    That a longer fault does more is assumed; a bound of the interval is what is returned, that which keeps the limits.
+    The search assumes that a longer fault has a larger effect. It returns the bound that keeps the limits.
     """
     good, bad = 0, round(broken_s / runs.timestep_s)
     while bad - good > max(1.0, _RESOLUTION_S / runs.timestep_s):

@@ -1,4 +1,4 @@
-"""Where faults are looked at: situations, which are paths at a speed, and the presets of the fault map."""
+"""Situations of the fault map, which are paths at a speed, and presets."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 TURN_MPS2: Final = 4.0
-"""Lateral acceleration of the turn, and the greatest of the lane change [m/s2]."""
+"""Lateral acceleration of the turn, and largest one of the lane change [m/s2]."""
 LANE_M: Final = 3.5
-"""Width of a lane, and how far beside it the next one is [m]."""
+"""Width of a lane, and lateral distance to the next one [m]."""
 _SPACING_M: Final = 1.0
 _ENTRY_S: Final = 2.0
 _STEADY_S: Final = 2.5
 _QUINTIC_PEAK: Final = 10.0 / math.sqrt(3.0)
-"""Greatest second derivative of 10 s^3 - 15 s^4 + 6 s^5; it is reached at s = 0.5 - 1 / sqrt(12)."""
+"""Largest second derivative of 10 s^3 - 15 s^4 + 6 s^5; it is reached at s = 0.5 - 1 / sqrt(12)."""
 
 
 class Situation(NamedTuple):
-    """A path that the driver follows, and when faults begin on it.
+    """A path for the driver, and the time at which faults begin.
 
     Attributes:
         curvature: Speed [m/s], time since the start [s] -> curvature of the path [1/m].
-        fault_s: Speed [m/s] -> when faults begin [s].
+        fault_s: Speed [m/s] -> time at which faults begin [s].
     """
 
     curvature: Callable[[float, float], float]
@@ -32,12 +32,12 @@ class Situation(NamedTuple):
 
 
 def _entry(time_s: float) -> float:
-    """Rises from 0 to 1 without a kink."""
+    """Return a smooth rise from 0 to 1."""
     return 0.5 - 0.5 * math.cos(math.pi * min(max(time_s / _ENTRY_S, 0.0), 1.0))
 
 
 def _lane_change_s() -> float:
-    """How long the change of lane takes, for its greatest lateral acceleration [s]."""
+    """Return the duration of the lane change for its largest lateral acceleration [s]."""
     return math.sqrt(_QUINTIC_PEAK * LANE_M / TURN_MPS2)
 
 
@@ -55,8 +55,8 @@ SITUATIONS: Final = {
     "circle_100m": Situation(lambda speed, time: _entry(time) / 100.0, lambda speed: _ENTRY_S + _STEADY_S),
     "circle_100m_right": Situation(lambda speed, time: -_entry(time) / 100.0, lambda speed: _ENTRY_S + _STEADY_S),
 }
-"""Straight ahead; a left turn of 4 m/s2; a change of lane by 3.5 m to the left with as much, the fault at the
-first peak of its curvature; a circle of 100 m, that of UN R79, annex 4, for cars, to the left and to the right."""
+"""Straight ahead; a left turn of 4 m/s2; a lane change by 3.5 m to the left with 4 m/s2, the fault at the first peak of
+its curvature; a circle of 100 m to the left and to the right, as in UN R79, annex 4, for cars."""
 
 
 class Preset(NamedTuple):
@@ -68,14 +68,14 @@ class Preset(NamedTuple):
 
 PRESETS: Final = {
     "usual": Preset((60.0, 100.0, 140.0), ("straight", "turn", "lane_change")),
-    # Cars and light vans, by extracts of UN R79, revision 4, annex 4, and of GB 17675-2021, which takes it over.
+    # Cars and light vans, from extracts of UN R79, revision 4, annex 4, and of GB 17675-2021, which adopts it.
     "un_r79": Preset((80.0,), ("circle_100m", "circle_100m_right")),
 }
-"""Name -> what is driven."""
+"""Name -> preset."""
 
 
 def path_of(situation: str, speed_mps: float, duration_s: float) -> dict[str, Any]:
-    """The manoeuvre of a situation: its path, some seconds longer than the car will come.
+    """Return the manoeuvre of a situation: its path, some seconds longer than the run.
 
     Args:
         situation: Name of one of `SITUATIONS`.

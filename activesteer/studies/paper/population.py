@@ -1,7 +1,7 @@
-"""The paper's claims over a population of cars, roads and drivers: in which share each holds, and what the systems do.
+"""The paper's claims over a population of cars, roads and drivers: proportions, and effects of the systems.
 
-It is the study `population`, paired: the three systems meet the same samples. What is driven is one question, what is
-said of it another: `population` drives, `summarise` counts.
+The study `population` is paired: the three systems meet the same samples. `population` drives the runs, `summarise`
+counts their results.
 """
 
 from __future__ import annotations
@@ -36,19 +36,19 @@ CHANGES: Final = (
     "yaw_rate_after_1750ms_share",
     STEERING_EFFORT,
 )
-"""Metrics whose change by a system is reported: peak of the sideslip, oscillation that is left, steering effort."""
+"""Metrics whose change by a system is reported: peak sideslip angle, remaining oscillation, steering effort."""
 _RANGE: Final = (0.05, 0.5, 0.95)
 
 
 def population_study(
     samples: int | None = None, seed: int | None = None, vehicle: FileOrTable | None = None
 ) -> StudyFile:
-    """The study that is driven.
+    """Return the study to drive.
 
     Args:
-        samples: Number of samples, that of the file where not given.
-        seed: Of the sample, likewise.
-        vehicle: Name, path or table of a vehicle, likewise.
+        samples: Number of samples; default: that of the file.
+        seed: Seed of the sample; default: that of the file.
+        vehicle: Name, path or table of a vehicle; default: that of the file.
 
     Raises:
         ActiveSteerError: an input is wrong.
@@ -73,19 +73,19 @@ def population(
     scheduler: str | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> Population:
-    """Checks the paper's claims over a population; see `study` for the arguments that are not here.
+    """Check the paper's claims over a population; see `study` for the arguments that are not listed.
 
     Args:
         samples: Number of samples; 15 runs each.
-        seed: Of the sample.
-        vehicle: The car that the samples are variations of.
-        output: Folder of the study; gone on with where it is there. Without one nothing is kept.
+        seed: Seed of the sample.
+        vehicle: The car of which the samples are variations.
+        output: Folder of the study; a study found there is resumed. Without a folder, nothing is stored.
         jobs: Number of processes.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
         progress: Called after every task.
 
     Returns:
-        Shares and effects.
+        Proportions and effects.
 
     Raises:
         ActiveSteerError: an input is wrong, or the folder holds another study.
@@ -96,15 +96,15 @@ def population(
 
 
 def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim]) -> Population:
-    """Counts what the runs of a population say.
+    """Count the results of a population's runs.
 
     Args:
         table: The study's table, or as much of it as there is.
         planned: The study.
-        nominal: The claims as the nominal runs have them.
+        nominal: The claims of the nominal runs.
 
     Returns:
-        Shares, in the order of the nominal claims, and effects.
+        Proportions, in the order of the nominal claims, and effects.
     """
     rows = table.select([name for name in table.column_names if not name.startswith(CURVE)]).to_pylist()
     first = [row for row in rows if row["controller"] == planned.controllers[0]]
@@ -151,11 +151,11 @@ def _fraction(held: Sequence[bool]) -> float:
 
 
 def effects(rows: Sequence[Mapping[str, Any]], without: str, *systems: str) -> list[SystemEffect]:
-    """What each system does in each scenario, against the same samples without it.
+    """Return the effect of each system in each scenario, relative to the same samples without it.
 
     Args:
-        rows: Those of a paired study's table.
-        without: Controller that the others are compared with.
+        rows: Rows of a paired study's table.
+        without: Controller with which the others are compared.
         systems: The others.
     """
     found = []

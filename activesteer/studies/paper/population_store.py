@@ -1,7 +1,7 @@
-"""What is kept of a population with the package: what came of it, every run in short, and the bands of its curves.
+"""Store of a population in the package: its results, a row for every run, and the bands of its curves.
 
-studies/population/summary.json    shares and effects, seed, versions
-studies/population/runs.parquet    one row a run: claims and metrics; the factors follow from the seed
+studies/population/summary.json    proportions and effects, seed, versions
+studies/population/runs.parquet    one row per run: claims and metrics; the factors follow from the seed
 studies/population/bands.parquet   10 to 90 % of the curves
 """
 
@@ -30,16 +30,16 @@ from activesteer.studies.paper.population import STUDY, population_study
 SUMMARY: Final = "summary.json"
 RUNS: Final = "runs.parquet"
 _EVERY: Final = 2
-"""A band is smoother than the curves: every second of their values will do."""
+"""Interval of the stored values of a band, which is smoother than the curves."""
 _KEPT: Final = ("sample", "maneuver", "controller", "status")
 
 
 def store_population(found: Population, study_folder: Path) -> list[Path]:
-    """Keeps a population with the package.
+    """Store a population with the package.
 
     Args:
-        found: What came of it.
-        study_folder: The folder of its study, finished.
+        found: Results of the population.
+        study_folder: Folder of its finished study.
 
     Returns:
         The files written.
@@ -62,10 +62,10 @@ def store_population(found: Population, study_folder: Path) -> list[Path]:
 
 
 def stored_runs() -> pa.Table:
-    """The runs of the package's population, with the factors that they were driven with.
+    """Return the runs of the package's population with their factors.
 
     Raises:
-        StudyError: there is none.
+        StudyError: the package stores no population.
     """
     folder = studies_dir() / STUDY
     if not (folder / RUNS).is_file():

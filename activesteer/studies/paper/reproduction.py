@@ -1,7 +1,7 @@
-"""The paper, reproduced: five scenarios by three steering systems, recorded, and what is claimed of them checked.
+"""Reproduction of the paper: five scenarios with three steering systems, recorded, and its claims checked.
 
-Runs are independent of each other, so they are spread over processes. Each writes its own file; the scorecard is made
-from the files, not from what the processes hold.
+Runs are independent, so they are distributed over processes. Each process writes its own file, and the scorecard is
+made from the files.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from activesteer.studies.engine.task_queue import TaskQueue, in_parallel
 from activesteer.studies.engine.workers import workers_for
 
 Progress = Callable[[str, int, int], None]
-"""Called with what was finished, how many runs are, and how many there are in all."""
+"""Called with the finished run, the number of finished runs, and the total."""
 
 
 @dataclass
 class Reproduction:
-    """What came of it.
+    """Result of a reproduction.
 
     Attributes:
         paths: Scenario -> system -> MCAP file.
-        failures: (scenario, system) -> why that run ended early; what it recorded until then is in its file.
+        failures: (scenario, system) -> reason why that run ended early; its file holds the rows up to then.
         scorecard: Claims of the scenarios whose three runs are complete.
     """
 
@@ -42,11 +42,11 @@ class Reproduction:
 
     @property
     def exit_status(self) -> int:
-        """0 where every run is complete and every claim passed or is known not to come out, else 1."""
+        """0 if every run is complete and every claim passed or is known not to be reproduced, else 1."""
         return 1 if self.failures else self.scorecard.exit_status
 
     def recordings(self) -> dict[str, dict[str, Recording]]:
-        """The complete runs, opened; scenario -> system -> recording."""
+        """Return the complete runs, opened: scenario -> system -> recording."""
         return {
             scenario: {system: Recording.open(path) for system, path in systems.items()}
             for scenario, systems in self.paths.items()
@@ -62,23 +62,23 @@ def reproduce(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Reproduction:
-    """Drives all five scenarios with all three systems and checks the paper's claims.
+    """Drive all five scenarios with all three systems and check the paper's claims.
 
-    With more than one job the runs are made in processes of their own, started afresh: a script that calls this needs
-    the usual `if __name__ == "__main__":`.
+    With more than one job, the runs are made in newly started processes: a script that calls this function needs
+    `if __name__ == "__main__":`.
 
     Args:
-        folder: Where the recordings go, as SCENARIO-SYSTEM.mcap; made where it does not exist.
+        folder: Folder of the recordings SCENARIO-SYSTEM.mcap; it is made if it does not exist.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value, for all runs; see `simulate`.
-        jobs: Number of processes; that of the processors where not given.
+        jobs: Number of processes; default: the number of processors.
         progress: Called after every run.
 
     Returns:
         Files and scorecard.
 
     Raises:
-        ActiveSteerError: an input is wrong. A run that fails ends no other run; it is named in `failures`.
+        ActiveSteerError: an input is wrong. A failed run stops no other run; `failures` names it.
     """
     scenarios = {name: resolve(name, vehicle, overrides) for name in SCENARIOS}
     target = make_folder(folder, ParameterError)
@@ -98,7 +98,7 @@ def reproduce(
 
 
 def recordings_in(folder: str | os.PathLike[str]) -> dict[str, dict[str, Recording]]:
-    """The recordings that `reproduce` left in a folder; scenario -> system -> recording, where all three are there.
+    """Return the recordings of `reproduce` in a folder: scenario -> system -> recording, for complete scenarios.
 
     Raises:
         RecordingError: there are none, or one cannot be read.
@@ -124,12 +124,12 @@ def _name_of(scenarios: Mapping[str, Scenario]) -> str:
 
 
 class Outcome(NamedTuple):
-    """How a run ended.
+    """Outcome of a run.
 
     Attributes:
-        scenario: Its name.
+        scenario: Name of the scenario.
         system: The controller.
-        problem: Why it ended early; empty where it did not.
+        problem: Reason why the run ended early; empty for a complete run.
     """
 
     scenario: str
@@ -140,12 +140,12 @@ class Outcome(NamedTuple):
 def drive(
     scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
 ) -> Iterator[Outcome]:
-    """Makes all runs and tells each as it ends; what a search must find first is found once for all controllers.
+    """Make all runs and yield each as it ends; a search is made once for all controllers.
 
     Args:
-        scenarios: What is driven, by name.
+        scenarios: Scenarios by name.
         paths: Name of the scenario -> controller -> file.
-        jobs: Number of processes; that of the processors where not given.
+        jobs: Number of processes; default: the number of processors.
     """
     with workers_for(jobs) as workers:
         queue = TaskQueue(workers)
@@ -164,7 +164,7 @@ def drive(
 
 
 def _run(scenario: Scenario, system: str, path: Path) -> str:
-    """One run in a process of its own; returns what went wrong."""
+    """Make one run in a process of its own; return the problem."""
     try:
         run_scenario(scenario, system, path=path)
     except ActiveSteerError as error:
@@ -173,11 +173,11 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
 
 
 def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None) -> list[Claim]:
-    """The claims as they come out of the scenarios as they are, without files.
+    """Return the claims of the nominal scenarios, without files.
 
     Args:
         vehicle: Name, path, or table of a vehicle.
-        jobs: Number of processes; that of the processors where not given.
+        jobs: Number of processes; default: the number of processors.
 
     Returns:
         All claims, in the order of the paper.
