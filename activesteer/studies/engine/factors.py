@@ -113,6 +113,7 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
             multiply the value of the files, with `nominal = "plus"` they are added to it. With
             `maneuvers = ["slalom"]` the key varies in these manoeuvres only, with
             `when = { "sensors.preset" = "production" }` only where another factor has that value.
+        source: Source of the study, for error messages.
 
     Returns:
         The factor.

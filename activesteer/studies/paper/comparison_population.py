@@ -180,6 +180,7 @@ def _lower(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> dict[tupl
     """Return scenario and controller -> samples in which its peak sideslip angle is the lowest.
 
     An incomplete run has no peak: it is never the lowest, and every other run counts as lower.
+    """
     peaks: dict[tuple[str, int], dict[str, float]] = {}
     for row in rows:
         found = next((abs(row[name]) for name in SIDESLIP_PEAKS if row.get(name) is not None), math.inf)
