@@ -52,6 +52,7 @@ def comparison_study(
 
     Args:
         controllers: As for `simulate`; they must include `none` and `REFERENCES`, with which the others are compared.
+        samples: Number of samples; default: that of the study `population`.
         seed: Seed of the sample; same default.
         vehicle: Name, path or table of a vehicle; same default.
 
