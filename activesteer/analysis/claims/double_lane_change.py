@@ -67,18 +67,7 @@ STATEMENTS: Final = (L1, L2, L3, L4)
 
 
 def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
-    """Check claims L1 to L4.
-
-    Args:
-        recordings: Double lane changes through the same course, by system; all of `SYSTEMS`.
-
-    Returns:
-        Four claims, in order. An undefined value (nan) fails its claim.
-
-    Raises:
-        ParameterError: one of the three runs is missing.
-        RecordingError: a run has no course, or a channel is missing.
-    """
+    """Check claims L1 to L4; see `scenarios.Claims`."""
     runs = SystemRuns(recordings, path_following.metrics, "double lane change")
     oscillates = runs.metrics["none"][AFTER_YAW_RATE] > SETTLED_YAW_RATE_RADPS
     others = all(runs.both_lower(name, CALMED, 0.0) for name in AFTER_DRIVER)

@@ -10,7 +10,12 @@ from activesteer.analysis.claims.claim import Claim, Statement
 from activesteer.analysis.source import RecordingLike
 
 Claims = Callable[[Mapping[str, RecordingLike]], list[Claim]]
-"""Function from recordings by system to claims."""
+"""Function that checks the claims about a manoeuvre, in order.
+
+It takes recordings of the same manoeuvre by system, all of `SYSTEMS`. An undefined value (nan) fails its claim. It
+raises `ParameterError` if a run is missing, and `RecordingError` if a run is of another manoeuvre, or lacks its course
+or a channel.
+"""
 
 _ROOMS: Final = {
     "step_steer": step_steer,

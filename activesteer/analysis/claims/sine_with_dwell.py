@@ -90,18 +90,7 @@ STATEMENTS: Final = (D1, D2, D3, D4, D5)
 
 
 def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
-    """Check claims D1 to D5.
-
-    Args:
-        recordings: Sines with dwell with the same steering input, by system; all of `SYSTEMS`.
-
-    Returns:
-        Five claims, in order. An undefined value (nan) fails its claim.
-
-    Raises:
-        ParameterError: one of the three runs is missing.
-        RecordingError: a run is no sine with dwell.
-    """
+    """Check claims D1 to D5; see `scenarios.Claims`."""
     runs = SystemRuns(recordings, sine_with_dwell.metrics, "sine with dwell")
     return [_lost(runs), _kept(runs, D2, "ars"), _kept(runs, D3, "afs"), _opposite(runs), _effective(runs)]
 

@@ -84,18 +84,7 @@ STATEMENTS: Final = (Z1, Z2, Z3, Z4, Z5)
 
 
 def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
-    """Check claims Z1 to Z5.
-
-    Args:
-        recordings: Slaloms around the same cones, by system; all of `SYSTEMS`.
-
-    Returns:
-        Five claims, in order. An undefined value (nan) fails its claim.
-
-    Raises:
-        ParameterError: one of the three runs is missing.
-        RecordingError: a run has no course, or a channel is missing.
-    """
+    """Check claims Z1 to Z5; see `scenarios.Claims`."""
     runs = SystemRuns(recordings, path_following.metrics, "slalom")
     wider = all(runs.metrics["none"][TRACK] - runs.metrics[system][TRACK] >= TRACK_M for system in SYSTEMS_WITH_CONTROL)
     kept = all(

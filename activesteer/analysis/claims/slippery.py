@@ -61,18 +61,7 @@ STATEMENTS: Final = (W1, W2, W3, W4)
 
 
 def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
-    """Check claims W1 to W4.
-
-    Args:
-        recordings: Double lane changes on a slippery road, by system; all of `SYSTEMS`.
-
-    Returns:
-        Four claims, in order. An undefined value (nan) fails its claim.
-
-    Raises:
-        ParameterError: one of the three runs is missing.
-        RecordingError: a run has no course, or a channel is missing.
-    """
+    """Check claims W1 to W4; see `scenarios.Claims`."""
     runs = SystemRuns(recordings, _metrics, "slippery double lane change")
     return [_leaves(runs), _stays(runs, W2, "ars"), _stays(runs, W3, "afs"), held(runs, W4)]
 

@@ -83,18 +83,7 @@ STATEMENTS: Final = (S1, S2, S3, S4, S5)
 
 
 def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
-    """Check claims S1 to S5.
-
-    Args:
-        recordings: Step steers with the same steering input, by system; all of `SYSTEMS`.
-
-    Returns:
-        Five claims, in order. An undefined value (nan) fails its claim.
-
-    Raises:
-        ParameterError: one of the three runs is missing.
-        RecordingError: a run is no step steer.
-    """
+    """Check claims S1 to S5; see `scenarios.Claims`."""
     runs = SystemRuns(recordings, _metrics, "step steer")
     steady = runs.metrics["none"][STEADY]
     helps = {
