@@ -96,7 +96,7 @@ def from_file(text: str, kind: Kind) -> FromFile:
 
 def is_user_module(name: str) -> bool:
     """Return whether a module was loaded from a user's file, or from beside it."""
-    return name.startswith(_USER_MODULE) or _Neighbours.loaded(name)
+    return isinstance(getattr(getattr(sys.modules.get(name), "__spec__", None), "loader", None), _Uncached)
 
 
 class _Uncached(SourceFileLoader):
@@ -122,21 +122,13 @@ class _Neighbours:
         return spec
 
     @classmethod
-    def loaded(cls, name: str) -> bool:
-        """Return whether a module in use was found here."""
-        file = getattr(sys.modules.get(name), "__file__", None) or ""
-        top = name.partition(".")[0]
-        return any(top in names and Path(folder) in Path(file).parents for folder, names in cls.folders.items())
-
-    @classmethod
     @contextmanager
     def first(cls, folder: Path, files: Iterable[str]) -> Iterator[None]:
         """Load modules anew, and those of a folder first; afterwards they are found if there is no other."""
         names = frozenset(Path(file).parts[0].removesuffix(".py") for file in files)
-        for name in [name for name in sys.modules if cls.loaded(name)]:
-            del sys.modules[name]
-        hidden = {name: sys.modules[name] for name in [*sys.modules] if name.partition(".")[0] in names}
-        for name in hidden:
+        loaded = [name for name in sys.modules if name.partition(".")[0] in names]
+        others = {name: sys.modules[name] for name in loaded if not is_user_module(name)}
+        for name in loaded:
             del sys.modules[name]
         cls.folders.pop(str(folder), None)
         cls.folders[str(folder)] = names
@@ -147,7 +139,7 @@ class _Neighbours:
         finally:
             sys.meta_path.remove(cls)
             sys.meta_path.append(cls)
-            sys.modules.update(hidden)
+            sys.modules.update(others)
 
 
 def source_of(text: str) -> dict[str, bytes]:

@@ -277,6 +277,29 @@ def test_a_module_beside_the_file_can_be_imported(write, tmp_path, how):
     assert str(tmp_path) not in sys.path
 
 
+def test_a_module_that_the_program_imported_itself_stays_as_it_is(write, tmp_path, monkeypatch):
+    (tmp_path / "apart.py").write_text("GAIN = 2.0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    import apart  # type: ignore[import-not-found]  # noqa: PLC0415
+
+    try:
+        apart.GAIN = 5.0
+        given = write(
+            """
+            from apart import GAIN
+
+            class Mine:
+                def step(self, command, measurement):
+                    return ActuatorCommand(0.001 * GAIN)
+            """
+        )
+        run = simulate("step_steer", f"{given}:Mine", overrides=SHORT)
+        assert (run["rear_steer_demand_rad"] == 0.002).all()
+        assert sys.modules["apart"] is apart
+    finally:
+        del sys.modules["apart"]
+
+
 def test_source_and_parameters_are_recorded():
     run = simulate("step_steer", Counting(gain=2.0), overrides=SHORT)
     assert run.metadata["controller"] == "test_plugins.py:Counting"
