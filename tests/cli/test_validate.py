@@ -21,7 +21,7 @@ def test_validate_prints_json_and_nothing_else(capsys: pytest.CaptureFixture[str
 @pytest.mark.slow
 def test_validate_writes_page_json_and_every_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate", "-o", str(tmp_path)]) == 0
-    assert "comparisons keep their tolerance" in capsys.readouterr().out
+    assert "comparisons within tolerance" in capsys.readouterr().out
     page = (tmp_path / "validation.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 2 + 2 * 11
     assert "default-src 'none'" in page
