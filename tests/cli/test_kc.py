@@ -2,9 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 import json
 
+import pytest
+
+from activesteer import rigs
 from activesteer.cli import main
+
+
+@pytest.fixture(scope="module", autouse=True)
+def measured_once():
+    """The rig measures the compact once for all tests of its command."""
+    with pytest.MonkeyPatch.context() as patch:
+        once = functools.cache(lambda vehicle: rigs_measure(vehicle, {}))
+        rigs_measure = rigs.kinematics_compliance
+        patch.setattr(rigs, "kinematics_compliance", lambda vehicle, overrides: once(vehicle))
+        yield
 
 
 def test_kc_prints_a_table_of_metrics_with_bands(capsys):
