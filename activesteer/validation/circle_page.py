@@ -41,7 +41,7 @@ def _page(result: CircleResult) -> Page:
         passed("inside") if result.inside else failed("outside"), f"{result.tolerance_deg:.1f}",
         f"{result.area_metric_deg:.1f}", f"{100.0 * result.overlap:.0f}",
     )  # fmt: skip
-    effects = [(effect.name, f"{result.worth_deg(effect):+.1f}") for effect in result.effects]
+    effects = [(effect.name, f"{result.contribution_deg(effect):+.1f}") for effect in result.effects]
     decisions = [("as decided", f"{result.nominal_deg:.1f}")]
     decisions += [(decision.name, f"{decision.angle_deg:.1f}") for decision in result.decisions]
     sections = [

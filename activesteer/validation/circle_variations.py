@@ -1,4 +1,4 @@
-"""A car of curves with one effect switched off, or with an open decision turned over: vehicle file -> vehicle file.
+"""A car of curves with one effect switched off, or with an open decision reversed: vehicle file -> vehicle file.
 
 `measured_circle` drives each of them, so that every degree of the predicted angle has an owner.
 """
@@ -18,7 +18,7 @@ Change = Callable[[Mapping[str, Any]], dict[str, Any]]
 _TOE, _CAMBER, _SIDE = (COORDINATES.index(name) for name in ("toe", "camber", "y"))
 _ENTRIES: Final = np.triu_indices(5)
 _RADIUS_M: Final = 0.335
-"""Height of the wheel centre: a side force at the road is one at the centre and this times it about x."""
+"""Height of the wheel centre: the lever of a side force at the road about x [m]."""
 
 
 def _axle(table: Mapping[str, Any], axle: str, **changes: Any) -> dict[str, Any]:
@@ -27,7 +27,7 @@ def _axle(table: Mapping[str, Any], axle: str, **changes: Any) -> dict[str, Any]
 
 
 def _over_travel(axle: str, curve: str, changed: Callable[[float, float], float]) -> Change:
-    """A curve over travel: its value and the static one -> its value in place of it."""
+    """Replace the values of a curve over travel by a function of the value and the static value."""
 
     def change(table: Mapping[str, Any]) -> dict[str, Any]:
         given = table["curves"][axle]

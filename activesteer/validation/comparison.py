@@ -1,4 +1,4 @@
-"""One number of ours beside one of the reference, the tolerance between them, and whether it is kept."""
+"""Comparison of one of our numbers with the reference, with its tolerance and verdict."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Kind = Literal["relative", "absolute"]
 
 @dataclass(frozen=True)
 class Comparison:
-    """A number of ours and its reference.
+    """One of our numbers and its reference.
 
     Attributes:
         run: Run or rig that it belongs to.
@@ -40,11 +40,11 @@ class Comparison:
 
     @property
     def inside(self) -> bool | None:
-        """Whether the tolerance is kept; None where there is none. What is not a number is not inside."""
+        """Whether the difference keeps the tolerance; None without a tolerance. A nan does not keep it."""
         return None if self.tolerance is None else bool(abs(self.error) <= self.tolerance)
 
     def row(self) -> dict[str, Any]:
-        """As in the JSON output."""
+        """Return JSON values."""
         return {
             "run": self.run,
             "quantity": self.quantity,
@@ -58,7 +58,7 @@ class Comparison:
         }
 
     def words(self) -> tuple[str, str, str, str, str, str]:
-        """Run, quantity, ours, reference, error and tolerance as they are printed."""
+        """Return run, quantity, our number, reference, error and tolerance as text."""
         unit = f" {self.unit}" if self.unit else ""
         if self.kind == "relative":
             error = f"{100.0 * self.error:+.2f} %"
@@ -70,16 +70,16 @@ class Comparison:
 
 
 def relative(run: str, quantity: str, unit: str, ours: float, reference: float, tolerance: float | None) -> Comparison:
-    """A comparison whose error is a fraction of the reference."""
+    """Return a comparison whose error is a fraction of the reference."""
     error = ours / reference - 1.0 if reference else math.inf
     return Comparison(run, quantity, unit, ours, reference, error, tolerance, "relative")
 
 
 def absolute(run: str, quantity: str, unit: str, ours: float, reference: float, tolerance: float | None) -> Comparison:
-    """A comparison whose error is the difference."""
+    """Return a comparison whose error is the difference."""
     return Comparison(run, quantity, unit, ours, reference, ours - reference, tolerance)
 
 
 def to_json(comparisons: Iterable[Comparison]) -> dict[str, list[dict[str, Any]]]:
-    """The comparisons as JSON values; a number that is not finite is None."""
+    """Return the comparisons as JSON values; a number that is not finite is None."""
     return finite({"comparisons": [comparison.row() for comparison in comparisons]})

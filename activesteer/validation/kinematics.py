@@ -25,15 +25,15 @@ _TRAVEL_TOLERANCES: Final = {
     "spring_length": ("mm", 0.3),
     "damper_length": ("mm", 0.3),
 }
-"""Quantity -> unit, tolerance."""
+"""Quantity -> unit and tolerance."""
 _FORCE_TOLERANCE: Final = 0.01
 _STEER_TOLERANCE: Final = 0.005
 _STEER_FROM_MM: Final = 5.0
-"""Rack travel from which on a fraction of the steer angle means something [mm]."""
+"""Least rack travel at which a fraction of the steer angle has a meaning [mm]."""
 
 
 class Curves(NamedTuple):
-    """Ours and the reference over a common abscissa, for a picture.
+    """Our values and the reference over a common abscissa, for a picture.
 
     Attributes:
         title: What is shown.
@@ -55,7 +55,7 @@ class Curves(NamedTuple):
 
 
 class _Rig:
-    """The car on the rig without springs, asked for what the reference gives."""
+    """The car on the rig without springs, evaluated for the quantities of the reference."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.held = HeldCar(vehicle, springs="out")
@@ -78,18 +78,18 @@ class _Rig:
         return rotation.T @ (data.xpos[body] - data.xpos[self._chassis])
 
     def axis(self, corner: str) -> Array:
-        """Spin axis of a wheel in chassis axes."""
+        """Return the spin axis of a wheel in chassis axes."""
         data = self.held.data
         wheel = data.xmat[self.held.model.body(f"{corner}_wheel").id].reshape(3, 3)
         return data.xmat[self._chassis].reshape(3, 3).T @ wheel[:, 1]
 
     def set(self, travel_mm: float, steering_wheel_rad: float = 0.0) -> None:
-        """Moves all wheels to a travel [mm]."""
+        """Move all wheels to a travel [mm]."""
         height_m = 1e-3 * (travel_mm - self.standing_mm)
         self.held.equilibrium(Case(height_m=height_m, steering_wheel_rad=steering_wheel_rad))
 
     def left(self, axle: int) -> dict[str, float]:
-        """What the left wheel of an axle does."""
+        """Return the motion of the left wheel of an axle."""
         moved = 1e3 * (self._in_chassis(self.held.data, self._wheels[axle]) - self._design[axle])
         corner = ("fl", "rl")[axle]
         axis = self.axis(corner)
@@ -106,7 +106,7 @@ class _Rig:
         }
 
     def spring_force_N(self, axle: int, length_mm: Array) -> Array:
-        """Force of the spring over its length, pushing apart positive, from the model as it is driven."""
+        """Return the force of the spring over its length, pushing apart positive, from the driven model."""
         model = self._vehicle.model
         tendon = model.tendon(f"{('fl', 'rl')[axle]}_spring").id
         free_mm = 1e3 * model.tendon_lengthspring[tendon, 0]
@@ -114,7 +114,7 @@ class _Rig:
 
 
 def compare_kinematics(vehicle: Vehicle, data: ReferenceData) -> tuple[list[Comparison], list[Curves]]:
-    """Sweeps of wheel travel and rack.
+    """Compare sweeps of wheel travel and rack.
 
     Args:
         vehicle: The car, in static ride.

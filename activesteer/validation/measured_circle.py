@@ -1,4 +1,4 @@
-"""A car against the road: the steering wheel angle that it needs on a circle, beside what was measured on a real one.
+"""A car against the road: its steering wheel angle on a circle, beside the angle measured on the real car.
 
 Nothing of the car is fitted to the measurement. What is uncertain is drawn: mass, lateral acceleration, tyre, radius.
 What makes the angle is switched off one by one, and what the car's data leave open, and somebody had to decide, is
@@ -27,7 +27,7 @@ from activesteer.validation.circle_variations import EFFECTS, READINGS
 
 DATA: Final = "measured_circle.json"
 SAMPLES: Final = 200
-"""How often the uncertain values are drawn, unless said otherwise."""
+"""Default number of samples of the uncertain values."""
 TOLERANCE_DEG: Final = 5.0
 TOLERANCE_FRACTION: Final = 0.03
 """Tolerance of the steering wheel angle in ISO 19364: 5 deg and 3 % of the measured value."""
@@ -41,7 +41,7 @@ _RISE_MPS2: Final = 0.15
 
 @dataclass(frozen=True)
 class Variation:
-    """The car with one thing different.
+    """The car with one variation.
 
     Attributes:
         name: What is different.
@@ -74,12 +74,12 @@ class CircleResult:
 
     @property
     def difference_deg(self) -> float:
-        """Mean of ours less mean of the measured ones."""
+        """Mean of our angles less mean of the measured angles."""
         return float(self.samples_deg.mean() - self.measured_deg.mean())
 
     @property
     def tolerance_deg(self) -> float:
-        """That of ISO 19364."""
+        """Tolerance of ISO 19364."""
         return TOLERANCE_DEG + TOLERANCE_FRACTION * float(self.measured_deg.mean())
 
     @property
@@ -105,12 +105,12 @@ class CircleResult:
         least = np.minimum(gaussian_kde(self.samples_deg)(grid), gaussian_kde(self.measured_deg)(grid))
         return float(least.sum() * (grid[1] - grid[0]))
 
-    def worth_deg(self, effect: Variation) -> float:
-        """What an effect adds to the nominal angle."""
+    def contribution_deg(self, effect: Variation) -> float:
+        """Return the contribution of an effect to the nominal angle."""
         return self.nominal_deg - effect.angle_deg
 
     def as_table(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return JSON values."""
         return {
             "vehicle": self.vehicle,
             "measured_deg": {
@@ -122,12 +122,12 @@ class CircleResult:
             },
             "difference_deg": self.difference_deg, "tolerance_deg": self.tolerance_deg, "inside": self.inside,
             "area_metric_deg": self.area_metric_deg, "overlap": self.overlap,
-            "effects": {effect.name: self.worth_deg(effect) for effect in self.effects},
+            "effects": {effect.name: self.contribution_deg(effect) for effect in self.effects},
             "decisions": {decision.name: decision.angle_deg for decision in self.decisions},
         }  # fmt: skip
 
     def text(self) -> str:
-        """What the command prints."""
+        """Return the text that the command prints."""
         ours, theirs = self.samples_deg, self.measured_deg
         lines = [
             f"{self.vehicle}: steering wheel angle on the measured circle",
@@ -138,7 +138,7 @@ class CircleResult:
             + ("inside" if self.inside else "OUTSIDE"),
             f"  area metric {self.area_metric_deg:.1f} deg, overlap of the distributions {100.0 * self.overlap:.0f} %",
             "what makes the angle, by switching it off alone:",
-            *(f"  {effect.name:66} {self.worth_deg(effect):+7.1f} deg" for effect in self.effects),
+            *(f"  {effect.name:66} {self.contribution_deg(effect):+7.1f} deg" for effect in self.effects),
             "the angle with open decisions turned over, one at a time:",
             *(f"  {decision.name:66} {decision.angle_deg:7.1f} deg" for decision in self.decisions),
         ]
@@ -146,7 +146,7 @@ class CircleResult:
 
 
 def is_measured(name: str) -> bool:
-    """Whether there is a measured circle of this car."""
+    """Return whether a measured circle of this car exists."""
     return is_file(models_dir() / "reference" / name / DATA)
 
 
@@ -158,7 +158,7 @@ def validate_circle(
     scheduler: str | None = None,
     progress: Callable[[float, str], None] = lambda _share, _what: None,
 ) -> CircleResult:
-    """Drives a car on the circle on which it was measured.
+    """Drive a car on the circle of its measurement.
 
     Args:
         name: The car, and its folder in `models/reference`.
@@ -200,7 +200,7 @@ def validate_circle(
 
 
 def steering_wheel_deg(table: Mapping[str, Any], radius_m: float, ay_mps2: float, mass: float, tyre: float) -> float:
-    """The angle that holds a car, which is alike on both sides, on a circle.
+    """Return the angle that holds a symmetric car on a circle.
 
     Args:
         table: The vehicle file.

@@ -1,4 +1,4 @@
-"""A recording of ours in the quantities, columns and signs of the reference runs."""
+"""Our recordings in the quantities, columns and signs of the reference runs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from activesteer.conventions import CORNERS, Array
 from activesteer.recording import Recording
 
 _ACCELERATION_INTERVAL_S: Final = 0.005
-"""Over which the reference takes its mean accelerations [s]."""
+"""Interval of the reference's mean accelerations [s]."""
 _WHEEL: Final = {
     "Fx": "tyre_fx_N", "Fy": "tyre_fy_N", "Fz": "tyre_fz_N", "Mz": "tyre_mz_Nm", "alpha": "slip_angle_rad",
     "kappa": "slip_ratio", "travel": "travel_m", "omega": "wheel_speed_radps",
@@ -19,7 +19,7 @@ _WHEEL: Final = {
 
 
 def reference_columns(recording: Recording, point_from_cg_m: tuple[float, float, float]) -> dict[str, Array]:
-    """What the reference's CSV files hold, from a recording of ours.
+    """Return the columns of the reference's CSV files from one of our recordings.
 
     Args:
         recording: The run.
@@ -66,7 +66,7 @@ def reference_columns(recording: Recording, point_from_cg_m: tuple[float, float,
 
 
 def _tilt(roll: Array, pitch: Array) -> Array:
-    """From chassis axes into the heading frame, shape (n, 3, 3)."""
+    """Return the rotations from chassis axes into the heading frame, shape (n, 3, 3)."""
     cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
     zero = np.zeros_like(roll)
     return np.stack(
@@ -80,7 +80,7 @@ def _tilt(roll: Array, pitch: Array) -> Array:
 
 
 def _accelerations(t: Array, yaw: Array, east: Array, north: Array) -> dict[str, Array]:
-    """Mean accelerations over the interval before each instant, in the heading at its middle."""
+    """Return the mean accelerations over the interval before each instant, in the heading at its middle."""
     before = t - _ACCELERATION_INTERVAL_S
     # Before the recording there is nothing: its first interval stands for what went before.
     before = np.maximum(before, t[0])

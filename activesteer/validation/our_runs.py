@@ -22,13 +22,13 @@ RMS_TOLERANCE: Final = 0.02
 LOAD_TOLERANCE: Final = 0.01
 SPEED_TOLERANCE: Final = 0.005
 _STEADY_S: Final = 0.5
-"""Length of the end of a run that counts as its steady state [s]."""
+"""Length of the end of a run whose mean is its steady state [s]."""
 _STEADY_CHANGE: Final = 0.01
-"""A quantity is steady where it changes by less than this fraction of its range in that time."""
+"""Largest change of a steady quantity in that time, as a fraction of its range."""
 
 
 class Quantity(NamedTuple):
-    """A column that is compared.
+    """A compared column.
 
     Attributes:
         column: Its name in the reference.
@@ -49,14 +49,14 @@ QUANTITIES: Final = (
     Quantity("roll", "roll", "rad", 1e-3),
     Quantity("beta", "sideslip", "rad", 1e-3),
 )
-"""What the agreement is asked for."""
+"""Quantities of the agreement."""
 _WHEELS: Final = ("FL", "FR", "RL", "RR")
 _PITCH: Final = Quantity("pitch", "pitch", "rad", 2e-3)
 _DECELERATION: Final = Quantity("ax", "longitudinal_acceleration", "m/s2", 0.5)
 
 
 class Trace(NamedTuple):
-    """A quantity of one run, ours beside the reference on its instants.
+    """A quantity of one run: our values and the reference on its instants.
 
     Attributes:
         quantity: What it is.
@@ -76,7 +76,7 @@ class Trace(NamedTuple):
         return float(np.ptp(self.reference))
 
     def corridor(self) -> tuple[Array, Array]:
-        """Lower and upper edge around the reference: 20 ms to either side, and 2 % of peak to peak."""
+        """Return lower and upper edge around the reference: 20 ms to either side, and 2 % of peak to peak."""
         return corridor(self.time_s, self.reference, RMS_TOLERANCE * self.span)
 
 
@@ -155,7 +155,7 @@ def _compare(run: str, trace: Trace) -> list[Comparison]:
 
 
 def _peak(t: Array, values: Array) -> tuple[float, float] | None:
-    """Time and height of the highest point, by a parabola through its neighbours; None where it is at an end."""
+    """Return time and height of the highest point, by a parabola through its neighbours; None at an end."""
     index = int(values.argmax())
     if index in (0, len(values) - 1):
         return None

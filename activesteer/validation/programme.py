@@ -1,4 +1,4 @@
-"""The whole comparison, as it is called."""
+"""The whole comparison with a reference."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _WRITTEN_EVERY_S: Final = 0.005
 
 @dataclass(frozen=True)
 class Validation:
-    """What came out.
+    """Result of the comparison.
 
     Attributes:
         reference: What was compared with.
@@ -49,7 +49,7 @@ class Validation:
 
     @property
     def outside(self) -> list[Comparison]:
-        """Comparisons that do not keep their tolerance."""
+        """Comparisons outside their tolerance."""
         return [comparison for comparison in self.comparisons if comparison.inside is False]
 
     @property
@@ -68,7 +68,7 @@ def validate(
     scheduler: str | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> Validation:
-    """Compares a car with the same car in another multibody code.
+    """Compare a car with the same car in another multibody code.
 
     Args:
         reference: Folder in `models/reference`.
@@ -115,16 +115,16 @@ def validate(
 
 
 def _columns(data: ReferenceData, run: str, timestep_s: float) -> Table:
-    """One of our runs, in the columns of the reference."""
+    """Return one of our runs in the columns of the reference."""
     recording = simulate(data.maneuver(run), vehicle=data.vehicle, timestep_s=timestep_s)
     return reference_columns(recording, data.point_from_cg_m)
 
 
 def write_json(result: Validation, path: Path) -> Path:
-    """Writes the comparisons as JSON; see `comparison.to_json`.
+    """Write the comparisons as JSON; see `comparison.to_json`.
 
     Args:
-        result: What came out.
+        result: Result of the comparison.
         path: The file.
 
     Returns:
@@ -139,10 +139,10 @@ def write_json(result: Validation, path: Path) -> Path:
 
 
 def write_runs(result: Validation, folder: Path) -> list[Path]:
-    """Writes our runs as CSV files, in the columns and signs of the reference.
+    """Write our runs as CSV files, in the columns and signs of the reference.
 
     Args:
-        result: What came out.
+        result: Result of the comparison.
         folder: Where to; made where it does not exist.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Reads the reference numbers that travel with the package in `models/reference/NAME`, where a README explains them."""
+"""The reference numbers of the package in `models/reference/NAME`, which a README explains there."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ENDING: Final = "_reference.csv"
 
 @dataclass(frozen=True)
 class ReferenceData:
-    """What another code says of a car.
+    """Results of another code for a car.
 
     Attributes:
         name: Name of the folder.
@@ -45,7 +45,7 @@ class ReferenceData:
 
     @classmethod
     def load(cls, name: str = "sedan", more: Path | None = None) -> ReferenceData:
-        """Finds the data.
+        """Find the data.
 
         Args:
             name: Folder in `models/reference`.
@@ -72,25 +72,25 @@ class ReferenceData:
         return cls(name, table["vehicle"], table["code"], (x, y, z), folder, folders, notes, study)
 
     def table(self, name: str) -> Table:
-        """A CSV of the folder, numbers only, by column."""
+        """Read a CSV of numbers from the folder, by column."""
         return read_table(self.folder / f"{name}.csv")
 
     def texts(self, name: str) -> list[dict[str, str]]:
-        """A CSV of the folder with words in it, row by row."""
+        """Read a CSV with words from the folder, row by row."""
         header, *lines = (self.folder / f"{name}.csv").read_text(encoding="utf-8").splitlines()
         return [dict(zip(header.split(","), line.split(","), strict=True)) for line in lines]
 
     @property
     def runs(self) -> list[str]:
-        """Names of all runs that are defined, sorted."""
+        """Return the names of all defined runs, sorted."""
         return sorted(path.stem for path in (self.folder / "runs").glob("*.toml"))
 
     def maneuver(self, run: str) -> Path:
-        """Manoeuvre file of a run."""
+        """Return the manoeuvre file of a run."""
         return self.folder / "runs" / f"{run}.toml"
 
     def run(self, run: str) -> Table | None:
-        """What the other code says of a run, by column; None where that is not known."""
+        """Return the other code's results of a run, by column; None if they are unknown."""
         for folder in self.folders:
             for path in (folder / f"{run}.csv", folder / f"{run}{_ENDING}"):
                 if is_file(path):
@@ -99,7 +99,7 @@ class ReferenceData:
 
 
 def read_table(path: Path) -> Table:
-    """A CSV of numbers by column.
+    """Read a CSV of numbers, by column.
 
     Raises:
         ParameterError: it cannot be read.

@@ -24,12 +24,12 @@ _TOLERANCES: Final = {
     "spring_length": ("mm", 0.3),
     "half_track": ("mm", 0.15),
 }
-"""Quantity -> unit and tolerance of the difference; the others are compared by their relative error."""
+"""Quantity -> unit and tolerance of the difference; other quantities are compared by their relative error."""
 _FRACTIONS: Final = {"load": 0.01, "side_force_inwards": 0.02}
 
 
 def compare_static(vehicle: Vehicle, data: ReferenceData) -> list[Comparison]:
-    """The car rolling straight ahead, left and right averaged.
+    """Return the values of the car rolling straight ahead, averaged over left and right.
 
     Args:
         vehicle: The car; it drives off and is not put back.

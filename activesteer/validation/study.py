@@ -1,4 +1,4 @@
-"""What the other code's simplifications cost, and what the step size costs: tables beside the comparison."""
+"""Effects of the other code's simplifications and of the step size, as tables beside the comparison."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from activesteer.validation.reference import ReferenceData
 
 _STEADY_S: Final = 0.5
 _STEPS_S: Final = (0.000125, 0.00025, 0.0005, 0.001)
-"""The shortest stands first: the others are measured against it [s]."""
+"""Steps of the engine, the shortest first as the reference of the others [s]."""
 _TYRE: Final = "vehicle.tyres.conventions."
 _RELAXATION: Final = {f"{_TYRE}relaxation": True}
 _CAMBER: Final = {f"{_TYRE}camber": True}
@@ -36,7 +36,7 @@ VARIANTS: Final[dict[str, dict[str, Any]]] = {
 
 
 class Response(NamedTuple):
-    """What a step steer comes to."""
+    """Result of a step steer."""
 
     name: str
     steady_yaw_rate_radps: float
@@ -47,7 +47,7 @@ class Response(NamedTuple):
     steady_roll_rad: float
 
     def relative_to(self, other: Response) -> dict[str, float]:
-        """Changes against another response, as fractions; of the time, in seconds."""
+        """Return the changes from another response, as fractions; for the time in seconds."""
         changes = {
             key: mine / theirs - 1.0
             for key, mine, theirs in zip(self._fields[1:], self[1:], other[1:], strict=True)
@@ -64,7 +64,7 @@ def step_sizes(
     *,
     scheduler: str | None = None,
 ) -> list[Response]:
-    """The same step steer at several steps of the engine, the shortest first.
+    """Drive the same step steer at several steps of the engine, the shortest first.
 
     Args:
         data: The reference.
@@ -91,7 +91,7 @@ def conventions(
     *,
     scheduler: str | None = None,
 ) -> list[Response]:
-    """The same step steer with the tyre evaluated as the other code does, and less so.
+    """Drive the same step steer with the other code's simplifications of the tyre, and with fewer of them.
 
     Args:
         data: The reference.
@@ -125,7 +125,7 @@ def _response(data: ReferenceData, run: str, name: str, overrides: Mapping[str, 
 
 
 def as_text(title: str, rows: list[Response]) -> str:
-    """A table of responses and what they differ by from the first of them."""
+    """Return a table of responses and their differences from the first one."""
     lines = [title, f"  {'':34} {'yaw rate':>18} {'peak':>18} {'peak at':>16} {'sideslip':>18} {'peak':>18}"]
     for row in rows:
         change = row.relative_to(rows[0])

@@ -1,4 +1,4 @@
-"""The tyre as the other code applies it, against ours under the same conventions."""
+"""The tyre in the other code and ours, under the same conventions."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from activesteer.validation.comparison import Comparison
 from activesteer.validation.reference import ReferenceData, Table
 
 _TOLERANCE: Final = 0.005
-"""Fraction of the peak."""
+"""Tolerance as a fraction of the peak."""
 _THEIR_LIMIT: Final = 1.5608
-"""The other code limits B times slip, the argument of the formula's arc tangent, to this; ours does not."""
+"""Limit of the other code for B times slip, the argument of the formula's arc tangent; ours has no limit."""
 _SHIFTS: Final = 0.1
-"""Room for the horizontal shifts, which stand beside the slip [in units of B times slip]."""
+"""Margin for the horizontal shifts, which add to the slip [in units of B times slip]."""
 _UNJUDGED: Final = ("inclined_3deg", "beyond_their_limits")
-"""Blocks in which the other code does not follow the formula; the difference is reported all the same."""
+"""Blocks in which the other code does not follow the formula; the difference is only reported."""
 _KEYS: Final = ("fx_N", "fy_N", "mz_Nm", "friction_x", "friction_y", "slip_stiffness_N", "cornering_stiffness_Nprad")
 _SPEED_MPS: Final = 22.22
 
 
 def compare_tyre(tyre: TyreParameters, data: ReferenceData) -> list[Comparison]:
-    """Forces and moments over loads, slips, sides, inclination and friction.
+    """Compare forces and moments over loads, slips, sides, inclination and friction.
 
     Args:
         tyre: The car's tyre, conventions included.
