@@ -167,3 +167,13 @@ def test_sides_may_not_differ_once_an_actuator_is_known_to_be_stuck(known):
     stuck = measured(0.0, SPEED_MPS)._replace(rear_steer_rad=math.radians(0.6))
     assert controller.step(steering(0.0), stuck).side_difference_Pa > 0.0
     assert held(controller, steering(0.0), stuck, 60).side_difference_Pa == 0.0
+
+
+def test_brakes_turn_the_car_by_half_the_track_and_angles_by_their_axles_arms(known):
+    moments_Nm, forces_N = Integrated(known)._effects(0.5, 0.25)
+    car, more = known.single_track, known.estimation.two_track
+    assert forces_N == pytest.approx([0.5 * car.front_stiffness_Nprad, 0.25 * car.rear_stiffness_Nprad, 0, 0, 0, 0])
+    assert moments_Nm[:2] == pytest.approx(forces_N[:2] * (car.cg_to_front_m, -car.cg_to_rear_m))
+    # Of a force of 1 kN.
+    halves_m = 0.5 * np.array([more.front_track_m] * 2 + [more.rear_track_m] * 2)
+    assert moments_Nm[2:] == pytest.approx(1000.0 * halves_m * (1, -1, 1, -1))
