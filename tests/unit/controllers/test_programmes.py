@@ -17,6 +17,7 @@ from activesteer.controllers.mpc import GIVEN, STATES, envelope_problem, model
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.scenario import resolve
 from activesteer.signals import Estimate
+from activesteer.theory.single_track import SingleTrack
 from tests.unit.controllers.cars import CAR, held, measured, steering
 
 pytest.importorskip("daqp")
@@ -177,3 +178,28 @@ def test_brakes_turn_the_car_by_half_the_track_and_angles_by_their_axles_arms(kn
     # Of a force of 1 kN.
     halves_m = 0.5 * np.array([more.front_track_m] * 2 + [more.rear_track_m] * 2)
     assert moments_Nm[2:] == pytest.approx(1000.0 * halves_m * (1, -1, 1, -1))
+
+
+def test_car_that_does_what_is_asked_keeps_the_angles_of_its_turn(known):
+    car, driver_rad = known.single_track, 0.004
+    yaw_rate_radps = driver_rad * SingleTrack(car).yaw_rate_gain(SPEED_MPS)
+    front_rad, rear_rad = steady_turn(car, SPEED_MPS)[:2, 0] * yaw_rate_radps
+    added_rad = front_rad - driver_rad
+    assert abs(added_rad) > math.radians(0.02)
+    assert rear_rad > math.radians(0.02)
+
+    class Turning:
+        def step(self, _measurement):
+            return Estimate(SPEED_MPS, 0.0, 0.0, yaw_rate_radps, 0.9, *[0.0] * 5)
+
+    regulator, turn = Lqr(known), None
+    regulator._estimator = Turning()  # pyright: ignore[reportAttributeAccessIssue]
+    seen = measured(yaw_rate_radps, SPEED_MPS)._replace(superposition_rad=added_rad, rear_steer_rad=rear_rad)
+    for _ in range(400):  # until the desired yaw rate has settled
+        regulator._front_rad, regulator._rear_rad = front_rad, rear_rad
+        regulator.apply(added_rad, rear_rad)
+        turn = regulator.turn(steering(driver_rad), seen)
+    assert turn is not None
+    assert turn.desired_radps == pytest.approx(yaw_rate_radps, rel=1e-3)
+    assert turn.steady_rad == pytest.approx((added_rad, rear_rad), abs=math.radians(0.01))
+    assert turn.demand_rad == pytest.approx((added_rad, rear_rad), abs=math.radians(0.01))
