@@ -100,7 +100,12 @@ ROOMS: Final = {
     ),
 }
 
-OTHER_NAMES: Final = {"native_curve_axle": "curve_axle", "native_screws": "toe_link_screw", "advance": "filter_parts"}
+OTHER_NAMES: Final = {
+    "native_curve_axle": "curve_axle",
+    "native_screws": "toe_link_screw",
+    "find": "plugins",
+    "advance": "filter_parts",
+}
 """Files whose tests are called otherwise."""
 
 _ARITHMETIC: Final = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Mod_Mul", "FloorDiv_Mul", "Sub_Mul")
