@@ -81,7 +81,7 @@ ROOMS: Final = {
         "tyre/kernels/*.py",
         "unit/tyre/kernels reference/test_tyre_against_mfeval.py",
         "physics/test_step_steer.py unit/tyre/test_*.py",
-        plain="unit/tyre/kernels/test_vertical.py reference/test_tyre_against_mfeval.py",
+        plain="unit/tyre/kernels/test_[rtv]*.py reference/test_tyre_against_mfeval.py",
     ),
     "vehicle/native": Room(
         "vehicle/native_*.py",
