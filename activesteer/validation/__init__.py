@@ -1,4 +1,4 @@
-"""Comparison of a car with what another multibody code says of the same car."""
+"""Comparison of a car with the same car in another multibody code, or with a measurement on the road."""
 
 from activesteer.validation.comparison import Comparison, to_json
 from activesteer.validation.programme import Validation, validate

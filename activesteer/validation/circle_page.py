@@ -56,7 +56,7 @@ def _page(result: CircleResult) -> Page:
             tables=[Table("", ["decision", "deg"], decisions, kind="comparisons")],
         ),
     ]
-    title = f"{result.vehicle} against the road"
+    title = f"{result.vehicle} against a measurement on the road"
     return Page(f"activesteer validate: {result.vehicle}", title, [lead], sections)
 
 
@@ -73,7 +73,7 @@ def _picture(result: CircleResult) -> Picture:
 
 
 def _cumulative(values: Array, label: str, colour: str) -> Curve:
-    """Return the steps of the empirical distribution."""
+    """Return the empirical distribution as a step curve."""
     ordered = np.repeat(np.sort(values), 2)
     fraction = np.repeat(np.arange(len(values) + 1) / len(values), 2)[1:-1]
     return Curve(ordered, fraction, label, colour)

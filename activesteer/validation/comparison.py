@@ -1,4 +1,4 @@
-"""Comparison of one of our numbers with the reference, with its tolerance and verdict."""
+"""Comparison of one of our numbers with its reference and a tolerance."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ Kind = Literal["relative", "absolute"]
 
 @dataclass(frozen=True)
 class Comparison:
-    """One of our numbers and its reference.
+    """Comparison of one of our numbers with its reference.
 
     Attributes:
-        run: Run or rig that it belongs to.
-        quantity: What is compared.
+        run: Run or rig of the number.
+        quantity: Name of the compared quantity.
         unit: Unit of both numbers.
-        ours: Our number; for curves, where the difference is greatest.
-        reference: The reference there.
-        error: Difference, in the sense of `kind`.
-        tolerance: How large its size may be; None where the two codes mean different things, and only the difference
-            is reported.
-        kind: `relative`: error and tolerance are fractions (0.02 is 2 %), of the reference or of what `quantity` says;
-            `absolute`: they are in the unit.
+        ours: Our number; for curves, at the largest difference.
+        reference: The reference at the same place.
+        error: Difference, as defined by `kind`.
+        tolerance: Largest permitted size of the error; None where the two codes define the quantity differently and
+            the difference is only reported.
+        kind: `relative`: error and tolerance are fractions (0.02 is 2 %) of the reference or of the base in
+            `quantity`; `absolute`: they have the unit.
     """
 
     run: str
@@ -40,11 +40,11 @@ class Comparison:
 
     @property
     def inside(self) -> bool | None:
-        """Whether the difference keeps the tolerance; None without a tolerance. A nan does not keep it."""
+        """True if the error is within the tolerance, False if not or if the error is nan; None without a tolerance."""
         return None if self.tolerance is None else bool(abs(self.error) <= self.tolerance)
 
     def row(self) -> dict[str, Any]:
-        """Return JSON values."""
+        """Return the JSON values."""
         return {
             "run": self.run,
             "quantity": self.quantity,
@@ -58,7 +58,7 @@ class Comparison:
         }
 
     def words(self) -> tuple[str, str, str, str, str, str]:
-        """Return run, quantity, our number, reference, error and tolerance as text."""
+        """Return run, quantity, ours, reference, error and tolerance as printed."""
         unit = f" {self.unit}" if self.unit else ""
         if self.kind == "relative":
             error = f"{100.0 * self.error:+.2f} %"

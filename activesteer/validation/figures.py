@@ -41,7 +41,7 @@ def run_picture(run: str, ours: Table, reference: Table | None) -> Picture:
 
 
 def cross_picture(run: str, ours: Table, reference: Table | None) -> Picture:
-    """Return a run, one quantity against another; the corridor is 2 % of the reference's range to every side."""
+    """Return cross-plots of a run; the corridor is 2 % of the reference's range in every direction."""
     panels = []
     for x, y in _CROSS:
         (x_label, x_factor), (y_label, y_factor) = _AXIS_NAMES[x], _AXIS_NAMES[y]
@@ -58,7 +58,7 @@ def cross_picture(run: str, ours: Table, reference: Table | None) -> Picture:
 
 
 def sweep_picture(curves: list[Curves]) -> Picture:
-    """Return the sweeps of the rig: the curves above, the differences in their corridors below."""
+    """Return the sweeps of the rig: curves above, differences within their corridors below."""
     above = [
         Panel(
             "", "",
@@ -77,7 +77,7 @@ def sweep_picture(curves: list[Curves]) -> Picture:
         )
         for curve in curves
     ]  # fmt: skip
-    title = "kinematics: curves above, ours less reference below, tolerance shaded"
+    title = "kinematics: curves (top), difference ours - reference with tolerance (bottom)"
     return Picture(
         title, above + below, columns=len(curves), width_in=2.6 * len(curves), height_in=4.6, shared_legend=True
     )

@@ -1,4 +1,4 @@
-"""Kinematics of the held car against the reference: wheel travel with the rack centred, and the rack's travel."""
+"""Kinematics of the held car against the reference: wheel travel at centred rack, and rack travel."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ _TRAVEL_TOLERANCES: Final = {
     "spring_length": ("mm", 0.3),
     "damper_length": ("mm", 0.3),
 }
-"""Quantity -> unit and tolerance."""
+"""Quantity -> unit, tolerance."""
 _FORCE_TOLERANCE: Final = 0.01
 _STEER_TOLERANCE: Final = 0.005
 _STEER_FROM_MM: Final = 5.0
-"""Least rack travel at which a fraction of the steer angle has a meaning [mm]."""
+"""Least rack travel at which the relative error of the steer angle is evaluated [mm]."""
 
 
 class Curves(NamedTuple):
-    """Our values and the reference over a common abscissa, for a picture.
+    """Our curve and the reference over a common abscissa, for a picture.
 
     Attributes:
-        title: What is shown.
+        title: Title.
         label: Label of the ordinate.
         x_label: Label of the abscissa.
         x: Abscissa.
         ours: Our values.
-        reference: Those of the reference.
+        reference: Values of the reference.
         tolerance: Half width of the corridor around the reference.
     """
 
@@ -55,7 +55,7 @@ class Curves(NamedTuple):
 
 
 class _Rig:
-    """The car on the rig without springs, evaluated for the quantities of the reference."""
+    """The car on the rig without springs, with the measurements that the reference contains."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.held = HeldCar(vehicle, springs="out")
@@ -89,7 +89,7 @@ class _Rig:
         self.held.equilibrium(Case(height_m=height_m, steering_wheel_rad=steering_wheel_rad))
 
     def left(self, axle: int) -> dict[str, float]:
-        """Return the motion of the left wheel of an axle."""
+        """Return position, angles and element lengths of the left wheel of an axle [mm, deg]."""
         moved = 1e3 * (self._in_chassis(self.held.data, self._wheels[axle]) - self._design[axle])
         corner = ("fl", "rl")[axle]
         axis = self.axis(corner)
@@ -106,7 +106,7 @@ class _Rig:
         }
 
     def spring_force_N(self, axle: int, length_mm: Array) -> Array:
-        """Return the force of the spring over its length, pushing apart positive, from the driven model."""
+        """Return the force of the driven model's spring over its length, positive in compression."""
         model = self._vehicle.model
         tendon = model.tendon(f"{('fl', 'rl')[axle]}_spring").id
         free_mm = 1e3 * model.tendon_lengthspring[tendon, 0]
@@ -156,7 +156,7 @@ def _travel(rig: _Rig, reference: Table) -> tuple[list[Comparison], list[Curves]
                         f"{name} axle", label, "wheel travel [mm] (+ bump)", x, ours, theirs, np.full_like(x, tolerance)
                     )
                 )
-        # Virtual work: the force at the wheel centre is the spring's times how much its length follows the wheel.
+        # Virtual work: the force at the wheel centre is the spring force times the motion ratio.
         ours = -rig.spring_force_N(axle, splines["spring_length"](x)) * splines["spring_length"](x, 1)
         theirs = reference[f"F_vert_spring_N_{name}"]
         worst = int(np.abs(ours / theirs - 1.0).argmax())

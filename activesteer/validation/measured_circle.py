@@ -1,8 +1,8 @@
-"""A car against the road: its steering wheel angle on a circle, beside the angle measured on the real car.
+"""Steering wheel angle of a car on a circle, compared with the angle measured on a real car.
 
-Nothing of the car is fitted to the measurement. What is uncertain is drawn: mass, lateral acceleration, tyre, radius.
-What makes the angle is switched off one by one, and what the car's data leave open, and somebody had to decide, is
-turned over one by one, to see what hangs on it (`circle_variations`).
+No parameter of the car is fitted to the measurement. The uncertain values (mass, lateral acceleration, tyre, radius)
+are sampled. Each effect that contributes to the angle is switched off alone, and each decision that the car's data
+leave open is reversed alone, to show its influence (`circle_variations`).
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from activesteer.files import is_file
 from activesteer.resources import find_vehicle, models_dir
 from activesteer.simulation.runner import simulate
 from activesteer.studies.engine.task_queue import in_parallel
-from activesteer.validation.circle_variations import EFFECTS, READINGS
+from activesteer.validation.circle_variations import DECISIONS, EFFECTS
 
 DATA: Final = "measured_circle.json"
 SAMPLES: Final = 200
 """Default number of samples of the uncertain values."""
 TOLERANCE_DEG: Final = 5.0
 TOLERANCE_FRACTION: Final = 0.03
-"""Tolerance of the steering wheel angle in ISO 19364: 5 deg and 3 % of the measured value."""
+"""Tolerance of the steering wheel angle in ISO 19364: 5 deg plus 3 % of the measured value."""
 _SIGMAS: Final = {"mass": 0.01, "tyre": 0.05, "ay_mps2": 0.1, "radius": 0.01}
 """Standard deviations: mass 1 % (assumed), tyre side force 5 %, lateral acceleration 0.1 m/s2, radius 1 % (assumed)."""
 _SEED: Final = 20121121
@@ -41,11 +41,11 @@ _RISE_MPS2: Final = 0.15
 
 @dataclass(frozen=True)
 class Variation:
-    """The car with one variation.
+    """A car with one change.
 
     Attributes:
-        name: What is different.
-        angle_deg: Steering wheel angle then.
+        name: The change.
+        angle_deg: Steering wheel angle with this change.
     """
 
     name: str
@@ -54,15 +54,15 @@ class Variation:
 
 @dataclass(frozen=True)
 class CircleResult:
-    """The comparison.
+    """Result of the comparison with a measured circle.
 
     Attributes:
         vehicle: The car.
         measured_deg: Measured steering wheel angles, shape (n,).
-        nominal_deg: Ours with every uncertain value at its middle.
-        samples_deg: Ours of the samples, shape (m,).
-        effects: The angles without one effect each.
-        decisions: What open decisions are worth.
+        nominal_deg: Our angle with the mean of every uncertain value.
+        samples_deg: Our angles of the samples, shape (m,).
+        effects: The angles with one effect each switched off.
+        decisions: The angles with one open decision each reversed.
     """
 
     vehicle: str
@@ -74,22 +74,22 @@ class CircleResult:
 
     @property
     def difference_deg(self) -> float:
-        """Mean of our angles less mean of the measured angles."""
+        """Mean of our samples minus mean of the measured angles."""
         return float(self.samples_deg.mean() - self.measured_deg.mean())
 
     @property
     def tolerance_deg(self) -> float:
-        """Tolerance of ISO 19364."""
+        """Tolerance by ISO 19364."""
         return TOLERANCE_DEG + TOLERANCE_FRACTION * float(self.measured_deg.mean())
 
     @property
     def inside(self) -> bool:
-        """Whether the means differ by no more than the tolerance."""
+        """True if the difference of the means is within the tolerance."""
         return abs(self.difference_deg) <= self.tolerance_deg
 
     @property
     def area_metric_deg(self) -> float:
-        """Area between both cumulative distributions (Ferson, Oberkampf, Ginzburg 2008)."""
+        """Area between the two cumulative distributions (Ferson, Oberkampf, Ginzburg 2008)."""
         grid = np.sort(np.concatenate([self.samples_deg, self.measured_deg]))
         ours, theirs = (
             np.searchsorted(np.sort(values), grid[:-1], side="right") / len(values)
@@ -99,7 +99,7 @@ class CircleResult:
 
     @property
     def overlap(self) -> float:
-        """Common area of both densities, 0 to 1."""
+        """Common area of the two densities, 0 to 1."""
         both = np.concatenate([self.samples_deg, self.measured_deg])
         grid = np.linspace(both.min() - 10.0, both.max() + 10.0, 2000)
         least = np.minimum(gaussian_kde(self.samples_deg)(grid), gaussian_kde(self.measured_deg)(grid))
@@ -110,7 +110,7 @@ class CircleResult:
         return self.nominal_deg - effect.angle_deg
 
     def as_table(self) -> dict[str, Any]:
-        """Return JSON values."""
+        """Return the JSON values."""
         return {
             "vehicle": self.vehicle,
             "measured_deg": {
@@ -137,16 +137,16 @@ class CircleResult:
             f"  difference {self.difference_deg:+7.1f} deg, tolerance of ISO 19364 {self.tolerance_deg:.1f} deg: "
             + ("inside" if self.inside else "OUTSIDE"),
             f"  area metric {self.area_metric_deg:.1f} deg, overlap of the distributions {100.0 * self.overlap:.0f} %",
-            "what makes the angle, by switching it off alone:",
+            "contribution of each effect, switched off alone:",
             *(f"  {effect.name:66} {self.contribution_deg(effect):+7.1f} deg" for effect in self.effects),
-            "the angle with open decisions turned over, one at a time:",
+            "angle with each open decision reversed, one at a time:",
             *(f"  {decision.name:66} {decision.angle_deg:7.1f} deg" for decision in self.decisions),
         ]
         return "\n".join(lines)
 
 
 def is_measured(name: str) -> bool:
-    """Return whether a measured circle of this car exists."""
+    """Return whether the package contains a measured circle of a car."""
     return is_file(models_dir() / "reference" / name / DATA)
 
 
@@ -158,14 +158,14 @@ def validate_circle(
     scheduler: str | None = None,
     progress: Callable[[float, str], None] = lambda _share, _what: None,
 ) -> CircleResult:
-    """Drive a car on the circle of its measurement.
+    """Drive a car on the circle on which it was measured.
 
     Args:
         name: The car, and its folder in `models/reference`.
-        samples: How often the uncertain values are drawn.
-        jobs: Processes.
+        samples: Number of samples of the uncertain values.
+        jobs: Number of processes; by default the number of processors.
         scheduler: Address of a Dask scheduler.
-        progress: Told the fraction that is done.
+        progress: Called with the finished fraction and the name of the step.
 
     Returns:
         The comparison.
@@ -183,7 +183,7 @@ def validate_circle(
     table, _ = read_toml(find_vehicle(name))
     table["name"] = name
     draws = np.random.default_rng(_SEED).normal(size=(samples, 4))
-    variations = [*EFFECTS.items(), *READINGS.items()]
+    variations = [*EFFECTS.items(), *DECISIONS.items()]
     calls = [(changed, radius, ay, 1.0, 1.0) for changed in (table, *(change(table) for _, change in variations))]
     calls += [
         (table, radius * (1.0 + _SIGMAS["radius"] * r), ay + _SIGMAS["ay_mps2"] * a, 1.0 + _SIGMAS["mass"] * m,
@@ -200,7 +200,7 @@ def validate_circle(
 
 
 def steering_wheel_deg(table: Mapping[str, Any], radius_m: float, ay_mps2: float, mass: float, tyre: float) -> float:
-    """Return the angle that holds a symmetric car on a circle.
+    """Return the steering wheel angle that holds a laterally symmetric car on a circle.
 
     Args:
         table: The vehicle file.
@@ -226,6 +226,6 @@ def steering_wheel_deg(table: Mapping[str, Any], radius_m: float, ay_mps2: float
     }
     run = simulate("constant_radius", "none", dict(table), overrides)
     late = run.time_s > _ENTRY_S + _SETTLED_S
-    # A circle of some metres' width: the angle over lateral acceleration is a straight line.
+    # The speed range is narrow, so the angle over lateral acceleration is a straight line.
     line = np.polyfit(np.abs(run["ay_mps2"][late]), np.degrees(np.abs(run["steering_wheel_rad"][late])), 1)
     return float(np.polyval(line, ay_mps2))

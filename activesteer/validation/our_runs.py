@@ -1,7 +1,7 @@
-"""Runs against the reference: steady state, peaks and their times, and the difference over the whole run.
+"""Comparison of runs with the reference: steady state, peaks and their times, difference over the whole run.
 
-Tolerances are those agreed for this comparison; the way to look at it, corridors around the reference in time and
-amplitude, is that of ISO 19364 (steady-state circular driving) and ISO 19365 (sine with dwell).
+The tolerances were agreed for this comparison. The method, corridors around the reference in time and amplitude, is
+that of ISO 19364 (steady-state circular driving) and ISO 19365 (sine with dwell).
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ RMS_TOLERANCE: Final = 0.02
 LOAD_TOLERANCE: Final = 0.01
 SPEED_TOLERANCE: Final = 0.005
 _STEADY_S: Final = 0.5
-"""Length of the end of a run whose mean is its steady state [s]."""
+"""Final interval of a run that counts as its steady state [s]."""
 _STEADY_CHANGE: Final = 0.01
-"""Largest change of a steady quantity in that time, as a fraction of its range."""
+"""A quantity is steady if it changes by less than this fraction of its range in that interval."""
 
 
 class Quantity(NamedTuple):
@@ -34,7 +34,7 @@ class Quantity(NamedTuple):
         column: Its name in the reference.
         word: Its name in the comparisons.
         unit: Its unit.
-        min_range: A run in which it changes by less says nothing about it, in its unit.
+        min_range: Least range, in the unit; a run with a smaller range is not compared in this column.
     """
 
     column: str
@@ -49,20 +49,20 @@ QUANTITIES: Final = (
     Quantity("roll", "roll", "rad", 1e-3),
     Quantity("beta", "sideslip", "rad", 1e-3),
 )
-"""Quantities of the agreement."""
+"""The quantities with agreed tolerances."""
 _WHEELS: Final = ("FL", "FR", "RL", "RR")
 _PITCH: Final = Quantity("pitch", "pitch", "rad", 2e-3)
 _DECELERATION: Final = Quantity("ax", "longitudinal_acceleration", "m/s2", 0.5)
 
 
 class Trace(NamedTuple):
-    """A quantity of one run: our values and the reference on its instants.
+    """A quantity of one run, ours and the reference at the same instants.
 
     Attributes:
-        quantity: What it is.
+        quantity: The quantity.
         time_s: Instants.
         ours: Our values.
-        reference: Those of the reference.
+        reference: Values of the reference.
     """
 
     quantity: Quantity
@@ -76,12 +76,12 @@ class Trace(NamedTuple):
         return float(np.ptp(self.reference))
 
     def corridor(self) -> tuple[Array, Array]:
-        """Return lower and upper edge around the reference: 20 ms to either side, and 2 % of peak to peak."""
+        """Return lower and upper edge of the corridor: 20 ms in time and 2 % of peak to peak around the reference."""
         return corridor(self.time_s, self.reference, RMS_TOLERANCE * self.span)
 
 
 def traces(ours: Table, reference: Table, quantities: tuple[Quantity, ...] = QUANTITIES) -> list[Trace]:
-    """Our values on the reference's instants."""
+    """Return our values at the instants of the reference."""
     t = reference["t"]
     t = t[t <= ours["t"][-1]]
     return [
@@ -91,12 +91,12 @@ def traces(ours: Table, reference: Table, quantities: tuple[Quantity, ...] = QUA
 
 
 def compare_run(run: str, ours: Table, reference: Table) -> list[Comparison]:
-    """A run against the reference.
+    """Compare a run with the reference.
 
     Args:
-        run: Its name.
-        ours: Our columns; see `motion.reference_columns`.
-        reference: Those of the reference; what lasts longer than ours is left out.
+        run: Name of the run.
+        ours: Our columns; see `reference_columns`.
+        reference: Columns of the reference; its part after the end of our run is not used.
 
     Returns:
         The comparisons.
@@ -133,7 +133,7 @@ def _compare(run: str, trace: Trace) -> list[Comparison]:
     base = steady[1] if is_steady else 0.0
     for word, sign in (("highest", 1.0), ("lowest", -1.0)):
         theirs = _peak(t, sign * trace.reference)
-        # A value that is only reached at the end, or before anything happens, is no peak.
+        # A value at the end of the run or before the input is not a peak.
         if theirs is None or sign * base + 0.02 * trace.span > theirs[1] or theirs[1] < 0.1 * trace.span:
             continue
         ours = _peak(t, sign * trace.ours)
@@ -155,7 +155,7 @@ def _compare(run: str, trace: Trace) -> list[Comparison]:
 
 
 def _peak(t: Array, values: Array) -> tuple[float, float] | None:
-    """Return time and height of the highest point, by a parabola through its neighbours; None at an end."""
+    """Return time and height of the peak by a parabola through its neighbours; None if it is at an end."""
     index = int(values.argmax())
     if index in (0, len(values) - 1):
         return None

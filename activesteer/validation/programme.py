@@ -1,4 +1,4 @@
-"""The whole comparison with a reference."""
+"""The complete comparison of a car with the reference."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from activesteer.simulation.runner import simulate
 from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.validation.comparison import Comparison, to_json
 from activesteer.validation.kinematics import Curves, compare_kinematics
-from activesteer.validation.motion import reference_columns
 from activesteer.validation.our_runs import compare_run
 from activesteer.validation.reference import ReferenceData, Table
+from activesteer.validation.reference_columns import reference_columns
 from activesteer.validation.static import compare_static
 from activesteer.validation.tyre_grid import compare_tyre
 
@@ -34,11 +34,11 @@ class Validation:
     """Result of the comparison.
 
     Attributes:
-        reference: What was compared with.
+        reference: The reference data.
         comparisons: All numbers.
         curves: The sweeps of the rig.
-        runs: Our columns of every run, whether the reference has it or not.
-        references: Those of the reference, where there are.
+        runs: Our columns of every run, including runs without a reference.
+        references: Columns of the reference, for the runs that have one.
     """
 
     reference: ReferenceData
@@ -72,18 +72,18 @@ def validate(
 
     Args:
         reference: Folder in `models/reference`.
-        more: Folder with further reference runs, NAME.csv in the same columns.
+        more: Folder with further reference runs NAME.csv in the same columns.
         timestep_s: Step of our simulation [s].
-        unknown_runs: Whether runs are driven whose reference is not known.
-        jobs: Number of processes; that of the processors where not given.
+        unknown_runs: Drive also the runs without a reference.
+        jobs: Number of processes; by default the number of processors.
         scheduler: See `in_parallel`.
-        progress: Called with the fraction that is done and what comes next.
+        progress: Called with the finished fraction and the name of the next step.
 
     Returns:
         The comparisons.
 
     Raises:
-        ActiveSteerError: reference or car are not found or wrong, or a run failed.
+        ActiveSteerError: reference or car is missing or wrong, or a run failed.
     """
     data = ReferenceData.load(reference, more)
     references = {run: table for run in data.runs if (table := data.run(run)) is not None}
@@ -115,7 +115,7 @@ def validate(
 
 
 def _columns(data: ReferenceData, run: str, timestep_s: float) -> Table:
-    """Return one of our runs in the columns of the reference."""
+    """Drive a run and return it in the columns of the reference."""
     recording = simulate(data.maneuver(run), vehicle=data.vehicle, timestep_s=timestep_s)
     return reference_columns(recording, data.point_from_cg_m)
 
@@ -131,7 +131,7 @@ def write_json(result: Validation, path: Path) -> Path:
         The path.
 
     Raises:
-        ParameterError: it cannot be written.
+        ParameterError: the file cannot be written.
     """
     make_folder(path.parent, ParameterError)
     text = json_text(to_json(result.comparisons))
@@ -139,11 +139,11 @@ def write_json(result: Validation, path: Path) -> Path:
 
 
 def write_runs(result: Validation, folder: Path) -> list[Path]:
-    """Write our runs as CSV files, in the columns and signs of the reference.
+    """Write our runs as CSV files in the columns and signs of the reference.
 
     Args:
         result: Result of the comparison.
-        folder: Where to; made where it does not exist.
+        folder: Output folder; it is created if it does not exist.
 
     Returns:
         The files.

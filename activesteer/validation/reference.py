@@ -1,4 +1,4 @@
-"""The reference numbers of the package in `models/reference/NAME`, which a README explains there."""
+"""Reference data of the package in `models/reference/NAME`; a README there explains them."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _ENDING: Final = "_reference.csv"
 
 @dataclass(frozen=True)
 class ReferenceData:
-    """Results of another code for a car.
+    """Reference data of a car from another code.
 
     Attributes:
         name: Name of the folder.
-        vehicle: The car of ours that is the same.
+        vehicle: The same car in this package.
         code: The other code, with its version.
-        point_from_cg_m: Where the other code measures the motion, from our `cg` site, chassis axes [m].
-        folder: Where the files are.
-        folders: Folders to look for runs in; the first that has one counts.
-        notes: Where the two codes differ, and which is right.
-        study_run: The step steer by which conventions and step sizes are compared.
+        point_from_cg_m: Point of the other code's motion, from our `cg` site, chassis axes [m].
+        folder: Folder of the files.
+        folders: Folders of runs; the first folder that contains a run counts.
+        notes: Differences between the codes, and which code is right.
+        study_run: Step steer for the comparison of conventions and step sizes.
     """
 
     name: str
@@ -45,20 +45,20 @@ class ReferenceData:
 
     @classmethod
     def load(cls, name: str = "sedan", more: Path | None = None) -> ReferenceData:
-        """Find the data.
+        """Load the reference data.
 
         Args:
             name: Folder in `models/reference`.
-            more: Folder with further runs as NAME.csv, in the same columns.
+            more: Folder with further runs NAME.csv in the same columns.
 
         Raises:
-            ParameterError: there is no such folder.
+            ParameterError: a folder does not exist.
         """
         home = models_dir() / "reference"
         folder = home / name
         names = [path.parent.name for path in home.glob("*/reference.toml")]
         if name not in names:
-            known = sorted(path.name for path in home.iterdir() if is_folder(path))  # a measured circle is one too
+            known = sorted(path.name for path in home.iterdir() if is_folder(path))  # includes measured circles
             raise ParameterError(
                 f"there is no reference named {shown(name)}; {nearest_names(name, known)}", value=name, allowed=known
             )
@@ -72,17 +72,17 @@ class ReferenceData:
         return cls(name, table["vehicle"], table["code"], (x, y, z), folder, folders, notes, study)
 
     def table(self, name: str) -> Table:
-        """Read a CSV of numbers from the folder, by column."""
+        """Return the columns of a numeric CSV file of the folder."""
         return read_table(self.folder / f"{name}.csv")
 
     def texts(self, name: str) -> list[dict[str, str]]:
-        """Read a CSV with words from the folder, row by row."""
+        """Return the rows of a CSV file of the folder, as text."""
         header, *lines = (self.folder / f"{name}.csv").read_text(encoding="utf-8").splitlines()
         return [dict(zip(header.split(","), line.split(","), strict=True)) for line in lines]
 
     @property
     def runs(self) -> list[str]:
-        """Return the names of all defined runs, sorted."""
+        """Sorted names of all defined runs."""
         return sorted(path.stem for path in (self.folder / "runs").glob("*.toml"))
 
     def maneuver(self, run: str) -> Path:
@@ -90,7 +90,7 @@ class ReferenceData:
         return self.folder / "runs" / f"{run}.toml"
 
     def run(self, run: str) -> Table | None:
-        """Return the other code's results of a run, by column; None if they are unknown."""
+        """Return the columns of a run of the other code; None without a reference."""
         for folder in self.folders:
             for path in (folder / f"{run}.csv", folder / f"{run}{_ENDING}"):
                 if is_file(path):
@@ -99,10 +99,10 @@ class ReferenceData:
 
 
 def read_table(path: Path) -> Table:
-    """Read a CSV of numbers, by column.
+    """Read the columns of a numeric CSV file.
 
     Raises:
-        ParameterError: it cannot be read.
+        ParameterError: the file cannot be read.
     """
     first, *lines = read_text(path, ParameterError, MAX_CSV_BYTES).split("\n")
     header = first.strip().split(",")

@@ -1,4 +1,4 @@
-"""The rolling car against the reference: loads, attitude, toe, camber, forces of the tyres."""
+"""Comparison of the rolling car with the reference: loads, attitude, toe, camber, tyre forces."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ _TOLERANCES: Final = {
     "spring_length": ("mm", 0.3),
     "half_track": ("mm", 0.15),
 }
-"""Quantity -> unit and tolerance of the difference; other quantities are compared by their relative error."""
+"""Quantity -> unit and tolerance of the difference; other quantities have a tolerance of the relative error."""
 _FRACTIONS: Final = {"load": 0.01, "side_force_inwards": 0.02}
 
 
 def compare_static(vehicle: Vehicle, data: ReferenceData) -> list[Comparison]:
-    """Return the values of the car rolling straight ahead, averaged over left and right.
+    """Compare the car rolling straight ahead, averaged over left and right.
 
     Args:
-        vehicle: The car; it drives off and is not put back.
+        vehicle: The car; its state afterwards is that of the last run.
         data: The reference.
 
     Returns:
-        The comparisons, at each speed that the reference has.
+        The comparisons, at each speed of the reference.
     """
     rows: dict[str, dict[str, float]] = {}
     for row in data.texts("static"):
@@ -67,7 +67,7 @@ def _rolling(vehicle: Vehicle, speed_mps: float) -> dict[str, float]:
     vehicle.check()
     model, data = vehicle.model, vehicle.data
     mujoco.mj_forward(model, data)
-    # The channels of one row: what the sensors and the callback say of this instant.
+    # The channels of one row, from the sensors and the callback at this instant.
     rows = vehicle.rows.empty(1)
     for row, live in zip(rows, vehicle.rows.live(), strict=True):
         row[0] = live

@@ -1,4 +1,4 @@
-"""Effects of the other code's simplifications and of the step size, as tables beside the comparison."""
+"""Effects of the other code's tyre simplifications and of the step size, as tables beside the comparison."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.simulation.runner import simulate
 from activesteer.studies.engine.task_queue import in_parallel
-from activesteer.validation.motion import reference_columns
 from activesteer.validation.reference import ReferenceData
+from activesteer.validation.reference_columns import reference_columns
 
 _STEADY_S: Final = 0.5
 _STEPS_S: Final = (0.000125, 0.00025, 0.0005, 0.001)
-"""Steps of the engine, the shortest first as the reference of the others [s]."""
+"""Step sizes [s]; the first is the base of the comparison."""
 _TYRE: Final = "vehicle.tyres.conventions."
 _RELAXATION: Final = {f"{_TYRE}relaxation": True}
 _CAMBER: Final = {f"{_TYRE}camber": True}
@@ -36,7 +36,7 @@ VARIANTS: Final[dict[str, dict[str, Any]]] = {
 
 
 class Response(NamedTuple):
-    """Result of a step steer."""
+    """Characteristic values of a step steer."""
 
     name: str
     steady_yaw_rate_radps: float
@@ -47,7 +47,7 @@ class Response(NamedTuple):
     steady_roll_rad: float
 
     def relative_to(self, other: Response) -> dict[str, float]:
-        """Return the changes from another response, as fractions; for the time in seconds."""
+        """Return the relative changes from another response; the change of the time in seconds."""
         changes = {
             key: mine / theirs - 1.0
             for key, mine, theirs in zip(self._fields[1:], self[1:], other[1:], strict=True)
@@ -64,13 +64,13 @@ def step_sizes(
     *,
     scheduler: str | None = None,
 ) -> list[Response]:
-    """Drive the same step steer at several steps of the engine, the shortest first.
+    """Drive the step steer with several step sizes, the smallest first.
 
     Args:
-        data: The reference.
-        run: A step steer of it.
-        report: Called with what is done.
-        jobs: Number of processes; that of the processors where not given.
+        data: The reference data.
+        run: Name of a step steer.
+        report: Called with the name of a finished run.
+        jobs: Number of processes; by default the number of processors.
         scheduler: See `in_parallel`.
 
     Returns:
@@ -91,13 +91,13 @@ def conventions(
     *,
     scheduler: str | None = None,
 ) -> list[Response]:
-    """Drive the same step steer with the other code's simplifications of the tyre, and with fewer of them.
+    """Drive the step steer with the other code's tyre conventions, and with our conventions, singly and combined.
 
     Args:
-        data: The reference.
-        run: A step steer of it.
-        report: Called with what is done.
-        jobs: Number of processes; that of the processors where not given.
+        data: The reference data.
+        run: Name of a step steer.
+        report: Called with the name of a finished run.
+        jobs: Number of processes; by default the number of processors.
         scheduler: See `in_parallel`.
 
     Returns:
@@ -125,7 +125,7 @@ def _response(data: ReferenceData, run: str, name: str, overrides: Mapping[str, 
 
 
 def as_text(title: str, rows: list[Response]) -> str:
-    """Return a table of responses and their differences from the first one."""
+    """Return a table of responses and their differences from the first response."""
     lines = [title, f"  {'':34} {'yaw rate':>18} {'peak':>18} {'peak at':>16} {'sideslip':>18} {'peak':>18}"]
     for row in rows:
         change = row.relative_to(rows[0])

@@ -1,4 +1,4 @@
-"""The tyre in the other code and ours, under the same conventions."""
+"""Comparison of the other code's tyre forces with ours under the same conventions."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from activesteer.validation.comparison import Comparison
 from activesteer.validation.reference import ReferenceData, Table
 
 _TOLERANCE: Final = 0.005
-"""Tolerance as a fraction of the peak."""
+"""Fraction of the peak."""
 _THEIR_LIMIT: Final = 1.5608
-"""Limit of the other code for B times slip, the argument of the formula's arc tangent; ours has no limit."""
+"""The other code limits B times slip, the argument of the formula's arc tangent, to this value; our code does not."""
 _SHIFTS: Final = 0.1
 """Margin for the horizontal shifts, which add to the slip [in units of B times slip]."""
 _UNJUDGED: Final = ("inclined_3deg", "beyond_their_limits")
-"""Blocks in which the other code does not follow the formula; the difference is only reported."""
+"""Blocks in which the other code does not follow the formula; their difference is only reported."""
 _KEYS: Final = ("fx_N", "fy_N", "mz_Nm", "friction_x", "friction_y", "slip_stiffness_N", "cornering_stiffness_Nprad")
 _SPEED_MPS: Final = 22.22
 
@@ -33,15 +33,15 @@ def compare_tyre(tyre: TyreParameters, data: ReferenceData) -> list[Comparison]:
         data: The reference.
 
     Returns:
-        Largest differences as fractions of the peaks, block by block; what lies beyond the other code's limits without
-        a tolerance.
+        Largest difference of each block as a fraction of the peak; blocks beyond the other code's limits have no
+        tolerance.
     """
     rows = data.texts("tyre_grid")
     numbers = {key: np.array([float(row[key]) for row in rows]) for key in rows[0] if key != "side"}
     left = np.array([row["side"] == "L" for row in rows])
     found = _forces(tyre, numbers, left, numbers["kappa"])
-    # In the other code the contact frame of an inclined wheel is too short by the cosine of its inclination: the speed
-    # in it is too low, and the slip too great. The same is done to ours, to show that this is the whole difference.
+    # In the other code the contact frame of an inclined wheel is too short by the cosine of its inclination. The speed
+    # in this frame is too low and the slip too great. The same change of our slip shows that nothing else differs.
     stretched = (1.0 + numbers["kappa"]) / np.cos(np.radians(numbers["incl_deg"])) - 1.0
     in_their_frame = _forces(tyre, numbers, left, stretched)
     load = numbers["load_N"]

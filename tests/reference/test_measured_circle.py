@@ -1,6 +1,7 @@
-"""The comparison with a measured circle: its measures by hand, the angle against what geometry asks for, the readings.
+"""Comparison with a measured circle: its measures by hand, the angle against geometry, effects and open decisions.
 
-The rules behind the source's numbers: C. Angerer et al., NEVVE 2018, and S. Fuchs, TUM 2014, as in TUMFTM/TOTEM.
+The design rules of the source's numbers are from C. Angerer et al., NEVVE 2018, and S. Fuchs, TUM 2014, as in
+TUMFTM/TOTEM.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import pytest
 from activesteer.config import read_toml
 from activesteer.errors import ParameterError
 from activesteer.resources import find_vehicle, models_dir
-from activesteer.validation.circle_variations import EFFECTS, READINGS
+from activesteer.validation.circle_variations import DECISIONS, EFFECTS
 from activesteer.validation.measured_circle import CircleResult, is_measured, steering_wheel_deg, validate_circle
 from tests.raising import raises
 
@@ -55,7 +56,7 @@ def source() -> dict[str, Any]:
 
 
 def test_springs_and_dampers_of_the_source_are_of_an_axle_and_of_a_design_rule() -> None:
-    """1 Hz for the car, 1.1 times more behind than in front, damping ratio 0.3 and 1.6 times as much behind."""
+    """Rule: 1 Hz for the car, 1.1 times that at the rear; damping ratio 0.3, 1.6 times that at the rear."""
     given = source()
     shares = {"F": 1.0 - given["xSP"] / given["l"], "R": given["xSP"] / given["l"]}
     lowest = (2.0 * math.pi) ** 2 / (shares["F"] + 1.21 * shares["R"])
@@ -77,43 +78,43 @@ def test_the_wheel_inertia_of_the_source_is_that_of_both_wheels_of_an_axle() -> 
 
 
 def toe_deg(table: dict[str, Any], axle: str, side_N: float, aligning_Nm: float) -> float:
-    """Turn of the left wheel to the left under forces at the road."""
+    """Return the rotation of the left wheel to the left under forces at the road."""
     matrix = np.zeros((5, 5))
     matrix[np.triu_indices(5)] = table["curves"][axle]["stiffness"]
     moved = np.linalg.solve(matrix + np.triu(matrix, 1).T, [0.0, side_N, 0.335 * side_N, 0.0, aligning_Nm])
     return float(np.degrees(moved[4]))
 
 
-def test_an_effect_that_is_switched_off_takes_nothing_else_along() -> None:
+def test_switching_an_effect_off_changes_no_other_effect() -> None:
     table, _ = read_toml(find_vehicle("tesla_model_s"))
-    for axle, word, sign in (("front", "in front", 1.0), ("rear", "behind", -1.0)):
+    for axle, sign in (("front", 1.0), ("rear", -1.0)):
         side, aligning = toe_deg(table, axle, -1e3, 0.0), toe_deg(table, axle, 0.0, 100.0)
         assert side * sign > 0.03, "towards the middle of the car: front toe-out, rear toe-in"
         assert aligning > 0.4
-        no_side = EFFECTS[f"toe over side force {word}"](table)
+        no_side = EFFECTS[f"toe over side force, {axle}"](table)
         assert toe_deg(no_side, axle, -1e3, 0.0) == pytest.approx(0.0, abs=1e-4)
         assert toe_deg(no_side, axle, 0.0, 100.0) == pytest.approx(aligning, rel=1e-4)
-        no_moment = EFFECTS[f"toe over aligning moment {word} (assumed)"](table)
+        no_moment = EFFECTS[f"toe over aligning moment, {axle} (assumed)"](table)
         assert toe_deg(no_moment, axle, -1e3, 0.0) == pytest.approx(side, rel=1e-3)
         assert toe_deg(no_moment, axle, 0.0, 100.0) < 0.5 * aligning
-        no_camber = EFFECTS[f"camber over side force {word}"](table)
+        no_camber = EFFECTS[f"camber over side force, {axle}"](table)
         assert toe_deg(no_camber, axle, -1e3, 0.0) == pytest.approx(side, rel=1e-2)
-        turned = READINGS["elkin_y_toe of both axles the other way round (read: understeering)"](table)
+        turned = DECISIONS["elkin_y_toe of both axles reversed (used: understeering)"](table)
         assert toe_deg(turned, axle, -1e3, 0.0) == pytest.approx(-side, rel=1e-3)
 
 
 @pytest.mark.slow
-def test_without_what_toe_does_the_angle_is_that_of_geometry_and_tyres() -> None:
-    """Tyres add some degrees to Ackermann's 87: the front axle carries more load and more of the roll moment."""
+def test_without_changes_of_toe_the_angle_is_that_of_geometry_and_tyres() -> None:
+    """Tyres add some degrees to the Ackermann angle of 87: the front carries more load and more roll moment."""
     table, _ = read_toml(find_vehicle("tesla_model_s"))
-    changed = EFFECTS["all six together"]({**table, "name": "tesla_model_s"})
+    changed = EFFECTS["all six effects on toe"]({**table, "name": "tesla_model_s"})
     angle = steering_wheel_deg(changed, 30.0, 5.65, 1.0, 1.0)
     assert 88.0 < angle < 98.0
 
 
 @pytest.mark.slow
 def test_without_lateral_acceleration_the_angle_is_that_of_ackermann() -> None:
-    """On 30 m the wheels ask for 5.64 deg, the ratio is 15.5: there a line through two low accelerations ends."""
+    """A line through two low accelerations must reach 5.64 deg at the wheels (30 m) times the ratio of 15.5."""
     table, _ = read_toml(find_vehicle("tesla_model_s"))
     low, high = (steering_wheel_deg({**table, "name": "tesla_model_s"}, 30.0, ay, 1.0, 1.0) for ay in (0.6, 1.2))
     assert low < high

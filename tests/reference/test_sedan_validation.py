@@ -11,9 +11,9 @@ import pytest
 from activesteer import simulate
 from activesteer.errors import ParameterError
 from activesteer.validation import Validation, to_json, validate
-from activesteer.validation.motion import reference_columns
 from activesteer.validation.our_runs import compare_run
 from activesteer.validation.reference import ReferenceData
+from activesteer.validation.reference_columns import reference_columns
 from tests.raising import raises
 
 RUNS = ("coast_80", "sine_0p5Hz", "step_0p2g_L", "step_0p4g_L")

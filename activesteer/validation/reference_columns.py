@@ -1,4 +1,4 @@
-"""Our recordings in the quantities, columns and signs of the reference runs."""
+"""Conversion of a recording to the quantities, columns and signs of the reference runs."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from activesteer.conventions import CORNERS, Array
 from activesteer.recording import Recording
 
 _ACCELERATION_INTERVAL_S: Final = 0.005
-"""Interval of the reference's mean accelerations [s]."""
+"""Interval over which the reference averages its accelerations [s]."""
 _WHEEL: Final = {
     "Fx": "tyre_fx_N", "Fy": "tyre_fy_N", "Fz": "tyre_fz_N", "Mz": "tyre_mz_Nm", "alpha": "slip_angle_rad",
     "kappa": "slip_ratio", "travel": "travel_m", "omega": "wheel_speed_radps",
 }  # fmt: skip
-"""Column of the reference, without the wheel -> channel of ours."""
+"""Column of the reference without the wheel -> channel of the recording."""
 
 
 def reference_columns(recording: Recording, point_from_cg_m: tuple[float, float, float]) -> dict[str, Array]:
-    """Return the columns of the reference's CSV files from one of our recordings.
+    """Return the columns of the reference's CSV files from a recording.
 
     Args:
         recording: The run.
-        point_from_cg_m: Where the motion is wanted, from the `cg` site, chassis axes [m].
+        point_from_cg_m: Point of the motion, from the `cg` site, chassis axes [m].
 
     Returns:
         Column -> values at every recorded step: `t`, velocities `vx`, `vy` and accelerations `ax`, `ay` of the point in
@@ -38,7 +38,7 @@ def reference_columns(recording: Recording, point_from_cg_m: tuple[float, float,
     arm = to_heading @ np.asarray(point_from_cg_m)
     sin_roll, cos_roll = np.sin(roll), np.cos(roll)
     p, q = r["roll_rate_radps"], r["pitch_rate_radps"]
-    # The yaw rate is that of the Euler angle; about the body's own z axis it is this.
+    # The channel is the rate of the Euler angle; the rate about the body's z axis is this.
     body_yaw = (r["yaw_rate_radps"] * np.cos(pitch) - sin_roll * q) / cos_roll
     spin = np.einsum("nij,nj->ni", to_heading, np.column_stack([p, q, body_yaw]))
     velocity = np.column_stack([r["vx_mps"], r["vy_mps"], r["vz_mps"]]) + np.cross(spin, arm)
@@ -66,7 +66,7 @@ def reference_columns(recording: Recording, point_from_cg_m: tuple[float, float,
 
 
 def _tilt(roll: Array, pitch: Array) -> Array:
-    """Return the rotations from chassis axes into the heading frame, shape (n, 3, 3)."""
+    """Return the rotation from chassis axes to the heading frame, shape (n, 3, 3)."""
     cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
     zero = np.zeros_like(roll)
     return np.stack(
@@ -80,9 +80,9 @@ def _tilt(roll: Array, pitch: Array) -> Array:
 
 
 def _accelerations(t: Array, yaw: Array, east: Array, north: Array) -> dict[str, Array]:
-    """Return the mean accelerations over the interval before each instant, in the heading at its middle."""
+    """Return mean accelerations over the interval before each instant, in the heading at its middle."""
     before = t - _ACCELERATION_INTERVAL_S
-    # Before the recording there is nothing: its first interval stands for what went before.
+    # The first interval of the recording also stands for the time before it.
     before = np.maximum(before, t[0])
     span = np.maximum(t - before, 1e-12)
     ax, ay = ((v - np.interp(before, t, v)) / span for v in (east, north))
