@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Final
 
 from activesteer.analysis.claims import STATEMENTS, Kind, not_reproduced
-from activesteer.analysis.claims.population import Population, percent, stored_population
+from activesteer.analysis.claims.population import Population, stored_population
+from activesteer.theory.proportions import percent
 
 PAGE: Final = Path(__file__).parents[1] / "docs" / "claims.md"
 BEGIN: Final = "<!-- the table is written by tools/make_claims_table.py -->\n"

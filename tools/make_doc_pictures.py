@@ -21,6 +21,7 @@ import numpy as np
 from PIL import Image
 
 from activesteer import study
+from activesteer.analysis.claims.population import read_population
 from activesteer.analysis.figures import BY_KIND, style, time_histories, time_panels
 from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
 from activesteer.analysis.frequency_response import frequency_response
@@ -34,7 +35,6 @@ from activesteer.simulation.runner import run_scenario
 from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops
 from activesteer.studies.paper.comparison import compare
 from activesteer.studies.paper.comparison_figure import comparison_figure, comparison_population_figure
-from activesteer.studies.paper.comparison_population import stored_comparison
 from activesteer.studies.paper.envelope import envelope
 from activesteer.studies.paper.envelope_figure import envelope_figure
 from activesteer.tyre import MagicFormula, load_tir
@@ -274,7 +274,7 @@ def _comparison() -> dict[str, Figure]:
 
 def _comparison_population() -> dict[str, Figure]:
     """The comparison over a population that belongs to the package."""
-    found = stored_comparison()
+    found = read_population("comparison")
     return {} if found is None else {"comparison_population": comparison_population_figure(found)}
 
 

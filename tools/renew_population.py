@@ -14,20 +14,20 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Iterable
-from functools import partial
 from pathlib import Path
 from typing import Final
 
 from activesteer.analysis.claims import STATEMENTS, Kind
-from activesteer.analysis.claims.population import Change, Population, percent
+from activesteer.analysis.claims.population import Change, Population
 from activesteer.commands.progress import RunCounter
 from activesteer.metric_table import metric
 from activesteer.resources import find_study
-from activesteer.studies.paper.comparison_population import compare_population, store_comparison
-from activesteer.studies.paper.comparison_shares import ComparisonPopulation
-from activesteer.studies.paper.comparison_targets import NONE, REFERENCES
-from activesteer.studies.paper.population import STUDY, population
-from activesteer.studies.paper.population_store import store_population
+from activesteer.studies.paper.comparison_population import comparison_text
+from activesteer.studies.paper.comparison_targets import REFERENCES
+from activesteer.studies.paper.population import population
+from activesteer.studies.paper.population_store import store_population, store_summary
+from activesteer.studies.paper.population_studies import STUDY
+from activesteer.theory.proportions import percent
 
 DOCS: Final = Path(__file__).resolve().parent.parent / "docs"
 PAGE: Final = DOCS / "population.md"
@@ -91,7 +91,7 @@ def page(found: Population) -> str:
     return head + "\n".join(_claims(found)) + "\n" + _SYSTEMS + "\n".join(_systems(found)) + "\n"
 
 
-def comparison_page(text: str, found: ComparisonPopulation | None) -> str:
+def comparison_page(text: str, found: Population | None) -> str:
     """Return the page on chassis control with the table of a comparison in its place.
 
     Args:
@@ -104,8 +104,8 @@ def comparison_page(text: str, found: ComparisonPopulation | None) -> str:
     return f"{before}{BEGIN}" + "\n".join(lines if found is None else _comparison(found)) + f"\n{END}{after}"
 
 
-def _comparison(found: ComparisonPopulation) -> list[str]:
-    names = [name for name in found.controllers if name != NONE]
+def _comparison(found: Population) -> list[str]:
+    names = found.controllers
     versions = ", ".join(f"{name} {version}" for name, version in found.versions.items())
     lines = [
         f"{found.samples} samples of the {found.vehicle}, seed {found.seed}; driven with {versions}.",
@@ -113,8 +113,8 @@ def _comparison(found: ComparisonPopulation) -> list[str]:
         _row(f"peak of the sideslip below the lowest of {', '.join(REFERENCES)}", [f"`{name}`" for name in names]),
         "|---|" + "---|" * len(names),
     ]
-    for scenario in dict.fromkeys(effect.scenario for effect in found.effects):
-        own = [effect for effect in found.effects if effect.scenario == scenario]
+    for scenario in dict.fromkeys(effect.scenario for effect in found.systems):
+        own = [effect for effect in found.systems if effect.scenario == scenario]
         lines.append(_row(scenario.replace("_", " "), [str(effect.lower) for effect in own]))
     totals = [found.total(name) for name in names]
     lines.append(_row("**all scenarios**", [str(total.lower) for total in totals]))
@@ -140,8 +140,9 @@ def _claims(found: Population) -> list[str]:
 
 def _systems(found: Population) -> list[str]:
     return [
-        f"| {effect.scenario} | {effect.controller} | {effect.lost_without} | {effect.saved} | {effect.fine_without} | "
-        f"{effect.spoiled} | {effect.spun_without}, {effect.spun} | {'; '.join(map(_change, effect.changes))} |"
+        f"| {effect.scenario} | {effect.controller} | {effect.saved.number} | {effect.saved.count} | "
+        f"{effect.spoiled.number} | {effect.spoiled.count} | {effect.spun_without}, {effect.spun} | "
+        f"{'; '.join(map(_change, effect.changes))} |"
         for effect in found.systems
     ]
 
@@ -167,15 +168,16 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, metavar="N")
     options = parser.parse_args()
     output = options.output or Path("build", "comparison" if options.comparison else "population")
-    drive = partial(compare_population, COMPARED) if options.comparison else population
     with RunCounter("population", quiet=False) as counter:
-        found = drive(options.samples, output=output, jobs=options.jobs, progress=counter)
-    print(found.to_text())
-    if isinstance(found, ComparisonPopulation):
-        print(store_comparison(found))
+        controllers = COMPARED if options.comparison else None
+        found = population(options.samples, controllers, output=output, jobs=options.jobs, progress=counter)
+    if options.comparison:
+        print(comparison_text(found))
+        print(store_summary(found, "comparison"))
         text = CHASSIS_CONTROL.read_text(encoding="utf-8")
         CHASSIS_CONTROL.write_text(comparison_page(text, found), encoding="utf-8")
         return
+    print(found.to_text())
     for path in store_population(found, output):
         print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")
     PAGE.write_text(page(found), encoding="utf-8")

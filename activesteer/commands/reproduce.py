@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import functools
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -152,16 +151,16 @@ def _report(result: Reproduction, folder: Path) -> Path | None:
 
 
 def _population(options: argparse.Namespace) -> int:
-    from activesteer.studies.paper.comparison_population import compare_population
-    from activesteer.studies.paper.comparison_shares import ComparisonPopulation
+    from activesteer.studies.paper.comparison_population import comparison_json, comparison_text
     from activesteer.studies.paper.population import population
 
     if options.figures and options.controllers is None:
         raise ParameterError("--figures draws the nominal runs; leave out --population")
-    drive = population if options.controllers is None else functools.partial(compare_population, _controllers(options))
+    controllers = None if options.controllers is None else _controllers(options)
     with RunCounter("population", quiet=options.json) as counter:
-        found = drive(
+        found = population(
             options.population,
+            controllers,
             seed=options.seed,
             vehicle=options.vehicle,
             output=options.output,
@@ -169,8 +168,8 @@ def _population(options: argparse.Namespace) -> int:
             scheduler=options.scheduler,
             progress=counter,
         )
-    table, figures = found.to_json(), []
-    if options.figures and isinstance(found, ComparisonPopulation):
+    table, figures = found.to_json() if controllers is None else comparison_json(found), []
+    if options.figures:
         from activesteer.studies.paper.comparison_figure import draw_comparison_population
 
         figures = [draw_comparison_population(found, options.output / "comparison_population.png")]
@@ -178,7 +177,7 @@ def _population(options: argparse.Namespace) -> int:
     if options.json:
         print_json(table)
         return 0
-    print_wrapped(found.to_text())
+    print_wrapped(found.to_text() if controllers is None else comparison_text(found))
     for path in figures:
         print(f"figure: {path}")
     return 0

@@ -1,7 +1,7 @@
-"""Shares of a population of cars, roads and drivers in which the claims hold, and effects of the systems in it.
+"""Results of a population of cars, roads and drivers: proportions in which claims hold, and effects of controllers.
 
-`studies.paper.population` drives it. The result of the package's own population is stored with it, so that a nominal
-verdict can be read beside its share.
+`studies.paper.population` drives it. The package stores the results of its own populations; a nominal verdict
+is printed beside the proportion.
 """
 
 from __future__ import annotations
@@ -9,23 +9,25 @@ from __future__ import annotations
 import functools
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Final
 
 from activesteer.errors import StudyError
-from activesteer.files import reading
+from activesteer.files import finite, reading
 from activesteer.metric_table import metric
 from activesteer.resources import studies_dir
-from activesteer.theory.shares import ShareVerdict, share_verdict
+from activesteer.theory.proportions import Proportion, ProportionVerdict, percent, proportion_verdict
 
 NONE: Final = "none"
 """Name in place of a factor if no factor is significant."""
+TOTAL: Final = "all scenarios"
+SUMMARY: Final = "summary.json"
 
 
 @dataclass(frozen=True)
-class ClaimShare:
-    """Share of a population in which a claim holds.
+class ClaimProportion:
+    """Proportion of a population in which a claim holds.
 
     Attributes:
         id: Number of the claim.
@@ -53,9 +55,9 @@ class ClaimShare:
     at: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def verdict(self) -> ShareVerdict:
+    def verdict(self) -> ProportionVerdict:
         """Verdict of the interval."""
-        return share_verdict(self.low, self.high)
+        return proportion_verdict(self.low, self.high)
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values."""
@@ -93,29 +95,54 @@ class Change:
 
 @dataclass(frozen=True)
 class SystemEffect:
-    """Effects of a system in a scenario.
+    """Effect of a controller in a scenario, relative to the same samples without control.
+
+    `loss_of_control.is_lost` decides whether a car is lost.
 
     Attributes:
-        controller: The system.
+        controller: The controller.
         scenario: The manoeuvre.
-        lost_without: Number of samples in which the car without control is lost; see `loss_of_control.is_lost`.
-        saved: Number of these samples in which the car with the system is not lost.
-        fine_without: Number of samples in which the car without control is not lost.
-        spoiled: Number of these samples in which the car with the system is lost.
-        spun_without: Number of samples in which the car without control spins; the other lost cars leave the course.
-        spun: Number of samples in which the car with the system spins.
+        saved: Samples in which the car is not lost, of those in which it is lost without control.
+        spoiled: Samples in which the car is lost, of those in which it is not lost without control.
         changes: Peak of the sideslip, remaining oscillation, steering effort, if the manoeuvre has them.
+        spun_without: Number of samples in which the car without control spins; the other lost cars leave the course.
+            None if it is not stored.
+        spun: Number of samples in which the car with the controller spins; None if it is not stored.
+        lower: Samples with a lower peak sideslip angle than the lowest of the reference controllers; no samples if the
+            controller is not compared with them.
     """
 
     controller: str
     scenario: str
-    lost_without: int
-    saved: int
-    fine_without: int
-    spoiled: int
-    spun_without: int
-    spun: int
-    changes: tuple[Change, ...]
+    saved: Proportion
+    spoiled: Proportion
+    changes: tuple[Change, ...] = ()
+    spun_without: int | None = None
+    spun: int | None = None
+    lower: Proportion = Proportion()
+
+    def median_change(self, metrics: Sequence[str]) -> float:
+        """Return the median change of the first metric that the scenario has; nan if it has none of them."""
+        medians = {change.metric: change.median for change in self.changes}
+        return next((medians[name] for name in metrics if name in medians), math.nan)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values."""
+        return finite({**asdict(self), **{name: getattr(self, name).to_json() for name in _PROPORTIONS}})
+
+    @classmethod
+    def from_json(cls, table: dict[str, Any]) -> SystemEffect:
+        """Return the effect that `to_json` described."""
+        read: dict[str, Any] = {name: Proportion(table[name]["count"], table[name]["number"]) for name in _PROPORTIONS}
+        nan: dict[str, Any] = dict.fromkeys(("low", "median", "high"), math.nan)
+        read["changes"] = tuple(
+            Change(**nan | {key: value for key, value in change.items() if value is not None})
+            for change in table["changes"]
+        )
+        return cls(**table | read)
+
+
+_PROPORTIONS: Final = ("saved", "spoiled", "lower")
 
 
 @dataclass(frozen=True)
@@ -127,24 +154,44 @@ class Population:
         seed: Seed of the samples.
         vehicle: The car that the samples are variations of.
         versions: Versions of the program and its libraries.
-        claims: In the order of the paper.
-        systems: Scenario by scenario.
+        claims: In the order of the paper; none for a comparison of controllers.
+        systems: Effects, scenario by scenario, in the order of the controllers.
+        failed: Number of incomplete runs; each counts as lost.
+        table: Median of every metric over the samples: `scenario`, `controller`, `metric`, `value`. Empty for a
+            population with claims, and not stored.
     """
 
     samples: int
     seed: int
     vehicle: str
     versions: Mapping[str, str]
-    claims: tuple[ClaimShare, ...]
+    claims: tuple[ClaimProportion, ...]
     systems: tuple[SystemEffect, ...]
+    failed: int = 0
+    table: tuple[Mapping[str, Any], ...] = ()
 
-    def of(self, claim: str) -> ClaimShare | None:
-        """Return the share of a claim; None for an unknown claim."""
-        return next((share for share in self.claims if share.id == claim), None)
+    def of(self, claim: str) -> ClaimProportion | None:
+        """Return the proportion of a claim; None for an unknown claim."""
+        return next((proportion for proportion in self.claims if proportion.id == claim), None)
+
+    @property
+    def controllers(self) -> list[str]:
+        """Controllers that have effects, in their order."""
+        return list(dict.fromkeys(effect.controller for effect in self.systems))
+
+    def total(self, controller: str) -> SystemEffect:
+        """Return the effect of a controller in all scenarios together, without changes."""
+        own = [effect for effect in self.systems if effect.controller == controller]
+        saved, spoiled, lower = (sum((getattr(effect, name) for effect in own), Proportion()) for name in _PROPORTIONS)
+        return SystemEffect(controller, TOTAL, saved, spoiled, lower=lower)
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values."""
-        return {**asdict(self), "claims": [claim.to_json() for claim in self.claims]}
+        return {
+            **asdict(self),
+            "claims": [claim.to_json() for claim in self.claims],
+            "systems": [effect.to_json() for effect in self.systems],
+        }
 
     @classmethod
     def from_json(cls, table: Mapping[str, Any]) -> Population:
@@ -154,17 +201,20 @@ class Population:
             StudyError: the table is damaged.
         """
         try:
-            claims = [ClaimShare(**{key: claim[key] for key in claim if key != "verdict"}) for claim in table["claims"]]
-            systems = [
-                SystemEffect(**{**effect, "changes": tuple(Change(**change) for change in effect["changes"])})
-                for effect in table["systems"]
-            ]
-            return cls(**{**table, "claims": tuple(claims), "systems": tuple(systems)})
-        except (KeyError, TypeError) as reason:
+            claims = (
+                ClaimProportion(**{key: claim[key] for key in claim if key != "verdict"}) for claim in table["claims"]
+            )
+            read = {
+                "claims": tuple(claims),
+                "systems": tuple(SystemEffect.from_json(effect) for effect in table["systems"]),
+                "table": tuple(table["table"]),
+            }
+            return cls(**{field.name: read.get(field.name, table[field.name]) for field in fields(cls)})
+        except (KeyError, TypeError, AttributeError) as reason:
             raise StudyError(f"the stored population is damaged: {reason}") from reason
 
     def to_text(self) -> str:
-        """Return shares and effects for a terminal, in degrees."""
+        """Return proportions and effects for a terminal, in degrees."""
         return "\n".join(
             [f"{self.samples} samples of {self.vehicle}, seed {self.seed}", "", *self._claim_lines(), "",
              *self._system_lines()]
@@ -184,9 +234,9 @@ class Population:
         lines = []
         for effect in self.systems:
             lines.append(
-                f"{effect.scenario}, {effect.controller}: saves {effect.saved} of the {effect.lost_without} that are "
-                f"lost without it ({effect.spun_without} spin, with it {effect.spun}), spoils {effect.spoiled} of the "
-                f"{effect.fine_without} that are not"
+                f"{effect.scenario}, {effect.controller}: saves {effect.saved.count} of the {effect.saved.number} "
+                f"that are lost without it ({effect.spun_without} spin, with it {effect.spun}), spoils "
+                f"{effect.spoiled.count} of the {effect.spoiled.number} that are not"
             )
             for change in effect.changes:
                 shown = metric(change.metric)
@@ -196,12 +246,22 @@ class Population:
         return lines
 
 
-def percent(share: float) -> str:
-    """Write a share in whole percent; within one percent of 0 or 100 with the digit that differs from them."""
-    value = 100.0 * share
-    beyond = float(f"{min(value, 100.0 - value):.1g}")
-    decimals = max(0, -math.floor(math.log10(beyond))) if beyond > 0.0 else 0
-    return f"{value:.{decimals}f}"
+def read_population(name: str) -> Population | None:
+    """Return the results that the package stores of a study; None if it stores none.
+
+    Args:
+        name: Folder of the results, in the folder of the study files: `population`, or `comparison` for the comparison
+            of controllers.
+
+    Raises:
+        StudyError: the file cannot be read.
+    """
+    path = studies_dir() / name / SUMMARY
+    if not path.is_file():
+        return None
+    with reading(path, StudyError):
+        text = path.read_text(encoding="utf-8")
+    return Population.from_json(json.loads(text))
 
 
 @functools.cache
@@ -217,10 +277,5 @@ def stored_population(vehicle: str) -> Population | None:
     Raises:
         StudyError: the file cannot be read.
     """
-    path = studies_dir() / "population" / "summary.json"
-    if not path.is_file():
-        return None
-    with reading(path, StudyError):
-        text = path.read_text(encoding="utf-8")
-    found = Population.from_json(json.loads(text))
-    return found if found.vehicle == vehicle else None
+    found = read_population("population")
+    return found if found is not None and found.vehicle == vehicle else None

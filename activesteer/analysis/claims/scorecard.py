@@ -11,12 +11,12 @@ from importlib.resources import files
 from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims.claim import SYSTEMS, Claim
-from activesteer.analysis.claims.population import ClaimShare, Population, percent, stored_population
+from activesteer.analysis.claims.population import ClaimProportion, Population, stored_population
 from activesteer.analysis.claims.scenarios import STATEMENTS
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.files import finite
 from activesteer.metric_table import recorded_metric
-from activesteer.theory.shares import ShareVerdict
+from activesteer.theory.proportions import ProportionVerdict, percent
 
 FILE: Final = "not_reproduced.toml"
 
@@ -45,7 +45,7 @@ class Judged(NamedTuple):
     claim: Claim
     verdict: Verdict
     reason: str
-    share: ClaimShare | None = None
+    share: ClaimProportion | None = None
 
 
 @dataclass(frozen=True)
@@ -111,16 +111,16 @@ class Scorecard:
             lines += [f"{'':2}{verdict.value:<13}  {names}" for verdict, names in self.by_share().items()]
         return "\n".join(lines)
 
-    def by_share(self) -> dict[ShareVerdict, str]:
+    def by_share(self) -> dict[ProportionVerdict, str]:
         """Return the numbers of the claims by verdict of the population, with the factor of the largest influence."""
         shares = [item.share for item in self.judged if item.share is not None]
         return {
             verdict: ", ".join(
-                f"{share.id} ({share.depends_on})" if verdict is ShareVerdict.DEPENDS else share.id
+                f"{share.id} ({share.depends_on})" if verdict is ProportionVerdict.DEPENDS else share.id
                 for share in shares
                 if share.verdict is verdict
             )
-            for verdict in ShareVerdict
+            for verdict in ProportionVerdict
             if any(share.verdict is verdict for share in shares)
         }
 

@@ -8,7 +8,6 @@ from datetime import date
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from activesteer.analysis.claims.population import percent
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict, number_lines
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import Group, entry, groups_of
@@ -29,6 +28,7 @@ from activesteer.errors import ParameterError
 from activesteer.files import write_text
 from activesteer.pages import render
 from activesteer.recording import Recording
+from activesteer.theory.proportions import percent
 
 TITLE: Final = "activesteer report"
 _VERDICT_CLASS: Final = {

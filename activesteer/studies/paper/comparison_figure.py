@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from activesteer.analysis.claims.population import percent
+from activesteer.analysis.claims.population import Population
 from activesteer.analysis.report.significance import Change, significance
 from activesteer.metric_table import metric as declared
 from activesteer.plotting import Heat, Picture, draw, save
 from activesteer.studies.paper.comparison import Comparison
-from activesteer.studies.paper.comparison_shares import ComparisonPopulation
 from activesteer.studies.paper.comparison_targets import REFERENCES, short
+from activesteer.theory.proportions import percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,7 +84,7 @@ def _legend(better: str, worse: str, neutral: str) -> list[tuple[str, str]]:
     return [(better, _BETTER), (worse, _WORSE), (neutral, _NEUTRAL)]
 
 
-def draw_comparison_population(made: ComparisonPopulation, path: Path) -> Path:
+def draw_comparison_population(made: Population, path: Path) -> Path:
     """Draw a comparison over a population and return its file.
 
     Raises:
@@ -93,15 +93,15 @@ def draw_comparison_population(made: ComparisonPopulation, path: Path) -> Path:
     return save(comparison_population_figure(made), path)
 
 
-def comparison_population_figure(made: ComparisonPopulation) -> Figure:
+def comparison_population_figure(made: Population) -> Figure:
     """Return the figure that `draw_comparison_population` writes: shares in percent by scenario and controller."""
-    names = list(dict.fromkeys(effect.controller for effect in made.effects))
-    scenarios = list(dict.fromkeys(effect.scenario for effect in made.effects))
+    names = list(dict.fromkeys(effect.controller for effect in made.systems))
+    scenarios = list(dict.fromkeys(effect.scenario for effect in made.systems))
     panels = []
     for key, (title, none, every) in _SHARES.items():
         shares = np.full((len(scenarios), len(names)), math.nan)
-        for effect in made.effects:
-            shares[scenarios.index(effect.scenario), names.index(effect.controller)] = getattr(effect, key).share
+        for effect in made.systems:
+            shares[scenarios.index(effect.scenario), names.index(effect.controller)] = getattr(effect, key).value
         texts = [["-" if math.isnan(share) else percent(share) for share in row] for row in shares.tolist()]
         rows = [name.replace("_", " ") if not panels else "" for name in scenarios]
         panels.append(Heat(none + (every - none) * shares, texts, names, rows, (-1.0, 1.0), _COLOURS, title))

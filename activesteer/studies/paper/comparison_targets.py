@@ -14,9 +14,9 @@ from activesteer.metric_table import metric
 NONE: Final = "none"
 REFERENCES: Final = ("ars", "afs", "esc")
 """Reference controllers: the paper's two systems, and the system that the law requires."""
-LOWER_SHARE: Final = 0.8
+LOWER_PROPORTION: Final = 0.8
 """Smallest proportion of a population with a lower peak sideslip angle than the lowest of `REFERENCES`."""
-SPOILED_SHARE: Final = 0.01
+SPOILED_PROPORTION: Final = 0.01
 """Largest proportion of runs that are lost with a controller, of those that are not lost without control."""
 
 

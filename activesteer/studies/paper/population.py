@@ -1,34 +1,38 @@
-"""The paper's claims over a population of cars, roads and drivers: proportions, and effects of the systems.
+"""Claims and controllers over a population of cars, roads and drivers: proportions, and effects of the controllers.
 
-The study `population` is paired: the three systems meet the same samples. `population` drives the runs, `summarise`
-counts their results.
+The studies are paired: all controllers meet the same samples. `population` drives the runs, `summarise` counts their
+results.
 """
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
 
-from activesteer.analysis.claims import SYSTEMS, Claim
-from activesteer.analysis.claims.population import NONE, Change, ClaimShare, Population, SystemEffect
+from activesteer.analysis.claims import Claim
+from activesteer.analysis.claims.population import NONE, Change, ClaimProportion, Population, SystemEffect
 from activesteer.analysis.loss_of_control import has_spun, is_lost
 from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.dependence import strongest
+from activesteer.studies.engine.factor_values import label_of
 from activesteer.studies.engine.factors import Factor
+from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
 from activesteer.studies.engine.run_identity import versions
-from activesteer.studies.engine.run_task import CLAIM, CURVE
+from activesteer.studies.engine.run_task import CLAIM, CURVE, Row
 from activesteer.studies.engine.study import StudyProgress, study
-from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.studies.engine.study_file import StudyFile
+from activesteer.studies.paper.comparison_targets import NONE as NO_CONTROL
+from activesteer.studies.paper.comparison_targets import REFERENCES, asked
+from activesteer.studies.paper.population_studies import comparison_study, population_study
 from activesteer.studies.paper.reproduction import nominal_claims
-from activesteer.theory.shares import wilson_interval
+from activesteer.theory.proportions import Proportion
 
-STUDY: Final = "population"
-"""Name of the study file."""
 STEERING_EFFORT: Final = "steering_wheel_rms_rad"
 CHANGES: Final = (
     *SIDESLIP_PEAKS,
@@ -40,31 +44,9 @@ CHANGES: Final = (
 _RANGE: Final = (0.05, 0.5, 0.95)
 
 
-def population_study(
-    samples: int | None = None, seed: int | None = None, vehicle: FileOrTable | None = None
-) -> StudyFile:
-    """Return the study to drive.
-
-    Args:
-        samples: Number of samples; default: that of the file.
-        seed: Seed of the sample; default: that of the file.
-        vehicle: Name, path or table of a vehicle; default: that of the file.
-
-    Raises:
-        ActiveSteerError: an input is wrong.
-    """
-    table = read_study(STUDY).to_table()
-    if samples is not None:
-        table["design"]["samples"] = samples
-    if seed is not None:
-        table["seed"] = seed
-    if vehicle is not None:
-        table["vehicles"] = [vehicle]
-    return read_study(table)
-
-
 def population(
     samples: int | None = None,
+    controllers: Sequence[str] | None = None,
     *,
     seed: int | None = None,
     vehicle: FileOrTable | None = None,
@@ -73,10 +55,13 @@ def population(
     scheduler: str | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> Population:
-    """Check the paper's claims over a population; see `study` for the arguments that are not listed.
+    """Check the paper's claims over a population, or compare controllers.
+
+    See `study` for the arguments that are not listed.
 
     Args:
         samples: Number of samples; 15 runs each.
+        controllers: Controllers to compare, see `comparison_study`; default: the claims of the paper's systems.
         seed: Seed of the sample.
         vehicle: The car of which the samples are variations.
         output: Folder of the study; a study found there is resumed. Without a folder, nothing is stored.
@@ -90,109 +75,124 @@ def population(
     Raises:
         ActiveSteerError: an input is wrong, or the folder holds another study.
     """
-    planned = population_study(samples, seed, vehicle)
+    if controllers is None:
+        planned = population_study(samples, seed, vehicle)
+    else:
+        planned = comparison_study(controllers, samples, seed, vehicle)
     table = study(planned, output=output, jobs=jobs, scheduler=scheduler, progress=progress)
-    return summarise(table, planned, nominal_claims(planned.vehicles[0], jobs=jobs))
+    return summarise(table, planned, nominal_claims(planned.vehicles[0], jobs=jobs) if planned.claims else ())
 
 
-def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim]) -> Population:
+def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()) -> Population:
     """Count the results of a population's runs.
 
     Args:
         table: The study's table, or as much of it as there is.
         planned: The study.
-        nominal: The claims of the nominal runs.
+        nominal: The claims of the nominal runs; none for a comparison.
 
     Returns:
         Proportions, in the order of the nominal claims, and effects.
     """
     rows = table.select([name for name in table.column_names if not name.startswith(CURVE)]).to_pylist()
-    first = [row for row in rows if row["controller"] == planned.controllers[0]]
+    names = [label_of(controller) for controller in planned.controllers]
+    without = [row for row in rows if row["controller"] == NO_CONTROL]
     return Population(
         samples=len({row["sample"] for row in rows}),
         seed=planned.seed,
-        vehicle=rows[0]["vehicle"] if rows else "",
+        vehicle=label_of(planned.vehicles[0]),
         versions=versions(),
-        claims=tuple(_share(claim.id, claim.passed, first, planned.factors) for claim in nominal),
-        systems=tuple(effects(rows, *SYSTEMS)),
+        claims=tuple(_proportion(claim.id, claim.passed, without, planned.factors) for claim in nominal),
+        systems=tuple(_effects(rows, [name for name in names if name != NO_CONTROL])),
+        failed=sum(row["status"] != "ok" for row in rows),
+        table=() if planned.claims else tuple(_medians(rows, planned)),
     )
 
 
-def _share(name: str, passed: bool, rows: Sequence[Mapping[str, Any]], factors: Sequence[Factor]) -> ClaimShare:
+def _proportion(name: str, passed: bool, rows: Sequence[Row], factors: Sequence[Factor]) -> ClaimProportion:
     column = f"{CLAIM}{name}"
     judged = [row for row in rows if row.get(column) is not None]
     held = [row[column] == 1.0 for row in judged]
-    low, high = wilson_interval(sum(held), len(held))
     varied = [
         factor
         for factor in factors
         if judged and not factor.when and (not factor.maneuvers or judged[0]["maneuver"] in factor.maneuvers)
     ]
-    at = {
-        f"{factor.key} = {value}": _fraction(
-            [one for row, one in zip(judged, held, strict=True) if row[factor.key] == value]
-        )
-        for factor in varied
-        for value in factor.values
-    }
+    at: dict[str, float] = {}
+    for factor in varied:
+        for value in factor.values:
+            chosen = [one for row, one in zip(judged, held, strict=True) if row[factor.key] == value]
+            at[f"{factor.key} = {value}"] = _count(chosen).value
     # A choice of two counts as 0 and 1.
     found = strongest({factor.key: _numbers(factor, judged) for factor in varied}, held)
     depends = (NONE, 0.0, 0) if found is None else found
-    return ClaimShare(name, passed, len(held), _fraction(held), low, high, *depends, at)
+    proportion = _count(held)
+    return ClaimProportion(name, passed, len(held), proportion.value, *proportion.interval, *depends, at)
 
 
-def _numbers(factor: Factor, rows: Sequence[Mapping[str, Any]]) -> list[float]:
+def _numbers(factor: Factor, rows: Sequence[Row]) -> list[float]:
     values = [row[factor.key] for row in rows]
     return [factor.values.index(value) for value in values] if factor.values else values
 
 
-def _fraction(held: Sequence[bool]) -> float:
-    return sum(held) / len(held) if held else float("nan")
-
-
-def effects(rows: Sequence[Mapping[str, Any]], without: str, *systems: str) -> list[SystemEffect]:
-    """Return the effect of each system in each scenario, relative to the same samples without it.
-
-    Args:
-        rows: Rows of a paired study's table.
-        without: Controller with which the others are compared.
-        systems: The others.
-    """
-    found = []
+def _effects(rows: Sequence[Row], systems: Sequence[str]) -> Iterator[SystemEffect]:
+    """Yield the effect of each system in each scenario, relative to the same samples without control."""
     for scenario in dict.fromkeys(row["maneuver"] for row in rows):
         driven = [row for row in rows if row["maneuver"] == scenario]
-        by_system = {
-            system: {row["sample"]: row for row in driven if row["controller"] == system}
-            for system in (without, *systems)
-        }
         has = [name for name in driven[0] if any(row[name] is not None for row in driven)]
-        metrics = [name for name in CHANGES if name in has]
+        runs = {(row["controller"], row["sample"]): {name: row[name] for name in has} for row in driven}
+        samples = dict.fromkeys(row["sample"] for row in driven)
         for system in systems:
             both = [
-                (row, by_system[system][sample])
-                for sample, row in by_system[without].items()
-                if sample in by_system[system]
+                (runs[NO_CONTROL, sample], runs[system, sample])
+                for sample in samples
+                if (NO_CONTROL, sample) in runs and (system, sample) in runs
             ]
-            lost = [tuple(is_lost({name: row[name] for name in has}) for row in pair) for pair in both]
-            found.append(
-                SystemEffect(
-                    controller=system,
-                    scenario=scenario,
-                    lost_without=sum(a for a, _ in lost),
-                    saved=sum(a and not b for a, b in lost),
-                    fine_without=sum(not a for a, _ in lost),
-                    spoiled=sum(b and not a for a, b in lost),
-                    spun_without=sum(has_spun(row) for row, _ in both),
-                    spun=sum(has_spun(row) for _, row in both),
-                    changes=tuple(_change(name, both) for name in metrics),
-                )
+            lost = [(is_lost(without), is_lost(row)) for without, row in both]
+            lowest = [_has_lowest_peak(runs, system, sample) for sample in samples if (system, sample) in runs]
+            yield SystemEffect(
+                system,
+                scenario,
+                saved=_count(not after for before, after in lost if before),
+                spoiled=_count(after for before, after in lost if not before),
+                changes=tuple(_change(name, both) for name in CHANGES if name in has),
+                spun_without=sum(has_spun(row) for row, _ in both),
+                spun=sum(has_spun(row) for _, row in both),
+                lower=_count(lowest if asked([system]) else ()),
             )
-    return found
 
 
-def _change(metric: str, both: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> Change:
+def _count(held: Iterable[bool]) -> Proportion:
+    judged = list(held)
+    return Proportion(sum(judged), len(judged))
+
+
+def _has_lowest_peak(runs: Mapping[tuple[str, int], Row], system: str, sample: int) -> bool:
+    """Return whether the peak sideslip angle is below that of every reference; a run without a peak has the largest."""
+
+    def peak(controller: str) -> float:
+        row = runs.get((controller, sample), {})
+        return next((abs(row[name]) for name in SIDESLIP_PEAKS if row.get(name) is not None), math.inf)
+
+    return peak(system) < min(peak(name) for name in REFERENCES)
+
+
+def _change(metric: str, both: Sequence[tuple[Row, Row]]) -> Change:
     pairs = np.array([[row[metric] for row in pair] for pair in both], dtype=np.float64)
     change = np.diff(np.abs(pairs), axis=1)[:, 0]
     change = change[np.isfinite(change)]
     low, median, high = np.quantile(change, _RANGE).tolist() if len(change) else [float("nan")] * 3
     return Change(metric, len(change), low, median, high)
+
+
+def _medians(rows: Sequence[Row], planned: StudyFile) -> Iterator[dict[str, Any]]:
+    about = {*IDENTITY, *OUTCOME, *planned.keys}
+    metrics = [name for name in (rows[0] if rows else ()) if name not in about]
+    for scenario in dict.fromkeys(row["maneuver"] for row in rows):
+        for controller in dict.fromkeys(row["controller"] for row in rows):
+            own = [row for row in rows if row["maneuver"] == scenario and row["controller"] == controller]
+            for metric in metrics:
+                values = [row[metric] for row in own if row[metric] is not None and math.isfinite(row[metric])]
+                if values:
+                    median = float(np.median(values))
+                    yield {"scenario": scenario, "controller": controller, "metric": metric, "value": median}

@@ -1,6 +1,7 @@
-"""Store of a population in the package: its results, a row for every run, and the bands of its curves.
+"""Store of populations in the package: results, a row for every run, and the bands of the curves.
 
 studies/population/summary.json    proportions and effects, seed, versions
+studies/comparison/summary.json    the same of the comparison of controllers
 studies/population/runs.parquet    one row per run: claims and metrics; the factors follow from the seed
 studies/population/bands.parquet   10 to 90 % of the curves
 """
@@ -8,6 +9,7 @@ studies/population/bands.parquet   10 to 90 % of the curves
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -18,20 +20,37 @@ import pyarrow.parquet as pq
 
 from activesteer.analysis.bands import FILE as BANDS
 from activesteer.analysis.bands import TRACK, Band, band_of_tracks, band_over_time, table_of
-from activesteer.analysis.claims.population import Population
+from activesteer.analysis.claims.population import SUMMARY, Population, read_population
 from activesteer.conventions import CURVE_STEP_S
 from activesteer.errors import StudyError
 from activesteer.files import make_folder, replacing, write_text
 from activesteer.resources import studies_dir
 from activesteer.studies.engine.run_task import CLAIM, CURVE
 from activesteer.studies.engine.store import RESULTS
-from activesteer.studies.paper.population import STUDY, population_study
+from activesteer.studies.paper.population_studies import STUDY, population_study
 
-SUMMARY: Final = "summary.json"
 RUNS: Final = "runs.parquet"
 _EVERY: Final = 2
 """Interval of the stored values of a band, which is smoother than the curves."""
 _KEPT: Final = ("sample", "maneuver", "controller", "status")
+
+
+def store_summary(found: Population, name: str) -> Path:
+    """Store the results of a population or a comparison with the package, without the medians of all metrics.
+
+    Args:
+        found: The results.
+        name: Folder to write, in the folder of the study files; see `read_population`.
+
+    Returns:
+        The file.
+
+    Raises:
+        StudyError: the file cannot be written.
+    """
+    folder = make_folder(studies_dir() / name, StudyError)
+    text = json.dumps(replace(found, table=()).to_json(), indent=1)
+    return write_text(folder / SUMMARY, f"{text}\n", StudyError)
 
 
 def store_population(found: Population, study_folder: Path) -> list[Path]:
@@ -50,10 +69,10 @@ def store_population(found: Population, study_folder: Path) -> list[Path]:
     results = study_folder / RESULTS
     if not results.is_file():
         raise StudyError(f"{study_folder} holds no finished study; go on with it")
-    folder = make_folder(studies_dir() / STUDY, StudyError)
     table = pq.read_table(results)
     about = {b"vehicle": found.vehicle.encode()}
-    paths = [write_text(folder / SUMMARY, json.dumps(found.to_json(), indent=1) + "\n", StudyError)]
+    paths = [store_summary(found, STUDY)]
+    folder = paths[0].parent
     for name, kept in ((RUNS, _in_short(table)), (BANDS, table_of(_bands(table)))):
         with replacing(folder / name, StudyError) as path:
             pq.write_table(kept.replace_schema_metadata(about), path, compression="zstd", compression_level=19)
@@ -68,9 +87,9 @@ def stored_runs() -> pa.Table:
         StudyError: the package stores no population.
     """
     folder = studies_dir() / STUDY
-    if not (folder / RUNS).is_file():
+    summary = read_population(STUDY)
+    if summary is None or not (folder / RUNS).is_file():
         raise StudyError(f"{folder} holds no population; make one with tools/renew_population.py")
-    summary = Population.from_json(json.loads((folder / SUMMARY).read_text(encoding="utf-8")))
     table = pq.read_table(folder / RUNS)
     table = table.append_column("vehicle", pa.array([summary.vehicle] * len(table)))
     samples = population_study(summary.samples, summary.seed).samples()[0]

@@ -8,8 +8,9 @@ import math
 import pytest
 
 from activesteer.analysis.claims import Claim, Kind, Statement, Verdict, not_reproduced, scorecard
-from activesteer.analysis.claims.population import ClaimShare, Population, percent
+from activesteer.analysis.claims.population import ClaimProportion, Population
 from activesteer.errors import ParameterError
+from activesteer.theory.proportions import percent
 from tests.raising import raises
 
 
@@ -99,9 +100,9 @@ def test_a_wrong_list_is_refused(text, key):
 
 def test_the_share_of_the_population_stands_beside_the_nominal_verdict():
     shares = (
-        ClaimShare("S1", True, 100, 0.99, 0.95, 1.0),
-        ClaimShare("S2", True, 100, 0.5, 0.4, 0.6, "road.mu", 0.3, 1),
-        ClaimShare("D1", False, 100, 0.0, 0.0, 0.04),
+        ClaimProportion("S1", True, 100, 0.99, 0.95, 1.0),
+        ClaimProportion("S2", True, 100, 0.5, 0.4, 0.6, "road.mu", 0.3, 1),
+        ClaimProportion("D1", False, 100, 0.0, 0.0, 0.04),
     )
     population = Population(100, 1, "compact", {}, shares, ())
     claims = [claim("S1", True), claim("S2", True), claim("D1", False), claim("D2", True)]

@@ -10,21 +10,28 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
+from activesteer.analysis.claims.population import Population, SystemEffect
 from activesteer.cli import main
 from activesteer.errors import ParameterError, StudyError
+from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.paper import comparison_population as module
-from activesteer.studies.paper.comparison_population import SCENARIOS, comparison_study, summarise
-from activesteer.studies.paper.comparison_shares import ComparisonPopulation, Share
-from activesteer.studies.paper.population import population_study
+from activesteer.studies.paper import population as module
+from activesteer.studies.paper.comparison_population import (
+    comparison_json,
+    comparison_text,
+    population_targets,
+)
+from activesteer.studies.paper.population import STEERING_EFFORT, summarise
+from activesteer.studies.paper.population_studies import SCENARIOS, comparison_study, population_study
+from activesteer.theory.proportions import Proportion
 from tests.raising import raises
 
 NAMES = ("none", "ars", "afs", "esc", "lqr")
 SPIN_RAD = 1.0
 
 
-def made_up(**peaks: list[float | None]) -> ComparisonPopulation:
+def made_up(**peaks: list[float | None]) -> Population:
     """The peaks of the sideslip in samples of a sine with dwell [rad]; None where the run did not come to its end."""
     planned = comparison_study(tuple(peaks), 8)
     samples = planned.samples()[0]
@@ -39,6 +46,11 @@ def made_up(**peaks: list[float | None]) -> ComparisonPopulation:
     return summarise(pa.Table.from_pylist(rows), planned)
 
 
+def effect_of(found: Population, controller: str) -> SystemEffect:
+    [effect] = [effect for effect in found.systems if effect.controller == controller]
+    return effect
+
+
 def test_the_best_of_the_references_is_taken_sample_by_sample():
     found = made_up(
         none=[SPIN_RAD, SPIN_RAD, 0.1, 0.1],
@@ -47,41 +59,43 @@ def test_the_best_of_the_references_is_taken_sample_by_sample():
         esc=[0.30, 0.10, 0.05, 0.05],
         lqr=[0.09, 0.11, 0.05, SPIN_RAD],
     )
-    [lqr] = found.of("lqr")
-    assert lqr.lower == Share(1, 4)  # as low is not lower
-    assert lqr.saved == Share(2, 2)
-    assert lqr.spoiled == Share(1, 2)
-    assert found.of("ars")[0].lower == Share(0, 0)
-    assert lqr.sideslip_change_rad == pytest.approx((-0.89 - 0.05) / 2.0)
-    assert math.isnan(lqr.steering_change_rad)
-    assert [target.passed for target in found.targets] == [False, False]
+    lqr = effect_of(found, "lqr")
+    assert lqr.lower == Proportion(1, 4)  # as low is not lower
+    assert lqr.saved == Proportion(2, 2)
+    assert lqr.spoiled == Proportion(1, 2)
+    assert effect_of(found, "ars").lower == Proportion(0, 0)
+    assert lqr.median_change(SIDESLIP_PEAKS) == pytest.approx((-0.89 - 0.05) / 2.0)
+    assert math.isnan(lqr.median_change([STEERING_EFFORT]))
+    assert [target.passed for target in population_targets(found)] == [False, False]
 
 
 def test_a_run_that_did_not_end_is_lower_than_nothing_and_all_are_lower_than_it():
     found = made_up(none=[0.1, 0.1], ars=[None, 0.1], afs=[None, 0.1], esc=[None, 0.1], lqr=[5.0, None])
-    [lqr] = found.of("lqr")
-    assert lqr.lower == Share(1, 2)
-    assert lqr.spoiled == Share(2, 2)
+    lqr = effect_of(found, "lqr")
+    assert lqr.lower == Proportion(1, 2)
+    assert lqr.spoiled == Proportion(2, 2)
     assert found.failed == 4
 
 
 def test_shares_at_the_bounds_meet_the_targets():
     found = made_up(none=[0.3] * 5, ars=[0.2] * 5, afs=[0.2] * 5, esc=[0.2] * 5, lqr=[0.1, 0.1, 0.1, 0.1, 0.3])
-    assert [target.passed for target in found.targets] == [True, True]
-    assert "lqr  passed  peak of the sideslip below the lowest of ars, afs, esc in 80 % (38 to 96)" in found.to_text()
+    assert [target.passed for target in population_targets(found)] == [True, True]
+    assert "lqr  passed  peak of the sideslip below the lowest of ars, afs, esc in 80 % (38 to 96)" in comparison_text(
+        found
+    )
 
 
 def test_what_is_stored_is_what_was_found():
     found = made_up(none=[0.3], ars=[0.2], afs=[0.2], esc=[0.2], lqr=[0.1])
-    table = json.loads(json.dumps(found.to_json()))
-    again = ComparisonPopulation.from_json(table)
-    assert again.to_json() == found.to_json()
-    assert again.total("lqr").lower == Share(1, 1)
+    table = json.loads(json.dumps(comparison_json(found), allow_nan=False))
+    again = Population.from_json(table)
+    assert again == found
+    assert again.total("lqr").lower == Proportion(1, 1)
     assert {(row["scenario"], row["controller"], row["metric"]) for row in table["table"]} == {
         ("sine_with_dwell", name, "sideslip_peak_abs_rad") for name in NAMES
     }
     with raises(StudyError, cause=KeyError):
-        ComparisonPopulation.from_json({"controllers": []})
+        Population.from_json({"claims": []})
 
 
 def test_the_factors_are_those_of_the_population_without_gains_and_with_sensors_of_production_cars():

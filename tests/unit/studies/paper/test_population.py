@@ -11,15 +11,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from activesteer.analysis.claims import Claim
-from activesteer.analysis.claims.population import NONE, ClaimShare, Population
+from activesteer.analysis.claims.population import NONE, ClaimProportion, Population
 from activesteer.cli import main
 from activesteer.errors import StudyError
 from activesteer.metric_table import CONES_MISSED
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.paper.population import population_study, summarise
-from activesteer.theory.shares import ShareVerdict
+from activesteer.studies.paper.population import summarise
+from activesteer.studies.paper.population_studies import population_study
+from activesteer.theory.proportions import Proportion, ProportionVerdict
 from tests.raising import raises
 
 RESULTS = "results.parquet"
@@ -93,7 +94,8 @@ def made_up(planned: StudyFile, outcomes: dict[str, list[tuple[float | None, flo
             peak_rad, missed = values[sample]
             rows.append({
                 "run": len(rows), "sample": sample, "maneuver": "slalom", "vehicle": "compact", "controller": system,
-                **samples[sample], "sideslip_peak_abs_rad": peak_rad, CONES_MISSED: missed,
+                **samples[sample], "status": "failed" if peak_rad is None else "ok",
+                "sideslip_peak_abs_rad": peak_rad, CONES_MISSED: missed,
                 "claim_Z1": 1.0 if samples[sample]["speed_kmh"] > 1.0 else 0.0, "claim_Z2": 1.0,
                 "claim_Z3": 1.0 if samples[sample]["sensors.preset"] == "ideal" else 0.0,
             })  # fmt: skip
@@ -113,8 +115,10 @@ def test_saved_and_spoiled_are_counted_in_pairs() -> None:
     )
     found = summarise(table, planned, nominal(Z1=True, Z2=False))
     ars, afs = found.systems
-    assert (ars.lost_without, ars.saved, ars.fine_without, ars.spoiled) == (2, 1, 2, 0)
-    assert (afs.lost_without, afs.saved, afs.fine_without, afs.spoiled) == (2, 1, 2, 2)
+    assert (ars.saved, ars.spoiled) == (Proportion(1, 2), Proportion(0, 2))
+    assert (afs.saved, afs.spoiled) == (Proportion(1, 2), Proportion(2, 2))
+    assert ars.lower == Proportion(0, 0)
+    assert found.failed == 1
     assert (ars.spun_without, ars.spun, afs.spun) == (1, 0, 2)
     [change] = ars.changes
     assert (change.metric, change.number) == ("sideslip_peak_abs_rad", 4)
@@ -127,8 +131,8 @@ def test_the_factor_that_decides_is_named() -> None:
     planned = population_study(128)
     table = made_up(planned, dict.fromkeys(("none", "ars", "afs"), [(0.1, 0.0)] * 128))
     speed, always = summarise(table, planned, nominal(Z1=True, Z2=True)).claims
-    assert (speed.depends_on, speed.direction, speed.verdict) == ("speed_kmh", 1, ShareVerdict.DEPENDS)
-    assert (always.depends_on, always.verdict) == (NONE, ShareVerdict.HOLDS)
+    assert (speed.depends_on, speed.direction, speed.verdict) == ("speed_kmh", 1, ProportionVerdict.DEPENDS)
+    assert (always.depends_on, always.verdict) == (NONE, ProportionVerdict.HOLDS)
     assert speed.words == "with more speed_kmh"
 
 
@@ -152,7 +156,7 @@ def test_what_is_stored_is_what_was_found(serial: Path) -> None:
 
 def test_a_share_is_whole_only_where_it_is() -> None:
     for share, shown in ((1.0, " 100 %"), (0.999, " 99.9 %"), (0.001, " 0.1 %"), (0.0, " 0 %")):
-        claim = ClaimShare("S1", True, 1000, share, 0.0, 1.0)
+        claim = ClaimProportion("S1", True, 1000, share, 0.0, 1.0)
         assert shown in Population(1000, 1, "compact", {}, (claim,), ()).to_text()
 
 

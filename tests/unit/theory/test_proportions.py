@@ -1,4 +1,4 @@
-"""Confidence intervals of shares and the verdicts that they allow."""
+"""Confidence intervals of proportions and the verdicts that they allow."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 from scipy.stats import binomtest
 
 from activesteer.errors import ParameterError
-from activesteer.theory.shares import ShareVerdict, share_verdict, wilson_interval
+from activesteer.theory.proportions import ProportionVerdict, proportion_verdict, wilson_interval
 from tests.raising import raises
 
 
@@ -33,11 +33,11 @@ def test_interval_is_that_of_scipy(passed: int, number: int) -> None:
 
 def test_nothing_is_known_of_no_samples() -> None:
     assert wilson_interval(0, 0) == (0.0, 1.0)
-    assert share_verdict(*wilson_interval(0, 0)) is ShareVerdict.DEPENDS
+    assert proportion_verdict(*wilson_interval(0, 0)) is ProportionVerdict.DEPENDS
 
 
 @pytest.mark.parametrize(("passed", "number"), [(3, 2), (-1, 2)])
-def test_what_is_no_share_is_refused(passed: int, number: int) -> None:
+def test_what_is_no_proportion_is_refused(passed: int, number: int) -> None:
     with raises(ParameterError, value=(passed, number)):
         wilson_interval(passed, number)
 
@@ -46,15 +46,16 @@ def test_what_is_no_share_is_refused(passed: int, number: int) -> None:
     ("passed", "verdict"),
     # Of 500: 418 is the first whose lower end reaches 80 %, 82 the last whose upper end stays within 20 %.
     [
-        (500, ShareVerdict.HOLDS), (418, ShareVerdict.HOLDS), (417, ShareVerdict.DEPENDS), (250, ShareVerdict.DEPENDS),
-        (83, ShareVerdict.DEPENDS), (82, ShareVerdict.DOES_NOT_HOLD), (0, ShareVerdict.DOES_NOT_HOLD),
+        (500, ProportionVerdict.HOLDS), (418, ProportionVerdict.HOLDS), (417, ProportionVerdict.DEPENDS),
+        (250, ProportionVerdict.DEPENDS), (83, ProportionVerdict.DEPENDS), (82, ProportionVerdict.DOES_NOT_HOLD),
+        (0, ProportionVerdict.DOES_NOT_HOLD),
     ],
 )  # fmt: skip
-def test_verdict_is_given_where_chance_cannot_have_made_it(passed: int, verdict: ShareVerdict) -> None:
-    assert share_verdict(*wilson_interval(passed, 500)) is verdict
+def test_verdict_is_given_where_chance_cannot_have_made_it(passed: int, verdict: ProportionVerdict) -> None:
+    assert proportion_verdict(*wilson_interval(passed, 500)) is verdict
 
 
 def test_a_few_samples_allow_no_verdict() -> None:
     # 15 of 15 still leave a lower end of 79.6 %.
-    assert share_verdict(*wilson_interval(15, 15)) is ShareVerdict.DEPENDS
-    assert share_verdict(*wilson_interval(16, 16)) is ShareVerdict.HOLDS
+    assert proportion_verdict(*wilson_interval(15, 15)) is ProportionVerdict.DEPENDS
+    assert proportion_verdict(*wilson_interval(16, 16)) is ProportionVerdict.HOLDS
