@@ -89,7 +89,7 @@ def line(points: Sequence[tuple[float, float]]) -> Callable[[Array], Array]:
 
 
 def stations(shape: Shape) -> Array:
-    """Where the cross-sections are, x [m], from the nose to the tail."""
+    """Positions of the cross-sections, x [m], from the nose to the tail."""
     ends = [point[0] for point in shape.top] + [point[0] for point in shape.half_width]
     ends += [*shape.windscreen_m, *shape.rear_window_m, *np.ravel(shape.pillars_m)]
     for seam in shape.seams_m:
@@ -134,7 +134,7 @@ def sections(shape: Shape, x: Array) -> Array:
 
 
 def colours(shape: Shape, x: Array) -> NDArray[np.str_]:
-    """What each four-sided face of half the surface is, shape (stations - 1, points - 1)."""
+    """Material of each four-sided face of half the surface, shape (stations - 1, points - 1)."""
     middle = 0.5 * (x[1:] + x[:-1])[:, None]
     point = np.arange(SIDE + PILLAR + ROOF - 1)[None]
     found = np.full((len(middle), point.size), "paint", "U8")

@@ -279,7 +279,7 @@ def _comparison_population() -> dict[str, Figure]:
 
 
 def _envelope(name: str) -> Figure:
-    """Who gets through, with the typical driver."""
+    """Map of the runs that succeed, with the typical driver."""
     speeds_kmh, lines_m = ENVELOPES[name]
     return envelope_figure(envelope(name, SYSTEMS, speeds_kmh=speeds_kmh, lines_m=lines_m))
 

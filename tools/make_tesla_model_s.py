@@ -65,7 +65,7 @@ def main() -> None:
 
 
 def tell_controllers(file: Path) -> None:
-    """What controllers believe of the car: as driven, by the compact's rules (`models/vehicles/compact.toml`)."""
+    """Controllers' model of the car: as driven, by the compact's rules (`models/vehicles/compact.toml`)."""
     found = identify(NAME)
     write_single_track(file, found, "python tools/make_tesla_model_s.py", datetime.date.today().isoformat())
     text = file.read_text(encoding="utf-8")
@@ -133,7 +133,7 @@ def _starting(given: dict[str, Any], starts: tuple[str, ...]) -> dict[str, Any]:
 
 
 def write_tables(given: dict[str, Any], folder: Path) -> None:
-    """What the source gives of each axle, as a laboratory would."""
+    """Data that the source gives for each axle, in the form of a laboratory report."""
     for axle, end, track in (("front", "f", given["sF"]), ("rear", "r", given["sR"])):
         toe, toe0 = given[f"kin_toe_{end}"]
         camber, camber0 = given[f"kin_camb_{end}"]

@@ -144,7 +144,7 @@ class Mutant(NamedTuple):
 
 
 def _is_code(node: Any) -> bool:
-    """Whether a node belongs to code, not to a type, a decorator, an import or an error message."""
+    """Return whether a node belongs to code, not to a type, a decorator, an import or an error message."""
     child = node
     while (parent := child.parent) is not None:
         typed = parent.type in {"annassign", "tfpdef"} and child is parent.children[1]
@@ -158,7 +158,7 @@ def _is_code(node: Any) -> bool:
 
 
 def _is_weak(node: Any, operator: str) -> bool:
-    """Whether a number would change by less than 1 %, which no test should pin."""
+    """Return whether a number would change by less than 1 %, which no test should pin."""
     return operator == "NumberReplacer" and abs(ast.literal_eval(node.value)) >= 100
 
 
