@@ -1,4 +1,4 @@
-"""A test by a standard: drive and evaluate every controller, and write the result."""
+"""Test by a standard: drive and evaluate each controller, and write the result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A test as one HTML page with its pictures in it, made to be printed."""
+"""Printable HTML page of a test, with its pictures embedded."""
 
 from __future__ import annotations
 

@@ -118,8 +118,9 @@ def _reference_angle(ground: Ground) -> tuple[float, dict[str, list[float]]]:
     found = [math.degrees(abs(run.metric("steering_wheel_at_0_3g_rad"))) for run in runs]
     for run, angle in zip(runs, found, strict=True):
         if math.isnan(angle):
-            why = run.error or f"it stays below {FIT[1] * REFERENCE_MPS2:.3g} m/s2"
-            raise NoResult(f"is not found with {run.case['steer.rate_degps']:g} deg/s of the wheel: {why}", key="A")
+            why = run.error or f"the lateral acceleration stays below {FIT[1] * REFERENCE_MPS2:.3g} m/s2"
+            rate = f"{run.case['steer.rate_degps']:g} deg/s"
+            raise NoResult(f"cannot be determined from the slow ramp at {rate}: {why}", key="A")
     rounded = [round(angle, 1) for angle in found]
     sides = {side: rounded[RAMPS * number :][:RAMPS] for number, side in enumerate(signs)}
     return round(sum(rounded) / len(rounded), 1), sides
@@ -139,7 +140,7 @@ def _summary(series: list[dict[str, Any]], broken: list[list[str]]) -> str:
 def _table(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> Table:
     limits = zip(INSTANTS_S, RATIO_LIMITS, strict=True)
     columns = (
-        "first to the", "amplitude [A]", "amplitude [deg]",
+        "first direction", "amplitude [A]", "amplitude [deg]",
         *(f"yaw rate after {instant_s:.2f} s [%], at most {100.0 * limit:.0f}" for instant_s, limit in limits),
         f"displacement after {DISPLACEMENT_TIME_S:.2f} s [m], at least {least_m:.2f} from {DISPLACED_FROM:g} A on",
         "result",
@@ -183,7 +184,7 @@ def _pictures(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> 
     return [
         Picture("Yaw rate", [panel("yaw_rate_radps", "yaw rate [deg/s]", side) for side in SIDES], scale),
         Picture(
-            "Yaw rate after the completion of steer, of its first peak after the reversal; lateral displacement",
+            "Yaw rate after completion of steer, relative to its first peak after the reversal; lateral displacement",
             [
                 *(
                     over_amplitude(name, f"after {instant_s:.2f} s [%]", 100.0, limit)
@@ -203,23 +204,24 @@ STANDARD: Final = Standard(
         "requirements. Written from knowledge of the public text; the range of the regression is that of NHTSA TP-126."
     ),
     implemented=(
-        "Slowly increasing steer at 13.5 deg/s and 80 km/h, three left and three right, of the car as it is, with its "
+        "Slowly increasing steer at 13.5 deg/s and 80 km/h, three runs left and three right, of the car with its "
         "controller. A is the steering wheel angle at 0.3 g by linear regression from 0.1 to 0.375 g, to 0.1 deg.",
-        "Sine of 0.7 Hz with a dwell of 500 ms at the second peak, throttle released at 80 km/h when it begins, from "
-        "1.5 A in steps of 0.5 A to the greater of 6.5 A and 270 deg, at most 300 deg; left first and right first.",
+        "Sine of 0.7 Hz with a dwell of 500 ms at the second peak; the throttle is released at 80 km/h when it begins. "
+        "Amplitudes from 1.5 A in steps of 0.5 A to the greater of 6.5 A and 270 deg, at most 300 deg; left first and "
+        "right first.",
         "Steering wheel angle filtered at 10 Hz, yaw rate and lateral acceleration at 6 Hz, by 12-pole phaseless "
         "Butterworth filters, and zeroed over the second before the wheel turns at more than 75 deg/s for 200 ms.",
-        "Limits: yaw rate 1.00 and 1.75 s after completion of steer at most 35 and 20 % of its first peak after the "
-        "reversal, in magnitude; displacement 1.07 s after the beginning of steer, by integrating the lateral "
-        "acceleration twice, at least 1.83 m (1.52 m above 3500 kg) at 5 A and more.",
+        "Limits: 1.00 and 1.75 s after completion of steer, the yaw rate is at most 35 and 20 % of its first peak "
+        "after the reversal, in magnitude. The displacement 1.07 s after the beginning of steer, the double integral "
+        "of the lateral acceleration, is at least 1.83 m (1.52 m above 3500 kg) at 5 A and more.",
     ),
     left_out=(
-        "Whether the system is an electronic stability control by S5.1, how it detects malfunctions, telltales (S5.3).",
+        "Check of the system against the definition in S5.1, detection of malfunctions, telltales (S5.3).",
         "Brake and tyre conditioning (S7.4, S7.5): the model has no warm-up. Ambient conditions; outriggers.",
-        "With ideal sensors, the default, the three repetitions to a side are the same run.",
-        "The car is driven as in its file; driver and measuring equipment are loaded with --set load. keys. The "
-        "mass that decides on 1.83 or 1.52 m is the mass of the car as driven, not its gross vehicle weight rating.",
-        "Road: even, 0.9 times the friction of the tyre file, in place of a peak friction of 0.9 of a reference tyre.",
+        "With ideal sensors, the default, the three repetitions to each side are identical.",
+        "The car is driven as in its file; add driver and measuring equipment with --set load.* keys. The "
+        "choice between 1.83 and 1.52 m uses the mass of the car as driven, not its gross vehicle weight rating.",
+        "Road: even, 0.9 times the friction of the tyre file instead of a peak friction of 0.9 of a reference tyre.",
     ),
     examine=_examine,
 )

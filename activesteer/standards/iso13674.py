@@ -26,7 +26,7 @@ WEAVE_Hz: Final = 0.2
 """Frequency of the weave [Hz]."""
 PERIODS: Final = 6
 _DROPPED: Final = 2
-"""Number of periods, and number of those before the motion is periodic."""
+"""Number of periods, and number of initial periods that are not evaluated, because the motion is not yet periodic."""
 TRANSITION_DEGPS: Final = 5.0
 """Rate of the steering wheel in the transition test [deg/s]."""
 _CENTRE_MPS2: Final = 0.5
@@ -86,8 +86,8 @@ def _examine(ground: Ground) -> Findings:
     through = _through_centre(transition)
     lines = transition_lines(through)
     summary = (
-        f"weave: {loops[0]['gradient']:.3f} m/s² per deg of the steering wheel, the car lags "
-        f"{loops[0]['abscissa_dead_band']:.2f} deg behind it; transition: {lines[0]['slope']:.3f} m/s² per deg"
+        f"weave: {loops[0]['gradient']:.3f} m/s² per deg of the steering wheel, dead band "
+        f"{loops[0]['abscissa_dead_band']:.2f} deg; transition: {lines[0]['slope']:.3f} m/s² per deg"
     )
     tables = [
         Table(
@@ -137,8 +137,8 @@ def transition_lines(signals: Signals) -> list[dict[str, Any]]:
         signals: As for `weave_loops`, from one side through straight ahead to the other.
 
     Returns:
-        For each plot `abscissa`, `ordinate`, `slope`, and for the hand torque `intercept`: the beginning of the line
-        from 0.5 m/s² on, which is the friction of the steering.
+        For each plot `abscissa`, `ordinate` and `slope`. Plots of the hand torque also have `intercept`, the value at
+        zero of the line beyond 0.5 m/s², which is the friction of the steering; it is None in the other plots.
     """
     ay = signals["ay_mps2"]
     near = np.abs(ay) <= _CENTRE_MPS2
@@ -164,16 +164,16 @@ def _panels(signals: Signals) -> list[Panel]:
 STANDARD: Final = Standard(
     name="iso13674",
     title="ISO 13674: on-centre handling, weave and transition test",
-    edition="ISO 13674-1:2010 and ISO 13674-2:2016, as they are known from the literature; no text was at hand.",
+    edition="ISO 13674-1:2010 and ISO 13674-2:2016, as known from the literature; the texts were not available.",
     implemented=(
         "Weave: 0.2 Hz at 100 km/h with peaks of 2 m/s² of lateral acceleration, six periods, of which the last four "
         "are evaluated. Gradients around zero and dead bands of lateral acceleration, yaw rate and hand torque over "
         "steering wheel angle, and of hand torque over lateral acceleration.",
         "Transition: from straight ahead at 5 deg/s of the steering wheel to 2 m/s², left and right. Slopes of lateral "
-        "acceleration and yaw rate within 0.5 m/s² of the centre; intercepts of the lines of the hand torque beyond.",
+        "acceleration and yaw rate within 0.5 m/s² of the centre; intercepts of the hand torque lines beyond 0.5 m/s².",
     ),
     left_out=(
-        "Polynomials that are fitted to measured loops. Deceleration, side wind, crown and unevenness of the road.",
+        "Polynomials fitted to measured loops. Deceleration, crosswind, crown and unevenness of the road.",
         "The power assist is a constant fraction of the column's torque; its boost curve is not modelled.",
     ),
     examine=_examine,

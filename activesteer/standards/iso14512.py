@@ -51,8 +51,8 @@ def _examine(ground: Ground) -> Findings:
     else:
         summary = (
             f"1 s after the brake the car yaws at {abs(math.degrees(worst['yaw_rate_after_1000ms_radps'])):.1f} deg/s, "
-            f"has turned by {abs(math.degrees(worst['yaw_angle_after_1000ms_rad'])):.1f} deg and is "
-            f"{abs(worst['lateral_deviation_after_1000ms_m']):.2f} m aside"
+            f"has turned by {abs(math.degrees(worst['yaw_angle_after_1000ms_rad'])):.1f} deg and has deviated by "
+            f"{abs(worst['lateral_deviation_after_1000ms_m']):.2f} m"
         )
     return Findings(
         {"runs": [run.values | own[label] for label, run in runs.items()]},
@@ -65,15 +65,15 @@ def _examine(ground: Ground) -> Findings:
 STANDARD: Final = Standard(
     name="iso14512",
     title="ISO 14512: straight-ahead braking on split friction, steering wheel held",
-    edition="ISO 14512:1999, as it is known from the literature; the text itself was not at hand.",
+    edition="ISO 14512:1999, as known from the literature; the text was not available.",
     implemented=(
-        "Full braking from 80 km/h on a road with 0.9 times the friction of the tyre file on one side and 0.3 times on "
-        "the other, either way, steering wheel held straight, clutch open, anti-lock system at work.",
+        "Full braking from 80 km/h on a road with 0.9 times the friction of the tyre file on one side and 0.3 times "
+        "on the other, in both arrangements. Steering wheel held straight, clutch open, anti-lock system active.",
         "Yaw rate, yaw angle and lateral deviation 1 s after the beginning of braking; deceleration and peaks.",
     ),
     left_out=(
-        "Series over pedal force and speed. The driver who keeps the line is the manoeuvre split_mu_braking.",
-        "Transverse rows of the surface's joints, water, temperature.",
+        "Series over pedal force and speed. A driver who keeps the line: the manoeuvre split_mu_braking has one.",
+        "Transverse joints of the surface, water, temperature.",
     ),
     examine=_examine,
 )

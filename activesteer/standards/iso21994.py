@@ -45,15 +45,15 @@ def _examine(ground: Ground) -> Findings:
 STANDARD: Final = Standard(
     name="iso21994",
     title="ISO 21994: stopping distance at straight-line braking with an anti-lock system",
-    edition="ISO 21994:2007, as it is known from the literature; the text itself was not at hand.",
+    edition="ISO 21994:2007, as known from the literature; the text was not available.",
     implemented=(
         "Full braking from 100 km/h to standstill on an even dry road (0.9 times the friction of the tyre file), "
-        "clutch open, pedal pressed to the end within 0.1 s, the driver keeps the line.",
-        "Stopping distance from the beginning of pedal travel, corrected to 100 km/h with the square of the speed; "
+        "clutch open, pedal fully pressed within 0.1 s. The driver keeps the line.",
+        "Stopping distance from the beginning of pedal travel, corrected to 100 km/h by the square of the speed; "
         "mean fully developed deceleration from 80 to 10 % of the speed (UN R13-H).",
     ),
     left_out=(
-        "Repetitions and their mean: without noise every run is the same.",
+        "Repetitions and their mean: without noise all runs are identical.",
         "Temperature of brakes and tyres, bedding in. For a wet surface use --set road.mu.",
     ),
     examine=_examine,

@@ -19,17 +19,17 @@ MARGINS_M: Final = (0.1, 0.15, 0.2)
 THROTTLE_OFF_M: Final = 2.0
 """Distance into the entry lane after which the throttle is released [m]."""
 COARSE_KMH: Final = (35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 70.0, 75.0, 80.0)
-"""Entry speeds of the coarse search [km/h], which ends at the highest and the lowest."""
+"""Entry speeds of the coarse search [km/h]; the search does not go beyond the lowest and the highest."""
 FINE_KMH: Final = 1.0
 """Resolution of the search [km/h]."""
 _CHANNELS: Final = ("x_m", "y_m", "speed_mps", "steering_wheel_rad", "yaw_rate_radps", "sideslip_rad")
 _SHOWN: Final = ("steering_wheel_rad", "yaw_rate_radps", "sideslip_rad", "speed_mps")
 _DURATION_S: Final = 14.0
 _BEYOND_M: Final = 10.0
-"""Length of a track behind the last lane [m]."""
+"""Length of the drawn track after the last lane [m]."""
 
 Try = Callable[[str, Sequence[float]], list[bool]]
-"""Function from the name of a series and entry speeds [km/h] to whether each is clean."""
+"""Function of the name of a series and entry speeds [km/h]; it returns True for each clean speed."""
 
 
 def highest_clean(attempt: Try) -> float | None:
@@ -51,12 +51,12 @@ def highest_clean(attempt: Try) -> float | None:
 
 
 def is_clean(run: Run) -> bool:
-    """Return whether the whole body keeps to the lanes and hits no cone."""
+    """Return True if the whole body stays in the lanes and hits no cone."""
     return run.metric("stays_in_lanes") == 1.0 and run.metric("cones_hit") == 0.0
 
 
 def best_run(runs: Sequence[Run], highest_kmh: float | None) -> Run | None:
-    """Return the run with most room at the highest clean speed, or at any speed if none is clean.
+    """Return the run with the largest clearance at the highest clean speed, or at any speed if none is clean.
 
     Args:
         runs: The runs to one side.
@@ -98,12 +98,12 @@ def _examine(ground: Ground) -> Findings:
 
 def _words(speed_kmh: float | None) -> str:
     if speed_kmh is None:
-        return f"none from {COARSE_KMH[0]:g} km/h on"
-    return f"{speed_kmh:.0f} km/h" + (" (and perhaps more)" if speed_kmh == COARSE_KMH[-1] else "")
+        return f"none at {COARSE_KMH[0]:g} km/h or above"
+    return f"{speed_kmh:.0f} km/h" + (" or more" if speed_kmh == COARSE_KMH[-1] else "")
 
 
 def _table(driven: dict[str, list[Run]]) -> Table:
-    """Return a row for each entry speed, with its lines beside each other."""
+    """Return a row for each entry speed, with a column for each line."""
     rows = []
     for side, runs in driven.items():
         for speed_kmh, group in groupby(runs, key=lambda run: run.case["speed_kmh"]):
@@ -116,12 +116,12 @@ def _table(driven: dict[str, list[Run]]) -> Table:
                 "clean" if clean else "not clean",
             ))  # fmt: skip
     columns = (
-        "first to the", "entry speed [km/h]",
-        *(f"line with {margin:g} m of margin: body beyond the lanes [m]" for margin in MARGINS_M),
-        "speed at the end of the best [km/h]", "",
+        "first direction", "entry speed [km/h]",
+        *(f"overstep of the body, line with a margin of {margin:g} m [m]" for margin in MARGINS_M),
+        "final speed of the best run [km/h]", "",
     )  # fmt: skip
     outside = frozenset(i for i, row in enumerate(rows) if row[-1] != "clean")
-    return Table("Entry speeds; below 0 the body is inside the lanes", columns, rows, outside)
+    return Table("Entry speeds; a negative overstep is clearance to the edge of the lane", columns, rows, outside)
 
 
 def _room(run: Run) -> str:
@@ -131,7 +131,7 @@ def _room(run: Run) -> str:
 
 
 def _pictures(ground: Ground, speeds: dict[str, float | None], driven: dict[str, list[Run]]) -> list[Picture]:
-    """Return the best run to each side: its track between the cones, and over time."""
+    """Return pictures of the best run to each side: its track between the cones, and its channels over time."""
     best = {side: run for side, runs in driven.items() if (run := best_run(runs, speeds[side])) is not None}
     if not best:
         return []
@@ -160,20 +160,20 @@ STANDARD: Final = Standard(
     name="iso3888-2",
     title="ISO 3888-2: obstacle avoidance, highest entry speed without a cone hit",
     edition=(
-        "ISO 3888-2:2011, as it is known from the literature; the text itself was not at hand. Sources differ on the "
+        "ISO 3888-2:2011, as known from the literature; the text was not available. Sources differ on the "
         "exit lane: it is 3 m wide here."
     ),
     implemented=(
         "Lanes of 12, 13.5, 11, 12.5 and 12 m on a dry road (0.9 times the friction of the tyre file), the obstacle to "
         "the left and to the right. The speed is held until 2 m into the entry lane, then the car coasts.",
-        "Highest entry speed at which the whole body keeps to the lanes and no cone is hit: every 5 km/h from 35 to 80 "
-        "first, then every 1 km/h above the highest clean one. At every speed three lines are tried, with margins of "
+        "Highest entry speed at which the whole body stays in the lanes and no cone is hit: first every 5 km/h from 35 "
+        "to 80, then every 1 km/h above the highest clean one. Three lines are driven at each speed, with margins of "
         "0.1, 0.15 and 0.2 m to the cones; one clean run suffices.",
     ),
     left_out=(
-        "A skilled driver's learning from run to run: the driver expert follows paths of least jerk, and steers by "
-        "the same rule at every speed. Choose other drivers with --driver.",
-        "The car coasts without engine drag: the clutch is open. The 2 m count from the front axle.",
+        "Learning from run to run: the driver expert follows paths of least jerk and steers by the same rule at every "
+        "speed. Choose another driver with --driver.",
+        "Engine drag: the clutch is open while the car coasts. The distance of 2 m is measured at the front axle.",
     ),
     examine=_examine,
     driver=DRIVER,

@@ -88,7 +88,7 @@ def _fixed_angle(ground: Ground, car: CarGeometry) -> list[Run]:
         {"steering": {"time_s": [0.0, 0.5 * _ENTRY_S], "steering_wheel_deg": [0.0, sign * angle_deg]}}
         for sign in SIDES.values()
     ]
-    # A factor cannot have tables as values, so the two sides are two series.
+    # The values of a factor cannot be tables, so each side is a series.
     return [
         ground.drive(f"constant_angle_{side}", {**maneuver, **case}, [{"speed_kmh": _START_KMH}], curves=_CHANNELS)[0]
         for side, case in zip(SIDES, cases, strict=True)
@@ -138,16 +138,16 @@ def _smooth(values: Array) -> Array:
 STANDARD: Final = Standard(
     name="iso4138",
     title="ISO 4138: steady-state circular driving behaviour",
-    edition="ISO 4138:2021, as it is known from the literature; the text itself was not at hand.",
+    edition="ISO 4138:2021, as known from the literature; the text was not available.",
     implemented=(
         f"Constant radius {RADIUS_M:g} m at slowly rising speed; constant steering wheel angle, the Ackermann angle "
         f"for {FIXED_RADIUS_M:g} m, at slowly rising speed; constant speed {SPEED_KMH:g} km/h at slowly rising "
         "steering wheel angle. Each to the left and to the right, up to the limit of the car.",
-        "Gradients of steering, understeer, sideslip and roll over lateral acceleration, from 0.5 to 2 m/s²; where the "
-        "steer angle is 5 % off the line, and the largest lateral acceleration.",
+        "Gradients of steering, understeer, sideslip and roll over lateral acceleration, from 0.5 to 2 m/s²; lateral "
+        "acceleration at which the steer angle deviates by 5 % from the line; largest lateral acceleration.",
     ),
     left_out=(
-        "Discrete steady states: the speed or the angle rises slowly and without pause.",
+        "Discrete steady states: the speed or the angle rises slowly and continuously.",
         "Steering wheel torque. Constant speed with constant radius (variation of the radius on fixed circles).",
     ),
     examine=_examine,

@@ -34,11 +34,11 @@ _RESPONSES: Final = {
 _NAMES: Final = {"yaw_rate_radps": "yaw rate", "ay_mps2": "lateral acceleration", "roll_rad": "roll angle"}
 _POINTS: Final = 60
 SEQUENCES: Final = 12
-"""Number of runs with random steering, of a minute each; the standard requires 12 minutes."""
+"""Number of one-minute runs with random steering; the standard requires 12 minutes."""
 RANDOM_SHARE: Final = 0.2
 """Root mean square of the random angle, as a fraction of the step's angle: the peaks stay below the step."""
 COHERENCE: Final = 0.95
-"""Bound of the coherence: below it, noise and nonlinearity have more than a twentieth of the output's power."""
+"""Bound of the coherence; below it, noise and nonlinearity cause more than a twentieth of the output's power."""
 
 Responses = dict[str, FrequencyResponse]
 
@@ -175,19 +175,19 @@ def _bode(name: str, found: Responses) -> Picture:
 STANDARD: Final = Standard(
     name="iso7401",
     title="ISO 7401: lateral transient response to step, continuous sinusoidal and random input",
-    edition="ISO 7401:2011, as it is known from the literature; the text itself was not at hand.",
+    edition="ISO 7401:2011, as known from the literature; the text was not available.",
     implemented=(
-        "Step input at 80 km/h to the angle at which the tested car reaches 4 m/s² in a slow ramp, 400 deg/s, left and "
-        "right: steady state, response times to 90 %, peak response times, overshoot, TB.",
+        "Step input at 80 km/h and 400 deg/s to the angle at which the tested car reaches 4 m/s² in a slow ramp, left "
+        "and right: steady state, response times to 90 %, peak response times, overshoot, TB.",
         "Continuous sinusoidal input with rising frequency, 0.1 to 5 Hz, 9 deg: frequency responses of yaw rate, "
         "lateral acceleration and roll angle from 0.2 to 4 Hz with phase and coherence, bandwidth, phase at 1 Hz.",
-        "Random input, 0.1 to 5 Hz with the same power at all frequencies, 12 runs of a minute, the root mean square a "
-        "fifth of the step's angle: the same frequency responses from averaged spectra (Hann windows of 20 s that "
-        "overlap by half, estimate H1), with coherence and standard error.",
+        "Random input, 0.1 to 5 Hz with the same power at all frequencies, 12 runs of a minute, with a root mean "
+        "square of a fifth of the step's angle: the same frequency responses from averaged spectra (Hann windows of "
+        "20 s that overlap by half, estimate H1), with coherence and standard error.",
         f"Ranges with a coherence below {COHERENCE:g} are listed. The bound is an assumption.",
     ),
     left_out=(
-        "Pulse and single-sine input. Other speeds than 80 km/h. The random steering of a driver has less power at "
+        "Pulse and single-sine input. Speeds other than 80 km/h. Random steering by a driver, which has less power at "
         "high frequencies.",
         "Filters: the signals are those of the model, without noise.",
     ),

@@ -13,7 +13,7 @@ from activesteer.standards.steering_angle import steering_wheel_at
 
 SPEED_KMH: Final = 80.0
 AY_MPS2: Final = 5.0
-"""Steady state before the brake [km/h, m/s2]: a circle of 100 m."""
+"""Steady state before braking [km/h, m/s2]: a circle of 100 m."""
 PEDALS: Final = (0.12, 0.2, 0.28, 0.36, 0.44, 0.52, 0.6)
 """Pedal positions of a series, from gentle to nearly full braking."""
 _SHOWN: Final = (
@@ -22,7 +22,7 @@ _SHOWN: Final = (
 _CHANNELS: Final = ("yaw_rate_radps", "sideslip_rad", "speed_mps")
 _BEGIN_S: Final = 6.0
 _AFTER_S: Final = 2.2
-"""Duration after the beginning of braking [s]; the car must not stop, since sideslip has no meaning then."""
+"""Duration after the beginning of braking [s]; it ends before the car stops, where sideslip is undefined."""
 
 
 def _examine(ground: Ground) -> Findings:
@@ -41,7 +41,7 @@ def _examine(ground: Ground) -> Findings:
         worst = max(done, key=lambda run: abs(run.metric("yaw_rate_deviation_after_1000ms_radps")))
         deviation = math.degrees(worst.metric("yaw_rate_deviation_after_1000ms_radps"))
         summary = (
-            f"largest yaw rate deviation {deviation:+.1f} deg/s 1 s after the brake "
+            f"largest yaw rate deviation {deviation:+.1f} deg/s 1 s after the beginning of braking "
             f"({'turns in' if deviation > 0.0 else 'runs wide'}), at {worst.metric('mean_deceleration_mps2'):.1f} m/s² "
             f"of deceleration; {len(done)} of {len(runs)} runs evaluated"
         )
@@ -75,16 +75,16 @@ def _over_deceleration(name: str, by_side: dict[str, list[Run]]) -> Panel:
 STANDARD: Final = Standard(
     name="iso7975",
     title="ISO 7975: braking in a turn, open loop",
-    edition="ISO 7975:2019, as it is known from the literature; the text itself was not at hand.",
+    edition="ISO 7975:2019, as known from the literature; the text was not available.",
     implemented=(
-        "Steady state at 80 km/h and 5 m/s² (100 m), left and right; throttle released, brake pressed within 0.2 s, "
-        "steering wheel held. The tested car reaches 5 m/s² at this angle in a slow ramp.",
-        "Series over the deceleration by the pedal. Yaw rate deviation and path deviation 1 s after the beginning of "
-        "braking against the steady circle, mean deceleration, peaks.",
+        "Steady state at 80 km/h and 5 m/s² (100 m), left and right; throttle released, brake applied within 0.2 s, "
+        "steering wheel held at the angle at which the tested car reaches 5 m/s² in a slow ramp.",
+        "Series of pedal positions, and so of decelerations. Deviations of yaw rate and path from the steady circle "
+        "1 s after the beginning of braking, mean deceleration, peaks.",
     ),
     left_out=(
-        "Constant lateral acceleration at other radii. Single wheels that lock are not a limit of the series.",
-        "Repetitions: without noise every run is the same.",
+        "Constant lateral acceleration at other radii. A locked wheel does not end the series.",
+        "Repetitions: without noise all runs are identical.",
     ),
     examine=_examine,
 )

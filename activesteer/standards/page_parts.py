@@ -1,4 +1,4 @@
-"""Tables and panels that the pages of several standards show."""
+"""Tables and panels of the pages of several standards."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from activesteer.plotting import Curve, Panel
 
 
 def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
-    """Return a table of the metrics of runs beside each other.
+    """Return a table of metrics with a column for each run.
 
     Args:
         title: Title of the table.
@@ -61,5 +61,5 @@ def time_panels(runs: Mapping[str, OverTime], channels: Sequence[str], begin_s: 
 
 
 def cell(value: float | None, digits: int) -> str:
-    """Write a number for a table: a hyphen for None or nan, and no minus before a zero."""
+    """Format a number for a table: a hyphen for None or nan, and no minus before a zero."""
     return "-" if value is None or math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"

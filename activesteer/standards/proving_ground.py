@@ -1,4 +1,4 @@
-"""The proving ground of a standard: series of runs on the study engine, in one set of workers."""
+"""Proving ground of a standard: series of runs on the study engine, in one set of workers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class ProvingGround:
     Attributes:
         standard: Name of the standard.
         vehicle: Name, path or table of the vehicle.
-        driver: Name, path or table of the driver, or his code.
+        driver: Name, path or table of the driver, or the file of a driver plug-in.
         controller: Name or file of the controller.
         overrides: Overrides of the car: dotted key -> value.
         folder: Folder for the studies, which can be resumed; None if they are not kept.
@@ -74,13 +74,13 @@ class ProvingGround:
 
     def fault_map(self, preset: str) -> list[dict[str, Any]]:
         """See `Ground`; the runs are not kept."""
-        asked = PRESETS[preset]
+        selection = PRESETS[preset]
         return fault_map(
             self.controller,
             self.vehicle,
             self.overrides,
-            speeds_kmh=asked.speeds_kmh,
-            situations=asked.situations,
+            speeds_kmh=selection.speeds_kmh,
+            situations=selection.situations,
             driver=self.driver,
             workers=self.workers,
             progress=lambda done, total: self.progress("fault_map", done, total),

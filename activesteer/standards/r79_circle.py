@@ -43,10 +43,10 @@ SPEED_KMH: Final = 10.0
 RIM_RADIUS_M: Final = 0.185
 """Nominal radius of the steering wheel [m]: an assumption (diameter 370 mm); vehicle files have none."""
 PRESET: Final = "un_r79"
-"""Name of the circle of annex 4 in the fault map."""
+"""Name of the annex 4 circle in the fault map."""
 CIRCLES: Final = {"circle_100m": "left", "circle_100m_right": "right"}
 _TURNED_S: Final = 3.0
-"""Time in which the steering wheel reaches the Ackermann angle of the radius [s]; the car has a third more time."""
+"""Time in which the steering wheel reaches the Ackermann angle of the radius [s]; the limit is a third longer."""
 _BEGIN_S: Final = 0.5
 _CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "speed_mps")
 
@@ -84,13 +84,13 @@ def _examine(ground: Ground) -> Findings:
     spirals = {name: _spirals(ground, name, effort) for name, effort in EFFORTS.items()}
     efforts = []
     for name, runs in spirals.items():
-        asked = EFFORTS[name]
+        requirement = EFFORTS[name]
         for side, run in runs.items():
-            found = reached(run, asked.radius_m)
-            good = found.time_s <= WITHIN_S and found.effort_N <= asked.limit_N
+            found = reached(run, requirement.radius_m)
+            good = found.time_s <= WITHIN_S and found.effort_N <= requirement.limit_N
             efforts.append({
-                "steering": name, "direction": side, "radius_m": asked.radius_m, "time_s": found.time_s,
-                "effort_N": found.effort_N, "limit_N": asked.limit_N, "pass": good,
+                "steering": name, "direction": side, "radius_m": requirement.radius_m, "time_s": found.time_s,
+                "effort_N": found.effort_N, "limit_N": requirement.limit_N, "pass": good,
             })  # fmt: skip
     faults = [
         {"fault": row["fault"], "direction": CIRCLES[row["situation"]]}
@@ -101,7 +101,7 @@ def _examine(ground: Ground) -> Findings:
         "rim_radius_m": RIM_RADIUS_M, "efforts": efforts, "faults": faults,
         "pass": all(row["pass"] for row in efforts),
     }  # fmt: skip
-    summary = f"{_effort_words(efforts)}; circle, which has no limits: {_fault_words(faults)}"
+    summary = f"{_effort_words(efforts)}; circle (no limits): {_fault_words(faults)}"
     force = {f"{name.replace('_', ' ')}, {side}": run for name, runs in spirals.items() for side, run in runs.items()}
     pictures = [
         Picture("Spiral at 10 km/h", time_panels(force, _CHANNELS[:2], _BEGIN_S, "the beginning of steer")),
@@ -118,7 +118,7 @@ def _fault_map(ground: Ground) -> list[dict[str, Any]]:
 
 
 def _spirals(ground: Ground, name: str, effort: Effort) -> dict[str, Run]:
-    """Drive to a radius on both sides at steadily rising steering wheel angle."""
+    """Drive a spiral to each side with a steadily rising steering wheel angle."""
     config = ground.scenario("slowly_increasing_steer").car.config
     single_track = config.single_track
     angle_deg = math.degrees(
@@ -145,16 +145,16 @@ def _effort_words(efforts: list[dict[str, Any]]) -> str:
         words = [f"{row['steering'].replace('_', ' ')}, {row['direction']}: {_how(row)}" for row in broken]
         return f"steering effort: {'; '.join(words)}"
     hardest = [
-        f"{max(row['effort_N'] for row in efforts if row['steering'] == name):.0f} N of {asked.limit_N:.0f} "
+        f"{max(row['effort_N'] for row in efforts if row['steering'] == name):.0f} N of {requirement.limit_N:.0f} "
         f"({name.replace('_', ' ')})"
-        for name, asked in EFFORTS.items()
+        for name, requirement in EFFORTS.items()
     ]
-    return f"limits of the steering effort kept: {' and '.join(hardest)}"
+    return f"steering effort within limits: {' and '.join(hardest)}"
 
 
 def _how(row: Mapping[str, Any]) -> str:
     if math.isnan(row["time_s"]):
-        return f"{row['radius_m']:g} m are not reached within {WITHIN_S:g} s"
+        return f"a radius of {row['radius_m']:g} m is not reached within {WITHIN_S:g} s"
     return f"{row['effort_N']:.0f} N ({row['limit_N']:.0f} allowed) after {row['time_s']:.1f} s"
 
 
@@ -164,9 +164,9 @@ def _fault_words(faults: list[dict[str, Any]]) -> str:
     if done:
         worst = max(done, key=lambda row: row["steering_correction_rad"])
         words = (
-            f"{worst['fault']} ({worst['direction']}) needs the greatest correction, "
-            f"{math.degrees(worst['steering_correction_rad']):.0f} deg of the steering wheel, with the car "
-            f"{abs(worst['lateral_offset_1s_driver_m']):.2f} m off course after 1 s"
+            f"{worst['fault']} ({worst['direction']}) needs the largest correction, "
+            f"{math.degrees(worst['steering_correction_rad']):.0f} deg at the steering wheel; the car is "
+            f"{abs(worst['lateral_offset_1s_driver_m']):.2f} m off its course after 1 s"
         )
     return words + ("" if done == faults else f"; {len(faults) - len(done)} of {len(faults)} faults did not finish")
 
@@ -180,11 +180,11 @@ def _effort_table(efforts: list[dict[str, Any]]) -> Table:
         for row in efforts
     ]  # fmt: skip
     columns = (
-        "steering", "to the", "turning radius [m]", f"reached after [s], at most {WITHIN_S:g}", "steering effort [N]",
-        "at most [N]", "result",
+        "steering", "direction", "turning radius [m]", f"time to the radius [s], at most {WITHIN_S:g}",
+        "steering effort [N]", "limit [N]", "result",
     )  # fmt: skip
     outside = frozenset(i for i, row in enumerate(efforts) if not row["pass"])
-    return Table("Steering effort until the radius is reached", columns, rows, outside)
+    return Table("Steering effort to reach the radius", columns, rows, outside)
 
 
 def _fault_table(faults: list[dict[str, Any]]) -> Table:
@@ -202,7 +202,7 @@ def _fault_table(faults: list[dict[str, Any]]) -> Table:
         "fault", "circle", "yaw rate, change, hands fixed [deg/s]", "lateral acceleration, change, hands fixed [m/s²]",
         "lateral offset after 1 s, hands fixed [m]", "lateral offset after 1 s, driver [m]",
         "driver's correction [deg]",
-        "tolerated for [s], by the fault map's limits",
+        "fault-tolerant time [s], by the fault map's limits",
     )  # fmt: skip
     outside = frozenset(i for i, row in enumerate(faults) if "error" in row)
     return Table("Failures in a circle of 100 m at 80 km/h", columns, rows, outside)
@@ -238,16 +238,16 @@ STANDARD: Final = Standard(
     title="UN R79: steering effort, and failures of auxiliary steering equipment in a circle",
     edition=(
         "UN Regulation 79, revision 4 (03 series of amendments, 2018): paragraphs 6.2.4 to 6.2.6 with table 2, and "
-        "annex 4, for cars (M1). The numbers are from extracts of this revision and of GB 17675-2021, which takes them "
-        "over; the driving of the tests is from memory. The text was not at hand: check it before you rely on it."
+        "annex 4, for cars (M1). The numbers are from extracts of this revision and of GB 17675-2021, which adopts "
+        "them; the test procedures are from memory. The text was not available: check it before you rely on it."
     ),
     implemented=(
-        "Steering effort: from straight ahead into a spiral at 10 km/h, left and right. The force at the rim until the "
-        "radius of 12 m is reached, within 4 s, is at most 150 N; with a failure, here of the whole power assist, "
-        "at most 300 N to a radius of 20 m. These limits decide between pass and fail.",
-        "Annex 4: the faults of the fault map, each set when the car goes steadily round a circle of 100 m at 80 km/h, "
-        "left-hand and right-hand: motion of the car with the steering wheel held, correction and lateral offset with "
-        "the driver after 1 s. The annex requires control without abnormal correction and has no numbers: no verdict.",
+        "Steering effort: from straight ahead into a spiral at 10 km/h, left and right. Up to a radius of 12 m, "
+        "reached within 4 s, the force at the rim is at most 150 N. With a failure, here of the whole power assist, it "
+        "is at most 300 N up to a radius of 20 m. These limits decide between pass and fail.",
+        "Annex 4: the faults of the fault map, each activated in a steady circle of 100 m at 80 km/h, left and right. "
+        "Evaluated are the motion of the car with the steering wheel held, and correction and lateral offset with the "
+        "driver after 1 s. The annex requires control without abnormal correction and has no numbers: no verdict.",
     ),
     left_out=(
         "Manufacturer and technical service choose the faults: here the actuators and sensors of a controller fail in "

@@ -38,7 +38,7 @@ class Run:
         case: Values in which it differs from the other runs of its series.
         metrics: Its metrics; empty if it failed or could not be evaluated.
         channels: Kept channels over time, every `CURVE_STEP_S`.
-        error: Why it has no metrics; empty if it has some.
+        error: Reason for missing metrics; empty if there are metrics.
     """
 
     case: Mapping[str, Any]
@@ -146,7 +146,7 @@ class Findings:
     """Findings of a test of one car with one controller.
 
     Attributes:
-        values: Values that `--json` prints; with `pass` if the standard has limits.
+        values: Values that `--json` prints, with `pass` if the standard has limits.
         summary: Verdict or findings in a sentence.
         tables: Tables of the page.
         pictures: Pictures of the page.
@@ -164,12 +164,12 @@ class Findings:
 
     @property
     def error(self) -> str:
-        """Why there is no result; empty with a result."""
+        """Reason for a missing result; empty with a result."""
         return self.values.get("error", "")
 
     @property
     def passed(self) -> bool | None:
-        """Whether the car keeps the limits; None for a method without limits."""
+        """True if the car keeps the limits; None for a method without limits."""
         return self.values.get("pass")
 
 

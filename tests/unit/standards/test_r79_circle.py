@@ -75,7 +75,7 @@ def test_more_than_the_effort_that_is_allowed_fails(force_N, steering):
 def test_a_radius_that_is_not_reached_fails():
     found = STANDARD.examine(SpiralGround(tightest_m=15.0))
     assert found.passed is False
-    assert "12 m are not reached within 4 s" in found.summary
+    assert "a radius of 12 m is not reached within 4 s" in found.summary
 
 
 def test_a_fault_that_ends_the_run_is_a_row_and_no_verdict():
