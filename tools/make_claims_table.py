@@ -29,13 +29,13 @@ def table() -> str:
         for statement in STATEMENTS.values():
             if statement.kind is kind:
                 nominal = "not reproduced" if statement.id in known else "reproduced"
-                cells = (statement.id, statement.text, nominal, *_share(population, statement.id))
+                cells = (statement.id, statement.text, nominal, *_proportion(population, statement.id))
                 lines.append("| " + " | ".join(cells) + " |")
         lines.append("")
     return "\n".join(lines)
 
 
-def _share(population: Population | None, number: str) -> tuple[str, str]:
+def _proportion(population: Population | None, number: str) -> tuple[str, str]:
     found = None if population is None else population.of(number)
     if found is None:
         return "", ""

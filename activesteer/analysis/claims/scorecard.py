@@ -39,13 +39,13 @@ class Judged(NamedTuple):
         claim: The claim.
         verdict: Its verdict.
         reason: Why it is not reproduced; empty for a claim that is not listed.
-        share: Share of the stored population in which it holds; None without a population.
+        proportion: Proportion of the stored population in which it holds; None without a population.
     """
 
     claim: Claim
     verdict: Verdict
     reason: str
-    share: ClaimProportion | None = None
+    proportion: ClaimProportion | None = None
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Scorecard:
                     "criterion": item.claim.criterion,
                     "kind": item.claim.statement.kind.value,
                     "obstacle": item.claim.obstacle,
-                    "population": None if item.share is None else item.share.to_json(),
+                    "population": None if item.proportion is None else item.proportion.to_json(),
                 }
                 for item in self.judged
             ],
@@ -91,11 +91,13 @@ class Scorecard:
 
     def to_text(self) -> str:
         """Return the scorecard for a terminal: number, verdict, text, then the values, in degrees and km/h."""
-        beside = any(item.share is not None for item in self.judged)
+        beside = any(item.proportion is not None for item in self.judged)
         lines = [f"    {'nominal':<14}  population"] if beside else []
-        for claim, verdict, reason, share in self.judged:
+        for claim, verdict, reason, proportion in self.judged:
             short = {Verdict.FAILED: "FAILED", Verdict.UNEXPECTED: "passed!"}.get(verdict, verdict.value)
-            held = f"{percent(share.share):>4} %  {share.verdict.value:<13}  " if share is not None else ""
+            held = (
+                f"{percent(proportion.share):>4} %  {proportion.verdict.value:<13}  " if proportion is not None else ""
+            )
             lines.append(f"{claim.id}  {short:<14}  {held or (' ' * 23 if beside else '')}{claim.text}")
             lines += [f"{'':20}{line}" for line in number_lines(claim.values)]
             if claim.obstacle:
@@ -108,20 +110,20 @@ class Scorecard:
         lines.append(f"{len(self.judged)} claims: {', '.join(counts)}")
         if beside and self.population is not None:
             lines.append(f"in {self.population.samples} other cars, roads and drivers, with 95 % confidence:")
-            lines += [f"{'':2}{verdict.value:<13}  {names}" for verdict, names in self.by_share().items()]
+            lines += [f"{'':2}{verdict.value:<13}  {names}" for verdict, names in self.by_proportion().items()]
         return "\n".join(lines)
 
-    def by_share(self) -> dict[ProportionVerdict, str]:
+    def by_proportion(self) -> dict[ProportionVerdict, str]:
         """Return the numbers of the claims by verdict of the population, with the factor of the largest influence."""
-        shares = [item.share for item in self.judged if item.share is not None]
+        proportions = [item.proportion for item in self.judged if item.proportion is not None]
         return {
             verdict: ", ".join(
-                f"{share.id} ({share.depends_on})" if verdict is ProportionVerdict.DEPENDS else share.id
-                for share in shares
-                if share.verdict is verdict
+                f"{proportion.id} ({proportion.depends_on})" if verdict is ProportionVerdict.DEPENDS else proportion.id
+                for proportion in proportions
+                if proportion.verdict is verdict
             )
             for verdict in ProportionVerdict
-            if any(share.verdict is verdict for share in shares)
+            if any(proportion.verdict is verdict for proportion in proportions)
         }
 
     def _count(self, verdict: Verdict) -> int:
