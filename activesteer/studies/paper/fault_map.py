@@ -163,14 +163,14 @@ def _cell(
     if limits.lateral_offset_m is None:
         limits = replace(limits, lateral_offset_m=0.5 * (LANE_M - width_m))
     longest_delay_s = max(fault.delay_s or 0.0 for fault in faults.values())
-    runs = _Runs(ClosedLoop(scenario, controller), begin_s, longest_delay_s)
+    runs = _FaultRuns(ClosedLoop(scenario, controller), begin_s, longest_delay_s)
     return [
         {"fault": text, "speed_kmh": speed_kmh, "situation": situation, **_judged(runs, fault, limits)}
         for text, fault in faults.items()
     ]
 
 
-class _Motion(NamedTuple):
+class _Signals(NamedTuple):
     """Evaluated signals of a run from the beginning of the fault, shape (n,) each."""
 
     x_m: Array
@@ -181,29 +181,29 @@ class _Motion(NamedTuple):
     steering_wheel_rad: Array
 
 
-class _Keeps:
+class _RecordingDriver:
     """Driver whose commands are recorded."""
 
     def __init__(self, driver: Any) -> None:
         self._driver = driver
-        self.said: list[DriverCommand] = []
+        self.commands: list[DriverCommand] = []
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        self.said.append(self._driver.step(setpoint, measurement, motion))
-        return self.said[-1]
+        self.commands.append(self._driver.step(setpoint, measurement, motion))
+        return self.commands[-1]
 
 
 class _HandsFixed:
     """Driver that replays the commands of the car without a fault."""
 
-    def __init__(self, said: Sequence[DriverCommand]) -> None:
-        self._next = iter(said)
+    def __init__(self, commands: Sequence[DriverCommand]) -> None:
+        self._next = iter(commands)
 
     def step(self, *_: Any) -> DriverCommand:
         return next(self._next)
 
 
-class _Runs:
+class _FaultRuns:
     """The runs of a cell, from one state shortly before the faults begin."""
 
     def __init__(self, loop: ClosedLoop, begin_s: float, lead_s: float) -> None:
@@ -212,19 +212,19 @@ class _Runs:
         lead = min(round(begin_s / self.timestep_s), round(lead_s / self.timestep_s) + 10)
         loop.advance(round(begin_s / self.timestep_s) - lead)
         self._start, self._lead = loop.save_state(), lead
-        driver = _Keeps(loop.driver)
+        driver = _RecordingDriver(loop.driver)
         self.in_order = self._driven(driver)
-        self._said = driver.said
+        self._commands = driver.commands
 
-    def hands_fixed(self, fault: Fault) -> _Motion:
+    def hands_fixed(self, fault: Fault) -> _Signals:
         """Return the motion with a fault and hands fixed."""
-        return self._again(fault, _HandsFixed(self._said))
+        return self._again(fault, _HandsFixed(self._commands))
 
-    def with_driver(self, fault: Fault) -> _Motion:
+    def with_driver(self, fault: Fault) -> _Signals:
         """Return the motion with a fault and a responding driver."""
         return self._again(fault, None)
 
-    def _again(self, fault: Fault, driver: Any) -> _Motion:
+    def _again(self, fault: Fault, driver: Any) -> _Signals:
         loop = self.loop
         loop.fail(())
         loop.restore_state(self._start)
@@ -232,16 +232,16 @@ class _Runs:
         loop.fail((replace(fault, start_s=self.begin_s, end_s=ends),))
         return self._driven(driver)
 
-    def _driven(self, driver: Any) -> _Motion:
+    def _driven(self, driver: Any) -> _Signals:
         loop = self.loop
         recorder = Recorder(loop.vehicle, loop.steps - loop.step_count)
         loop.advance(loop.steps - loop.step_count, recorder, driver=driver)
         names = [channel.name for channel in recorder.channels]
         values = recorder.result()[1][self._lead :]
-        return _Motion(*(values[:, names.index(name)].copy() for name in _Motion._fields))
+        return _Signals(*(values[:, names.index(name)].copy() for name in _Signals._fields))
 
 
-def _judged(runs: _Runs, fault: Fault, limits: Limits) -> dict[str, Any]:
+def _judged(runs: _FaultRuns, fault: Fault, limits: Limits) -> dict[str, Any]:
     """Return the values of a fault; nan for an incomplete run."""
     try:
         fixed = runs.hands_fixed(fault)
@@ -262,7 +262,7 @@ def _judged(runs: _Runs, fault: Fault, limits: Limits) -> dict[str, Any]:
     return dict(zip(FIGURES, figures, strict=True))
 
 
-def _offset_m(runs: _Runs, motion: _Motion) -> float:
+def _offset_m(runs: _FaultRuns, motion: _Signals) -> float:
     """Return the lateral offset from the path without the fault, one second after its beginning, left positive [m]."""
     row, good = round(OFFSET_AT_S / runs.timestep_s) - 1, runs.in_order
     yaw = good.yaw_rad[row]
@@ -270,7 +270,7 @@ def _offset_m(runs: _Runs, motion: _Motion) -> float:
     return float(across)
 
 
-def _first_broken_s(runs: _Runs, motion: _Motion, limits: Limits) -> float | None:
+def _first_broken_s(runs: _FaultRuns, motion: _Signals, limits: Limits) -> float | None:
     """Return the time from the beginning of the fault until a limit is exceeded [s]; None if none is."""
     good = runs.in_order
     broken = np.abs(motion.yaw_rate_radps - good.yaw_rate_radps) > limits.yaw_rate_radps
@@ -281,7 +281,7 @@ def _first_broken_s(runs: _Runs, motion: _Motion, limits: Limits) -> float | Non
     return float(np.argmax(broken)) * runs.timestep_s if broken.any() else None
 
 
-def _tolerant_s(runs: _Runs, fault: Fault, limits: Limits, broken_s: float) -> float:
+def _tolerant_s(runs: _FaultRuns, fault: Fault, limits: Limits, broken_s: float) -> float:
     """Find the time by bisection, below the time at which the lasting fault exceeds a limit.
 
     The search assumes that a longer fault has a larger effect. It returns the bound that keeps the limits.
