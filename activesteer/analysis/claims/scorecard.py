@@ -95,10 +95,10 @@ class Scorecard:
         lines = [f"    {'nominal':<14}  population"] if beside else []
         for claim, verdict, reason, proportion in self.judged:
             short = {Verdict.FAILED: "FAILED", Verdict.UNEXPECTED: "passed!"}.get(verdict, verdict.value)
-            held = (
-                f"{percent(proportion.share):>4} %  {proportion.verdict.value:<13}  " if proportion is not None else ""
-            )
-            lines.append(f"{claim.id}  {short:<14}  {held or (' ' * 23 if beside else '')}{claim.text}")
+            held = " " * 23 if beside else ""
+            if proportion is not None:
+                held = f"{percent(proportion.share):>4} %  {proportion.verdict.value:<13}  "
+            lines.append(f"{claim.id}  {short:<14}  {held}{claim.text}")
             lines += [f"{'':20}{line}" for line in number_lines(claim.values)]
             if claim.obstacle:
                 lines.append(f"{'':20}nothing is proved: {claim.obstacle}")
