@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from PIL import Image
 
-from activesteer import study
+from activesteer import ActuatorCommand, Simulation, study
 from activesteer.analysis.claims.population import read_population
 from activesteer.analysis.figures import BY_KIND, style, time_histories, time_panels
 from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
@@ -94,6 +94,7 @@ def main(names: Sequence[str]) -> None:
     pictures |= {
         "controller": _controller,
         "driver": _driver,
+        "stepping": _stepping,
         "rear_steer_gains": _rear_steer_gains,
         "sensors": _sensors,
         "tyres": _tyres,
@@ -186,6 +187,25 @@ def _sensors() -> dict[str, Figure]:
     axes[0].legend(frameon=False)
     figure.align_ylabels(list(axes))
     return {"sensors": figure}
+
+
+def _stepping() -> dict[str, Figure]:
+    """Sideslip angle of a step steer that continues from one saved state with three rear angles."""
+    simulation = Simulation("step_steer", overrides={"duration_s": 3.0})
+    simulation.advance(700)
+    now = simulation.save_state()
+    figure = new_figure(6.0, 3.0)
+    axis = figure.subplots()
+    for rear_deg, colour in ((-1.0, "#0072b2"), (0.0, "#222222"), (1.0, "#d55e00")):
+        simulation.restore_state(now)
+        simulation.advance(500, actuator_command=ActuatorCommand(math.radians(rear_deg)))
+        run = simulation.recording()
+        axis.plot(run.time_s, np.degrees(run["sideslip_rad"]), color=colour, label=f"rear angle {rear_deg:+.0f} deg")
+    axis.axvline(0.7, color="#888888", linewidth=0.8, linestyle=":")
+    axis.set_xlabel("time [s]")
+    style.plain(axis, "sideslip angle [deg]")
+    axis.legend(frameon=False)
+    return {"stepping": figure}
 
 
 def _driver() -> dict[str, Figure]:

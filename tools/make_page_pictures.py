@@ -1,0 +1,62 @@
+"""Make the pictures of HTML pages in the documentation: `python tools/make_page_pictures.py`.
+
+The tool drives short runs, writes a report, a comparison and a standard's page, and draws the top of each in Chromium.
+Run it again after a change of the look of these pages. It takes about a minute.
+"""
+
+from __future__ import annotations
+
+import io
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+from activesteer.cli import main as activesteer
+
+PICTURES: Final = Path(__file__).resolve().parents[1] / "docs" / "pictures"
+SIZE: Final = (1000, 760)
+"""Width and height of the browser's window [px]."""
+COLOURS: Final = 64
+
+
+def write_pages(folder: Path) -> dict[str, Path]:
+    """Write the pages.
+
+    Args:
+        folder: An empty folder.
+
+    Returns:
+        Name of the picture -> page.
+    """
+    names = {controller: str(folder / f"step_steer-{controller}.mcap") for controller in ("none", "ars")}
+    for controller, file in names.items():
+        activesteer(["run", "step_steer", "-c", controller, "-o", file])
+    report, comparison = folder / "report.html", folder / "compared.html"
+    activesteer(["report", *names.values(), "-o", str(report)])
+    activesteer(["compare", names["none"], names["ars"], "-o", str(comparison)])
+    activesteer(["test", "iso21994", "-o", str(folder)])
+    return {"page_report": report, "page_comparison": comparison, "page_standard": folder / "iso21994.html"}
+
+
+def main() -> None:
+    """Draw the top of each page."""
+    width, height = SIZE
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        for name, page in write_pages(Path(folder)).items():
+            shown = browser.new_page(viewport={"width": width, "height": height})
+            shown.goto(page.as_uri())
+            shown.wait_for_timeout(500)
+            picture = Image.open(io.BytesIO(shown.screenshot())).convert("RGB")
+            file = PICTURES / f"{name}.png"
+            picture.quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
+            print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()
