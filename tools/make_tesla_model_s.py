@@ -1,4 +1,4 @@
-"""Makes the Tesla Model S of the package from the published numbers: tyre file, K&C tables, car.
+"""Make the Tesla Model S of the package from the published numbers: tyre file, K&C tables, car.
 
 python tools/make_tesla_model_s.py writes models/tyres/tesla_245_45R19.tir, models/reference/tesla_model_s/kc,
 models/mjcf/tesla_model_s and models/vehicles/tesla_model_s.toml. What was settled and assumed stands here beside the
@@ -30,7 +30,7 @@ TYRE: Final = "tesla_245_45R19.tir"
 ROLL_CENTRE_M: Final = 0.09
 """zRC* is -0.2606 m and r_stat0 0.3506 m: counted from the wheel centre, the roll centres lie 0.09 m over the road."""
 PINION_M: Final = 0.0075
-"""Chosen: the source has no rack; the angle of the steering wheel times this stands for it."""
+"""Chosen, because the source has no rack: rack travel over steering wheel angle."""
 TRAVEL_M: Final = np.linspace(-0.08, 0.08, 33)
 FORCE_N: Final = np.linspace(-4000.0, 4000.0, 17)
 TYRE_WIDTH_M: Final = 0.245
@@ -40,7 +40,7 @@ regression of the source's institute gives for both wheels of an axle (TUMFTM/TO
 
 
 def main() -> None:
-    """Writes everything."""
+    """Write all files."""
     vehicle = json.loads((FOLDER / "vehicle.json").read_text(encoding="utf-8"))
     tyre = json.loads((FOLDER / "tyre.json").read_text(encoding="utf-8"))
     write_tyre(tyre, models_dir() / "tyres" / TYRE)
@@ -65,7 +65,7 @@ def main() -> None:
 
 
 def tell_controllers(file: Path) -> None:
-    """Controllers' model of the car: as driven, by the compact's rules (`models/vehicles/compact.toml`)."""
+    """Write single-track model and controllers from runs of the car, by the rules in `models/vehicles/compact.toml`."""
     found = identify(NAME)
     write_single_track(file, found, "python tools/make_tesla_model_s.py", datetime.date.today().isoformat())
     text = file.read_text(encoding="utf-8")
@@ -78,15 +78,15 @@ def tell_controllers(file: Path) -> None:
     rear = model.rear_stiffness_Nprad * model.cg_to_rear_m / model.yaw_inertia_kgm2
     front = model.front_stiffness_Nprad * model.cg_to_front_m / model.yaw_inertia_kgm2
     note = (
-        "# Chosen: the paper's controllers by the compact's rules. a_y_max is what this car reaches with mu 0.9; the\n"
-        f"# gains are the compact's: here yaw rate per rear angle integrates with {rear:.0f} 1/s, per front with\n"
-        f"# {front:.0f} (there with 105 and 49), so that the phase margins are greater.\n"
+        "# Chosen: the paper's controllers by the compact's rules. a_y_max: reached by this car with mu 0.9.\n"
+        f"# The gains are those of the compact. Yaw rate over rear angle integrates with {rear:.0f} 1/s, over front\n"
+        f"# angle with {front:.0f} 1/s (compact: 105 and 49), so the phase margins are larger.\n"
     )
     file.write_text(text[:start] + note + controllers, encoding="utf-8")
 
 
 def write_tyre(given: dict[str, Any], file: Path) -> None:
-    """The tyre as PAC2002; the radius is half of DIAMETER, UNLOADED_RADIUS (0.314 m) belongs to another tyre."""
+    """Write the tyre as PAC2002; its radius is half of DIAMETER, as UNLOADED_RADIUS (0.314 m) is another tyre's."""
     dimension = {
         "UNLOADED_RADIUS": 0.5 * given["DIAMETER"], "WIDTH": given["WIDTH"], "ASPECT_RATIO": given["ASPECT_RATIO"],
         "RIM_RADIUS": 0.5 * 0.0254 * given["RIM"], "RIM_WIDTH": given["RIM_WIDTH"],
@@ -133,7 +133,7 @@ def _starting(given: dict[str, Any], starts: tuple[str, ...]) -> dict[str, Any]:
 
 
 def write_tables(given: dict[str, Any], folder: Path) -> None:
-    """Data that the source gives for each axle, in the form of a laboratory report."""
+    """Write the data of each axle in the form of a laboratory report."""
     for axle, end, track in (("front", "f", given["sF"]), ("rear", "r", given["sR"])):
         toe, toe0 = given[f"kin_toe_{end}"]
         camber, camber0 = given[f"kin_camb_{end}"]
@@ -174,7 +174,7 @@ def _write(file: Path, columns: dict[str, Array]) -> None:
 
 
 def car_table(given: dict[str, Any]) -> str:
-    """The table of the car."""
+    """Return the table of the car."""
     to_front, to_rear, height = given["lF"], given["lR"], given["zSP_r"]
     unsprung = {"front": given["m_usF"], "rear": given["m_usR"]}
     tracks = {"front": given["sF"], "rear": given["sR"]}

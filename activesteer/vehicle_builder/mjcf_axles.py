@@ -15,9 +15,9 @@ _LINKED = """  <!-- {words} {axle} axle, a fragment of the chassis body. Every p
        hardpoint in vehicle coordinates: origin on the road below the front axle, x forward, y left,
        z up, design position. Links are tendons; an arm is two links that share their outer point. -->"""
 _GUIDED = """  <!-- {words} guide the {axle} axle, a fragment of the chassis body: the travel z is free,
-       the other joints follow the curves of the vehicle file and give way about them. Vehicle coordinates: origin on
-       the road below the front axle, x forward, y left, z up, design position. Sites of springs and dampers are only
-       drawn. -->"""
+       the other joints follow the curves of the vehicle file and deflect elastically from them. Vehicle coordinates:
+       origin on the road below the front axle, x forward, y left, z up, design position. Sites of springs and dampers
+       serve only for display. -->"""
 
 
 def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:

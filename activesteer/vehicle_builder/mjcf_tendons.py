@@ -105,7 +105,7 @@ def viewer_springs(car: Car) -> str:
     for axle in car.axles:
         if axle.spring.start_m is None or axle.spring.lever != 1.0:
             if not lines:
-                lines.append("    <!-- Without force: springs whose tendons have no shape, or another one. -->")
+                lines.append("    <!-- Springs without force, only drawn: the real tendons have no shape here. -->")
             for side in (1.0, -1.0):
                 corner = corner_name(axle, side)
                 lines.append(
@@ -121,7 +121,7 @@ def _viewer_guides(car: Car) -> list[str]:
     for axle in car.axles:
         if axle.measured is None:
             continue
-        lines.append("    <!-- Stand in for the curves that guide the wheels. -->")
+        lines.append("    <!-- Replace the curves that guide the wheels. -->")
         for side in (1.0, -1.0):
             corner = corner_name(axle, side)
             for joint, stiffness, damping in _VIEWER_GUIDES:

@@ -22,20 +22,21 @@ roll steer."""
 _REMARKS: Final = {
     "dampers.front": "Compression positive.",
     "curves.front": (
-        "Cubic splines through the points; toe-in, camber with the top outwards, caster with the top to the rear,\n"
-        "bump and a rack that steers left are positive. The unloaded guide's: the loaded car has the measured ones."
+        "Cubic splines through the points. Toe-in, camber with the top outwards, caster with the top to the rear,\n"
+        "bump and a rack that steers left are positive. Curves of the unloaded guide; under load the car has the "
+        "measured curves."
     ),
-    "curves.rear": "As in front; no rack steers it.",
+    "curves.rear": "As for the front axle, without a rack.",
     "friction": "Dry friction; vibration as in the compact's file (a road of class A at 80 km/h).",
     "brakes": "Torque per wheel at full pedal.",
-    "rear_actuator": "Instead of the hinges of the model.",
-    "superposition_actuator": "Instead of the servo of the model.",
-    "sensors": "What controllers see.",
+    "rear_actuator": "Replaces the hinges of the model.",
+    "superposition_actuator": "Replaces the servo of the model.",
+    "sensors": "Sensors that the controllers read.",
     "powertrain": "At the wheels: torques in first gear, power, rev limit in top gear.",
     "controllers.desired_yaw_rate": (
-        "Controllers of the compact, a start: their gains were found for that car. What a control-free run of this "
-        "car\nreaches (max_lateral_acceleration_mps2) and its servos' lags decide them; see the comments in the "
-        "compact's file."
+        "Controllers of the compact as a start; their gains belong to that car. Adapt them to the lateral acceleration "
+        "that\nthis car reaches without control (max_lateral_acceleration_mps2) and to the lags of its servos; see the "
+        "comments\nin the compact's file."
     ),
 }
 """Comments above tables, equal for every car."""
@@ -50,15 +51,16 @@ def vehicle_text(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> st
         model: Compiled car, for its single-track model; None for a placeholder during the trim.
     """
     remarks = _REMARKS | {
-        "steering": f"Ratio at the centre, unloaded; lock: the rack stops at {1e3 * car.rack_limit_m:.1f} mm.",
+        "steering": f"Ratio at the centre without load; lock: the rack stops at {1e3 * car.rack_limit_m:.1f} mm.",
         "single_track": (
-            f"Estimated: stiffnesses are {_LEFT_OF_STIFFNESS['front']:g} (front) and {_LEFT_OF_STIFFNESS['rear']:g} "
-            "(rear) of those of the tyres under static load, as in the compact.\n"
+            f"Estimated: {_LEFT_OF_STIFFNESS['front']:g} (front) and {_LEFT_OF_STIFFNESS['rear']:g} (rear) times the "
+            "stiffness of the tyres under static load, as in the compact.\n"
             f"`activesteer identify --vehicle {car.name}.toml` drives the car and replaces the values."
         ),
     }
-    made = "Made by `activesteer vehicle new`; README.md lists what was assumed."
-    return f"# {car.name}: what its MJCF cannot say. {made}\n{toml_text(_table(car, trimmed, model), remarks)}"
+    made = "Made by `activesteer vehicle new`; README.md lists the assumptions."
+    text = toml_text(_table(car, trimmed, model), remarks)
+    return f"# {car.name}: properties that its MJCF does not define. {made}\n{text}"
 
 
 def _table(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> dict[str, Any]:
