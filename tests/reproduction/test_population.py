@@ -21,9 +21,8 @@ from activesteer.recording import Recording
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.run_task import CLAIM, Row, drive
 from activesteer.studies.paper.population import CHANGES, summarise
-from activesteer.studies.paper.population_store import stored_runs
 from activesteer.studies.paper.population_studies import population_study
-from tools.renew_population import CHASSIS_CONTROL, PAGE, comparison_page, page
+from tools.renew_population import CHASSIS_CONTROL, PAGE, comparison_page, page, stored_runs
 
 TOLERANCE = 1e-3
 CHECKED = 8

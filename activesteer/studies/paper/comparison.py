@@ -106,13 +106,14 @@ class Comparison:
     def shown(self) -> list[tuple[str, str, dict[str, float]]]:
         """Yield scenario, metric and its value by controller, for the metrics of `SHOWN`."""
         known = {(row.scenario, row.metric, row.controller): row.value for row in self.rows}
-        found = []
-        for scenario, metrics in SHOWN.items():
-            for metric in metrics:
-                values = {name: known.get((scenario, metric, name)) for name in self.controllers}
-                found.append((scenario, metric, {name: value for name, value in values.items() if value is not None}))
-        order = list(CASES)
-        return sorted((line for line in found if line[2]), key=lambda line: order.index(line[0]))
+        lines = []
+        for scenario in CASES:
+            for metric in SHOWN[scenario]:
+                keys = {name: (scenario, metric, name) for name in self.controllers}
+                values = {name: known[key] for name, key in keys.items() if key in known}
+                if values:
+                    lines.append((scenario, metric, values))
+        return lines
 
     @property
     def targets(self) -> list[Target]:

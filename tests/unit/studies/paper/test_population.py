@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any, cast
@@ -10,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from activesteer.analysis.claims import Claim
+from activesteer.analysis.claims import SYSTEMS, Claim
 from activesteer.analysis.claims.population import NONE, ClaimProportion, Population
 from activesteer.cli import main
 from activesteer.errors import StudyError
@@ -22,6 +23,7 @@ from activesteer.studies.paper.population import summarise
 from activesteer.studies.paper.population_studies import population_study
 from activesteer.theory.proportions import Proportion, ProportionVerdict
 from tests.raising import raises
+from tools import renew_population
 
 RESULTS = "results.parquet"
 
@@ -152,6 +154,24 @@ def test_what_is_stored_is_what_was_found(serial: Path) -> None:
     assert "S1   passed" in found.to_text()
     with raises(StudyError, cause=KeyError):
         Population.from_json({"claims": []})
+
+
+def test_the_package_stores_results_runs_and_bands(
+    serial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(renew_population, "studies_dir", lambda: tmp_path)
+    found = summarise(pq.read_table(serial / RESULTS), shortened(2), nominal(S1=True))
+    summary, runs, bands = renew_population.store_population(found, serial)
+    assert Population.from_json(json.loads(summary.read_text())) == found
+    assert (
+        pq.read_table(runs).select(["sample", "maneuver", "controller"]).to_pylist()
+        == pq.read_table(serial / RESULTS).select(["sample", "maneuver", "controller"]).to_pylist()
+    )
+    assert {"claim_S1", "sideslip_peak_rad", "status"} <= set(pq.read_table(runs).column_names)
+    assert not set(shortened(2).keys) & set(pq.read_table(runs).column_names)
+    assert set(pq.read_table(bands)["controller"].to_pylist()) == set(SYSTEMS)
+    with raises(StudyError):
+        renew_population.store_population(found, tmp_path)
 
 
 def test_a_share_is_whole_only_where_it_is() -> None:
