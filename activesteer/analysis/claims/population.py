@@ -19,7 +19,7 @@ from activesteer.metric_table import metric
 from activesteer.resources import studies_dir
 from activesteer.theory.proportions import Proportion, ProportionVerdict, percent, proportion_verdict
 
-NONE: Final = "none"
+NO_FACTOR: Final = "none"
 """Name in place of a factor if no factor is significant."""
 TOTAL: Final = "all scenarios"
 SUMMARY: Final = "summary.json"
@@ -33,14 +33,14 @@ class ClaimProportion:
         id: Number of the claim.
         passed: Whether the claim holds with the nominal car, road and driver.
         number: Number of samples in which the claim could be judged.
-        share: Share of these samples in which it holds; nan for no samples.
+        share: Proportion of these samples in which it holds; nan for no samples.
         low: Lower end of the 95 % interval.
         high: Upper end.
         depends_on: Key of the factor with the largest influence; `none` if no factor is significant.
-        explained: Share of the variance that this factor explains.
+        explained: Proportion of the variance that this factor explains.
         direction: 1 if the claim holds more often with more of the factor, -1 with less, 0 in the middle or at the
             ends.
-        at: Value of a factor that is a choice, as `sensors.preset = ideal` -> share of the samples with this value.
+        at: Value of a factor that is a choice, as `sensors.preset = ideal` -> proportion of the samples with this value.
     """
 
     id: str
@@ -49,7 +49,7 @@ class ClaimProportion:
     share: float
     low: float
     high: float
-    depends_on: str = NONE
+    depends_on: str = NO_FACTOR
     explained: float = 0.0
     direction: int = 0
     at: Mapping[str, float] = field(default_factory=dict)
@@ -66,9 +66,9 @@ class ClaimProportion:
     @property
     def words(self) -> str:
         """The factor in words; empty without a factor."""
-        if self.depends_on == NONE:
+        if self.depends_on == NO_FACTOR:
             return ""
-        choices = {name: share for name, share in self.at.items() if name.startswith(f"{self.depends_on} = ")}
+        choices = {name: value for name, value in self.at.items() if name.startswith(f"{self.depends_on} = ")}
         if choices:
             return f"with {max(choices, key=lambda name: choices[name])}"
         return f"{('in the middle or at the ends of', 'with more', 'with less')[self.direction]} {self.depends_on}"

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from activesteer.analysis.claims import Claim
-from activesteer.analysis.claims.population import NONE, Change, ClaimProportion, Population, SystemEffect
+from activesteer.analysis.claims.population import NO_FACTOR, Change, ClaimProportion, Population, SystemEffect
 from activesteer.analysis.loss_of_control import has_spun, is_lost
 from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.scenario import FileOrTable
@@ -27,8 +27,7 @@ from activesteer.studies.engine.run_identity import versions
 from activesteer.studies.engine.run_task import CLAIM, CURVE, Row
 from activesteer.studies.engine.study import StudyProgress, study
 from activesteer.studies.engine.study_file import StudyFile
-from activesteer.studies.paper.comparison_targets import NONE as NO_CONTROL
-from activesteer.studies.paper.comparison_targets import REFERENCES, asked
+from activesteer.studies.paper.comparison_targets import NONE, REFERENCES, asked
 from activesteer.studies.paper.population_studies import comparison_study, population_study
 from activesteer.studies.paper.reproduction import nominal_claims
 from activesteer.theory.proportions import Proportion
@@ -96,14 +95,14 @@ def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()
     """
     rows = table.select([name for name in table.column_names if not name.startswith(CURVE)]).to_pylist()
     names = [label_of(controller) for controller in planned.controllers]
-    without = [row for row in rows if row["controller"] == NO_CONTROL]
+    without = [row for row in rows if row["controller"] == NONE]
     return Population(
         samples=len({row["sample"] for row in rows}),
         seed=planned.seed,
         vehicle=label_of(planned.vehicles[0]),
         versions=versions(),
         claims=tuple(_proportion(claim.id, claim.passed, without, planned.factors) for claim in nominal),
-        systems=tuple(_effects(rows, [name for name in names if name != NO_CONTROL])),
+        systems=tuple(_effects(rows, [name for name in names if name != NONE])),
         failed=sum(row["status"] != "ok" for row in rows),
         table=() if planned.claims else tuple(_medians(rows, planned)),
     )
@@ -125,7 +124,7 @@ def _proportion(name: str, passed: bool, rows: Sequence[Row], factors: Sequence[
             at[f"{factor.key} = {value}"] = _count(chosen).value
     # A choice of two counts as 0 and 1.
     found = strongest({factor.key: _numbers(factor, judged) for factor in varied}, held)
-    depends = (NONE, 0.0, 0) if found is None else found
+    depends = (NO_FACTOR, 0.0, 0) if found is None else found
     proportion = _count(held)
     return ClaimProportion(name, passed, len(held), proportion.value, *proportion.interval, *depends, at)
 
@@ -144,9 +143,9 @@ def _effects(rows: Sequence[Row], systems: Sequence[str]) -> Iterator[SystemEffe
         samples = dict.fromkeys(row["sample"] for row in driven)
         for system in systems:
             both = [
-                (runs[NO_CONTROL, sample], runs[system, sample])
+                (runs[NONE, sample], runs[system, sample])
                 for sample in samples
-                if (NO_CONTROL, sample) in runs and (system, sample) in runs
+                if (NONE, sample) in runs and (system, sample) in runs
             ]
             lost = [(is_lost(without), is_lost(row)) for without, row in both]
             lowest = [_has_lowest_peak(runs, system, sample) for sample in samples if (system, sample) in runs]

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from activesteer.analysis.claims import SYSTEMS, Claim
-from activesteer.analysis.claims.population import NONE, ClaimProportion, Population
+from activesteer.analysis.claims.population import NO_FACTOR, ClaimProportion, Population
 from activesteer.cli import main
 from activesteer.errors import StudyError
 from activesteer.metric_table import CONES_MISSED
@@ -134,7 +134,7 @@ def test_the_factor_that_decides_is_named() -> None:
     table = made_up(planned, dict.fromkeys(("none", "ars", "afs"), [(0.1, 0.0)] * 128))
     speed, always = summarise(table, planned, nominal(Z1=True, Z2=True)).claims
     assert (speed.depends_on, speed.direction, speed.verdict) == ("speed_kmh", 1, ProportionVerdict.DEPENDS)
-    assert (always.depends_on, always.verdict) == (NONE, ProportionVerdict.HOLDS)
+    assert (always.depends_on, always.verdict) == (NO_FACTOR, ProportionVerdict.HOLDS)
     assert speed.words == "with more speed_kmh"
 
 
