@@ -26,12 +26,12 @@ _WORSE, _NEUTRAL, _BETTER = "#e08a3c", "#f4f4f4", "#5b9fd0"
 _COLOURS: Final = (_WORSE, _NEUTRAL, _BETTER)
 _PALEST: Final = 0.2
 """Least depth of the colour of a better or worse value, so that it is seen to be one [-]."""
-_SHARES: Final = {
+_PROPORTIONS: Final = {
     "lower": (f"sideslip below all\nof {', '.join(REFERENCES)} [%]", -1.0, 1.0),
     "saved": ("lost without control,\nsaved [%]", 0.0, 1.0),
     "spoiled": ("fine without control,\nspoiled [%]", 0.0, -1.0),
 }
-"""Share of an effect -> title of its panel, and place in the colours, from -1 to 1, of none and of all runs."""
+"""Proportion of an effect -> title of its panel, and place in the colours, from -1 to 1, of none and of all runs."""
 
 
 def draw_comparison(made: Comparison, path: Path) -> Path:
@@ -94,17 +94,20 @@ def draw_comparison_population(made: Population, path: Path) -> Path:
 
 
 def comparison_population_figure(made: Population) -> Figure:
-    """Return the figure that `draw_comparison_population` writes: shares in percent by scenario and controller."""
+    """Return the figure that `draw_comparison_population` writes: proportions in percent by scenario and controller."""
     names = list(dict.fromkeys(effect.controller for effect in made.systems))
     scenarios = list(dict.fromkeys(effect.scenario for effect in made.systems))
     panels = []
-    for key, (title, none, every) in _SHARES.items():
-        shares = np.full((len(scenarios), len(names)), math.nan)
+    for key, (title, none, every) in _PROPORTIONS.items():
+        proportions = np.full((len(scenarios), len(names)), math.nan)
         for effect in made.systems:
-            shares[scenarios.index(effect.scenario), names.index(effect.controller)] = getattr(effect, key).value
-        texts = [["-" if math.isnan(share) else percent(share) for share in row] for row in shares.tolist()]
+            proportions[scenarios.index(effect.scenario), names.index(effect.controller)] = getattr(effect, key).value
+        texts = [
+            ["-" if math.isnan(proportion) else percent(proportion) for proportion in row]
+            for row in proportions.tolist()
+        ]
         rows = [name.replace("_", " ") if not panels else "" for name in scenarios]
-        panels.append(Heat(none + (every - none) * shares, texts, names, rows, (-1.0, 1.0), _COLOURS, title))
+        panels.append(Heat(none + (every - none) * proportions, texts, names, rows, (-1.0, 1.0), _COLOURS, title))
     legend = _legend("better", "worse", "as without control, or in half of the runs")
     title = f"{made.samples} samples of {made.vehicle}, seed {made.seed}; -: no such run"
     width_in, height_in = 2.0 + 1.5 * len(names), 1.4 + 0.3 * len(scenarios)
