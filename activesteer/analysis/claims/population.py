@@ -40,7 +40,7 @@ class ClaimProportion:
         explained: Proportion of the variance that this factor explains.
         direction: 1 if the claim holds more often with more of the factor, -1 with less, 0 in the middle or at the
             ends.
-        at: Value of a factor that is a choice, as `sensors.preset = ideal` -> proportion of the samples with this value.
+        at: Value of a choice, such as `sensors.preset = ideal` -> proportion of the samples with this value.
     """
 
     id: str

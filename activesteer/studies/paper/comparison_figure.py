@@ -102,10 +102,7 @@ def comparison_population_figure(made: Population) -> Figure:
         proportions = np.full((len(scenarios), len(names)), math.nan)
         for effect in made.systems:
             proportions[scenarios.index(effect.scenario), names.index(effect.controller)] = getattr(effect, key).value
-        texts = [
-            ["-" if math.isnan(proportion) else percent(proportion) for proportion in row]
-            for row in proportions.tolist()
-        ]
+        texts = [["-" if math.isnan(value) else percent(value) for value in row] for row in proportions.tolist()]
         rows = [name.replace("_", " ") if not panels else "" for name in scenarios]
         panels.append(Heat(none + (every - none) * proportions, texts, names, rows, (-1.0, 1.0), _COLOURS, title))
     legend = _legend("better", "worse", "as without control, or in half of the runs")
