@@ -1,8 +1,8 @@
-"""A car of one's own, in two ways: the compact with a few keys changed, and a car made from a table of hardpoints.
+"""Make a car of your own in two ways: change keys of the compact, and build a car from a table of hardpoints.
 
     python examples/own_car.py
 
-More of it: docs/own_car.md and docs/suspension.md. From a shell the second way is `activesteer vehicle new`.
+Guides: docs/own_car.md and docs/suspension.md. On the command line the second way is `activesteer vehicle new`.
 """
 
 import math
@@ -14,11 +14,11 @@ from activesteer.resources import models_dir
 from activesteer.vehicle_builder import check_vehicle, new_vehicle
 
 LOADED = {"load.payload_kg": 300.0, "load.payload_position_m": [-2.4, 0.0, 0.7]}
-"""300 kg in the boot; every key of the vehicle file can be given like this."""
+"""Load of 300 kg in the boot; you can override every key of the vehicle file like this."""
 
 
 def stiffer_front(folder):
-    """A car whose front springs and anti-roll bar are stiffer than the compact's, from the compact's own table."""
+    """Build a car with stiffer front springs and anti-roll bar from the compact's table."""
     table = (models_dir() / "tables" / "compact.toml").read_text(encoding="utf-8")
     for compact, mine in (
         ("spring_rate_Npm = 24200", "spring_rate_Npm = 30000"),
@@ -28,7 +28,7 @@ def stiffer_front(folder):
         table = table.replace(compact, mine)
     file = Path(folder) / "stiffer_front.toml"
     file.write_text(table, encoding="utf-8")
-    # Springs are set so that the car stands where its hardpoints are; that and every assumption is in its README.
+    # The builder preloads the springs so that the car stands at its hardpoints; the README lists every assumption.
     made = new_vehicle("stiffer_front", file, Path(folder) / "stiffer_front")
     report = check_vehicle(made.vehicle_file)
     assert not report.count("error"), report.table()
@@ -36,7 +36,7 @@ def stiffer_front(folder):
 
 
 def compare(folder):
-    """A step steer of the three cars, all to the same lateral acceleration."""
+    """Drive a step steer with the three cars, all to the same lateral acceleration."""
     return {
         "compact": activesteer.simulate("step_steer"),
         "300 kg in the boot": activesteer.simulate("step_steer", overrides=LOADED),

@@ -1,9 +1,9 @@
-"""A controller of one's own: a yaw damper for the rear wheels, against no control and the built-in rear steering.
+"""Compare a controller of your own, a yaw damper for the rear wheels, with no control and the built-in rear steering.
 
     python examples/own_controller.py
     activesteer run sine_with_dwell -c none -c "examples/own_controller.py:YawDamper?gain_s=0.05"
 
-More of it: docs/controller.md.
+Guide: docs/controller.md.
 """
 
 import math
@@ -13,27 +13,27 @@ from activesteer import ActuatorCommand
 
 
 class YawDamper:
-    """Turns the rear wheels in the direction of every quick change of the yaw rate; lasting yaw rates pass."""
+    """Steer the rear wheels in the direction of every fast change of the yaw rate, but not of a steady yaw rate."""
 
     def __init__(self, setup, gain_s=0.05, washout_s=0.3):
-        """`setup` is what a controller may know of the car; the other arguments are parameters of one's own."""
+        """Take the car's data from `setup`; the other arguments are your own parameters."""
         self.gain_s = gain_s
         self.fraction = setup.timestep_s / washout_s  # of a first-order low-pass filter, per step
         self.limit_rad = math.radians(3.0)  # stop of the rear steering hinge
         self.lasting_radps = 0.0
 
     def step(self, command, measurement):
-        """Called every millisecond with what the driver demands and what the sensors say."""
+        """Return the actuator command; called every millisecond with the driver's command and the measurement."""
         quick_radps = measurement.yaw_rate_radps - self.lasting_radps
         self.lasting_radps += self.fraction * quick_radps
         wanted_rad = self.gain_s * quick_radps
         angle_rad = min(max(wanted_rad, -self.limit_rad), self.limit_rad)
-        # Left is positive: rear wheels to the left push the rear end to the left, and the car turns less to the left.
+        # Left is positive: rear wheels steered to the left push the rear end left, so the car turns left more slowly.
         return ActuatorCommand(rear_steer_demand_rad=angle_rad, saturated=angle_rad != wanted_rad)
 
 
 def compare():
-    """The same sine with dwell without control, with the built-in rear steering, and with the damper."""
+    """Drive the same sine with dwell without control, with the built-in rear steering, and with the damper."""
     controllers = {"none": "none", "ars": "ars", "yaw damper": YawDamper}
     return {name: activesteer.simulate("sine_with_dwell", item) for name, item in controllers.items()}
 

@@ -1,9 +1,9 @@
-"""A driver of one's own, who steers for a single point of the path ahead (pure pursuit), in the double lane change.
+"""Drive the double lane change with a driver of your own, who steers towards one point ahead (pure pursuit).
 
     python examples/own_driver.py
     activesteer run double_lane_change --driver "examples/own_driver.py:PurePursuit?preview_s=0.5"
 
-More of it: docs/driver.md.
+Guide: docs/driver.md.
 """
 
 import math
@@ -16,10 +16,10 @@ from activesteer.road.path_search import PathSearch
 
 
 class PurePursuit:
-    """Steers along the arc that leads from the car to a point on the path (Coulter 1992)."""
+    """Steer along the arc from the car to a point on the path (Coulter 1992)."""
 
     def __init__(self, setup, preview_s=0.6):
-        """`setup` is what a driver knows of the car: steering ratio, single-track model, engine, and more."""
+        """Take the car's data from `setup`: steering ratio, single-track model, engine, and more."""
         self.robot = OpenLoopDriver.from_vehicle(setup)  # turns the steering wheel, holds the speed
         self.steering_ratio = setup.steering_ratio
         self.wheelbase_m = setup.single_track.cg_to_front_m + setup.single_track.cg_to_rear_m
@@ -27,7 +27,7 @@ class PurePursuit:
         self.travelled_m = 0.0
 
     def step(self, setpoint, measurement, motion):
-        """Called every millisecond with what the manoeuvre asks for, what the sensors say, and where the car is."""
+        """Return the driver's command; called every millisecond with setpoint, measurement and motion of the car."""
         if setpoint.path is None:  # the car still settles, or the manoeuvre gives the steering wheel angle itself
             return self.robot.step(setpoint, measurement, motion)
         search = PathSearch(setpoint.path)
@@ -41,7 +41,7 @@ class PurePursuit:
 
 
 def compare(speed_kmh=60.0):
-    """The double lane change with the typical driver and with this one."""
+    """Drive the double lane change with the typical driver and with this driver."""
     drivers = {"typical": "typical", "pure pursuit": PurePursuit}
     overrides = {"speed_kmh": speed_kmh, "duration_s": 13.0}
     return {

@@ -1,9 +1,9 @@
-"""A controller of one's own that knows the sideslip angle, as well as a car of today can: from an estimator.
+"""Control the sideslip angle with a controller of your own that takes the angle from an estimator.
 
     python examples/own_estimating_controller.py
     activesteer run step_steer -c "examples/own_estimating_controller.py:SideslipDamper?gain=0.4"
 
-More of it: docs/estimation.md.
+Guide: docs/estimation.md.
 """
 
 import math
@@ -13,17 +13,17 @@ from activesteer import ActuatorCommand
 
 
 class SideslipDamper:
-    """Turns the rear wheels against the sideslip angle, by a fraction of it."""
+    """Steer the rear wheels against the sideslip angle by a fraction of it."""
 
     def __init__(self, setup, gain=0.5, limit_deg=3.0):
-        """`setup.estimator()` knows the car as its file says it, and what the data sheets of the sensors say."""
+        """Make the estimator, which uses the data of the vehicle file and of the sensors' data sheets."""
         self.estimator = setup.estimator()
         self.gain, self.limit_rad = gain, math.radians(limit_deg)
 
     def step(self, command, measurement):
-        """Called every millisecond; so the estimator is too."""
+        """Return the actuator command; called every millisecond, and the estimator with it."""
         estimate = self.estimator.step(measurement)
-        # A car that slides to the left of its heading has that stopped by rear wheels to the right.
+        # Rear wheels steered to the right stop a car that slides to the left of its heading.
         wanted_rad = -self.gain * estimate.sideslip_rad
         if estimate.sideslip_std_rad > math.radians(1.0):
             wanted_rad = 0.0  # nobody knows where it slides
@@ -32,7 +32,7 @@ class SideslipDamper:
 
 
 def compare():
-    """The same step steer without control and with the damper, with the sensors of a car of today."""
+    """Drive the same step steer without control and with the damper, with the sensors of a production car."""
     sensors = {"sensors.preset": "production"}
     controllers = {"none": "none", "damper": SideslipDamper}
     return {name: activesteer.simulate("step_steer", item, overrides=sensors) for name, item in controllers.items()}

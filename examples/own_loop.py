@@ -1,8 +1,8 @@
-"""A car in a loop of one's own, every command by hand: from 10 to 15 m/s, and into a left turn of 50 m radius.
+"""Drive a car in a loop of your own with your own commands: from 10 to 15 m/s, and into a left turn of 50 m radius.
 
     python examples/own_loop.py
 
-More of it: docs/stepping.md.
+Guide: docs/stepping.md.
 """
 
 import activesteer
@@ -10,7 +10,7 @@ from activesteer import ActuatorCommand, DriverCommand
 
 
 def drive(radius_m=50.0, speed_mps=15.0):
-    """Commands every 10 ms until the manoeuvre ends; returns the simulation."""
+    """Command the car every 10 ms until the manoeuvre ends, and return the simulation."""
     simulation = activesteer.Simulation("straight_line", overrides={"duration_s": 8.0, "speed_mps": 10.0})
     measurement, wheel_rad = simulation.measurement, 0.0
     while not simulation.done:

@@ -1,8 +1,8 @@
-"""A manoeuvre of one's own, made in Python: a bend that tightens (clothoid), driven at several speeds.
+"""Drive a manoeuvre of your own, made in Python, at several speeds: a bend that tightens (clothoid).
 
     python examples/own_manoeuvre.py
 
-A manoeuvre is a table, with the keys of a manoeuvre file; `own_manoeuvre.toml` beside this is one as a file.
+A manoeuvre is a table with the keys of a manoeuvre file; `own_manoeuvre.toml` in this folder is such a file.
 """
 
 import math
@@ -13,7 +13,7 @@ import activesteer
 
 
 def tightening_bend(straight_m=40.0, length_m=80.0, radius_m=45.0):
-    """Points of the path [m]: straight ahead, then a curvature that grows steadily up to 1 / `radius_m`."""
+    """Return points of the path [m]: straight ahead, then a curvature that grows linearly to 1 / `radius_m`."""
     along_m = np.arange(0.0, straight_m + length_m, 0.5)
     into_bend_m = np.clip(along_m - straight_m, 0.0, None)
     heading_rad = into_bend_m**2 / (2.0 * length_m * radius_m)
@@ -23,7 +23,7 @@ def tightening_bend(straight_m=40.0, length_m=80.0, radius_m=45.0):
 
 
 def drive(speed_kmh, controller="none"):
-    """The bend at a speed [km/h]."""
+    """Drive the bend at a speed [km/h]."""
     table = {
         "kind": "follow_path",
         "name": "tightening_bend",

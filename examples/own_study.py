@@ -1,4 +1,4 @@
-"""A study: one manoeuvre with many cars and roads, and a table of what came out.
+"""Run a study: one manoeuvre with many cars and roads, and a table of the results.
 
     python examples/own_study.py
 
@@ -23,7 +23,7 @@ STUDY = {
 
 
 def overshoots(table):
-    """Mean overshoot of the yaw rate by controller and friction."""
+    """Return the mean overshoot of the yaw rate by controller and friction."""
     found = {}
     for row in table.to_pylist():
         if row["status"] == "ok":
@@ -31,6 +31,6 @@ def overshoots(table):
     return {key: math.fsum(values) / len(values) for key, values in found.items()}
 
 
-if __name__ == "__main__":  # the runs are spread over processes, which read this file again
+if __name__ == "__main__":  # the processes of the study read this file again
     for (controller, mu), overshoot in overshoots(study(STUDY)).items():
         print(f"{controller:9}  mu {mu:.1f}  yaw rate overshoots by {overshoot:.1%}")
