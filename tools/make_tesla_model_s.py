@@ -229,7 +229,7 @@ def car_table(given: dict[str, Any]) -> str:
             "knuckle_mass_kg": knuckle,
             "points": {"wheel_centre": [x, 0.5 * tracks[axle], centre]},
         }
-    return f"# Made by tools/make_tesla_model_s.py, which says what was assumed.\n{toml_text(table)}"
+    return f"# Made by tools/make_tesla_model_s.py, which lists the assumptions.\n{toml_text(table)}"
 
 
 if __name__ == "__main__":
