@@ -1,9 +1,9 @@
 """Mutation testing: change one line of the program and see whether a quick test fails.
 
-`make mutants` draws changes among all that cosmic-ray can make in the rooms below, runs the tests of the room on each,
-and prints the score. The draw depends on the seed and on the lines themselves, so that it stays the same while other
-lines change. Results are kept in `build/mutants`: an interrupted run resumes there. `tools/mutants.md` lists the
-survivors with a reason each.
+`make mutants` draws changes among all that cosmic-ray can make in the rooms below, runs the tests of the room on each
+change, and prints the score. The draw depends on the seed and on the text of the lines, so that it stays the same while
+other lines change. `build/mutants` holds the results, and an interrupted run resumes there. `tools/mutants.md` gives a
+reason for each survivor.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ REASONS: Final = ROOT / "tools" / "mutants.md"
 LEAST_PER_ROOM: Final = 15
 CACHES: Final = PLACE / "caches"
 TIME_LIMIT_S: Final = 400
-"""A mutant whose tests take longer is caught: it loops."""
+"""Longest time of the tests of a mutant; beyond it the mutant is caught [s]."""
 
 
 class Room(NamedTuple):
-    """A room, and the tests that must notice a change in it: files, folders and patterns in `tests`.
+    """A room, and the tests that must notice a change in it, as patterns of paths.
 
     Attributes:
-        files: Patterns of its files in the package.
-        near: Quick tests of the room; those that are called like the changed file come first.
-        wide: What is run if these notice nothing.
-        plain: What is run before all others without the compiler, which takes half a minute for a change of a kernel.
+        files: Files of the room in the package.
+        near: Quick tests of the room. The test file with the name of the changed file runs before them.
+        wide: Tests that run if the near tests notice nothing.
+        plain: Tests that run first, without the compiler, which needs half a minute after a change of a kernel.
     """
 
     files: str
@@ -106,7 +106,7 @@ OTHER_NAMES: Final = {
     "find": "plugins",
     "advance": "filter_parts",
 }
-"""Files whose tests are called otherwise."""
+"""File -> name of its tests, if the name differs."""
 
 _ARITHMETIC: Final = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Mod_Mul", "FloorDiv_Mul", "Sub_Mul")
 _COMPARISONS: Final = (
@@ -121,7 +121,7 @@ OPERATORS: Final = (
     *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ZeroIterationForLoop"),
     *("ExceptionReplacer", "NumberReplacer"),
 )
-"""Of cosmic-ray's operators those that leave a plausible program: no `<<` for `*`, which any test would catch."""
+"""Operators of cosmic-ray that make plausible mistakes; any test would catch `<<` in place of `*`."""
 _NO_CODE: Final = {"decorator", "raise_stmt", "fstring", "import_from", "import_name"}
 
 
@@ -129,11 +129,11 @@ class Mutant(NamedTuple):
     """One change of one line.
 
     Attributes:
-        identity: Text that stays the same while other lines change.
+        identity: Name that stays the same while other lines change.
         room: Room of the file.
         file: Path in the project.
-        operator: Name of cosmic-ray's operator.
-        occurrence: Which of the places in the file that the operator can change.
+        operator: Name of the operator of cosmic-ray.
+        occurrence: Index of the place among all places in the file that the operator can change.
     """
 
     identity: str
@@ -163,7 +163,7 @@ def _is_weak(node: Any, operator: str) -> bool:
 
 
 def mutants_of(room: str, path: Path) -> Iterator[Mutant]:
-    """All changes that could be made in a file."""
+    """Find all possible changes of a file."""
     source = path.read_text()
     lines, tree = source.splitlines(), get_ast(source)
     same = Counter[str]()
@@ -180,7 +180,7 @@ def mutants_of(room: str, path: Path) -> Iterator[Mutant]:
 
 
 def draw(count: int, seed: int) -> dict[str, list[Mutant]]:
-    """Draw mutants in proportion to the number possible in each room, but at least `LEAST_PER_ROOM`."""
+    """Draw mutants in proportion to the possible changes of each room, and at least `LEAST_PER_ROOM`."""
     possible: dict[str, list[Mutant]] = {}
     for room, about in ROOMS.items():
         files = sorted(file for one in about.files.split() for file in (ROOT / "activesteer").glob(one))
@@ -194,7 +194,7 @@ def draw(count: int, seed: int) -> dict[str, list[Mutant]]:
 
 
 def copy_tree(tree: Path) -> None:
-    """Bring a private copy of the project up to date: the files that git knows or would add."""
+    """Update a private copy of the project: all files that git knows or would add."""
     listed = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=ROOT, check=True, stdout=-1
     ).stdout.decode()
@@ -207,22 +207,13 @@ def copy_tree(tree: Path) -> None:
         if not copy.exists() or copy.read_bytes() != (ROOT / name).read_bytes():
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, copy)
-    # The hash decides, not the time: a mutant may be written in the second in which its file was.
-    compiling = [
-        sys.executable,
-        "-m",
-        "compileall",
-        "-q",
-        "--invalidation-mode",
-        "checked-hash",
-        "activesteer",
-        "tests",
-    ]
-    subprocess.run(compiling, cwd=tree, check=False)
+    # By hash, not by time: a mutant may be written in the same second as its original.
+    options = ["-q", "--invalidation-mode", "checked-hash"]
+    subprocess.run([sys.executable, "-m", "compileall", *options, "activesteer", "tests"], cwd=tree, check=False)
 
 
 def commands(mutant: Mutant, *, wide: bool) -> list[str]:
-    """The pytest commands for a mutant."""
+    """Return the pytest commands for a mutant, in their order."""
     stem, room = OTHER_NAMES.get(stem := Path(mutant.file).stem, stem), ROOMS[mutant.room]
     pytest = f"{sys.executable} -m pytest -x -q -p no:cacheprovider -m 'not slow'"
     plain = f"env NUMBA_DISABLE_JIT=1 {pytest} -W ignore::RuntimeWarning"
@@ -232,13 +223,13 @@ def commands(mutant: Mutant, *, wide: bool) -> list[str]:
 
 
 def tests_of(patterns: str) -> list[str]:
-    """The test files and folders of some patterns, in their order, as they are in the copy."""
+    """Return the paths that match some patterns in the tests of the copy, in the order of the patterns."""
     found = (path for pattern in patterns.split() for path in sorted((TREE / "tests").glob(pattern)))
     return [str(path.relative_to(TREE)) for path in dict.fromkeys(found)]
 
 
 def run_on(mutant: Mutant, warm: Path, *, wide: bool) -> tuple[TestOutcome, str]:
-    """Run the tests with a copy of compiled kernels and found amplitudes, so that a mutant leaves nothing behind."""
+    """Run the tests of a mutant with its own copy of the caches, so that it leaves nothing in them."""
     shutil.rmtree(CACHES, ignore_errors=True)
     shutil.copytree(warm, CACHES)
     outcome, output = TestOutcome.SURVIVED, ""
@@ -249,7 +240,7 @@ def run_on(mutant: Mutant, warm: Path, *, wide: bool) -> tuple[TestOutcome, str]
 
 
 def catcher(outcome: TestOutcome, output: str) -> str:
-    """The test that caught a mutant, or nothing."""
+    """Return the name of the test that caught a mutant, or an empty text."""
     if outcome is TestOutcome.SURVIVED:
         return ""
     assert "no tests ran" not in output, output
@@ -280,7 +271,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=300, help="mutants to draw")
     parser.add_argument("--seed", type=int, default=26, help="seed of the draw")
     parser.add_argument("--room", choices=ROOMS, action="append", help="only this room (may be repeated)")
-    parser.add_argument("--near", action="store_true", help="leave out the tests that look wide")
+    parser.add_argument("--near", action="store_true", help="leave out the wide tests")
     parser.add_argument("--again", action="store_true", help="run the survivors of earlier runs again")
     parser.add_argument("--list", action="store_true", help="run nothing, only report")
     options = parser.parse_args()
@@ -290,7 +281,8 @@ def main() -> None:
     kept = PLACE / "results.json"
     results = json.loads(kept.read_text()) if kept.exists() else {}
     if options.again:
-        results = {identity: result for identity, result in results.items() if result["by"]}
+        chosen = {mutant.identity for mutants in drawn.values() for mutant in mutants}
+        results = {name: result for name, result in results.items() if result["by"] or name not in chosen}
     if not options.list:
         run(drawn, results, kept, wide=not options.near)
     report(drawn, results)
@@ -306,7 +298,7 @@ def run(drawn: dict[str, list[Mutant]], results: dict[str, dict[str, Any]], kept
         left = [mutant for mutant in mutants if mutant.identity not in results]
         if not left:
             continue
-        warm.mkdir(exist_ok=True)
+        warm.mkdir(parents=True, exist_ok=True)
         outcome, output = run_on(Mutant("", room, "-", "", 0), warm, wide=wide)
         if outcome is not TestOutcome.SURVIVED:
             print(f"{room}: skipped, its tests fail without a mutant\n{output[-2000:]}", flush=True)

@@ -13,6 +13,7 @@ from activesteer.estimation import advance
 from activesteer.estimation.kalman_filter import begin, predict
 from activesteer.estimation.records import FRICTION, LATERAL_SPEED, MEMORY, N_STATES, SAID, YAW_RATE, known_of
 from activesteer.estimation.speed_filter import brush_slip
+from activesteer.estimation.two_track_model import follow
 from activesteer.estimation.wheels import read_wheels
 from activesteer.scenario import resolve
 from tests.unit.estimation.drives import estimates, rolling
@@ -176,3 +177,17 @@ def test_braking_shows_how_much_friction_there_is_at_least(make, known):
     assert friction[-1] == pytest.approx(0.85 * 6.0 / GRAVITY_MPS2, rel=0.04)
     risen = friction[500 + 400] / friction[-1]
     assert risen == pytest.approx(1.0 - math.exp(-2.0), abs=0.05)
+
+
+@pytest.mark.parametrize("calls", [0, 1, 5, 9])
+def test_the_way_to_the_present_is_as_long_as_the_sample_is_old(known, memory, setup, calls):
+    tyres, old = np.array([tyre.force_N for tyre in setup.estimation.tyres]), known.copy()
+    old["age_s"] = calls * old.call_s
+    memory["speed_mps"], memory["state"][[LATERAL_SPEED, YAW_RATE]] = 20.0, (0.5, 0.2)
+    advance._predict_present(old, tyres, memory, np.zeros((calls + 2, len(SAID))))
+    whole = np.empty(N_STATES)
+    follow(old, tyres, memory, memory.state, calls * old.call_s, whole)
+    moved, expected = (states[LATERAL_SPEED] - memory.state[LATERAL_SPEED] for states in (memory.now, whole))
+    # In steps of 4 ms at most, which differ little from a single one.
+    assert moved == pytest.approx(expected, rel=0.05, abs=1e-9)
+    assert (calls > 0) == (abs(moved) > 1e-3)
