@@ -59,7 +59,7 @@ def population(
     See `study` for the arguments that are not listed.
 
     Args:
-        samples: Number of samples; 15 runs each.
+        samples: Number of samples; for the claims, 15 runs each.
         controllers: Controllers to compare, see `comparison_study`; default: the claims of the paper's systems.
         seed: Seed of the sample.
         vehicle: The car of which the samples are variations.
